@@ -62,6 +62,8 @@ cdef class ShadingTable:
     cdef object arrays
     cdef uint8_t[::1] materials
     cdef uint8_t[::1] lights
+    cdef tl_light headlight
+    cdef Rays rays
 
     def __init__(self, const float[:, ::1] normals, bint finds_inverse_w, const int32_t[:, ::1] normal_of_corner,
                  const float[:, ::1] corner_normals, const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
@@ -108,6 +110,48 @@ cdef class ShadingTable:
                 m[k].normal_map, m[k].emission_map = texture_of(full[8]), texture_of(full[9])
         self.shading.materials, self.shading.n_materials = m, len(materials)
 
+    def seen(self, const float[:, ::1] normals, bint finds_inverse_w, const double[:, :] clip_from_eye, const double[:, :] view,
+             const double[:] center, double width, double height):
+        """Return the same, seen by a camera in a whole picture of this size, in a space whose origin is at `center`.
+
+        `view`: (4, 4), to eye space. `normals`: those of the vertices with 1/w, or None.
+        """
+        cdef ShadingTable own = ShadingTable.__new__(ShadingTable)
+        cdef tl_shading *s = &own.shading
+        cdef int i, k
+        own.shading, own.materials, own.arrays = self.shading, self.materials, (self.arrays, normals)
+        s.finds_inverse_w = finds_inverse_w
+        if normals is not None:
+            s.normals = &normals[0, 0] if normals.shape[0] else NULL
+        find_rays(clip_from_eye, view, center, width, height, &own.rays)
+        s.has_perspective = own.rays.has_perspective
+        for k in range(3):
+            s.eye[k] = <float>own.rays.rows[0][k]
+            for i in range(4):
+                s.ray[i][k] = <float>own.rays.rows[1 + i][k]
+            for i in range(3):
+                s.eye_from[i][k] = <float>own.rays.rows[5 + i][k]
+        return own
+
+    @property
+    def camera_rays(self):
+        """What `camera_rays` returns of the camera that sees it."""
+        return self.rays.has_perspective, np.array([[self.rays.rows[i][k] for k in range(3)] for i in range(9)]), self.rays.scale
+
+    def set_headlight(self, to_light, float color, float ambient):
+        """Take one light in a direction of eye space, which wraps round what it lights, and light from all sides."""
+        cdef double[3] at = to_light
+        cdef double total
+        cdef int i, k
+        for i in range(3):
+            total = 0.0
+            for k in range(3):
+                total = total + self.rays.rows[5 + k][i] * at[k]
+            self.headlight.at[i] = <float>total
+            self.headlight.color[i], self.shading.ambient[i] = color, ambient
+        self.headlight.kind, self.headlight.falloff = <tl_light_kind>2, 0.0
+        self.shading.lights, self.shading.n_lights = &self.headlight, 1
+
     def set_lights(self, lights, ambient):
         """Take rows (kind, at, color, falloff)."""
         cdef tl_light *light
@@ -130,22 +174,23 @@ cdef class ShadingTable:
         """Have the opacity of the surface in the picture's alpha; the materials are full."""
         self.shading.wants_opacity = True
 
-    def set_view(self, int show, Mipmap matcap, eye_from, bint has_perspective, eye, ray, background, background_bytes):
-        """Take what the picture tells, where it is seen from, and what is behind it."""
+    def set_picture(self, int show, Mipmap matcap, background, background_bytes):
+        """Take what the picture tells, and what is behind it."""
         cdef tl_shading *s = &self.shading
         cdef int k
-        s.show, s.has_perspective = <tl_show>show, has_perspective
+        s.show = <tl_show>show
         s.matcap = &matcap.texture if matcap is not None else NULL
         self.arrays += (matcap,)
-        copy_floats(s.eye, eye, 3)
-        for k in range(3):
-            copy_floats(s.eye_from[k], eye_from[k], 3)
-        for k in range(4):
-            copy_floats(s.ray[k], ray[k], 3)
         copy_floats(s.background, background, 4)
         for k in range(4):
             s.background_bytes[k] = background_bytes[k]
         self.set_fog((0, 0, 0), 0, 0, 0, 0)
+
+    def set_turn(self, eye_from):
+        """Take the rows of a matrix (3, 3) that takes normals to the space that they are told in."""
+        cdef int k
+        for k in range(3):
+            copy_floats(self.shading.eye_from[k], eye_from[k], 3)
 
     def set_fog(self, color, float near, float scale, float distance_start, float distance_scale):
         """Take the depth cue."""

@@ -35,7 +35,7 @@ from topleft._meshes.model.light import AMBIENT, Fog, Light, as_not_negative
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import ShadingInputs
+from topleft._meshes.picture.look import EYE, ShadingInputs, Surface
 from topleft.typing import ShadingOption
 
 __all__ = ["Lit", "LookOptions", "Shading", "ShadingOptions", "ShownInstance", "shade_instances", "shade_numbers"]
@@ -62,6 +62,9 @@ class Shading(StrEnum):
 
 
 SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
+PLAIN = (Material(),)
+"""What is not looked at where normals are told."""
+
 GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
 """Greys of the depth picture: neither black nor white, so that it shows on both."""
 
@@ -152,9 +155,13 @@ class ShownInstance(NamedTuple):
     place: F64 | None = None
     """World from object, (4, 4); None: the world is the space of the mesh."""
 
-    def camera(self, camera: Camera) -> Camera:
-        """The camera as it stands in the object space of the instance, without its lens."""
-        return camera.straightened() if self.place is None else camera.straightened().placed(self.place)
+
+def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
+    """Eye from object of each instance, (4, 4), as a camera without a lens sees it."""
+    if all(one.place is None for one in shown):
+        return [camera.view] * len(shown)
+    places = np.concatenate([EYE if one.place is None else one.place for one in shown], axis=1)
+    return list(np.ascontiguousarray(engine.product(camera.view, places).reshape(4, -1, 4).transpose(1, 0, 2)))
 
 
 class Lit:
@@ -168,8 +175,11 @@ class Lit:
         if self.n_triangles and all(size):
             self.subpixel_bits = shown[0].snapped.subpixel_bits
             finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
-            looks = [look_of(one, camera, size, options, finds_inverse_w=finds_inverse_w) for one in shown]
-            self.scene = scene_of_tables(shown, [look.shading for look in looks])
+            tables = [
+                look_of(one, view, camera, size, options, finds_inverse_w=finds_inverse_w).shading
+                for one, view in zip(shown, views_of(shown, camera), strict=True)
+            ]
+            self.scene = scene_of_tables(shown, tables)
 
     def picture(self, seen: SeenSamples, at: I32 | None = None) -> U8:
         """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
@@ -237,25 +247,32 @@ def scene_of_tables(shown: Sequence[ShownInstance], tables: Sequence[engine.Shad
 
 
 def look_of(
-    shown: ShownInstance, camera: Camera, size: tuple[int, int], options: ShadingOptions, *, finds_inverse_w: bool
+    shown: ShownInstance,
+    view: F64,
+    camera: Camera,
+    size: tuple[int, int],
+    options: ShadingOptions,
+    *,
+    finds_inverse_w: bool,
 ) -> ShadingInputs:
-    """What kernels read of an instance."""
+    """What kernels read of an instance that is seen by `view`, eye from object."""
     mesh = shown.mesh
     own = (options.material,) if options.material is not None else mesh.materials
     own = own or (plain_material(options.color if mesh.colors is None else None),)
-    rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
-    look = ShadingInputs(
-        shown.snapped, mesh, shown.camera(camera), size, rows, is_flat=options.mode is Shading.FLAT,
-        finds_inverse_w=finds_inverse_w,
-    )  # fmt: skip
-    all_full = options.environment is not None or options.shows_opacity
-    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
+    surface = Surface(
+        own,
+        own is mesh.materials and len(own) > 1,
+        options.mode is Shading.FLAT,
+        options.mode is Shading.UNLIT,
+        options.environment is not None or options.shows_opacity,
+    )
+    look = ShadingInputs(shown.snapped, mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
     look.set_lights(options.lights, options.ambient, shown.place)
     if options.environment is not None or any(one.is_metallic_rough for one in own):
         look.set_environment(options.environment, shown.place)
     if options.shows_opacity:
         look.set_opacity()
-    look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
+    look.set_picture(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
     look.set_fog(options.fog)
     return look
 
@@ -359,12 +376,10 @@ def shade_normals(
         return np.zeros((*ids.shape, 3), np.float32)
     out = empty((*ids.shape, 3), np.float32)
     finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > ids.size
-    tables = []
-    for one in shown:
-        size = ids.shape[1], ids.shape[0]
-        look = ShadingInputs(
-            one.snapped, one.mesh, one.camera(camera), size, None, is_flat=False, finds_inverse_w=finds_inverse_w
-        )
+    tables, size = [], (ids.shape[1], ids.shape[0])
+    for one, view in zip(shown, views_of(shown, camera), strict=True):
+        surface = Surface(PLAIN, is_by_triangle=False)
+        look = ShadingInputs(one.snapped, one.mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
         look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
         tables.append(look.shading)
     scene = scene_of_tables(shown, tables)
