@@ -31,20 +31,20 @@ def test_alpha_is_the_share_of_samples_with_a_triangle(n):
 @ON_EACH_ISA
 @pytest.mark.parametrize("shading", ["smooth", "flat", "normals"])
 @pytest.mark.parametrize("size", [SIZE, (1100, 40)])
-def test_picture_is_the_same_from_planes_of_samples(isa, shading, size):
-    knot = tl.Mesh(KNOT.vertices, KNOT.triangles)  # one that is drawn often is drawn from clusters
-    square = tl.Camera.orthographic(tl.Camera.framing(knot).view, near=0.1, far=30, height=3)
+def test_picture_is_the_same_from_planes_of_samples(monkeypatch, isa, shading, size):
+    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: False)  # planes of samples
+    square = tl.Camera.orthographic(tl.Camera.framing(KNOT).view, near=0.1, far=30, height=3)
     look = {"shading": shading, "fog": tl.Fog(2.0, 9.0), "background": (10, 200, 30, 100)}
     lights = [tl.Light((1, 2, 3), kind="point")]
     with on(isa):
         for camera, n in ((None, 4), (square, 2), (square, 16)):
-            camera = camera or tl.Camera.framing(knot)
-            frags = tl.rasterize_mesh(knot, camera, size, sampling=f"msaa{n}", threads=3)
-            from_lists = tl.shade(frags, knot, camera, lights=lights, **look)
+            camera = camera or tl.Camera.framing(KNOT)
+            frags = tl.rasterize_mesh(KNOT, camera, size, sampling=f"msaa{n}", threads=3)
+            from_lists = tl.shade(frags, KNOT, camera, lights=lights, **look)
             assert frags._split is not None
             assert frags.samples_depth.shape[-1] == n
             assert frags._split is None
-            assert_same(tl.shade(frags, knot, camera, lights=lights, **look), from_lists)
+            assert_same(tl.shade(frags, KNOT, camera, lights=lights, **look), from_lists)
 
 
 @pytest.mark.parametrize("look", [{}, {"shading": "ids"}, {"cutoff": 0.5}, {"edges": True}, {"cull": "back"}])
