@@ -14,7 +14,8 @@ FRONT = sorted(ROOT.glob("*.md"))
 CHECKED = [*FRONT, *PAGES, *sorted(ROOT.glob("benchmarks/**/*.md")), *sorted(ROOT.glob("csrc/**/*.md"))]
 
 ROOMS = ("src", "csrc", "tests", "benchmarks", "examples", "docs")
-SOURCES = [path.as_posix() for path in [ROOT / "setup.py", *(p for name in ROOMS for p in (ROOT / name).rglob("*.*"))]]
+BUILD = [ROOT / "setup.py", ROOT / "packaging" / "bindings.py"]
+SOURCES = [path.as_posix() for path in [*BUILD, *(p for name in ROOMS for p in (ROOT / name).rglob("*.*"))]]
 NAMED = re.compile(r"(?<![\w./])[\w./]*[a-z0-9_]\.(?:c|h|py|pyi|pyx|pxi)\b(?!\()")
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from topleft._apps.explore.session import Reply, Request, Session
+from topleft._core.base.array_types import U8
 from topleft._core.base.arrays import as_number
 from topleft._core.base.color import Color, as_color
 from topleft._core.raster.verbs import Rasterizer
@@ -37,10 +38,6 @@ from topleft._meshes.picture.view_layers import render_layers
 from topleft._meshes.plan.plan import plan
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
-
-__all__ = ["HANDLERS", "LAYERS", "MeshView", "draw", "load_bytes"]
-
-U8 = NDArray[np.uint8]
 
 MAX_SIDE_PX, MAX_PIXELS = 8192, 2**23
 """Of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""
@@ -75,7 +72,7 @@ CONTROLS: dict[str, list[tuple[str, str, list[tuple[Any, str]] | None]]] = {
          + [(name, name) for name in ("center", "msaa2", "msaa4", "msaa8", "msaa16")]),
         ("tolerance", "tolerance", [(0, "none: the mesh itself")]
          + [(px, f"{px:g} px: a coarser level") for px in (0.25, 0.5, 1, 2, 4)]),
-        ("cull", "cull", [(name, name) for name in ("none", "back", "front")]),
+        ("cull", "cull", [("none", "as materials say"), ("back", "back"), ("front", "front")]),
         ("wireframe", "edges", None),
     ],
     "Camera": [
@@ -505,10 +502,11 @@ def as_job(shown: Shown, view: MeshView) -> tuple[str, bytes]:
         f'up = "{view.up}"',
         'background = "transparent"',
         f'sampling = "{view.sampling}"',
-        f'cull = "{view.cull}"',
         f"tolerance = {float(view.tolerance)!r}",
         f"ortho = {'false' if view.fov else 'true'}",
     ]
+    if view.cull != "none":
+        lines.append(f'cull = "{view.cull}"')
     if view.fov:
         lines.append(f"fov = {float(view.fov)!r}")
     lines.append(f'shading = "{view.layer if view.layer in SHADINGS else "ids"}"')

@@ -7,8 +7,9 @@ cdef class Mipmap:
     cdef tl_texture texture
     cdef object texels
 
-    def __init__(self, const uint16_t[:, ::1] texels, const int32_t[:, ::1] levels, int filter_code, int wrap_u, int wrap_v,
-                 int uv_set=0, transform=None, tangent=(1, 0), float hand=1):
+    def __init__(self, const uint16_t[:, ::1] texels, const int32_t[:, ::1] levels, int filter_code, int wrap_u,
+                 int wrap_v, int uv_set=0, transform: Sequence[Sequence[float]] | None = None,
+                 tangent: Sequence[float] = (1, 0), float hand=1):
         cdef int k
         self.texels = texels
         self.texture.texels = &texels[0, 0]
@@ -30,7 +31,8 @@ cdef class Surroundings:
     cdef tl_surroundings surroundings
     cdef object texels
 
-    def __init__(self, const float[:, ::1] texels, const int32_t[:, ::1] levels, sky, ground, float diffuse, from_shading):
+    def __init__(self, const float[:, ::1] texels or None, const int32_t[:, ::1] levels or None, sky: Sequence[float],
+                 ground: Sequence[float], float diffuse, from_shading: Sequence[Sequence[float]]):
         cdef tl_surroundings *e = &self.surroundings
         cdef int k
         self.texels = texels
@@ -65,10 +67,11 @@ cdef class ShadingTable:
     cdef tl_light headlight
     cdef Rays rays
 
-    def __init__(self, const float[:, ::1] normals, bint finds_inverse_w, const int32_t[:, ::1] normal_of_corner,
-                 const float[:, ::1] corner_normals, const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
-                 const float[:, ::1] uv, const float[:, ::1] uv1, const float[:, ::1] colors, bint has_alpha, float front_side,
-                 const int32_t[::1] material_of, const float[::1] decode):
+    def __init__(self, const float[:, ::1] normals, bint finds_inverse_w,
+                 const int32_t[:, ::1] normal_of_corner or None, const float[:, ::1] corner_normals or None,
+                 const float[:, ::1] face_normals or None, positions: Array, const uint8_t[::1] is_turned or None,
+                 const float[:, ::1] uv or None, const float[:, ::1] uv1 or None, const float[:, ::1] colors or None,
+                 bint has_alpha, float front_side, const int32_t[::1] material_of or None, const float[::1] decode):
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef tl_shading *s = &self.shading
         self.arrays = (normals, normal_of_corner, corner_normals, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
@@ -88,7 +91,7 @@ cdef class ShadingTable:
         s.n_materials = s.n_lights = 0
         s.matcap = NULL
 
-    def set_materials(self, materials):
+    def set_materials(self, materials: Sequence[tuple[Any, ...]]):
         """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None, None or what makes
         it full: (is_metallic, metallic, roughness, occlusion, normal_scale, emission, four textures or None))."""
         cdef tl_material *m
@@ -110,8 +113,8 @@ cdef class ShadingTable:
                 m[k].normal_map, m[k].emission_map = texture_of(full[8]), texture_of(full[9])
         self.shading.materials, self.shading.n_materials = m, len(materials)
 
-    def seen(self, const float[:, ::1] normals, bint finds_inverse_w, const double[:, :] clip_from_eye, const double[:, :] view,
-             const double[:] center, double width, double height):
+    def seen(self, const float[:, ::1] normals or None, bint finds_inverse_w, const double[:, :] clip_from_eye,
+             const double[:, :] view, const double[:] center, double width, double height) -> ShadingTable:
         """Return the same, seen by a camera in a whole picture of this size, in a space whose origin is at `center`.
 
         `view`: (4, 4), to eye space. `normals`: those of the vertices with 1/w, or None.
@@ -134,11 +137,11 @@ cdef class ShadingTable:
         return own
 
     @property
-    def camera_rays(self):
+    def camera_rays(self) -> tuple[bool, F64, float]:
         """What `camera_rays` returns of the camera that sees it."""
         return self.rays.has_perspective, np.array([[self.rays.rows[i][k] for k in range(3)] for i in range(9)]), self.rays.scale
 
-    def set_headlight(self, to_light, float color, float ambient):
+    def set_headlight(self, to_light: Any, float color, float ambient):
         """Take one light in a direction of eye space, which wraps round what it lights, and light from all sides."""
         cdef double[3] at = to_light
         cdef double total
@@ -152,7 +155,7 @@ cdef class ShadingTable:
         self.headlight.kind, self.headlight.falloff = <tl_light_kind>2, 0.0
         self.shading.lights, self.shading.n_lights = &self.headlight, 1
 
-    def set_lights(self, lights, ambient):
+    def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]):
         """Take rows (kind, at, color, falloff)."""
         cdef tl_light *light
         cdef int k
@@ -174,7 +177,7 @@ cdef class ShadingTable:
         """Have the opacity of the surface in the picture's alpha; the materials are full."""
         self.shading.wants_opacity = True
 
-    def set_picture(self, int show, Mipmap matcap, background, background_bytes):
+    def set_picture(self, int show, Mipmap matcap or None, background: Sequence[float], background_bytes: Sequence[int]):
         """Take what the picture tells, and what is behind it."""
         cdef tl_shading *s = &self.shading
         cdef int k
@@ -186,13 +189,13 @@ cdef class ShadingTable:
             s.background_bytes[k] = background_bytes[k]
         self.set_fog((0, 0, 0), 0, 0, 0, 0)
 
-    def set_turn(self, eye_from):
+    def set_turn(self, eye_from: Sequence[Sequence[float]]):
         """Take the rows of a matrix (3, 3) that takes normals to the space that they are told in."""
         cdef int k
         for k in range(3):
             copy_floats(self.shading.eye_from[k], eye_from[k], 3)
 
-    def set_fog(self, color, float near, float scale, float distance_start, float distance_scale):
+    def set_fog(self, color: Sequence[float], float near, float scale, float distance_start, float distance_scale):
         """Take the depth cue."""
         cdef tl_shading *s = &self.shading
         copy_floats(s.fog_color, color, 3)
@@ -230,7 +233,7 @@ cdef class ShadedScene:
     cdef uint8_t[::1] rows
     cdef object arrays
 
-    def __init__(self, meshes, tables, first_ids):
+    def __init__(self, meshes: Sequence[SnappedMesh], tables: Sequence[ShadingTable], first_ids: Sequence[int]):
         """Take at least one mesh and as many shading tables, and what triangle 0 of each is called in the ids."""
         cdef int64_t i, n = len(meshes)
         cdef SnappedMesh mesh
@@ -244,8 +247,8 @@ cdef class ShadedScene:
             instances[i].snapped, instances[i].shading, instances[i].first_id = &mesh.snapped, &table.shading, first_ids[i]
         self.scene.instances, self.scene.n, self.scene.view = instances, n, self.mesh.clip_view()
 
-    def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows,
-              const int32_t[::1] at=None):
+    def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row,
+              int64_t n_rows, const int32_t[::1] at=None):
         """Write rows of the picture (H, W, 4) of a visibility buffer, as the sample at (x, y) sub-pixels from the centre sees it.
 
         Unless given it is that which each mesh is seen from.
@@ -260,7 +263,7 @@ cdef class ShadedScene:
                     K.shade(&self.scene, &window, at_fx, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
             raise_if_given_up()
 
-    def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth, Split split,
+    def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth, Split split or None,
                       uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
         """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
 
@@ -287,8 +290,8 @@ cdef class ShadedScene:
             raise_if_given_up()
 
 
-def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
-            float[:, ::1] depth, int64_t first_row, int64_t n_rows):
+def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles,
+            int32_t[:, ::1] ids, float[:, ::1] depth, int64_t first_row, int64_t n_rows):
     """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     cdef tl_target target
@@ -306,8 +309,8 @@ def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, c
     raise_if_given_up()
 
 
-def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
-                 bint is_peeled, int64_t first_row, int64_t n_rows):
+def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids,
+                 float[:, :, ::1] depth, bint is_peeled, int64_t first_row, int64_t n_rows):
     """Draw triangles, but for what their materials cut out, over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
     cdef int64_t height = ids.shape[1], width = ids.shape[2]
     cdef tl_window window = mesh.window(first_row, n_rows, width)

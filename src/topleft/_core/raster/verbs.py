@@ -20,8 +20,6 @@ from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_o
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import AlphaOption, BlendOption, DepthTestOption, PerOption, ResolveOption
 
-__all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
-
 WHY_LINES = "lines run between points of the grid"
 
 

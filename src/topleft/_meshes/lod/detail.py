@@ -23,6 +23,7 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_number, as_size, shown
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.lod.levels import Level, Levels
@@ -32,10 +33,6 @@ from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.scene.adapt import MeshLike, as_mesh
 from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import CullOption
-
-__all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
-
-F64 = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,7 @@ def choose_detail(
     size: int | tuple[int, int],
     *,
     tolerance: float,
-    cull: CullOption = "none",
+    cull: CullOption | None = None,
     material: Material | None = None,
     transform: npt.ArrayLike | None = None,
     viewport: tuple[int, int] | None = None,
@@ -199,7 +196,7 @@ def check_tolerance(tolerance: float) -> float:
     return float(tolerance)
 
 
-def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str, material: Material | None) -> str | None:
+def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, material: Material | None) -> str | None:
     """Why nothing but the mesh itself will do, as far as that is known without its levels."""
     if tolerance == 0:
         return "tolerance=0: the picture of the mesh itself, to the bit"
@@ -207,7 +204,7 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str, material:
         return "it has no triangles"
     if camera.lens is not None:
         return "a lens bends the picture by what no bound is known of"
-    if str(cull) != "none":
+    if cull is not None and str(cull) != "none":
         return f"cull={str(cull)!r}: which way a triangle is turned has no bound"
     if any(has_holes(one, mesh) for one in (mesh.materials if material is None else (material,))):
         return "a material cuts holes, and they have no bound"
@@ -256,7 +253,7 @@ def detailed(
     matrices = mesh.clip_from_objects(sight.clip_from_world)
     meshes = meshes_of(mesh)
     for one, at in mesh.meshes.values():
-        if not why_whole(one, camera, tolerance, options.get("cull", "none"), options.get("material")):
+        if not why_whole(one, camera, tolerance, options.get("cull"), options.get("material")):
             levels = levels_of(one)
             for i, level in zip(at.tolist(), sight.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
                 meshes[i] = levels[level].mesh if level else one
@@ -269,7 +266,7 @@ def level_of(
     size: tuple[int, int],
     tolerance: float,
     *,
-    cull: str = "none",
+    cull: str | None = None,
     material: Material | None = None,
     viewport: tuple[int, int] | None = None,
     origin: tuple[int, int] = (0, 0),

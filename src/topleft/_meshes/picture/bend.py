@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, I64
 from topleft._core.base.arrays import set_aligned
 from topleft._core.base.options import Cull, parse
 from topleft._meshes.camera.camera import Camera
@@ -29,8 +30,6 @@ from topleft._meshes.camera.lens import FLIP, Lens
 from topleft._meshes.model.mesh import Mesh, keep_corner_normals
 from topleft._meshes.model.normals import CornerNormals, moved
 
-F64 = npt.NDArray[np.float64]
-I64 = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 Parts = tuple[I64, I64, F64, Bools]
 """Triangles (N, 3), their sources (N,), weights (N, 3, 3) and which sides are outline (N, 3)."""

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, U8
 from topleft._core.base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._core.base.memory import FRESH
 from topleft._core.base.options import PointShape
@@ -28,12 +29,6 @@ from topleft._meshes.model.light import TO_HEADLIGHT, Light, LightKind, LightSpa
 from topleft._meshes.model.normals import moved, turn_of_normals, unit_or_zero
 from topleft._meshes.model.points import Points, PointUnit
 from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_each, shade_numbers
-
-__all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
 
 NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""
@@ -51,7 +46,7 @@ def draw_cloud(
     """
     if depth_test != "less":
         raise ValueError(f"points are drawn with depth_test 'less', got {depth_test!r}")
-    if options.get("cull", "none") != "none":
+    if options.get("cull") not in (None, "none"):
         raise ValueError("points have no side to cull")
     frame = options.get("viewport") or size
     positions: npt.NDArray[Any] = cloud.positions

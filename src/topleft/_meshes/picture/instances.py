@@ -36,8 +36,6 @@ from topleft._meshes.picture.through_lens import DrawnScene, scene_through
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import DepthTestOption
 
-__all__ = ["PlacedScene", "draw_nearest", "draw_scene", "draw_scene_coverage", "peel_scene", "place"]
-
 #: Snapped vertices that are held at a time: 16 bytes each.
 VERTICES_AT_ONCE = 1 << 20
 
@@ -166,6 +164,8 @@ class PlacedScene:
 
     @cached_property
     def _has_sides(self) -> bool:
+        if not self._view.sides_by_material:
+            return False
         masks = (mesh.single_sided(self._material) for mesh, _ in self.whole.meshes.values())
         return any(mask is not None and not mask.all() for mask in masks)
 

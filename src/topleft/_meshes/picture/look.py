@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64
 from topleft._core.base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts, threads_of_rows
@@ -33,11 +34,6 @@ from topleft._meshes.model.normals import (
     unit_rows,
 )
 from topleft._meshes.model.texture import Texture
-
-__all__ = ["CameraRays", "ShadingInputs", "ShadingMesh"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
 
 LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
 
@@ -218,7 +214,7 @@ def material_row(one: Material, mesh: Mesh, surface: Surface, back_side: float) 
     shininess = one.shininess if one.specular > 0 else 0.0
     cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
     full = full_part(one, mesh) if surface.all_full or is_full(one) else None
-    compiled = None if texture is None else texture.compiled
+    compiled = None if texture is None else texture.engine_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
     return color, back, side, (one.specular,) * 3, shininess, surface.is_unlit or one.unlit, cutoff, compiled, full
 
 

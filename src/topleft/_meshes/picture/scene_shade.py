@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-import numpy.typing as npt
-
+from topleft._core.base.array_types import U8
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.points import PointFragments
@@ -26,10 +24,6 @@ from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.shade import Shading, ShadingOptions, shade_instances, shade_numbers
 from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import ShadingOption
-
-__all__ = ["shade", "shade_by"]
-
-U8 = npt.NDArray[np.uint8]
 
 
 def shade(

@@ -19,9 +19,9 @@ from functools import lru_cache
 from typing import NamedTuple, TypedDict
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import INT32_MAX, shown
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
 from topleft._core.base.memory import empty
@@ -37,13 +37,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture.look import EYE, ShadingInputs, Surface
 from topleft.typing import ShadingOption
-
-__all__ = ["Lit", "LookOptions", "Shading", "ShadingOptions", "ShownInstance", "shade_instances", "shade_numbers"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
-I32 = npt.NDArray[np.int32]
 
 MIN_PX_PER_THREAD = 1 << 14
 """Pixels whose light is worth a thread: a tenth of a millisecond. A scene is shaded instance by instance."""

@@ -29,8 +29,6 @@ from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
-__all__ = ["render_transparent", "visible_layers"]
-
 CLEAR = (0, 0, 0, 0)
 
 
@@ -47,7 +45,7 @@ class PeelOptions(WindowOptions, total=False):
     layers: int
     depth_test: DepthTestOption
     sampling: SamplesOption
-    cull: CullOption
+    cull: CullOption | None
     threads: int | None
 
 
@@ -60,7 +58,7 @@ def render_transparent(
     layers: int = 8,
     shading: ShadingOption = "smooth",
     background: ColorLike = WHITE,
-    cull: CullOption = "none",
+    cull: CullOption | None = None,
     subpixel_bits: int | Literal["exact"] = 8,
     tolerance: float = 0.0,
     threads: int | None = None,

@@ -33,8 +33,6 @@ from topleft._meshes.scene.adapt import MeshLike
 from topleft.methods import METHODS
 from topleft.typing import DepthTestOption, OutputOption
 
-__all__ = ["OUTPUTS", "Plan", "plan"]
-
 #: Which verb gives an output.
 OUTPUTS = {
     "coverage": "coverage",
@@ -379,7 +377,7 @@ def plan_mesh(
     viewport = options.get("viewport")
     options["transform"] = camera.clip_from_world(viewport or size)
     found = choose_detail(
-        mesh, camera, size, tolerance=tolerance, cull=options.get("cull", "none"), viewport=viewport,
+        mesh, camera, size, tolerance=tolerance, cull=options.get("cull"), viewport=viewport,
         origin=options.get("origin", (0, 0)),
     )  # fmt: skip
     return found.mesh, plan_detail(found)

@@ -1,0 +1,20 @@
+/* The functions that lower files call of higher ones, and all of them: a sink is compiled into the walkers and into the
+ * lanes, so that inner loops know what they draw, and two sinks are rooms of their own.  What includes this file and
+ * draws for such a sink must be compiled together with the file that defines it, as kernels.c does. */
+#ifndef TL_HOOKS_H
+#define TL_HOOKS_H
+
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+
+/* TL_SINK_BLEND, in blend/mix_few.c: the colours of the pixels [at, at + n). */
+struct blend_state;
+static void mix_run(struct blend_state *b, int64_t at, int64_t n);
+
+/* TL_SINK_SPANS, in few/row_spans.c: the n samples from `at` on are covered. */
+struct span_table;
+static void note_span(struct span_table *t, int64_t at, int64_t n);
+
+#endif

@@ -1,0 +1,466 @@
+/* Sinks: what covered samples do to the buffers.  The walkers know nothing of what is drawn.
+ * In: lanes, spans or lists of samples.  Out: mask, counts, bits of samples, or ids with depth.
+ * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so
+ * that each copy of the code keeps one case. */
+#ifndef TL_SINK_C
+#define TL_SINK_C
+
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/setup.c"
+#include "sink/covered.c"
+#include "sink/fragments.h"
+#include "sink/hooks.h"
+#include "sink/peel.c"
+
+/* Samples interpolated by weights at a time. */
+#define TL_CHUNK 64
+
+/* A copy of a function for each sink of whole samples, so that inner loops know what they draw, and a call of the right
+ * one.  Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...),
+ * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND, TL_SINK_SPANS and TL_SINK_CENSUS have code of their
+ * own. */
+#define TL_SINK_COPY(f, name, sink, declared, ...) \
+    static __attribute__((noinline)) void f##_##name declared { f(__VA_ARGS__, sink); }
+#define TL_SINK_COPIES(f, declared, ...)                               \
+    TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)         \
+    TL_SINK_COPY(f, count, TL_SINK_COUNT, declared, __VA_ARGS__)       \
+    TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__)       \
+    TL_SINK_COPY(f, paint, TL_SINK_PAINT, declared, __VA_ARGS__)       \
+    TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)   \
+    TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__) \
+    TL_SINK_COPY(f, peel, TL_SINK_PEEL, declared, __VA_ARGS__)
+#define TL_SINK_CALL(f, sink, ...)                                            \
+    switch (sink) { /* no default: compilers name a sink that is forgotten */ \
+    case TL_SINK_MASK: f##_mask(__VA_ARGS__); break;                          \
+    case TL_SINK_COUNT: f##_count(__VA_ARGS__); break;                        \
+    case TL_SINK_LABEL: f##_label(__VA_ARGS__); break;                        \
+    case TL_SINK_PAINT: f##_paint(__VA_ARGS__); break;                        \
+    case TL_SINK_NEAREST: f##_nearest(__VA_ARGS__); break;                    \
+    case TL_SINK_FARTHEST: f##_farthest(__VA_ARGS__); break;                  \
+    case TL_SINK_PEEL: f##_peel(__VA_ARGS__); break;                          \
+    case TL_SINK_SAMPLES:                                                     \
+    case TL_SINK_BLEND:                                                       \
+    case TL_SINK_SPANS:                                                       \
+    case TL_SINK_CENSUS: __builtin_trap();                                    \
+    }
+
+/* Code that only lists samples needs fewer copies: what a list holds is places, places and ids, or depths, too.  A copy
+ * has one sink of its kind for all. */
+#define TL_LIST_COPIES(f, declared, ...)                         \
+    TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)   \
+    TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__) \
+    TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)
+#define TL_LIST_CALL(f, sink, ...)                      \
+    switch (sink) {                                     \
+    case TL_SINK_MASK:                                  \
+    case TL_SINK_COUNT: f##_mask(__VA_ARGS__); break;   \
+    case TL_SINK_LABEL: f##_label(__VA_ARGS__); break;  \
+    case TL_SINK_PAINT:                                 \
+    case TL_SINK_NEAREST:                               \
+    case TL_SINK_FARTHEST:                              \
+    case TL_SINK_PEEL: f##_nearest(__VA_ARGS__); break; \
+    case TL_SINK_SAMPLES:                               \
+    case TL_SINK_BLEND:                                 \
+    case TL_SINK_SPANS:                                 \
+    case TL_SINK_CENSUS: __builtin_trap();              \
+    }
+
+TL_INLINE int sink_has_depth(tl_sink sink)
+{
+    return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST || sink == TL_SINK_PEEL;
+}
+
+/* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors
+ * and, where there are such, for half vectors. */
+#define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                              \
+    TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)       \
+    {                                                                                                \
+        int32_t *ids = (int32_t *)target->pixels + at;                                               \
+        M wins;                                                                                      \
+        if (sink == TL_SINK_PAINT) {                                                                 \
+            wins = P##m_and(m, P##i_gt(id, P##i_load_masked(m, ids)));                               \
+        } else {                                                                                     \
+            const F old = P##f_load_masked(m, target->depth + at);                                   \
+            const M equal = P##m_and(m, P##f_eq(depth, old));                                        \
+            wins = P##m_and(m, sink == TL_SINK_NEAREST ? P##f_lt(depth, old) : P##f_lt(old, depth)); \
+            if (__builtin_expect(P##m_any(equal), 0))                                                \
+                wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, ids), id)));    \
+        }                                                                                            \
+        P##f_store_some(target->depth + at, wins, depth, at + TL_LANES <= target->n_samples);        \
+        P##i_store_some(ids, wins, id, at + TL_LANES <= target->n_samples);                          \
+    }
+TL_PUT_DEPTHS(put_buffers, vm, vf, vi, v)
+#if TL_HALF_LANES
+TL_PUT_DEPTHS(put_depths_half, hm, hf, hi, h)
+#endif
+
+/* The lanes in m of a triangle. */
+TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, int32_t id)
+{
+    if (sink == TL_SINK_PEEL)
+        peel_lanes(target, at, m, depth, id);
+    else
+        put_buffers(target, sink, at, m, depth, vi_set1(id));
+}
+
+/* Counts or ids of the lanes in m. */
+TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm m, vi id)
+{
+    int32_t *pixels = (int32_t *)target->pixels + at;
+    const vi old = vi_load_masked(m, pixels);
+    vi_store_some(pixels, m,
+                  sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_xor(id, vi_set1(target->flip))),
+                  at + TL_LANES <= target->n_samples);
+}
+
+/* Samples of a word, of labels that come from the last triangle to the first: `covered` ones can no longer change. */
+TL_INLINE void put_word(const tl_target *target, int64_t word, uint64_t samples, vi name)
+{
+    const uint64_t fresh = samples & ~target->covered[word];
+    if (!fresh)
+        return;
+    target->covered[word] |= fresh;
+    int32_t *const pixels = (int32_t *)target->pixels + (word << 6);
+    for (int k = TL_LANES == 1 ? __builtin_ctzll(fresh) : 0; k < 64 && fresh >> k; k += TL_LANES) {
+        const vm m = vm_from_bits((unsigned)(fresh >> k) & (unsigned)((1ull << TL_LANES) - 1));
+        vi_store_some(pixels + k, m, vi_max(vi_load_masked(m, pixels + k), name),
+                      (word << 6) + k + TL_LANES <= target->n_samples);
+    }
+}
+TL_INLINE void put_uncovered(const tl_target *target, int64_t at, int64_t n, int32_t id)
+{
+    const vi name = vi_set1(id ^ target->flip);
+    const int64_t last = (at + n - 1) >> 6;
+    uint64_t samples = ~0ull << (at & 63);
+    for (int64_t word = at >> 6; word < last; word++, samples = ~0ull)
+        put_word(target, word, samples, name);
+    put_word(target, last, samples & ~0ull >> (63 - ((at + n - 1) & 63)), name);
+}
+
+/* A span of samples without depth. */
+TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
+{
+    if (sink == TL_SINK_MASK) {
+        cover_span(target, at, n);
+        return;
+    }
+    if (sink == TL_SINK_BLEND) {
+        mix_run(target->pixels, at, n);
+        return;
+    }
+    if (sink == TL_SINK_SPANS) {
+        note_span(target->pixels, at, n);
+        return;
+    }
+    if (sink == TL_SINK_SAMPLES) {
+        cover_samples(target, at, n);
+        return;
+    }
+    if (sink == TL_SINK_LABEL && target->covered) {
+        put_uncovered(target, at, n, id);
+        return;
+    }
+    int32_t *pixels = (int32_t *)target->pixels + at;
+    const vi name = vi_set1(id ^ target->flip);
+    for (int64_t k = 0; k < n; k += TL_LANES) {
+        const vm m = vm_first(n - k);
+        const vi old = vi_load_masked(m, pixels + k);
+        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name),
+                      at + k + TL_LANES <= target->n_samples);
+    }
+}
+
+/* The one rounding of depth to float32; + 0 makes -0 a 0. */
+TL_INLINE vf sum_depth(vd row, vd col) { return vf_add(vf_from_vd(vd_add(row, col)), vf_set1(0.0f)); }
+
+/* 0, 1, 2, ... times a step. */
+TL_INLINE vd ramp(double step) { return vd_mul(vd_from_vi(vi_iota()), vd_set1(step)); }
+
+/* The centre of a picture pixel in half sub-pixels from a corner of a triangle that holds it: terms may wrap, the
+ * difference of a triangle with a depth plane does not. */
+TL_INLINE double half_units(int64_t pixel, int64_t corner_fx, int bits)
+{
+    return (double)(int64_t)((((uint64_t)pixel * 2 + 1) << bits) - 2 * (uint64_t)corner_fx);
+}
+TL_INLINE double sample_x(const tl_triangle *t, const tl_window *window, int64_t col)
+{
+    return half_units(col + window->x_px, t->x_fx[0], window->subpixel_bits);
+}
+TL_INLINE double sample_y(const tl_triangle *t, const tl_window *window, int64_t row)
+{
+    return half_units(row + window->y_px, t->y_fx[0], window->subpixel_bits);
+}
+
+/* A row of a triangle's plane of depth: z + slope_x * x, x at column 0 of the window and from column to column. */
+typedef struct {
+    double z, slope_x, x, step;
+    int32_t id;
+} plane_row;
+
+/* Depths at columns first, first + apart, ... */
+TL_INLINE vf row_depths(const plane_row *r, int64_t first, int64_t apart)
+{
+    const vd x = vd_add(vd_set1(r->x + (double)first * r->step), ramp((double)apart * r->step));
+    return sum_depth(vd_set1(r->z), vd_mul(vd_set1(r->slope_x), x));
+}
+
+#define TL_QUAD (4 * TL_LANES)
+
+/* As put_depths of TL_QUAD columns that are covered whole: equal depths are looked for once. */
+TL_INLINE int put_quad(const tl_target *target, tl_sink sink, int64_t at, const vf *depth, vi id)
+{
+    float *depths = target->depth + at;
+    int32_t *ids = (int32_t *)target->pixels + at;
+    vm wins[4], equal[4];
+    for (int k = 0; k < 4; k++) {
+        const vf old = vf_load(depths + k * TL_LANES);
+        equal[k] = vf_eq(depth[k], old);
+        wins[k] = sink == TL_SINK_NEAREST ? vf_lt(depth[k], old) : vf_lt(old, depth[k]);
+    }
+    if (__builtin_expect(vm_any(vm_or(vm_or(equal[0], equal[1]), vm_or(equal[2], equal[3]))), 0))
+        return 0;
+    for (int k = 0; k < 4; k++) {
+        vf_store_some(depths + k * TL_LANES, wins[k], depth[k], 1);
+        vi_store_some(ids + k * TL_LANES, wins[k], id, 1);
+    }
+    return 1;
+}
+
+TL_INLINE void put_some_columns(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, int64_t from,
+                                int64_t first, int64_t end)
+{
+    for (int64_t col = from; col < end; col += TL_LANES) {
+        const vm m = vm_and_not(vm_first(end - col), vm_first(first - col));
+        put_depths(target, sink, at + col, m, row_depths(r, col, 1), r->id);
+    }
+}
+
+/* Columns [first, end) of the row that begins at `at`, in vectors that begin at multiples of TL_LANES columns. */
+TL_INLINE void put_columns(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, int64_t first,
+                           int64_t end)
+{
+    const int64_t whole0 = (first + TL_LANES - 1) & -(int64_t)TL_LANES;
+    const int64_t n_quads = end > whole0 ? (end - whole0) / TL_QUAD : 0, whole1 = whole0 + n_quads * TL_QUAD;
+    if (!n_quads) {
+        put_some_columns(r, target, sink, at, first & -(int64_t)TL_LANES, first, end);
+        return;
+    }
+    if (whole0 > first)
+        put_some_columns(r, target, sink, at, whole0 - TL_LANES, first, whole0);
+    const vd z = vd_set1(r->z), slope_x = vd_set1(r->slope_x), step = vd_set1(r->step * TL_LANES);
+    const vi id = vi_set1(r->id);
+    vd x = vd_add(vd_set1(r->x + (double)whole0 * r->step), ramp(r->step));
+    for (int64_t col = whole0; col < whole1; col += TL_QUAD) {
+        vf depth[4];
+        for (int k = 0; k < 4; k++) {
+            depth[k] = sum_depth(z, vd_mul(slope_x, x));
+            x = vd_add(x, step); /* whole numbers: exact */
+        }
+        if (__builtin_expect(!put_quad(target, sink, at + col, depth, id), 0))
+            put_some_columns(r, target, sink, at, col, col, col + TL_QUAD);
+    }
+    put_some_columns(r, target, sink, at, whole1, whole1, end);
+}
+
+/* As calls: walkers have many copies, and the loops above need all registers. */
+static __attribute__((noinline)) void put_columns_nearest(const plane_row *r, const tl_target *target, int64_t at,
+                                                          int64_t first, int64_t end)
+{
+    put_columns(r, target, TL_SINK_NEAREST, at, first, end);
+}
+static __attribute__((noinline)) void put_columns_farthest(const plane_row *r, const tl_target *target, int64_t at,
+                                                           int64_t first, int64_t end)
+{
+    put_columns(r, target, TL_SINK_FARTHEST, at, first, end);
+}
+
+/* The same without segments in which all that is drawn lies before the triangle.  Along a row depths as they are
+ * rounded never turn back, so those at the ends of a segment bound the others, to the bit.  What a triangle covers
+ * whole is a bound from then on: other depths only come before it.  Returns whether anything was left out. */
+TL_INLINE int put_bounded(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, float *bounds,
+                          int64_t first, int64_t end)
+{
+    const int64_t size = 1 << TL_SEGMENT_BITS, n_segments = ((end - 1) >> TL_SEGMENT_BITS) + 1;
+    const int64_t whole0 = (first + size - 1) >> TL_SEGMENT_BITS, whole1 = end >> TL_SEGMENT_BITS;
+    int is_any_behind = 0;
+    for (int64_t i = first >> TL_SEGMENT_BITS; i < n_segments; i += TL_LANES) {
+        const vm live = vm_first(n_segments - i);
+        const vf left = row_depths(r, i * size, size), right = row_depths(r, i * size + size - 1, size);
+        const vf low = vf_min(left, right), high = vf_max(left, right), bound = vf_load_masked(live, bounds + i);
+        const vm is_behind = sink == TL_SINK_NEAREST ? vf_lt(bound, low) : vf_lt(high, bound);
+        const vm whole = vm_and_not(vm_first(whole1 - i), vm_first(whole0 - i));
+        unsigned shown = vm_bits(vm_and_not(live, is_behind));
+        is_any_behind |= vm_any(vm_and(live, is_behind));
+        if (!shown)
+            continue;
+        vf_store_masked(bounds + i, vm_and(live, whole),
+                        sink == TL_SINK_NEAREST ? vf_min(high, bound) : vf_max(low, bound));
+        while (shown) { /* a run of segments at a time */
+            const int from = __builtin_ctz(shown), n = __builtin_ctz(~(shown >> from));
+            const int64_t col0 = max64((i + from) * size, first), col1 = min64((i + from + n) * size, end);
+            if (sink == TL_SINK_NEAREST)
+                put_columns_nearest(r, target, at, col0, col1);
+            else
+                put_columns_farthest(r, target, at, col0, col1);
+            shown &= ~(((1u << n) - 1) << from);
+        }
+    }
+    return is_any_behind;
+}
+
+/* The sinks that keep what comes first by depth, whatever comes when. */
+TL_INLINE int sink_keeps_order(tl_sink sink) { return sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST; }
+
+/* Columns of a triangle from which on its rows may look at bounds, and of a row from which on it does, or is drawn by
+ * whole vectors.  To look takes as long as to draw 40 columns; so a shorter row looks only if none of the last
+ * TL_UNLOOKED rows did without leaving anything out. */
+#define TL_LEAST_WIDE 128
+#define TL_LONG_ROW 192
+#define TL_UNLOOKED 3
+TL_INLINE int looks_wide(const tl_target *target, int64_t n, int n_left)
+{
+    return n >= TL_LONG_ROW || (target->bounds && n_left == 0);
+}
+
+/* Such a row, [first, end).  Returns how many shorter ones then do not look. */
+#define TL_PUT_WIDE(NAME, SINK, PUT_COLUMNS)                                                                           \
+    static __attribute__((noinline)) int NAME(const plane_row *r, const tl_target *target, int64_t row, int64_t first, \
+                                              int64_t end)                                                             \
+    {                                                                                                                  \
+        const int64_t at = row * target->stride_px;                                                                    \
+        if (!target->bounds) {                                                                                         \
+            PUT_COLUMNS(r, target, at, first, end);                                                                    \
+            return 0;                                                                                                  \
+        }                                                                                                              \
+        float *bounds = target->bounds + row * tl_segments(target->stride_px);                                         \
+        return put_bounded(r, target, SINK, at, bounds, first, end) ? 0 : TL_UNLOOKED;                                 \
+    }
+TL_PUT_WIDE(put_wide_nearest, TL_SINK_NEAREST, put_columns_nearest)
+TL_PUT_WIDE(put_wide_farthest, TL_SINK_FARTHEST, put_columns_farthest)
+
+TL_INLINE int put_wide(const plane_row *r, const tl_target *target, tl_sink sink, int64_t row, int64_t first,
+                       int64_t end)
+{
+    return sink == TL_SINK_NEAREST ? put_wide_nearest(r, target, row, first, end)
+                                   : put_wide_farthest(r, target, row, first, end);
+}
+
+/* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x. */
+TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                         int64_t row, int64_t first, int64_t end)
+{
+    const double step = (double)((int64_t)2 << window->subpixel_bits), x = sample_x(t, window, first);
+    const double z = t->z[0] + t->slope_y * sample_y(t, window, row);
+    if (sink_keeps_order(sink) && end - first >= TL_LEAST_WIDE && looks_wide(target, end - first, 0)) {
+        const plane_row wide = {z, t->slope_x, sample_x(t, window, 0), step, t->id};
+        put_wide(&wide, target, sink, row, first, end);
+        return;
+    }
+    const vd z_row = vd_set1(z), slope_x = vd_set1(t->slope_x);
+    const vd steps = ramp(step);
+    const int64_t at = row * target->stride_px;
+    for (int64_t col = first; col < end; col += TL_LANES) {
+        const vd xs = vd_add(vd_set1(x + (double)(col - first) * step), steps);
+        put_depths(target, sink, at + col, vm_first(end - col), sum_depth(z_row, vd_mul(slope_x, xs)), t->id);
+    }
+}
+
+/* A span with depth from the exact weights. */
+TL_ONCE void put_weighted(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                          int64_t row, int64_t first, int64_t end)
+{
+    double w1[TL_CHUNK], w2[TL_CHUNK];
+    float z[TL_CHUNK];
+    const double z0 = t->z[0], slope1 = (t->z[1] - z0) / t->w_sum, slope2 = (t->z[2] - z0) / t->w_sum;
+    for (int64_t col = first; col < end; col += TL_CHUNK) {
+        const int n = (int)min64(end - col, TL_CHUNK);
+        weights_at(t, window, row, col, n, w1, w2);
+        for (int k = 0; k < n; k++)
+            z[k] = (float)(z0 + (w1[k] * slope1 + w2[k] * slope2)) + 0.0f;
+        for (int k = 0; k < n; k += TL_LANES) {
+            const vm m = vm_first(n - k);
+            put_depths(target, sink, row * target->stride_px + col + k, m, vf_load_masked(m, z + k), t->id);
+        }
+    }
+}
+
+/* What depth needs of a triangle beyond its spans. */
+TL_INLINE void setup_sink(tl_triangle *t, const tl_window *window, tl_sink sink)
+{
+    if (!sink_has_depth(sink))
+        return;
+    setup_plane(t);
+    if (!t->has_plane)
+        setup_weights(t, window);
+}
+
+/* The samples [first, end) of a row; the window's own columns and rows. */
+TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                        int64_t row, int64_t first, int64_t end)
+{
+    if (!sink_has_depth(sink))
+        put_plain(target, sink, row * target->stride_px + first, end - first, t->id);
+    else if (t->has_plane)
+        put_plane(t, window, target, sink, row, first, end);
+    else
+        put_weighted(t, window, target, sink, row, first, end);
+}
+
+/* Writes a list of n out, one sample after the other: without branches, whatever wins. */
+TL_INLINE void write_list(const tl_target *target, const fragment_list *f, int n, tl_sink sink)
+{
+    if (sink == TL_SINK_PEEL) {
+        peel_fragments(target->peeled, f, n);
+        return;
+    }
+    int32_t *const pixels = target->pixels;
+    float *const depths = target->depth;
+    const int32_t flip = target->flip;
+    for (int k = 0; k < n; k++) {
+        const int64_t at = (uint32_t)f->sample[k];
+        if (sink_has_depth(sink)) { /* 6 % of a million-triangle mesh; nothing for sinks of one plane */
+            __builtin_prefetch(pixels + f->sample[k + TL_PREFETCH], 1);
+            __builtin_prefetch(depths + f->sample[k + TL_PREFETCH], 1);
+        }
+        if (sink == TL_SINK_MASK) {
+            target->covered[at >> 6] |= 1ull << (at & 63);
+        } else if (sink == TL_SINK_SAMPLES) {
+            const int64_t bit = at << target->sample_bits;
+            target->covered[bit >> 6] |= (uint64_t)(uint32_t)f->id[k] << (bit & 63); /* a bit a sample */
+        } else if (sink == TL_SINK_COUNT) {
+            pixels[at]++;
+        } else if (sink == TL_SINK_LABEL) {
+            const int32_t id = f->id[k] ^ flip;
+            pixels[at] = id > pixels[at] ? id : pixels[at];
+        } else if (sink == TL_SINK_PAINT) {
+            const int wins = f->id[k] > pixels[at];
+            pixels[at] = wins ? f->id[k] : pixels[at];
+            depths[at] = wins ? f->depth[k] : depths[at];
+        } else {
+            const int32_t turn = sink == TL_SINK_FARTHEST ? -1 : 0;
+            const int64_t key = sample_key(f->depth[k], f->id[k], turn), old = sample_key(depths[at], pixels[at], turn);
+            const int64_t least = key < old ? key : old;
+            pixels[at] = (int32_t)least;
+            depths[at] = key_depth(least, turn);
+        }
+    }
+}
+
+TL_SINK_COPY(write_list, samples, TL_SINK_SAMPLES, (const tl_target *target, const fragment_list *f, int n), target, f,
+             n)
+TL_SINK_COPIES(write_list, (const tl_target *target, const fragment_list *f, int n), target, f, n)
+
+/* Writes a list of n out. */
+static void flush_fragments(const tl_target *target, const fragment_list *f, int n)
+{
+    if (target->sink == TL_SINK_SAMPLES)
+        write_list_samples(target, f, n);
+    else if (n > 0)
+        TL_SINK_CALL(write_list, target->sink, target, f, n)
+}
+
+#endif
