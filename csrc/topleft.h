@@ -11,7 +11,6 @@
 
 #include "faces.h"
 #include "nearest.h"
-#include "shading.h"
 #include "tiles.h"
 
 /* Where there is no number. The sign is clear; that of Microsoft's NAN depends on the compiler. */
@@ -482,6 +481,7 @@ typedef struct {
 #include "clusters.h"
 #include "exact.h"
 #include "polygons.h"
+#include "shading.h"
 #include "kernels.h"
 #include "meshlets.h"
 
