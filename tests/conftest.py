@@ -104,7 +104,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def run(folder, capsys):
     """Run the command line: its exit status and the lines of stderr."""
-    import topleft._apps.cli
+    import topleft.cli
 
     def run_cli(*arguments):
         try:
