@@ -257,6 +257,10 @@ typedef struct tl_kernels {
     /* Normals of vertices [first, end) as vertex_normals has them, and of their groups. */
     void (*sum_creases)(const tl_fans *fans, const tl_creases *creases, int64_t first, int64_t end);
 
+    /* Triangles of faces with any number of corners, as rows of `corners`: n_corners - 2 of each that has three; room
+     * as tl_ear_words tells for the largest.  Returns how many faces are finished. */
+    int64_t (*cut_faces)(const tl_faces *faces, int64_t *triangles, int64_t *room);
+
     /* Low and high of the corners of triangles [first, end): six numbers. */
     int64_t (*box_of_faces)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *box);
 

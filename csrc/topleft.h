@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "faces.h"
 #include "nearest.h"
 #include "tiles.h"
 

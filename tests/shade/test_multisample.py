@@ -48,7 +48,7 @@ def test_picture_is_the_same_from_planes_of_samples(monkeypatch, isa, shading, s
 
 
 @pytest.mark.parametrize("look", [{}, {"shading": "ids"}, {"cutoff": 0.5}, {"edges": True}, {"cull": "back"}])
-def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, look):
+def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, force, look):
     """It is drawn from clusters then, a plane a sample, and what these show is snapped once for all samples."""
     vertices, triangles = tl.scenes.blob(30_000)
     holes = np.full((8, 8, 4), 255, np.uint8)
@@ -58,7 +58,7 @@ def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, lo
     mesh = tl.Mesh(vertices.astype(np.float32), triangles, uv=3 * vertices[:, :2], materials=[leaf])
     near = tl.Camera.look_at((0.2, 0.1, 1.2), near=0.01, far=100)
     n_planes, draw_plane = [], ClusteredMesh.draw
-    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
+    force(pays_to_draw_samples=True)
     monkeypatch.setattr(ClusteredMesh, "draw", lambda *a: n_planes.append(1) or draw_plane(*a))
     first, again = (tl.render(mesh, near, (200, 150), sampling="msaa4", **look) for _ in range(2))
     assert len(n_planes) == 4

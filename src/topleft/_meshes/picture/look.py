@@ -214,7 +214,7 @@ def material_row(one: Material, mesh: Mesh, surface: Surface, back_side: float) 
     shininess = one.shininess if one.specular > 0 else 0.0
     cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
     full = full_part(one, mesh) if surface.all_full or is_full(one) else None
-    compiled = None if texture is None else texture.engine_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
+    compiled = None if texture is None else texture.compiled_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
     return color, back, side, (one.specular,) * 3, shininess, surface.is_unlit or one.unlit, cutoff, compiled, full
 
 
