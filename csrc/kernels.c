@@ -3,53 +3,52 @@
  * isa_*.c name the set (TL_ISA_NAME) and the table (TL_KERNELS) and include this file. */
 #include "topleft.h"
 
-#include "vertex/snap.c"
-#include "vertex/project.c"
 #include "vertex/clip.c"
+#include "vertex/project.c"
+#include "vertex/snap.c"
 #include "clusters/cluster_sort.c"
 #include "clusters/cluster_view.c"
 #include "clusters/mark.c"
-#include "raster/raster.c"
-#include "raster/bin.c"
-#include "raster/setup.c"
-#include "area/area.c"
-#include "exact/take_points.c"
 #include "exact/pieces_exact.c"
-#include "exact/draw_exact.c"
-#include "exact/sides_exact.c"
+#include "exact/take_points.c"
+#include "mesh/creases.c"
+#include "mesh/ears.c"
+#include "mesh/equal.c"
+#include "mesh/nearest.c"
+#include "mesh/normals.c"
+#include "mesh/reach.c"
+#include "raster/bin.c"
+#include "raster/sides.c"
+#include "few/few.c"
+#include "area/area.c"
+#include "points/cloud.c"
+#include "pixels/composite.c"
+#include "pixels/instances.c"
+#include "pixels/paint.c"
+#include "pixels/planes.c"
+#include "pixels/points.c"
+#include "pixels/resolve.c"
+#include "pixels/slopes.c"
+#include "pixels/split.c"
+#include "pixels/texels.c"
+#include "pixels/weights.c"
 #include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
-#include "pixels/weights.c"
-#include "pixels/paint.c"
-#include "pixels/resolve.c"
-#include "pixels/split.c"
-#include "pixels/instances.c"
-#include "pixels/points.c"
-#include "pixels/planes.c"
-#include "pixels/slopes.c"
-#include "pixels/texels.c"
-#include "pixels/composite.c"
-#include "points/cloud.c"
-#include "lines/edges.c"
-#include "lines/lines.c"
 #include "blend/blend.c"
 #include "blend/fill_few.c"
+#include "lines/edges.c"
+#include "lines/lines.c"
+#include "polygons/labels.c"
+#include "polygons/mask.c"
+#include "polygons/points.c"
+#include "polygons/shares.c"
+#include "polygons/simple.c"
+#include "shade/alpha_test.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
-#include "shade/alpha_test.c"
-#include "mesh/creases.c"
-#include "mesh/equal.c"
-#include "mesh/normals.c"
-#include "mesh/nearest.c"
-#include "mesh/reach.c"
-#include "polygons/points.c"
-#include "polygons/simple.c"
-#include "polygons/mask.c"
-#include "polygons/labels.c"
-#include "polygons/shares.c"
-#include "tiles/spans.c"
 #include "tiles/corners.c"
 #include "tiles/merge.c"
+#include "tiles/spans.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
 #define TL_ISA_NAME "none"
@@ -92,7 +91,7 @@ const tl_kernels TL_KERNELS = {
     .survey_clusters = survey_clusters,
     .count_hidden = count_hidden,
     .find_shown = find_shown,
-    .drop_sides = drop_sides_of_mesh,
+    .drop_sides = drop_sides,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
     .draw_cloud = draw_cloud,
@@ -117,6 +116,7 @@ const tl_kernels TL_KERNELS = {
     .list_corners = list_corners,
     .find_creases = find_creases,
     .sum_creases = sum_creases,
+    .cut_faces = cut_faces,
     .box_of_faces = box_of_faces,
     .unit_vectors = unit_vectors,
     .move_points = move_points,

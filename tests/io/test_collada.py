@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 import zipfile
 from xml.etree import ElementTree
 
@@ -10,6 +11,7 @@ import pytest
 
 import topleft as tl
 from topleft._meshes.io.foreign import simplified
+from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.notes import Notes
 from topleft.errors import MeshError, MeshWarning
 
@@ -39,7 +41,8 @@ def collada(primitives=POLYLIST, positions=CHEVRON, node="<instance_geometry url
 
 def simple(content):
     notes = Notes("a.dae")
-    return ElementTree.fromstring(simplified(content, notes)), [line.partition(": ")[2] for line in notes.lines]
+    content = simplified(content, notes, Budget("a.dae"))[0]
+    return ElementTree.fromstring(content), [line.partition(": ")[2] for line in notes.lines]
 
 
 def area_of(root):
@@ -84,6 +87,41 @@ def test_collada_animations_and_lines_are_told():
     assert notes == ["lines not drawn", "animations not played: everything is at rest"]
 
 
+def sided(*values):
+    """A face in the colour of the first effect; effects say whether they have two sides, or None: nothing."""
+    extra = "<extra><technique profile='GOOGLEEARTH'><double_sided>{}</double_sided></technique></extra>"
+    look = "<technique sid='c'><phong><diffuse><color>1 0 0 1</color></diffuse></phong></technique>"
+    profiles = [look if value is None else look + extra.format(value) for value in values]
+    effects = [f"<effect id='e{i}'><profile_COMMON>{own}</profile_COMMON></effect>" for i, own in enumerate(profiles)]
+    materials = [f"<material id='m{i}'><instance_effect url='#e{i}'/></material>" for i in range(len(values))]
+    bound = "<technique_common><instance_material symbol='a' target='#m0'/></technique_common>"
+    return collada(
+        POLYLIST.replace("count='1'", "count='1' material='a'"),
+        node=f"<instance_geometry url='#g'><bind_material>{bound}</bind_material></instance_geometry>",
+        more=f"<library_effects>{''.join(effects)}</library_effects>"
+        f"<library_materials>{''.join(materials)}</library_materials>",
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "has_both"), [([None], True), ([1], True), ([0], False), ([0, 0], False), ([None, 0], True)]
+)
+def test_collada_shows_both_sides_unless_the_file_says_one(tmp_path, values, has_both):
+    pytest.importorskip("collada", reason="needs pycollada, of the extra formats")
+    path = tmp_path / "a.dae"
+    path.write_bytes(sided(*values))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MeshWarning)
+        (material,) = tl.load(path).materials
+    assert material.color == (255, 0, 0)
+    assert material.double_sided == has_both
+
+
+def test_collada_of_some_materials_of_one_side_is_told():
+    assert simple(sided(0, 1))[1] == ["materials of one side among others drawn from both sides"]
+    assert simple(sided(0, 0))[1] == simple(sided(None, 1))[1] == []
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -96,7 +134,7 @@ def test_collada_animations_and_lines_are_told():
 )
 def test_collada_that_is_broken_is_told(content, message):
     with pytest.raises(MeshError, match=message):
-        simplified(content, Notes("a.dae"))
+        simplified(content, Notes("a.dae"), Budget("a.dae"))
 
 
 @pytest.mark.parametrize("suffix", [".dae", ".zae"])

@@ -15,6 +15,7 @@ from strategies import soup
 
 import topleft as tl
 from topleft._core import engine
+from topleft._core.raster import choices
 from topleft.methods.reference.integers import ExactPicture, projected, snapped
 
 THREADS = (1, 2, 3, 8)
@@ -134,8 +135,7 @@ def cases(make, *arguments):
 @contextmanager
 def sharing(is_shared):
     """Threads share the triangles of any scene, or set up all of them in each."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules["topleft._core.raster.choices"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
+    with choices.forced(shared_setups=0 if is_shared else 2**62):
         yield
 
 

@@ -5,6 +5,7 @@ Input: a path. Output: one `Mesh`, and warnings of what it lacks.
 
 from __future__ import annotations
 
+import operator
 import os
 import warnings
 from collections.abc import Callable, Iterator
@@ -13,9 +14,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from topleft._core.base.arrays import as_path
+from topleft._core.base.arrays import as_number, as_path, shown
+from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.notes import tell
-from topleft._meshes.io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
+from topleft._meshes.io.references import InputFile, Moment
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh, as_crease
 from topleft._meshes.model.points import Points
@@ -24,14 +26,22 @@ from topleft.errors import MeshError, MissingPackageError
 Made = TypeVar("Made")
 
 GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
+ARCHIVE_SUFFIXES = (".zip", ".zae", ".tgz", ".gz", ".bz2")
 
 
 def load(
     path: str | os.PathLike[str],
     *,
     crease: float = DEFAULT_CREASE,
-    max_vertices: int = MAX_VERTICES,
-    max_texture_pixels: int = MAX_TEXTURE_PIXELS,
+    max_vertices: int | None = None,
+    max_texture_pixels: int | None = None,
+    time: float | None = None,
+    clip: int | str | None = None,
+    max_triangles: int | None = None,
+    max_nodes: int | None = None,
+    max_lines: int | None = None,
+    max_bytes: int | None = None,
+    max_unpacked_bytes: int | None = None,
 ) -> Mesh | Points:
     r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
 
@@ -42,27 +52,46 @@ def load(
     crease : float
         Degrees, 0 to 180: edges at which triangles bend by more are sharp, where the file has no normals; see `Mesh`.
         180: none is, 0: all are.
-    max_vertices : int
-        A file with more, or one that says so, is refused.
-    max_texture_pixels : int
-        Pictures with more are left out.
+    max_vertices, max_triangles, max_nodes : int, optional
+        A file with more, or one that says so, is refused: nodes with a mesh and instances count each time, and so do
+        their vertices and triangles. Unless given 4,194,304 vertices, 4,194,304 triangles and 32,768 nodes, or as many
+        as the file has bytes, and one node for 100 bytes.
+    max_texture_pixels : int, optional
+        Of all pictures together, and of textures that are made of them: those beyond are left out. Unless given
+        67,108,864 (8192 x 8192), or 16 for each byte.
+    max_lines : int, optional
+        Of lines of text, rows of PLY and elements of XML: a file with more is refused. Unless given 524,288, or one for
+        4 bytes.
+    max_bytes : int, optional
+        Of the file and all that it names: more are refused. Unless given 8 GiB.
+    max_unpacked_bytes : int, optional
+        Of what is in an archive, or in the file in a shorter form: more are refused. Unless given 33,554,432, or 8 for
+        each byte.
+    time : float, optional
+        Seconds, 0 or more: nodes, skins and morph targets of glTF are where an animation has them then; behind its end,
+        where it ends. Unless given everything is at rest.
+    clip : int or str, optional
+        The index or the name of the animation; "all" plays all of them, and where two move the same the first has it.
+        Unless given the first one plays, and `MeshWarning` tells of others.
 
     Returns
     -------
     Mesh, or Points
         `Points` of a file that holds points and no triangles. Of a mesh polygons are cut into triangles, groups and
         objects are one mesh, in the order of the file; the nodes of a scene are placed by their transforms, skins and
-        morph targets are at rest. Normals are those of the file. A file without normals gets its vertices merged where
-        they are equal, so that shading has no seams where a format (STL) or a texture had to double them; triangles of
-        glTF without normals are flat, as its standard says. Colours are those of the vertices or the faces, if there
-        are any; `uv` those of the file. Materials are those of MTL and glTF.
+        morph targets are at rest, or at the `time`. Normals are those of the file. A file without normals gets its
+        vertices merged where they are equal, so that shading has no seams where a format (STL) or a texture had to
+        double them; triangles of glTF without normals are flat, as its standard says. Colours are those of the vertices
+        or the faces, if there are any; `uv` those of the file. Materials are those of MTL and glTF.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     MeshError
-        If the file is broken, has no triangles, or is of an unsupported format.
+        If the file is broken, has no triangles, or is of an unsupported format, or has no such animation.
+    ValueError
+        If `time` is negative, infinite or NaN.
     MissingPackageError
         If trimesh, or a package that it needs for this format, is not installed.
 
@@ -89,39 +118,44 @@ def load(
     [[0, 1, 2]]
     """
     crease = as_crease(crease)
-    source = InputFile(as_path("path", path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
+    checked = as_path("path", path)
+    budget = Budget(
+        str(checked), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels, max_triangles=max_triangles,
+        max_nodes=max_nodes, max_lines=max_lines, max_bytes=max_bytes, max_unpacked_bytes=max_unpacked_bytes,
+    )  # fmt: skip
+    source = InputFile(checked, budget)
+    source.moment = as_moment(time, clip)
     mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
     return mesh
 
 
+def as_moment(time: float | None, clip: int | str | None) -> Moment | None:
+    """The time and the clip, checked as far as that goes without the file; None: everything is at rest."""
+    if time is None:
+        if clip is not None:
+            raise ValueError(f"clip {shown(clip)} needs a time")
+        return None
+    seconds = as_seconds(time)
+    if clip is not None and not isinstance(clip, str):
+        try:
+            clip = operator.index(clip)
+        except TypeError:
+            raise TypeError(f"clip must be an index or a name, got {shown(clip)}") from None
+    return Moment(seconds, clip)
+
+
+def as_seconds(time: float) -> float:
+    """A time, if it is one."""
+    seconds = as_number("time", time)
+    if not 0 <= seconds < np.inf:
+        raise ValueError(f"time must be a number of seconds, 0 or more, got {time!r}")
+    return seconds
+
+
 def _mesh(source: InputFile, crease: float) -> Mesh | Points:
-    """The mesh of the file; a reader is imported when a file needs it."""
-    match source.path.suffix.lower():
-        case suffix if suffix in GLTF_SUFFIXES:
-            from topleft._meshes.io.gltf import read_gltf
-
-            parts = read_gltf(source)
-        case ".obj":
-            from topleft._meshes.io.obj import read_obj
-
-            parts = read_obj(source)
-        case ".ply":
-            from topleft._meshes.io.ply import read_ply
-
-            parts = read_ply(source)
-        case ".stl" | ".stl_ascii":
-            from topleft._meshes.io.stl_off import read_stl
-
-            parts = read_stl(source)
-        case ".off":
-            from topleft._meshes.io.stl_off import read_off
-
-            parts = read_off(source)
-        case _:
-            from topleft._meshes.io.foreign import read_by_trimesh
-
-            parts = read_by_trimesh(source)
+    """The mesh of the file."""
+    parts = _parts(source)
     if not parts and source.clouds:
         return _points(source)
     if not any(len(part.triangles) for part in parts):
@@ -130,6 +164,41 @@ def _mesh(source: InputFile, crease: float) -> Mesh | Points:
         ]
         raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
     return joined(parts, crease)
+
+
+def _parts(source: InputFile) -> list[Mesh]:
+    """What a reader makes of the file; it is imported when a file needs it."""
+    match source.path.suffix.lower():
+        case suffix if suffix in GLTF_SUFFIXES:
+            from topleft._meshes.io.gltf.reader import read_gltf
+
+            return read_gltf(source)
+        case ".obj":
+            from topleft._meshes.io.obj import read_obj
+
+            return read_obj(source)
+        case ".ply":
+            from topleft._meshes.io.ply import read_ply
+
+            return read_ply(source)
+        case ".stl" | ".stl_ascii":
+            from topleft._meshes.io.stl_off import read_stl
+
+            return read_stl(source)
+        case ".off":
+            from topleft._meshes.io.stl_off import read_off
+
+            return read_off(source)
+        case suffix if suffix in ARCHIVE_SUFFIXES:
+            from topleft._meshes.io.limits.archives import unpacked
+
+            with unpacked(source.path, source.budget) as (folder, paths):
+                members = [InputFile(path, source.budget, archive=source, home=folder) for path in paths]
+                return [part for member in members for part in _parts(member)]
+        case _:
+            from topleft._meshes.io.foreign import read_by_trimesh
+
+            return read_by_trimesh(source)
 
 
 def _points(source: InputFile) -> Points:
@@ -173,6 +242,9 @@ def reading(source: InputFile, read: Callable[[], Made]) -> Made:
         raise MeshError(f"{str(path)!r} is a folder, not a mesh")
     if not path.is_file():
         raise MeshError(f"{str(path)!r} is a pipe or a device, not a file")
+    if source.moment is not None and path.suffix.lower() not in GLTF_SUFFIXES:
+        time = source.moment.time
+        raise MeshError(f"{str(path)!r} has no time={time:g}: animations are read of glTF and GLB alone")
     try:
         with _strict_parsing(), np.errstate(all="ignore"):
             return read()

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, encode_srgb
-from topleft._meshes.io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
+from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._meshes.io.references import InputFile
 from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.texture import Texture
@@ -70,6 +71,7 @@ class Materials:
         """
         row = entry(self._tree, "materials", index)
         if index not in self._materials:
+            self._source.budget.spend("max_nodes", 1)
             self._uv_sets[index] = self._sets = uv_sets_of(row)
             self._materials[index] = self._made(row)
         return self._materials[index]
@@ -84,7 +86,8 @@ class Materials:
         own: dict[str, Any] = {"double_sided": row.get("doubleSided") is True}
         gloss = extensions.get("KHR_materials_pbrSpecularGlossiness")
         rough = row.get("pbrMetallicRoughness", {})
-        if gloss is not None and not rough:
+        is_unlit = "KHR_materials_unlit" in extensions
+        if gloss is not None and not (is_unlit and rough):
             own |= self._glossy(gloss)
         else:
             factor = _numbers(rough, "baseColorFactor", (1, 1, 1, 1))
@@ -99,8 +102,8 @@ class Materials:
         mode = row.get("alphaMode", "OPAQUE")
         own["alpha_mode"] = {"MASK": AlphaMode.MASK, "BLEND": AlphaMode.BLEND}.get(mode, AlphaMode.OPAQUE)
         if mode == "MASK":
-            own["alpha_cutoff"] = _share(_number(row, "alphaCutoff", 0.5))
-        if "KHR_materials_unlit" in extensions:
+            own |= cutoff_of(_number(row, "alphaCutoff", 0.5))
+        if is_unlit:
             for name in ("metallic", "roughness", "metallic_roughness_texture"):
                 own.pop(name, None)
             return Material(unlit=True, **own)
@@ -126,11 +129,13 @@ class Materials:
         specular = self._texture(row.get("specularGlossinessTexture"), "srgb")
         own: dict[str, Any] = {"opacity": _share(diffuse_factor[3])}
         there = [each for each in (diffuse, specular) if each is not None]
+        size = max((each.image.shape[:2] for each in there), key=math.prod, default=(0, 0))
+        if not self._source.may_have(2 * math.prod(size), "of KHR_materials_pbrSpecularGlossiness"):
+            there = []
         if not there:
             base, metallic = metallic_of_specular(diffuse_factor[:3], specular_factor)
             return {**own, "color": srgb_of_light(base), "metallic": float(metallic), "roughness": 1 - gloss}
         laid = there[0]
-        size = max((each.image.shape[:2] for each in there), key=math.prod)
         colors = _resized(None if diffuse is None else diffuse.image, size)
         strengths = _resized(None if specular is None else specular.image, size)
         bases, roughs = colors.copy(), np.zeros((*size, 3), np.uint8)
@@ -166,8 +171,10 @@ class Materials:
         sampler = {} if "sampler" not in row else entry(self._tree, "samplers", row["sampler"])
         key = (info["index"], encoding, uv_set, None if matrix is None else matrix.tobytes())
         if key not in self._textures:
+            self._source.budget.spend("max_nodes", 1)
             picture = self._picture(row)
-            self._textures[key] = None if picture is None else Texture(
+            may = picture is not None and self._source.may_lay(picture, f"textures[{info['index']}]")
+            self._textures[key] = None if picture is None or not may else Texture(
                 picture, filter=_filter_of(sampler), wrap=_wrap_of(sampler), encoding=encoding, uv_set=uv_set,
                 transform=matrix,
             )  # fmt: skip
@@ -191,15 +198,14 @@ class Materials:
     def _decoded(self, image: Tree, index: int) -> npt.NDArray[np.uint8] | None:
         uri = image.get("uri")
         name = str(image.get("name") or f"images[{index}]")
-        content: bytes | memoryview | None
         if "bufferView" in image:
-            content = self._accessors.view(image["bufferView"]).tobytes()
-        elif uri is None:
+            view = image["bufferView"]
+            return self._source.decoded(("view", view), name, lambda: self._accessors.view(view).tobytes())
+        if uri is None:
             raise MeshError(f"images[{index}] has neither a uri nor a bufferView")
-        else:
-            name = name if str(uri).startswith("data:") else str(uri)
-            content = uri_content(uri, self._source, "textures")
-        return None if content is None else self._source.decode(bytes(content), name)
+        if not str(uri).startswith("data:"):
+            return self._source.picture(unquote(str(uri)))
+        return self._source.decoded(("uri", uri), name, lambda: uri_content(uri, self._source, "textures"))
 
 
 def uv_sets_of(row: Tree) -> tuple[int, int]:
@@ -217,6 +223,11 @@ def uv_sets_of(row: Tree) -> tuple[int, int]:
         return 0, 1
     first, second = [*sorted(named), *({0, 1} - named)][:2]
     return first, second
+
+
+def cutoff_of(cutoff: float) -> dict[str, float]:
+    """What a material says of a cutoff: one above 1 hides what is opaque, too, as that of 1 hides what is clear."""
+    return {"alpha_cutoff": _share(cutoff)} if cutoff <= 1 else {"alpha_cutoff": 1.0, "opacity": 0.0}
 
 
 def metallic_of_specular(diffuse: F64, specular: F64) -> tuple[F64, F64]:
