@@ -9,8 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "faces.h"
 #include "nearest.h"
-#include "shading.h"
 #include "tiles.h"
 
 /* Where there is no number. The sign is clear; that of Microsoft's NAN depends on the compiler. */
@@ -481,6 +481,7 @@ typedef struct {
 #include "clusters.h"
 #include "exact.h"
 #include "polygons.h"
+#include "shading.h"
 #include "kernels.h"
 #include "meshlets.h"
 

@@ -108,7 +108,7 @@ def run(folder, capsys):
 
     def run_cli(*arguments):
         try:
-            status = topleft.cli.main([str(argument) for argument in arguments])
+            status = topleft._apps.cli.main([str(argument) for argument in arguments])
         except SystemExit as leaving:
             status = leaving.code
         return status, capsys.readouterr().err.splitlines()

@@ -16,14 +16,15 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_aligned, as_array, set_aligned, shown
 from topleft._core.base.memory import empty
-from topleft._core.raster.fragments import Fragments, Viewer, as_sample, view_of
+from topleft._core.raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
 from topleft._core.raster.peel import DepthLayers
-from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh, weighed
-from topleft._meshes.scene.scene import Instance, Scene, counted_ranges, meshes_of
+from topleft._meshes.picture.shade import ShownInstance
+from topleft._meshes.scene.scene import Scene, counted_ranges, meshes_in_places, meshes_of
 
 if TYPE_CHECKING:
     from topleft._meshes.picture.instances import PlacedScene
@@ -54,22 +55,18 @@ class VisiblePart(Part):
     """A part, and the instance that shows there; without one the mesh stands where its vertices are."""
 
     mesh: Mesh
-    instance: Instance | None = None
+    transform: F64 | None = None
 
     @cached_property
-    def drawn(self) -> tuple[Fragments, Mesh]:
-        """The fragments and the mesh as they were drawn, for the kernels: through a lens those of its parts."""
-        frags, mesh = self.frags, self.mesh
-        return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
+    def shown(self) -> ShownInstance:
+        """The mesh as it was drawn, for kernels."""
+        ((i, snapped, first),) = self.frags._drawn()
+        return ShownInstance(snapped, self.frags._parts_of(i, self.mesh), first)
 
     @property
     def place(self) -> npt.NDArray[np.float64]:
         """World from object, (4, 4)."""
-        return np.eye(4) if self.instance is None else self.instance.transform
-
-    def camera(self, camera: Camera) -> Camera:
-        """The camera as it stands in the object space of the instance, without its lens."""
-        return camera.straightened() if self.instance is None else camera.straightened().placed(self.instance.transform)
+        return np.eye(4) if self.transform is None else self.transform
 
 
 PartT = TypeVar("PartT", bound=Part)
@@ -77,10 +74,18 @@ PartT = TypeVar("PartT", bound=Part)
 
 def parts_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[VisiblePart]:
     """What each instance shows that shows anything, of the mesh or scene that was drawn; a mesh shows one part."""
-    if isinstance(subject, Mesh):
-        return [VisiblePart(0, WHOLE, frags, subject)]
-    found = cast(SceneFragments, frags).parts
-    return [VisiblePart(part.i, part.box, part.frags, subject[part.i].mesh, subject[part.i]) for part in found]
+    parts: Sequence[Part] = getattr(frags, "parts", [Part(0, WHOLE, frags)])
+    placed = meshes_in_places(subject)
+    return [VisiblePart(part.i, part.box, part.frags, *placed[part.i]) for part in parts]
+
+
+def shown_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[ShownInstance]:
+    """The instances that some sample sees, as they are shaded, of the mesh or scene that was drawn."""
+    placed = meshes_in_places(subject)
+    return [
+        ShownInstance(snapped, frags._parts_of(i, placed[i][0]), first, placed[i][1])
+        for i, snapped, first in frags._drawn()
+    ]
 
 
 def join(
@@ -196,6 +201,33 @@ class SceneFragments(InstanceIds, Fragments):
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
         return local_ids(self.samples_id, self.samples_instance, self.placed.whole_first_ids)
 
+    def _whole(self, ids: Ids) -> Ids:
+        return self.placed.whole_ids(ids)
+
+    def _seen(self) -> SeenSamples:
+        return SeenSamples.of(*self.drawn_planes)
+
+    def _parts_of(self, i: int, mesh: Mesh) -> Mesh:
+        return mesh if self.placed.bent is None else self.placed.bent[i].mesh_of(mesh)
+
+    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
+        return self._snapped_instances
+
+    @cached_property
+    def _snapped_instances(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
+        ids, first_ids = self.drawn_planes[0], self.placed.first_ids
+        boxes = np.tile(np.array([*ids.shape[:0:-1], 0, 0], np.int32), (len(first_ids) - 1, 1))
+        for plane in ids:
+            find_instances(np.ascontiguousarray(as_aligned(plane)), first_ids, boxes)
+        found = []
+        for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
+            left, top, right, bottom = boxes[i].tolist()
+            first, end = first_ids[i : i + 2].tolist()
+            part = ids[:, top:bottom, left:right]
+            mesh = self.placed.snap_part(i, lambda part=part, first=first, end=end: local_part(part, first, end))
+            found.append((i, mesh.seen_from(*self.positions[0]), first))
+        return tuple(found)
+
     def _at_sample(self, i: int) -> SceneFragments:
         """Return ids, depth and attributes at one sample of each pixel."""
         i = as_sample(i, len(self.positions))
@@ -220,7 +252,7 @@ class SceneFragments(InstanceIds, Fragments):
             box = slice(top, bottom), slice(left, right)
             first, end = self.placed.first_ids[i : i + 2].tolist()
             own = local_part(self.drawn_planes[0][0][box], first, end)
-            scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(left, top)
+            scene = self.placed.snap_part(i, lambda own=own: own).seen_from(*self.positions[0]).moved(left, top)
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
             frags.corners = self.placed.corners(i)
@@ -367,6 +399,18 @@ class BentFragments(Fragments):
             self._samples = tuple(BentFragments(sample, self.bent, self._mesh) for sample in samples)
             self._planes = planes and (self.bent.wholes[planes[0]], planes[1])
         return self._samples, self._planes
+
+    def _whole(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
+        return self.bent.wholes[ids]
+
+    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
+        return self.drawn._drawn()
+
+    def _parts_of(self, i: int, mesh: Mesh) -> Mesh:  # noqa: ARG002
+        return self.bent.mesh_of(mesh)
+
+    def _seen(self) -> SeenSamples:
+        return self.drawn._seen()
 
     def again(self) -> BentFragments:
         """Return the same made anew from the parts, whose buffers have changed."""
