@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from topleft._core.base.arrays import as_size, shown
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.verbs import Rasterizer, rasterize
+from topleft._core.raster.verbs import Rasterizer, draw_ids
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.material import Material
@@ -222,8 +222,5 @@ def rasterize_shot(
     if drawn.bent is None:
         view.setdefault("plan", StaticPlan(subject))
     view["plan"] = drawn.sided(view.get("plan"), subject.single_sided(material))
-    if rasterizer is None:
-        frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
-    else:
-        frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
+    frags = draw_ids(rasterizer, size, drawn.vertices, drawn.triangles, is_split=True, **view)
     return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)
