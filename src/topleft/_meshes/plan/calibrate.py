@@ -55,7 +55,7 @@ class Sample:
     ns: float
 
 
-def calibrate(*, n_rounds: int = 7) -> Costs:
+def calibrate(*, n_rounds: int = 5) -> Costs:
     """Measure this machine: half a minute.
 
     Parameters
@@ -321,7 +321,7 @@ def tune(own: Costs, n_rounds: int) -> Costs:
         kept = replace(own, **{name: getattr(shipped, name) for name in (*one.rows, *MEASURED.get(one.choice, ()))})
         tables = [kept, *(scaled(table, one.rows, by) for table in (own, kept) for by in FACTORS)]
         fitted, others = (
-            np.stack([losses(one, draw, tables, min(5, n_rounds)) for draw in one.draws(seed)]) for seed in (1, 2)
+            np.stack([losses(one, draw, tables, min(3, n_rounds)) for draw in one.draws(seed)]) for seed in (1, 2)
         )
         best = int(np.argmin(fitted.mean(axis=0)))
         if others[:, best].mean() > others[:, 0].mean() - LEAST_GAIN:

@@ -25,7 +25,7 @@ def as_text(plan: Mapping[str, Any]) -> str:
             lines += paragraph("not: ", rejected)
     total = milliseconds(plan["estimated_ms"], None)
     lines.append(f"{'':<12}{'in all':<{WIDTH - 36}}{total:>12}{milliseconds(plan['measured_ms'], None):>12}".rstrip())
-    lines += ["", f"estimates: {plan['costs']}; on memory that is kept"]
+    lines += ["", *wrap(f"choices and estimates: {plan['costs']}; on memory that is kept", WIDTH)]
     return "\n".join(lines)
 
 
