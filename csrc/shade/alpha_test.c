@@ -84,7 +84,7 @@ TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64
     const int is_nearest = c->target->sink == TL_SINK_NEAREST;
     if (is_nearest)
         hide_nearest(c, n, own, own_depth, to);
-    find_runs(s, own, n);
+    find_runs(s, own, n, column);
     if (!s->n_runs)
         return;
     set_runs(s, row);

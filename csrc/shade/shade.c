@@ -59,7 +59,7 @@ static void start_runs(shade_runs *s, const tl_snapped *snapped, const tl_window
     s->needs_more = s->needs_uv1 || s->needs_alpha || s->needs_tangents[0] || s->needs_tangents[1];
     s->needs_q = s->needs_uv || s->needs_more || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
     s->is_plain = s->needs_normal && !s->needs_q && !shading->face_normals && !shading->normal_of_corner &&
-                  !shading->finds_inverse_w && !snapped->mesh.exact && window->subpixel_bits > 0;
+                  !shading->finds_inverse_w && window->subpixel_bits > 0;
     note_far(s);
     start_grey(s);
     memset(s->ints, 0, sizeof s->ints);
@@ -71,7 +71,7 @@ static void start_runs(shade_runs *s, const tl_snapped *snapped, const tl_window
 TL_INLINE int start_span(shade_runs *s, const int32_t *ids, int64_t row, int64_t column)
 {
     const int n = (int)min64(TL_SPAN, s->window->width - column);
-    find_runs(s, ids + row * s->window->width + column, n);
+    find_runs(s, ids + row * s->window->width + column, n, column);
     set_runs(s, row);
     return n;
 }

@@ -55,7 +55,7 @@ TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, int64_t row, int64_t
 {
     started_span span;
     span.next = 0;
-    find_runs(s, sums->ids, n);
+    find_runs(s, sums->ids, n, column);
     set_runs(s, row);
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         if (!s->visible[i])
