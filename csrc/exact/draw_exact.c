@@ -16,6 +16,7 @@
 #include "few/few.c"
 #include "exact/alone_exact.c"
 #include "exact/boxes_exact.c"
+#include "exact/pieces_exact.c"
 #include "exact/rows_exact.c"
 #include "exact/setup_exact.c"
 #include "raster/batch.c"
@@ -294,6 +295,20 @@ static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window 
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
 }
 
+/* The pieces of listed triangles. */
+static __attribute__((noinline)) void draw_listed_pieces(exact_state *s, int64_t n_whole, const tl_share *share)
+{
+    const tl_exact_pieces *pieces = s->points->pieces;
+    for (int64_t i = share->first; i < share->end; i++) {
+        int64_t k = first_exact_piece(pieces, share->ids[i]);
+        for (; k < pieces->n_pieces && pieces->source[k] == share->ids[i]; k++) {
+            if (s->bad_row >= 0 || tl_is_given_up(s->window))
+                return;
+            TL_SINK_CALL(draw_lone, s->target->sink, s, (int32_t)(n_whole + k))
+        }
+    }
+}
+
 /* The triangles [n_whole, end) are pieces. */
 TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window,
                                 const tl_target *target, tl_share *share, tl_exact_counts *counts, int64_t *bad_row,
@@ -326,6 +341,8 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const t
     TL_LIST_CALL(flush_middle_exact, sink, &s)
     TL_LIST_CALL(flush_rows_exact, sink, &s)
     draw_slivers(&s);
+    if (share->ids && s.points->pieces)
+        draw_listed_pieces(&s, n_whole, share);
     flush_fragments(target, &s.fragments, s.fragments.n);
     if (counts_pieces && s.bad_row < 0)
         count_pieces(&s, max64(share->first, n_whole), share->end);

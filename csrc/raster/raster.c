@@ -361,9 +361,4 @@ static int64_t draw_bands_of(const tl_snapped *snapped, const tl_window *window,
     return -1;
 }
 
-static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
-{
-    return draw_bands_of(snapped, window, target, share, draw_part);
-}
-
 #endif

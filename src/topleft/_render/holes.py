@@ -163,8 +163,6 @@ def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, threads:
 
 def inputs_of(scene: _engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
     """What the kernel reads of materials with holes."""
-    if scene.exact is not None:
-        raise ValueError("subpixel_bits must be in 0..16 where textures cut holes, got 'exact'")
     inputs = ShadingInputs(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
     inputs.set_materials(mesh, cut.materials, is_unlit=True)
     inputs.set_view(0, None, (0, 0, 0, 0))
