@@ -37,6 +37,7 @@
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
+#include "mesh/bend.c"
 #include "mesh/creases.c"
 #include "mesh/equal.c"
 #include "mesh/normals.c"
@@ -124,6 +125,10 @@ const tl_kernels TL_KERNELS = {
     .group_rows = group_rows,
     .build_tree = build_tree,
     .find_nearest = nearest_of_points,
+    .bend_vertices = bend_vertices,
+    .see_points = see_points,
+    .find_bent = find_bent,
+    .split_bent = split_bent,
     .find_reach = find_reach,
     .set_feet = set_feet,
     .snap_points = snap_points,

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "lens.h"
 #include "nearest.h"
 #include "shading.h"
 #include "tiles.h"

@@ -8,6 +8,7 @@ detail.pxi     bounds how far points may be off in a picture: what levels of det
 exact.pxi      draws triangles whose vertices are not snapped
 isa.py         chooses the instruction set that runs, and tells how this copy was built
 kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python
+lens.pxi       finds what a lens bends of a mesh, and splits it
 matrices.pxi   multiplies and inverts small matrices, the same on every machine
 meshlets.pxi   grows a mesh into meshlets, and draws those that a view may show
 mesh.pxi       computes normals of a mesh, and distances between surfaces

@@ -391,6 +391,28 @@ cdef extern from "topleft.h" nogil:
         int64_t *n_nodes
         int n_levels
         float slack
+    enum:
+        TL_LENS_RINGS
+    ctypedef struct tl_lens:
+        int is_fisheye
+        double k[6]
+        double p[2]
+        double s[4]
+        double tilt[4]
+        int has_prism, is_tilted
+        double limit, limit_cosine, limit_sine, slope, least_cosine, cap_cosine, cap_sine
+        double px_from_plane[6]
+        double tolerance_px, near, plain_cosine
+        float ring_scale
+        float allowed[TL_LENS_RINGS]
+    ctypedef struct tl_bent_parts:
+        int64_t n_parts, n_points, most
+        int32_t first_point
+        int32_t *triangles
+        int32_t *source
+        double *weights
+        uint8_t *is_outline
+        double *points
     ctypedef struct tl_reach:
         double known, bound
         int64_t n_pieces
@@ -553,6 +575,10 @@ cdef extern from "topleft.h" nogil:
         void (*move_points)(const tl_source *, const double *, int64_t, int64_t, double *) noexcept nogil
         void (*color_rows)(const uint8_t *, int, int64_t, int64_t, float *) noexcept nogil
         int64_t (*group_rows)(const uint32_t *, int, int64_t, int, int32_t *, int32_t *, int32_t *) noexcept nogil
+        void (*bend_vertices)(const tl_lens *, const tl_source *, const double *, int64_t, int64_t, double *, float *) noexcept nogil
+        void (*see_points)(const tl_lens *, const double *, int64_t, double *) noexcept nogil
+        int64_t (*find_bent)(const tl_lens *, const float *, int64_t, const int32_t *, int64_t, int64_t, int32_t *, int32_t *, int64_t *) noexcept nogil
+        void (*split_bent)(const tl_lens *, const double *, const float *, int64_t, const int32_t *, const int32_t *, int64_t, tl_bent_parts *) noexcept nogil
         void (*build_tree)(tl_surface *) noexcept nogil
         double (*find_nearest)(const tl_surface *, const double *, int64_t, int64_t, int32_t *, double *) noexcept nogil
         void (*find_reach)(const tl_surface *, const double *, const int32_t *, int64_t, int64_t, double, double, tl_reach *) noexcept nogil

@@ -25,6 +25,7 @@ FEW_STORED: int
 FEW_LABELLED: int
 BLENDED_ROWS: int
 MAX_LAYERS: int
+LENS_RINGS: int
 CLUSTER: int
 CLUSTER_GROUP: int
 CLUSTER_TAIL: int
@@ -546,6 +547,44 @@ class MeshletPass:
         room: I32,
         others: I32,
     ) -> int: ...
+
+class LensTable:
+    def __init__(
+        self,
+        is_fisheye: bool,
+        k: Sequence[float],
+        p: Sequence[float],
+        s: Sequence[float],
+        tilt: Sequence[float],
+        px_from_plane: Sequence[Sequence[float]],
+        tolerance_px: float,
+    ) -> None: ...
+    def go_on_from(self, limit: float, cosine: float, sine: float, slope: float) -> None: ...
+    def set_frame(self, least_cosine: float, cap_cosine: float, cap_sine: float) -> None: ...
+    def set_rings(self, cosine: float, allowed: F32) -> None: ...
+    def places(self, points: F64) -> F64: ...
+    def bend_vertices(
+        self, source: Source, eye_from: F64, near: float, first: int, end: int, bent: F64, records: F32
+    ) -> None: ...
+    def find_bent(
+        self, records: F32, triangles: I32, first: int, end: int, bent: I32, outside: I32
+    ) -> tuple[int, int]: ...
+    def count_parts(
+        self, points: F64, records: F32, triangles: I32, ids: I32, near: float, most: int
+    ) -> tuple[int, int]: ...
+    def write_parts(
+        self,
+        points: F64,
+        records: F32,
+        triangles: I32,
+        ids: I32,
+        near: float,
+        own: I32,
+        source: I32,
+        weights: F64,
+        is_outline: U8,
+        own_points: F64,
+    ) -> None: ...
 
 class Tree:
     def __init__(self, points: F64, triangles: I32, slack: float) -> None: ...
