@@ -1,5 +1,5 @@
-"""Build `topleft._engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and the
-classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's default instruction set.
+"""Build `topleft._core.engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and
+the classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's default instruction set.
 
 Everything that is not about compiling stands in `pyproject.toml`. setuptools gives all sources of an extension the same
 flags, so `BuildTopleft` compiles each unit by itself and links the objects.
@@ -32,7 +32,7 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, PlatformError
 
 ROOT = Path(__file__).resolve().parent
-ENGINE = "topleft._engine.kernels"
+ENGINE = "topleft._core.engine.kernels"
 CLASSICS = "topleft.methods.classics.classic_kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]

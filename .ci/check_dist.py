@@ -44,7 +44,7 @@ def main(folder: Path) -> None:
     check(wheel.name, in_wheel, modules, in_wheel - modules - extensions - metadata)
 
     top = {"LICENSE", "MANIFEST.in", "README.md", "pyproject.toml", "setup.py"}
-    built = {n for n in in_sdist if n.endswith((".so", ".o", ".pyc")) or n == "src/topleft/_engine/kernels.c"}
+    built = {n for n in in_sdist if n.endswith((".so", ".o", ".pyc")) or n == "src/topleft/_core/engine/kernels.c"}
     check(sdist.name, in_sdist, top | files_below("csrc", "src", "tests"), built)
 
 

@@ -33,7 +33,7 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture
 def shared_rows(monkeypatch):
     """Pictures however small are shaded by as many threads as are asked for."""
-    monkeypatch.setattr("topleft._shade.shade.MIN_PX_PER_THREAD", 1)
+    monkeypatch.setattr("topleft._meshes.picture.shade.MIN_PX_PER_THREAD", 1)
 
 
 #: Packages of the extra `test` that scenes and comparisons of tests need; the library itself never does.
@@ -91,7 +91,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def run(folder, capsys):
     """Run the command line: its exit status and the lines of stderr."""
-    import topleft.cli
+    import topleft._apps.cli
 
     def run_cli(*arguments):
         try:

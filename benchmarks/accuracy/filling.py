@@ -188,6 +188,6 @@ def areas(scene: Triangles) -> NDArray[np.float64]:
 
 def samplings() -> list[str]:
     """The ways to sample that the installed library has and that estimate how much of a pixel is covered."""
-    from topleft._base.options import Sampling
+    from topleft._core.base.options import Sampling
 
     return [str(value) for value in Sampling if value not in ("outer", "inner")]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from benchmarks.atlas.maps import tabulate
 from benchmarks.exact.clip import draw_clip, pieces_picture
 from benchmarks.scenes.families import NO_SNAP
-from topleft._explore.race import PRODUCTION
+from topleft._apps.explore.race import PRODUCTION
 from topleft.methods.reference.integers import box_side, edge_values, signed_area, snapped_points
 from topleft.scene_families import (
     MIDDLE_PX,

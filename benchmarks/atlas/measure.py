@@ -18,7 +18,7 @@ from benchmarks.atlas.depth import DEPTH_FAMILIES, measure_depth
 from benchmarks.atlas.maps import Faults, tabulate
 from benchmarks.harness.arguments import refuse_unknown
 from benchmarks.harness.records import Record, tell
-from topleft._explore.race import PRODUCTION, Entry, Exact, draw_counts, draw_labels, entries, find_faults
+from topleft._apps.explore.race import PRODUCTION, Entry, Exact, draw_counts, draw_labels, entries, find_faults
 from topleft.scene_families import FAMILIES, Family, walk
 
 SCHEMA = 1

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft._explore.race import Entry, Exact, draw_counts, draw_labels, entries
+from topleft._apps.explore.race import Entry, Exact, draw_counts, draw_labels, entries
 from topleft.failure_scenes import FailureScene, Got
 from topleft.methods import find_method
 from topleft.scene_families import FAMILIES, Family, PixelScene

@@ -9,7 +9,7 @@ from benchmarks.atlas.depth import DEPTH_FAMILIES
 from benchmarks.atlas.measure import SAMPLED
 from benchmarks.harness.records import Record
 from benchmarks.report.tables import left_table, table_text
-from topleft._explore.race import PRODUCTION
+from topleft._apps.explore.race import PRODUCTION
 from topleft.failure_scenes import FAILURE_SCENES
 
 Row = dict[str, Any]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes.arrays import Arrays, blob_arrays, map_arrays, rounded, shrunk, sliver_arrays, strewn_arrays
 from benchmarks.scenes.cases import HD, UHD, orbit_camera
-from topleft._camera.camera import Camera
-from topleft._camera.matrices import orbit_view
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.matrices import orbit_view
 from topleft.scenes import large_triangle
 
 

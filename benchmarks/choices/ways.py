@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 import topleft as tl
 from benchmarks.choices.scenes import Scene
 from benchmarks.harness.ways import Draw, Picture, Way, Ways
-from topleft import _engine
-from topleft._base import threads
-from topleft._base.memory import FreshMemory, KeptMemory
-from topleft._base.options import Sink
-from topleft._raster import choices, sampling
-from topleft._raster.rasterize import draw
-from topleft._raster.sampling import sample_positions, sum_areas
-from topleft._raster.snap import snap_mesh
-from topleft._raster.view import View
+from topleft._core import engine
+from topleft._core.base import threads
+from topleft._core.base.memory import FreshMemory, KeptMemory
+from topleft._core.base.options import Sink
+from topleft._core.raster import choices, sampling
+from topleft._core.raster.rasterize import draw
+from topleft._core.raster.sampling import sample_positions, sum_areas
+from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.view import View
 
 MSAA = ("msaa2", "msaa4", "msaa8", "msaa16")
 FAR_PX = 2**24
@@ -242,8 +242,8 @@ def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
         snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
         areas: NDArray[np.float32] = memory.empty("areas", (height, width), np.float32)
         if is_wide:
-            cells = np.zeros(height * _engine.area_stride(width), np.int64)
-            snapped.mesh.draw_area(areas, _engine.as_bytes(cells), 0, height, True, True)
+            cells = np.zeros(height * engine.area_stride(width), np.int64)
+            snapped.mesh.draw_area(areas, engine.as_bytes(cells), 0, height, True, True)
         else:
             sum_areas(memory, snapped.mesh, snapped.n_triangles, areas, 1, is_clamped=True)
         return (areas,)
@@ -255,7 +255,7 @@ def of_memory(scene: Scene) -> Ways:
     """Scratch that a thread keeps, or fresh memory; results are fresh either way."""
     if scene.verb == "rasterize" or scene.sampling not in ("center", "area"):
         return []
-    from topleft._raster import verbs as api
+    from topleft._core.raster import verbs as api
 
     call = verb_of(scene, tl, *scene.arrays, (scene.size,), scene.asked())
     return [Way("kept", call), Way("fresh", call, ((api, "SCRATCH", FreshMemory()),))]

@@ -20,8 +20,8 @@ from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.levels import page
 from benchmarks.report.study import Study
-from topleft._lod.detail import pixels_of_bound, window_of
-from topleft._render.through_lens import StaticPlan
+from topleft._meshes.lod.detail import pixels_of_bound, window_of
+from topleft._meshes.picture.through_lens import StaticPlan
 
 SIZE = (1920, 1080)
 HEIGHTS_PX = (1000, 300, 100, 30, 10)

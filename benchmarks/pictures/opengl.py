@@ -15,8 +15,8 @@ import numpy as np
 
 import topleft as tl
 from benchmarks.pictures.scenes import SIZE, PictureScene
-from topleft._base.color import DEFAULT_COLOR
-from topleft._model.environment import DEFAULT_ENVIRONMENT
+from topleft._core.base.color import DEFAULT_COLOR
+from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT
 
 ENVIRONMENT = {"LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "llvmpipe", "LP_NUM_THREADS": "0"}
 

@@ -113,10 +113,10 @@ def measure(case: PolygonCase, options: Options, record: Record) -> None:
 def right_picture(polygons: list[list[Any]], case: PolygonCase) -> Any:
     """Return what must be there."""
     import topleft as tl
-    from topleft import _engine
+    from topleft._core import engine
 
-    before = _engine.isa_in_use()
-    _engine.use_isa("scalar")
+    before = engine.isa_in_use()
+    engine.use_isa("scalar")
     try:
         if case.task == "table":
             table = tl.overlap(polygons, case.size, threads=1)
@@ -129,7 +129,7 @@ def right_picture(polygons: list[list[Any]], case: PolygonCase) -> Any:
             return tl.polygons(one, case.size, threads=1)
         return tl.polygons(polygons, case.size, values="index", threads=1)
     finally:
-        _engine.use_isa(before)
+        engine.use_isa(before)
 
 
 def errors(made: Any, right: Any, case: PolygonCase) -> tuple[int, float]:

@@ -38,7 +38,7 @@ def draw(path: Path, picture: Path, up: str = "y") -> dict[str, Any]:
         of what is drawn `n_triangles`, `n_points`, `load_s` (`tl.load`), `command_s` (all of `topleft render`), and
         `covered`: the share of the pixels that are not background.
     """
-    from topleft.cli import main
+    from topleft._apps.cli import main
 
     said = io.StringIO()
     picture.unlink(missing_ok=True)

@@ -97,8 +97,8 @@ def add(case: Case) -> None:
 
 def orbit_camera(size: tuple[int, int]) -> NDArray[np.float64]:
     """Clip from object (4, 4): the camera of all mesh scenes, 3 units from the origin, 30 degrees round, 20 up."""
-    from topleft._camera.camera import Camera
-    from topleft._camera.matrices import orbit_view
+    from topleft._meshes.camera.camera import Camera
+    from topleft._meshes.camera.matrices import orbit_view
 
     return Camera.perspective(orbit_view([0, 0, 0], 3.0, 30.0, 20.0), near=0.1, far=100.0).clip_from_world(size)
 
@@ -170,7 +170,7 @@ def singles_scene(n_across: int = 15, n_down: int = 10, size_px: int = 40, cell_
 def views_scene(task: str, n_triangles: int, n_views: int, size: tuple[int, int]) -> Scene:
     """The bumpy sphere from `n_views` sides, all round, 20 degrees up, in float32 and int32."""
     from topleft import Mesh, scenes
-    from topleft._camera.camera import Camera
+    from topleft._meshes.camera.camera import Camera
 
     vertices, triangles = scenes.blob(n_triangles)
     mesh = Mesh(vertices.astype(np.float32), triangles)

@@ -29,7 +29,7 @@ N_ROUNDS = 40
 def contestants() -> dict[str, Callable[[], object]]:
     """A call for each layer, the picture first."""
     import topleft as tl
-    from topleft._render.layers import LAYERS
+    from topleft._meshes.picture.layers import LAYERS
 
     vertices, triangles = tl.scenes.blob(N_TRIANGLES)
     uv = np.random.default_rng(0).random((len(vertices), 2), np.float32)

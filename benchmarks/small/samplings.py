@@ -12,8 +12,8 @@ import topleft as tl
 from benchmarks.harness.machine import IMAGES
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
-from topleft._base.options import Sampling
-from topleft._raster.sampling import POSITIONS
+from topleft._core.base.options import Sampling
+from topleft._core.raster.sampling import POSITIONS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

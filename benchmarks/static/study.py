@@ -3,8 +3,8 @@
 In: scenes of `scenes.py`. Out: a record with a row for each scene and one for each mesh.
 
 Both ways are the public call on memory that is kept, on one thread; each has a `Mesh` of its own, of the same arrays.
-The planner's has been drawn before: it is in clusters or in meshlets where `topleft._raster.choices` says that this
-pays. The other never is. A third one, where the first is in meshlets, never is in these.
+The planner's has been drawn before: it is in clusters or in meshlets where `topleft._core.raster.choices` says that
+this pays. The other never is. A third one, where the first is in meshlets, never is in these.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from benchmarks.harness.ways import Draw, Forced, Picture, Way, check_same_bits,
 from benchmarks.report.study import Study
 from benchmarks.static import tables
 from benchmarks.static.scenes import StaticScene, scenes
-from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredMesh
-from topleft._raster.clusters import Clusters
-from topleft._render import instances
+from topleft._core.raster import choices
+from topleft._core.raster.cluster_draw import ClusteredMesh
+from topleft._core.raster.clusters import Clusters
+from topleft._meshes.picture import instances
 
 WHOLE: Forced = ((choices, "pays_to_cluster", lambda *_: False),)
 ASKED = ("pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_instances")
@@ -118,7 +118,7 @@ def counting(fates: Fates) -> Forced:
             fates.n_turned_here += round(n * (seen.back + seen.front))
             return super().draw_rows(*arguments, **options)
 
-    rasterize = sys.modules["topleft._raster.rasterize"]  # not the verb of the same name
+    rasterize = sys.modules["topleft._core.raster.rasterize"]  # not the verb of the same name
     return (rasterize, "ClusteredMesh", CountedScene), (instances, "ClusteredMesh", CountedScene)
 
 

@@ -7,68 +7,68 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from topleft import scenes
-from topleft._base.memory import release_memory
-from topleft._camera.camera import Camera
-from topleft._camera.file_cameras import load_cameras
-from topleft._camera.lens import FisheyeLens, OpenCVLens
-from topleft._camera.viewpoints import turntable, viewpoints
-from topleft._engine.isa import build_info
-from topleft._field.field import field, height_map
-from topleft._field.grid import Grid
-from topleft._io.images import save_image
-from topleft._io.load import load
-from topleft._lod.detail import Detail, choose_detail
-from topleft._lod.levels import Level, Levels
-from topleft._lod.simplify import simplify
-from topleft._model.environment import Environment
-from topleft._model.light import Fog, Light
-from topleft._model.material import Material
-from topleft._model.mesh import Mesh
-from topleft._model.points import Points
-from topleft._model.texture import Texture
-from topleft._plan.plan import Plan, plan
-from topleft._points.points import PointFragments, points
-from topleft._polygons.overlap import Overlap, overlap
-from topleft._polygons.polygons import polygons
-from topleft._raster.classic import bresenham_line
-from topleft._raster.composite import composite
-from topleft._raster.fragments import Fragments
-from topleft._raster.peel import DepthLayers, peel
-from topleft._raster.poses import FragmentsBatch
-from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
-from topleft._render.fragments import SceneDepthLayers, SceneFragments
-from topleft._render.render import rasterize_mesh, render
-from topleft._render.scene_shade import shade
-from topleft._render.silhouette import silhouette
-from topleft._scene.adapt import as_mesh
-from topleft._scene.scene import Instance, Scene
+from topleft._core.base.grid import Grid
+from topleft._core.base.memory import release_memory
+from topleft._core.engine.isa import build_info
+from topleft._core.polygons.overlap import Overlap, overlap
+from topleft._core.polygons.polygons import polygons
+from topleft._core.raster.classic import bresenham_line
+from topleft._core.raster.composite import composite
+from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.peel import DepthLayers, peel
+from topleft._core.raster.points import PointFragments, points
+from topleft._core.raster.poses import FragmentsBatch
+from topleft._core.raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.file_cameras import load_cameras
+from topleft._meshes.camera.lens import FisheyeLens, OpenCVLens
+from topleft._meshes.camera.viewpoints import turntable, viewpoints
+from topleft._meshes.field.field import field, height_map
+from topleft._meshes.io.images import save_image
+from topleft._meshes.io.load import load
+from topleft._meshes.lod.detail import Detail, choose_detail
+from topleft._meshes.lod.levels import Level, Levels
+from topleft._meshes.lod.simplify import simplify
+from topleft._meshes.model.environment import Environment
+from topleft._meshes.model.light import Fog, Light
+from topleft._meshes.model.material import Material
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.points import Points
+from topleft._meshes.model.texture import Texture
+from topleft._meshes.picture.fragments import SceneDepthLayers, SceneFragments
+from topleft._meshes.picture.render import rasterize_mesh, render
+from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.silhouette import silhouette
+from topleft._meshes.plan.plan import Plan, plan
+from topleft._meshes.scene.adapt import as_mesh
+from topleft._meshes.scene.scene import Instance, Scene
 from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageError, TopleftError
 
 if TYPE_CHECKING:
-    from topleft._batch.batch import render_batch
-    from topleft._batch.jobs import Job
-    from topleft._diagram.pixel_grid import pixel_grid
-    from topleft._explore.open import Explorer, explore
-    from topleft._render.transparent import render_transparent, visible_layers
-    from topleft._render.view_layers import ViewLayers, render_layers
-    from topleft._tiles.merge import merge
-    from topleft._tiles.tiles import Tiles, Window, tiles
+    from topleft._apps.batch.batch import render_batch
+    from topleft._apps.batch.jobs import Job
+    from topleft._apps.diagram.pixel_grid import pixel_grid
+    from topleft._apps.explore.open import Explorer, explore
+    from topleft._apps.tiles.merge import merge
+    from topleft._apps.tiles.tiles import Tiles, Window, tiles
+    from topleft._meshes.picture.transparent import render_transparent, visible_layers
+    from topleft._meshes.picture.view_layers import ViewLayers, render_layers
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
-    "Explorer": "topleft._explore.open",
-    "Job": "topleft._batch.jobs",
-    "Tiles": "topleft._tiles.tiles",
-    "ViewLayers": "topleft._render.view_layers",
-    "Window": "topleft._tiles.tiles",
-    "explore": "topleft._explore.open",
-    "merge": "topleft._tiles.merge",
-    "pixel_grid": "topleft._diagram.pixel_grid",
-    "render_batch": "topleft._batch.batch",
-    "render_layers": "topleft._render.view_layers",
-    "render_transparent": "topleft._render.transparent",
-    "tiles": "topleft._tiles.tiles",
-    "visible_layers": "topleft._render.transparent",
+    "Explorer": "topleft._apps.explore.open",
+    "Job": "topleft._apps.batch.jobs",
+    "Tiles": "topleft._apps.tiles.tiles",
+    "ViewLayers": "topleft._meshes.picture.view_layers",
+    "Window": "topleft._apps.tiles.tiles",
+    "explore": "topleft._apps.explore.open",
+    "merge": "topleft._apps.tiles.merge",
+    "pixel_grid": "topleft._apps.diagram.pixel_grid",
+    "render_batch": "topleft._apps.batch.batch",
+    "render_layers": "topleft._meshes.picture.view_layers",
+    "render_transparent": "topleft._meshes.picture.transparent",
+    "tiles": "topleft._apps.tiles.tiles",
+    "visible_layers": "topleft._meshes.picture.transparent",
 }
 
 __version__: str = build_info()["version"]

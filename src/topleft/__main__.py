@@ -2,6 +2,6 @@
 
 import sys
 
-from topleft.cli import main
+from topleft._apps.cli import main
 
 sys.exit(main())

@@ -18,11 +18,11 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-from topleft._base.arrays import as_checked_triangles, as_pair
-from topleft._base.memory import empty
-from topleft._base.threads import parse_threads
-from topleft._raster.peel import DepthLayers, peel
-from topleft._raster.verbs import rasterize as draw
+from topleft._core.base.arrays import as_checked_triangles, as_pair
+from topleft._core.base.memory import empty
+from topleft._core.base.threads import parse_threads
+from topleft._core.raster.peel import DepthLayers, peel
+from topleft._core.raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, FilterModeOption
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft import _engine
-from topleft._base import memory
+from topleft._core import engine
+from topleft._core.base import memory
 
 SIZE = (256, 128)
 N_BYTES = 4 * 256 * 128
@@ -37,7 +37,7 @@ def test_memory_of_a_dead_array_is_given_again():
     first = memory.empty(SIZE, np.int32)
     at = address(first)
     del first
-    assert _engine.waiting_memory() == N_BYTES
+    assert engine.waiting_memory() == N_BYTES
     assert address(memory.empty(SIZE, np.float32)) == at
 
 
@@ -45,10 +45,10 @@ def test_memory_waits_only_when_the_last_view_has_died():
     array = memory.empty(SIZE, np.int32)
     corner = array[::-2, 1:].T
     del array
-    assert _engine.waiting_memory() == 0
+    assert engine.waiting_memory() == 0
     assert not np.shares_memory(corner, memory.empty(SIZE, np.int32))
     del corner
-    assert _engine.waiting_memory() == 2 * N_BYTES
+    assert engine.waiting_memory() == 2 * N_BYTES
 
 
 def test_memory_behind_a_memoryview_lives():
@@ -71,7 +71,7 @@ def test_memory_of_another_size_waits_on(n_asked):
     memory.empty((N_BYTES,), np.uint8)
     array = memory.empty((n_asked,), np.uint8)
     assert array.size == n_asked
-    assert _engine.waiting_memory() == N_BYTES
+    assert engine.waiting_memory() == N_BYTES
 
 
 def test_the_least_block_with_room_is_given():
@@ -88,38 +88,38 @@ def test_sizes_near_2_63_fit_no_block_that_waits():
     memory.empty(SIZE, np.int32)
     for n_asked in (2**63 - 1, 2**63 - 2**40):
         with pytest.raises(MemoryError, match=f"no {n_asked:,} bytes"):
-            _engine.lease_block(n_asked, refuse)
-    assert _engine.waiting_memory() == N_BYTES
+            engine.lease_block(n_asked, refuse)
+    assert engine.waiting_memory() == N_BYTES
 
 
 def test_no_more_waits_than_the_bound_and_what_waited_longest_goes_first():
-    _engine.keep_blocks(2 * N_BYTES)
+    engine.keep_blocks(2 * N_BYTES)
     arrays = [memory.empty(SIZE, np.int32) for _ in range(3)]
     oldest = address(arrays[0])
     for _ in range(3):
         arrays.pop(0)
-    assert _engine.waiting_memory() == 2 * N_BYTES
+    assert engine.waiting_memory() == 2 * N_BYTES
     assert oldest not in [address(array) for array in (memory.empty(SIZE, np.int32), memory.empty(SIZE, np.int32))]
 
 
 def test_an_array_beyond_the_bound_is_not_kept():
-    _engine.keep_blocks(N_BYTES - 1)
+    engine.keep_blocks(N_BYTES - 1)
     memory.empty(SIZE, np.int32)
-    assert _engine.waiting_memory() == 0
+    assert engine.waiting_memory() == 0
 
 
 def test_at_most_256_blocks_wait():
     arrays = [memory.empty((4096,), np.uint8) for _ in range(300)]
     del arrays
-    assert _engine.waiting_memory() == 256 * 4096
+    assert engine.waiting_memory() == 256 * 4096
 
 
 def test_release_memory_leaves_nothing_waiting_and_results_alone():
     frags = tl.rasterize(CORNERS, ONE, SIZE)
     tl.rasterize(CORNERS, ONE, SIZE)
-    assert _engine.waiting_memory() >= 2 * N_BYTES
+    assert engine.waiting_memory() >= 2 * N_BYTES
     tl.release_memory()
-    assert _engine.waiting_memory() == 0
+    assert engine.waiting_memory() == 0
     assert (frags.triangle[0] == 0).all()
 
 
@@ -127,15 +127,15 @@ def test_release_memory_leaves_nothing_waiting_and_results_alone():
 def test_memory_that_waits_is_given_back_before_an_array_has_none():
     program = """
 import resource
-from topleft import _engine
-from topleft._base import memory
+from topleft._core import engine
+from topleft._core.base import memory
 large = memory.empty((400 << 20,), "u1")
 del large
 used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (used + (100 << 20), resource.RLIM_INFINITY))
-assert _engine.waiting_memory() >= 400 << 20
+assert engine.waiting_memory() >= 400 << 20
 assert memory.empty((300 << 20,), "u1").size == 300 << 20
-assert _engine.waiting_memory() < 400 << 20
+assert engine.waiting_memory() < 400 << 20
 try:
     memory.empty((2 << 30,), "u1")
 except MemoryError as error:
@@ -165,13 +165,13 @@ def test_results_of_a_verb_come_back_when_they_die_without_the_garbage_collector
     gc.disable()
     try:
         result = VERBS[verb]()
-        before = _engine.waiting_memory()
+        before = engine.waiting_memory()
         del result
-        assert _engine.waiting_memory() >= before + 256 * 128
-        now = _engine.waiting_memory()
+        assert engine.waiting_memory() >= before + 256 * 128
+        now = engine.waiting_memory()
         for _ in range(3):
             VERBS[verb]()
-            assert _engine.waiting_memory() == now
+            assert engine.waiting_memory() == now
     finally:
         gc.enable()
 

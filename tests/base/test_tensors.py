@@ -74,7 +74,7 @@ def test_array_that_refuses_to_become_one_is_a_type_error():
 
 def test_tensors_of_torch_are_read_in_place():
     torch = pytest.importorskip("torch")
-    from topleft._base.arrays import as_array
+    from topleft._core.base.arrays import as_array
 
     tensor = torch.tensor(SQUARE)
     assert np.shares_memory(as_array("vertices", tensor), tensor.numpy())

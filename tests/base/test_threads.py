@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from topleft._base import threads
-from topleft._base.threads import run_parts
+from topleft._core.base import threads
+from topleft._core.base.threads import run_parts
 
 AT_EXIT = """
 import atexit, threading, time

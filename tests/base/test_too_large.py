@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._base import memory
+from topleft._core.base import memory
 
 SCENE = [[0.0, 0, 0], [60, 0, 0.5], [0, 50, 1]], [[0, 1, 2]]
 SIZE = (64, 48)

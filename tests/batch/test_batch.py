@@ -17,9 +17,9 @@ import pytest
 from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, pictures, views
 
 import topleft as tl
-from topleft._batch import jobs
-from topleft._batch.jobs import JobRunner
-from topleft._batch.workers import workers_of
+from topleft._apps.batch import jobs
+from topleft._apps.batch.jobs import JobRunner
+from topleft._apps.batch.workers import workers_of
 from topleft.errors import MissingPackageError
 
 

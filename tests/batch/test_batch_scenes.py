@@ -15,12 +15,12 @@ import pytest
 from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, pictures, views
 
 import topleft as tl
-from topleft._batch import jobs
-from topleft._batch import workers as crews
-from topleft._io import load as files
-from topleft._lod.levels import kept_levels
-from topleft._render.layers import LAYERS
-from topleft._scene import adapt
+from topleft._apps.batch import jobs
+from topleft._apps.batch import workers as crews
+from topleft._meshes.io import load as files
+from topleft._meshes.lod.levels import kept_levels
+from topleft._meshes.picture.layers import LAYERS
+from topleft._meshes.scene import adapt
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from batch_jobs import BOX, SIZE, orbit, pictures
 from PIL import Image
 
 import topleft as tl
-from topleft._base.remote import RemotePath, place_of
-from topleft.cli import main
+from topleft._apps.cli import main
+from topleft._core.base.remote import RemotePath, place_of
 
 fsspec = pytest.importorskip("fsspec", reason="the tiles extra is not installed")
 
@@ -183,7 +183,7 @@ def test_absent_package_is_hinted_at():
     code = (
         "import sys; sys.modules['fsspec'] = None; sys.modules['fsspec.core'] = None\n"
         "import topleft as tl, numpy as np\n"
-        "from topleft.cli import main\n"
+        "from topleft._apps.cli import main\n"
         "try: tl.save_image('s3://a/b.png', np.zeros((2, 2), np.uint8))\n"
         "except tl.MissingPackageError as error: print(error)\n"
         "print(main(['render', 'cube', '-o', 's3://a/', '--size', '9x9']))"

@@ -17,7 +17,7 @@ from comparing import files_of
 from PIL import Image
 
 import topleft as tl
-from topleft.cli import main
+from topleft._apps.cli import main
 
 distributed = pytest.importorskip("distributed", reason="the dask extra is not installed")
 

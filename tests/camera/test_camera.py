@@ -7,11 +7,11 @@ import pytest
 from comparing import assert_same
 
 from topleft import scenes
-from topleft._camera.camera import Camera
-from topleft._camera.matrices import bounding_sphere, orbit_view
-from topleft._camera.viewpoints import turntable
-from topleft._model.mesh import Mesh
-from topleft._scene.scene import Scene
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.matrices import bounding_sphere, orbit_view
+from topleft._meshes.camera.viewpoints import turntable
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.scene.scene import Scene
 
 SIZE = (640, 480)
 K = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])

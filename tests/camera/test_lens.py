@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._camera.camera import Camera
-from topleft._camera.lens import FisheyeLens, OpenCVLens
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.lens import FisheyeLens, OpenCVLens
 
 SIZE = (640, 480)
 K = np.array([[500.0, 3.0, 310.0], [0.0, 510.0, 250.0], [0.0, 0.0, 1.0]])

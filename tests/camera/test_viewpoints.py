@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from topleft import scenes
-from topleft._camera.camera import Camera
-from topleft._camera.viewpoints import turntable, viewpoints
-from topleft._model.mesh import Mesh
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.viewpoints import turntable, viewpoints
+from topleft._meshes.model.mesh import Mesh
 
 KNOT = Mesh(*scenes.shape("torus-knot"))
 BOX = [(-1.0, -2, -3), (1, 2, 3)]

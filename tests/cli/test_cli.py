@@ -14,10 +14,10 @@ from PIL import Image
 
 import topleft as tl
 from topleft import cli, scenes
-from topleft._camera.camera import Camera
-from topleft._io import png
-from topleft._model.mesh import Mesh
-from topleft._render.render import render
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.io import png
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.render import render
 
 PYRAMID = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0.5 1 0.5\nf 2 1 5\nf 3 2 5\nf 4 3 5\nf 1 4 5\nf 1 2 3\nf 1 3 4\n"
 SMALL = ["--size", "64x48"]

@@ -2,9 +2,9 @@
 
 import pytest
 
-import topleft.cli
+import topleft._apps.cli
 from topleft import build_info, testing
-from topleft._engine import isa_in_use
+from topleft._core.engine import isa_in_use
 
 
 def test_doctor_tells_version_and_each_instruction_set(capsys):
@@ -34,7 +34,7 @@ def test_doctor_tells_what_an_extra_lacks(capsys, monkeypatch):
         'numpy; extra == "formats"',
         'x; extra == "dev"',
     ]
-    monkeypatch.setattr("topleft.cli.doctor.requires", lambda name: lines)
+    monkeypatch.setattr("topleft._apps.cli.doctor.requires", lambda name: lines)
     topleft.cli.main(["doctor"])
     told = capsys.readouterr().out
     assert "extra formats: none-such-package is not installed, numpy" in told

@@ -19,13 +19,13 @@ from first_pictures import camera_of, first_picture, shape_of
 from PIL import Image
 
 from topleft import scenes
-from topleft._camera.camera import Camera
-from topleft._model.mesh import Mesh
-from topleft._render.render import rasterize_mesh, render
-from topleft._render.transparent import render_transparent
-from topleft.cli import animation
-from topleft.cli.sheet import make_sheet
-from topleft.cli.targets import Orbit
+from topleft._apps.cli import animation
+from topleft._apps.cli.sheet import make_sheet
+from topleft._apps.cli.targets import Orbit
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.render import rasterize_mesh, render
+from topleft._meshes.picture.transparent import render_transparent
 
 SMALL = ["--size", "64x48"]
 KNOT = Mesh(*scenes.shape("torus-knot"))
@@ -429,7 +429,7 @@ def topleft_with(method):
     if method is None:
         return ["-m", "topleft"]
     start = f"import multiprocessing, sys; multiprocessing.set_start_method({method!r})"
-    return ["-c", f"{start}; from topleft.cli import main; sys.exit(main())"]
+    return ["-c", f"{start}; from topleft._apps.cli import main; sys.exit(main())"]
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")

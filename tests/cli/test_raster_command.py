@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import topleft as tl
-from topleft.cli import main
+from topleft._apps.cli import main
 
 SRC = str(Path(tl.__file__).parents[1])
 RNG = np.random.default_rng(3)
@@ -174,7 +174,7 @@ def test_broken_meshes_are_told_in_one_line(tmp_path, pair, capsys):
 
 def test_command_leaves_optional_packages_alone(tmp_path, pair):
     code = (
-        "import sys; from topleft.cli import main\n"
+        "import sys; from topleft._apps.cli import main\n"
         f"main(['raster', {pair!r}, '-o', 'a.tif', '--size', '64x48'])\n"
         "print([name for name in ('zarr', 'dask', 'pyproj', 'fsspec', 'rasterio', 'tifffile') if name in sys.modules])"
     )

@@ -7,14 +7,14 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 from pages import before_a_page, behind_a_page
 
 import topleft as tl
-from topleft import _engine
-from topleft._base.memory import FreshMemory
-from topleft._base.options import DepthTest, Sink
-from topleft._raster import choices
-from topleft._raster.choices import Route
-from topleft._raster.rasterize import draw_fragments
-from topleft._raster.snap import snap_mesh
-from topleft._raster.view import View
+from topleft._core import engine
+from topleft._core.base.memory import FreshMemory
+from topleft._core.base.options import DepthTest, Sink
+from topleft._core.raster import choices
+from topleft._core.raster.choices import Route
+from topleft._core.raster.rasterize import draw_fragments
+from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.view import View
 
 SIZES = [(700, 90), (1000, 40), (260, 200), (129, 33), (64, 64)]
 
@@ -126,8 +126,8 @@ def test_what_lies_behind_is_not_drawn_at_all():
     view = View.parse(size, {})
     mesh = snap_mesh(FreshMemory(), whole, np.array([[0, 1, 2]]), view, with_depth=True, out=None).mesh
     ids, depth = np.empty(size[::-1], np.int32), np.empty(size[::-1], np.float32)
-    bounds = np.empty(_engine.Target.bounds_shape(*size[::-1]), np.float32)
-    target = _engine.Target(Sink.NEAREST, ids, depth, None, bounds=bounds)
+    bounds = np.empty(engine.Target.bounds_shape(*size[::-1]), np.float32)
+    target = engine.Target(Sink.NEAREST, ids, depth, None, bounds=bounds)
     mesh.draw(target, 0, size[1])
     assert (ids == 0).all()
     assert (bounds[:, :4] == 0.5).all()

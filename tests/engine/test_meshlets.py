@@ -7,18 +7,18 @@ from engine_cases import THREADS, Drawn, flat_grid, on, small_views
 from pages import before_a_page, behind_a_page
 
 import topleft as tl
-from topleft import _engine
-from topleft._base.memory import FreshMemory
-from topleft._base.options import Sink
-from topleft._raster import choices, cluster_draw
-from topleft._raster.cluster_draw import ClusteredMesh, Survey
-from topleft._raster.clusters import Clusters
-from topleft._raster.rasterize import draw_fragments
-from topleft._raster.view import View
+from topleft._core import engine
+from topleft._core.base.memory import FreshMemory
+from topleft._core.base.options import Sink
+from topleft._core.raster import choices, cluster_draw
+from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
+from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.rasterize import draw_fragments
+from topleft._core.raster.view import View
 
 SIZE = (160, 120)
 
-needs_meshlets = pytest.mark.skipif(not _engine.has_meshlets(), reason="no AVX-512 with VBMI, or other kernels in use")
+needs_meshlets = pytest.mark.skipif(not engine.has_meshlets(), reason="no AVX-512 with VBMI, or other kernels in use")
 
 #: `tl_meshlet` of csrc/meshlets.h.
 MESHLET = np.dtype([("xyz", np.float32, (3, 64)), ("corners", np.uint8, (3, 128)), ("names", np.int32, 128)])
@@ -300,7 +300,7 @@ def test_coordinates_are_float32_numbers_or_not(number):
 
 def test_scalar_kernels_have_no_meshlets():
     with on("scalar"):
-        assert not _engine.has_meshlets()
+        assert not engine.has_meshlets()
         view = View.parse(SIZE, {"cull": "back"})
         assert not choices.can_draw_meshlets(view, Sink.NEAREST, is_float32=True)
 
@@ -361,6 +361,6 @@ def test_share_that_is_hidden_is_of_what_the_view_may_show():
         view = View.parse(SIZE, {"transform": camera.clip_from_world(SIZE), "cull": "back"})
         seen = ClusteredMesh(clusters, view)
         frags = draw(mesh, None, transform=camera.clip_from_world(SIZE), cull="back")
-        target = _engine.Target(Sink.NEAREST, frags.triangle.copy(), frags.depth.copy(), None)
+        target = engine.Target(Sink.NEAREST, frags.triangle.copy(), frags.depth.copy(), None)
         shares.append(seen.hidden_share(target, len(clusters)))
     assert shares[0] < 0.3 < 0.4 < shares[1]

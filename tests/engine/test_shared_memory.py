@@ -12,7 +12,7 @@ from comparing import assert_same
 
 import topleft as tl
 from topleft import scenes
-from topleft._tiles.dask_array import WindowJob
+from topleft._apps.tiles.dask_array import WindowJob
 
 SIZE = (128, 128)
 VERTICES = np.array([[-10.0, -10], [300, -10], [-10, 300]])

@@ -114,7 +114,7 @@ def test_texture_keeps_its_levels_unless_they_are_large(monkeypatch):
     texture = tl.Texture(np.random.default_rng(3).integers(0, 256, (16, 16, 4), np.uint8))
     first = texture.value_levels()
     assert texture.value_levels() is first
-    monkeypatch.setattr("topleft._model.texture.MOST_KEPT_BYTES", first.texels.nbytes - 1)
+    monkeypatch.setattr("topleft._meshes.model.texture.MOST_KEPT_BYTES", first.texels.nbytes - 1)
     large = tl.Texture(texture.image)
     assert large.value_levels() is not large.value_levels()
     assert_same(large.value_levels().texels, first.texels)

@@ -11,11 +11,11 @@ playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: p
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
 
 import topleft as tl  # noqa: E402
-from topleft._explore.content import content_of  # noqa: E402
-from topleft._explore.handlers import answer  # noqa: E402
-from topleft._explore.messages import split  # noqa: E402
-from topleft._explore.notebook import markup  # noqa: E402
-from topleft._explore.session import Content, Session  # noqa: E402
+from topleft._apps.explore.content import content_of  # noqa: E402
+from topleft._apps.explore.handlers import answer  # noqa: E402
+from topleft._apps.explore.messages import split  # noqa: E402
+from topleft._apps.explore.notebook import markup  # noqa: E402
+from topleft._apps.explore.session import Content, Session  # noqa: E402
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium")

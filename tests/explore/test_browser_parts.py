@@ -15,10 +15,10 @@ playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: p
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
 
 import topleft as tl  # noqa: E402
-from topleft._explore.mesh_view import HANDLERS, MeshView  # noqa: E402
-from topleft._explore.race import HANDLERS as RACE  # noqa: E402
-from topleft._explore.session import Content, Session  # noqa: E402
-from topleft._explore.trace import trace  # noqa: E402
+from topleft._apps.explore.mesh_view import HANDLERS, MeshView  # noqa: E402
+from topleft._apps.explore.race import HANDLERS as RACE  # noqa: E402
+from topleft._apps.explore.session import Content, Session  # noqa: E402
+from topleft._apps.explore.trace import trace  # noqa: E402
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium")

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from topleft._explore.exact import draw_exact
+from topleft._apps.explore.exact import draw_exact
 from topleft.methods import reference
 from topleft.methods.reference import sampling
 

@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 
 import topleft as tl
-from topleft._explore.mesh_view import HANDLERS, HEAT, LAYERS, MeshView, load_bytes
-from topleft._explore.session import Content, Session
+from topleft._apps.explore.mesh_view import HANDLERS, HEAT, LAYERS, MeshView, load_bytes
+from topleft._apps.explore.session import Content, Session
 from topleft.errors import MeshError
 
 SIZE = (96, 64)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._explore import notebook
-from topleft._explore.content import content_of
+from topleft._apps.explore import notebook
+from topleft._apps.explore.content import content_of
 from topleft.errors import MissingPackageError
 
 VERTICES, TRIANGLES = [[1.0, 1], [7, 1], [1, 7]], [[0, 1, 2]]
@@ -53,7 +53,7 @@ def test_notebook_without_anywidget_is_told_how_to_get_it(shell, monkeypatch):
 
 @pytest.mark.parametrize("name", ["uvicorn", "starlette.applications", "websockets"])
 def test_explore_without_its_extra_is_told_how_to_get_it(name, monkeypatch):
-    monkeypatch.delitem(sys.modules, "topleft._explore.server", raising=False)
+    monkeypatch.delitem(sys.modules, "topleft._apps.explore.server", raising=False)
     monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(MissingPackageError, match=r"the explorer needs .*: pip install 'topleft\[explore\]'"):
         tl.explore(VERTICES, TRIANGLES, 8, wait=False, browser=False)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._explore.content import SCENES, content_of_name, scene
-from topleft._explore.handlers import answer
-from topleft._explore.session import Content, Session
-from topleft._explore.state import parse_state
+from topleft._apps.explore.content import SCENES, content_of_name, scene
+from topleft._apps.explore.handlers import answer
+from topleft._apps.explore.session import Content, Session
+from topleft._apps.explore.state import parse_state
 from topleft.errors import MeshError
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS, METHODS

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from topleft._explore import race
-from topleft._explore.race import COLORS, HANDLERS, entries, value_at
-from topleft._explore.session import Content, Session
+from topleft._apps.explore import race
+from topleft._apps.explore.race import COLORS, HANDLERS, entries, value_at
+from topleft._apps.explore.session import Content, Session
 from topleft.scene_families import FAMILIES, Axis
 
 RECORD = Path(__file__).parents[2] / "benchmarks" / "records" / "atlas.json"

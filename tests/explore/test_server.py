@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from topleft._explore.messages import pack, read_header, split, unpack
-from topleft._explore.session import Content, Reply
+from topleft._apps.explore.messages import pack, read_header, split, unpack
+from topleft._apps.explore.session import Content, Reply
 
 pytest.importorskip("starlette", reason="the explorer needs its extra: pip install 'topleft[explore]'")
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
@@ -22,9 +22,9 @@ sockets = pytest.importorskip("websockets.sync.client", reason="the explorer nee
 from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402
 
 import topleft as tl  # noqa: E402
-from topleft._explore import server as module  # noqa: E402
-from topleft._explore.open import open_page  # noqa: E402
-from topleft._explore.server import Server  # noqa: E402
+from topleft._apps.explore import server as module  # noqa: E402
+from topleft._apps.explore.open import open_page  # noqa: E402
+from topleft._apps.explore.server import Server  # noqa: E402
 
 SQUARE = {"vertices": [[1, 1], [7, 1], [1, 7]], "triangles": [[0, 1, 2]], "size": [8, 8]}
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._explore import trace as traces
-from topleft._explore.session import Content, Session
-from topleft._explore.trace import TRACED, trace
+from topleft._apps.explore import trace as traces
+from topleft._apps.explore.session import Content, Session
+from topleft._apps.explore.trace import TRACED, trace
 from topleft.methods import CLASSICS, METHODS, find_method, reference
 from topleft.methods.twins.walks import overdraw as walk
 

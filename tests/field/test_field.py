@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft import _engine, scenes
-from topleft._field.grid import Grid
+from topleft import scenes
+from topleft._core import engine
+from topleft._core.base.grid import Grid
 
 SQUARE = [[0.0, 0], [4, 0], [4, 3], [0, 3]]
 HALVES = [[0, 1, 2], [0, 2, 3]]
@@ -137,18 +138,18 @@ def test_field_threads_change_nothing():
     assert np.array_equal(one, three)
 
 
-@pytest.mark.parametrize("isa", _engine.isa_available())
+@pytest.mark.parametrize("isa", engine.isa_available())
 @pytest.mark.parametrize("n_points", [12, 3000])
 def test_field_has_the_same_bits_on_each_instruction_set(isa, n_points):
     points, triangles = scenes.planar_mesh(n_points, 90, 70)
     values = np.sin(points[:, 0])
-    before = _engine.isa_in_use()
+    before = engine.isa_in_use()
     expected = tl.field((points, triangles), values, (90, 70))
-    _engine.use_isa(isa)
+    engine.use_isa(isa)
     try:
         assert np.array_equal(tl.field((points, triangles), values, (90, 70)), expected, equal_nan=True)
     finally:
-        _engine.use_isa(before)
+        engine.use_isa(before)
 
 
 def test_field_out_is_written_and_returned():

@@ -20,7 +20,7 @@ def test_import_leaves_for_later(name):
     assert before == "True" or after == "False"
 
 
-@pytest.mark.parametrize("module", ["_batch.batch", "_batch.jobs", "_render.view_layers", "_render.transparent"])
+@pytest.mark.parametrize("module", ["_apps.batch.batch", "_apps.batch.jobs", "_meshes.picture.transparent"])
 def test_import_leaves_what_is_big_and_seldom_used_for_later(module):
     code = f"import sys, topleft; print('topleft.{module}' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

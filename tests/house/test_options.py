@@ -9,19 +9,19 @@ import pytest
 
 import topleft as tl
 import topleft.typing as words
-from topleft._base import options
-from topleft._batch.batch import OnError, Order
-from topleft._model.light import LightKind, LightSpace
-from topleft._model.material import AlphaMode
-from topleft._model.points import PointUnit
-from topleft._model.texture import Encoding, Filter, Wrap
-from topleft._plan.plan import OUTPUTS
-from topleft._polygons.polygons import Rule
-from topleft._raster.view import ViewOptions
-from topleft._render.layers import LAYERS
-from topleft._shade.shade import Shading
-from topleft._tiles import geotiff, zarr_files
-from topleft._tiles.drawing import KINDS
+from topleft._apps.batch.batch import OnError, Order
+from topleft._apps.tiles import geotiff, zarr_files
+from topleft._apps.tiles.drawing import KINDS
+from topleft._core.base import options
+from topleft._core.polygons.polygons import Rule
+from topleft._core.raster.view import ViewOptions
+from topleft._meshes.model.light import LightKind, LightSpace
+from topleft._meshes.model.material import AlphaMode
+from topleft._meshes.model.points import PointUnit
+from topleft._meshes.model.texture import Encoding, Filter, Wrap
+from topleft._meshes.picture.layers import LAYERS
+from topleft._meshes.picture.shade import Shading
+from topleft._meshes.plan.plan import OUTPUTS
 from topleft.methods import CLASSICS, METHODS
 
 #: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_read_from_the_types`.

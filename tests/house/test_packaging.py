@@ -110,7 +110,7 @@ def test_metadata_command_is_topleft():
 
 
 #: The engine, and the kernels of the classics.
-UNITS = ["_engine.kernels", "methods.classics.classic_kernels"]
+UNITS = ["_core.engine.kernels", "methods.classics.classic_kernels"]
 
 
 @pytest.mark.parametrize("name", ["py.typed", *(unit.replace(".", "/") + ".pyi" for unit in UNITS)])
@@ -149,7 +149,7 @@ def test_classics_use_no_engine_and_are_loaded_when_asked_for():
     folder = Path(str(resources.files("topleft.methods") / "__init__.py")).parent
     sources = [path for path in folder.rglob("*") if path.name.endswith((".py", ".pyx", ".pxi"))]
     lines = [line for path in sources for line in path.read_text(encoding="utf-8").splitlines()]
-    assert not [line for line in lines if "_engine" in line and "import" in line]
+    assert not [line for line in lines if "engine" in line and "import" in line]
 
 
 def test_build_info_has_the_documented_keys():
@@ -200,8 +200,8 @@ def test_isa_override_unknown_name_lists_the_choices():
     ("built", "reason"), [(["scalar", "avx2"], "which this machine cannot run"), (["scalar"], "which was not built")]
 )
 def test_isa_override_unavailable_says_why(monkeypatch, built, reason):
-    from topleft._engine import isa as _isa
-    from topleft._engine import kernels
+    from topleft._core.engine import isa as _isa
+    from topleft._core.engine import kernels
 
     monkeypatch.setenv("TOPLEFT_ISA", "avx2")
     monkeypatch.setattr(kernels, "isa_built", lambda: built)
@@ -211,12 +211,12 @@ def test_isa_override_unavailable_says_why(monkeypatch, built, reason):
 
 
 def test_use_isa_unknown_name_is_an_error_and_changes_nothing():
-    from topleft import _engine
+    from topleft._core import engine
 
-    before = _engine.isa_in_use()
+    before = engine.isa_in_use()
     with pytest.raises(ValueError, match="instruction set must be one of scalar"):
-        _engine.use_isa("sse9")
-    assert _engine.isa_in_use() == before
+        engine.use_isa("sse9")
+    assert engine.isa_in_use() == before
 
 
 def test_import_of_topleft_loads_no_optional_dependency():

@@ -10,7 +10,7 @@ import pytest
 
 import topleft as tl
 from topleft import methods, testing
-from topleft._explore.content import content_of
+from topleft._apps.explore.content import content_of
 
 ROOT = Path(tl.__file__).parent
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))

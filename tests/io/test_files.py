@@ -11,10 +11,10 @@ import pytest
 
 import topleft as tl
 from topleft import scenes
-from topleft._io import load as files
-from topleft._io.images import save_image
-from topleft._model.mesh import Mesh
-from topleft._model.normals import face_normals
+from topleft._meshes.io import load as files
+from topleft._meshes.io.images import save_image
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.normals import face_normals
 from topleft.errors import MeshError, MeshWarning, MissingPackageError
 
 trimesh = pytest.importorskip("trimesh")

@@ -261,7 +261,7 @@ def test_load_of_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkey
     import zipfile
 
     pytest.importorskip("trimesh")
-    monkeypatch.setattr("topleft._io.foreign.MAX_UNPACKED_BYTES", 1000)
+    monkeypatch.setattr("topleft._meshes.io.foreign.MAX_UNPACKED_BYTES", 1000)
     with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.obj", bytes(1001))
     with pytest.raises(MeshError, match="its archive holds 1001 bytes, more than 1000"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from topleft._io import images, png
+from topleft._meshes.io import images, png
 from topleft.errors import ImageError
 
 PICTURE = np.arange(4 * 5 * 4, dtype=np.uint8).reshape(4, 5, 4)

@@ -9,8 +9,8 @@ from PIL import Image
 
 import topleft as tl
 from topleft import scenes
-from topleft._io.layer_files import save_layers
-from topleft._render.view_layers import ViewLayers, render_layers
+from topleft._meshes.io.layer_files import save_layers
+from topleft._meshes.picture.view_layers import ViewLayers, render_layers
 from topleft.errors import ImageError
 
 SIZE = (64, 48)

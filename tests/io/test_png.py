@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 
 from topleft import scenes
-from topleft._io import png
-from topleft._model.mesh import Mesh
-from topleft._render.render import render
+from topleft._meshes.io import png
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.render import render
 from topleft.errors import ImageError
 
 try:

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import topleft as tl
-from topleft._camera.matrices import orbit_view
-from topleft.cli import main
+from topleft._apps.cli import main
+from topleft._meshes.camera.matrices import orbit_view
 
 ndimage = pytest.importorskip("scipy.ndimage")
 

@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from surface_samples import largest_squared, points_on, sampled_distance
 
-from topleft import _engine, scenes
-from topleft._lod import distance
-from topleft._lod.distance import LEAST, SHARE, TriangleTree, measure
+from topleft import scenes
+from topleft._core import engine
+from topleft._meshes.lod import distance
+from topleft._meshes.lod.distance import LEAST, SHARE, TriangleTree, measure
 
 ORIGIN = np.zeros(3)
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
@@ -111,15 +112,15 @@ def test_measure_does_not_depend_on_threads_or_instruction_set(monkeypatch):
     points, triangles = scenes.blob(30_000)
     shaken = points + np.random.default_rng(1).uniform(-1e-3, 1e-3, points.shape)
     found = set()
-    in_use = _engine.isa_in_use()
+    in_use = engine.isa_in_use()
     try:
-        for isa in _engine.isa_available():
-            _engine.use_isa(isa)
+        for isa in engine.isa_available():
+            engine.use_isa(isa)
             for threads in (1, 2, 3):
                 monkeypatch.setattr(distance, "available_threads", lambda n=threads: n)
                 found.add(measure(surface(points, triangles), surface(shaken, triangles)))
     finally:
-        _engine.use_isa(in_use)
+        engine.use_isa(in_use)
     assert len(found) == 1
 
 

@@ -9,10 +9,10 @@ import pytest
 from surface_samples import corners_of, sampled_distance
 
 import topleft as tl
-from topleft._lod import collapse as collapsing
-from topleft._lod.collapse import border_points, collapse, flatness, gather, wanted_of
-from topleft._lod.levels import kept_levels
-from topleft._lod.simplify import levels_of
+from topleft._meshes.lod import collapse as collapsing
+from topleft._meshes.lod.collapse import border_points, collapse, flatness, gather, wanted_of
+from topleft._meshes.lod.levels import kept_levels
+from topleft._meshes.lod.simplify import levels_of
 
 
 def torus(**attributes):
@@ -342,7 +342,7 @@ def test_simplify_leaves_out_a_level_with_a_spike(monkeypatch):
     mesh = tl.Mesh(*tl.scenes.torus(segments=96, sections=48))
     whole = tl.simplify(mesh)
     assert len(whole) == 3
-    module = sys.modules["topleft._lod.simplify"]
+    module = sys.modules["topleft._meshes.lod.simplify"]
     n_calls = []
 
     def careless(points, triangles, n_wanted, *, with_pairs):

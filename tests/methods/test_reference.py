@@ -22,7 +22,7 @@ def test_reference_module_imports_nothing_of_ours():
     assert [name for name in vars(ref) if getattr(vars(ref)[name], "__module__", "").startswith("topleft")] == [
         name for name in vars(ref) if getattr(vars(ref)[name], "__module__", "") == ref.__name__
     ]
-    assert "_engine" not in vars(ref)
+    assert "engine" not in vars(ref)
 
 
 def test_reference_docstring_examples_hold():

@@ -9,8 +9,8 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, on
 
 import topleft as tl
-from topleft._model.mesh import coincident, with_normals
-from topleft._model.normals import EQUAL_ANGLE_DEG, angle_weighted_normals, creased_normals, face_normals
+from topleft._meshes.model.mesh import coincident, with_normals
+from topleft._meshes.model.normals import EQUAL_ANGLE_DEG, angle_weighted_normals, creased_normals, face_normals
 
 SIZE = (96, 72)
 

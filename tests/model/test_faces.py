@@ -9,10 +9,10 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, on
 
 import topleft as tl
-from topleft._model import normals as faces
-from topleft._model.mesh import Mesh
-from topleft._model.normals import turn_of_normals
-from topleft._shade.look import ShadingMesh
+from topleft._meshes.model import normals as faces
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.normals import turn_of_normals
+from topleft._meshes.picture.look import ShadingMesh
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 

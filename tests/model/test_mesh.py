@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, on
 
-from topleft import _engine, scenes
-from topleft._model import mesh as mesh_module
-from topleft._model.mesh import Mesh, coincident
-from topleft._model.normals import angle_weighted_normals, face_normals
+from topleft import scenes
+from topleft._core import engine
+from topleft._meshes.model import mesh as mesh_module
+from topleft._meshes.model.mesh import Mesh, coincident
+from topleft._meshes.model.normals import angle_weighted_normals, face_normals
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 
@@ -152,12 +153,12 @@ def test_group_rows_gives_up_where_too_many_hashes_meet(isa):
         rows = np.arange(n, dtype=np.uint32)[:, None]
         first, group = np.empty((2, n), np.int32)
         table = np.full(1 << 17, -1, np.int32)
-        assert _engine.group_rows(rows, 17, table, first, group) == n
+        assert engine.group_rows(rows, 17, table, first, group) == n
         assert group.tolist() == list(range(n))
         table = np.full(1 << 17, -1, np.int32)
         table[:] = 0  # as if all places were taken by row 0
         table[-1] = -1
-        assert _engine.group_rows(rows, 17, table, first, group) == -1
+        assert engine.group_rows(rows, 17, table, first, group) == -1
 
 
 def test_coincident_of_nothing_is_empty():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._model.polygons import triangulate
-from topleft._scene.adapt import as_mesh, as_polygons
+from topleft._meshes.model.polygons import triangulate
+from topleft._meshes.scene.adapt import as_mesh, as_polygons
 
 ARROW = np.array([[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]], float)
 

@@ -5,7 +5,7 @@ import pytest
 from comparing import assert_same
 
 import topleft as tl
-from topleft._model import texture as module
+from topleft._meshes.model import texture as module
 
 RNG = np.random.default_rng(2)
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._base.memory import KeptMemory
-from topleft._base.options import DepthTest, Sink
-from topleft._raster import choices, sampling
-from topleft._raster.snap import snap_mesh
-from topleft._raster.view import View
+from topleft._core.base.memory import KeptMemory
+from topleft._core.base.options import DepthTest, Sink
+from topleft._core.raster import choices, sampling
+from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.view import View
 
 SIZE = (21, 17)
 

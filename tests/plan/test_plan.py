@@ -9,13 +9,13 @@ import pytest
 from comparing import assert_same
 
 import topleft as tl
-from topleft import _engine
-from topleft._base.memory import KeptMemory
-from topleft._engine.isa import build_info
-from topleft._plan import costs
-from topleft._plan.facts import find_facts
-from topleft._plan.plan import Plan
-from topleft._raster.view import View
+from topleft._core import engine
+from topleft._core.base.memory import KeptMemory
+from topleft._core.engine.isa import build_info
+from topleft._core.raster.view import View
+from topleft._meshes.plan import costs
+from topleft._meshes.plan.facts import find_facts
+from topleft._meshes.plan.plan import Plan
 from topleft.scenes import random_triangles, shape
 
 SIZE = (320, 200)
@@ -76,17 +76,17 @@ def test_every_triangle_is_of_one_class(outputs, cull):
         assert facts.n_cut <= n
 
 
-@pytest.mark.parametrize("isa", _engine.isa_available())
+@pytest.mark.parametrize("isa", engine.isa_available())
 def test_what_covers_is_about_what_is_counted(isa):
-    was = _engine.isa_in_use()
-    _engine.use_isa(isa)
+    was = engine.isa_in_use()
+    engine.use_isa(isa)
     try:
         vertices, triangles, _ = random_triangles(3000, 12, *SIZE)
         facts, _ = find_facts(vertices, triangles, View.parse(SIZE, {}), "overdraw", ("overdraw",), None)
         drawn = tl.overdraw(vertices, triangles, SIZE).sum()
         assert drawn == pytest.approx(facts.covered, rel=0.05)  # areas against samples, and boxes cut by the frame
     finally:
-        _engine.use_isa(was)
+        engine.use_isa(was)
 
 
 def test_stages_say_what_was_chosen():
@@ -139,7 +139,7 @@ class Counted(KeptMemory):
     ("color", "center"), ("color", "area"), ("depth", "center"), ("overdraw", "msaa2"),
 ])  # fmt: skip
 def test_memory_is_told_to_the_byte(monkeypatch, outputs, sampling, threads):
-    monkeypatch.setattr("topleft._raster.choices.MIN_TRIANGLES_TO_SHARE", 1000)
+    monkeypatch.setattr("topleft._core.raster.choices.MIN_TRIANGLES_TO_SHARE", 1000)
     vertices, triangles, _ = random_triangles(900, 12, *SIZE)
     plan = tl.plan(vertices, triangles.astype(np.int64), SIZE, outputs=outputs, sampling=sampling, threads=threads)
     memory = Counted()
@@ -291,7 +291,7 @@ def test_plan_of_a_mesh_counts_its_clusters():
     assert plan.scratch_bytes["clusters"] > mesh.clusters.n_bytes > 0
 
 
-@pytest.mark.skipif(not _engine.has_meshlets(), reason="no AVX-512 with VBMI, or other kernels in use")
+@pytest.mark.skipif(not engine.has_meshlets(), reason="no AVX-512 with VBMI, or other kernels in use")
 @pytest.mark.parametrize(("cull", "is_whole"), [("none", False), ("back", True)])
 def test_plan_of_a_mesh_tells_of_its_meshlets_and_counts_their_bytes(cull, is_whole):
     vertices, triangles = tl.scenes.blob(100_000)
@@ -397,7 +397,7 @@ def vars_of(own):
 
 
 def test_calibrate_measures_all_that_is_estimated_from():
-    from topleft._plan.calibrate import calibrate
+    from topleft._meshes.plan.calibrate import calibrate
 
     own, shipped = calibrate(n_rounds=1), costs.load_costs()
     for name in ("call", "vertex", "draw", "other"):
@@ -420,7 +420,7 @@ def test_cli_explains(capsys):
 
 def test_cli_calibrates(capsys, monkeypatch, tmp_path):
     from topleft import cli
-    from topleft._plan import calibrate
+    from topleft._meshes.plan import calibrate
 
     monkeypatch.setattr(calibrate, "calibrate", costs.load_costs)
     assert cli.main(["calibrate"]) == 0

@@ -8,7 +8,7 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, on
 
 import topleft as tl
-from topleft._raster.sampling import POSITIONS
+from topleft._core.raster.sampling import POSITIONS
 from topleft.methods.reference.points import points as exact_points
 
 SIZE = (23, 17)

@@ -5,10 +5,10 @@ import pytest
 from engine_cases import ON_EACH_ISA, on
 from polygon_cases import star
 
-from topleft._base.memory import SCRATCH
-from topleft._polygons.polygons import frame_of
-from topleft._polygons.prepared import prepare
-from topleft._polygons.rings import as_rings
+from topleft._core.base.memory import SCRATCH
+from topleft._core.polygons.polygons import frame_of
+from topleft._core.polygons.prepared import prepare
+from topleft._core.polygons.rings import as_rings
 
 SEEDS = range(60)
 
@@ -18,7 +18,7 @@ def certified(rings, rule="evenodd"):
     found, frame = frame_of(as_rings([[np.asarray(ring) / 256 for ring in rings]]), (9, 9), (0, 0), 8, 1, 1)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=rule == "nonzero")
     prepared.certify(assume_valid=False)
-    return bool(prepared.engine.which_are_simple()[0]), prepared.engine.weights_of_rings().tolist()
+    return bool(prepared.compiled.which_are_simple()[0]), prepared.compiled.weights_of_rings().tolist()
 
 
 def do_edges_meet(rings):

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import topleft as tl
-from topleft._io.polygon_files import load_polygons
+from topleft._meshes.io.polygon_files import load_polygons
 
 SQUARE = [[1, 1], [4, 1], [4, 3], [1, 3], [1, 1]]
 GEOJSON = {

@@ -10,8 +10,8 @@ from hypothesis import given
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
-from topleft._base.options import Sampling
-from topleft._raster.sampling import POSITIONS
+from topleft._core.base.options import Sampling
+from topleft._core.raster.sampling import POSITIONS
 from topleft.methods.reference import polygons as ref
 
 RULES = ["evenodd", "nonzero"]

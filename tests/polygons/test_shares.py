@@ -9,9 +9,9 @@ from hypothesis import given
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
-from topleft._base import memory
-from topleft._polygons import overlap
-from topleft._polygons.prepared import Prepared
+from topleft._core.base import memory
+from topleft._core.polygons import overlap
+from topleft._core.polygons.prepared import Prepared
 from topleft.methods.reference import polygons as ref
 
 UNIT = 2.0**-24

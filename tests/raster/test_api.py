@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._base import arrays, threads
-from topleft._base.memory import FreshMemory
-from topleft._raster import classic
-from topleft._raster.rasterize import canvas_of
+from topleft._core.base import arrays, threads
+from topleft._core.base.memory import FreshMemory
+from topleft._core.raster import classic
+from topleft._core.raster.rasterize import canvas_of
 from topleft.methods import CLASSICS, load_kernel
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
@@ -194,7 +194,7 @@ def test_rasterizer_gives_the_same_and_reuses_its_memory():
 
 
 def test_module_level_calls_keep_scratch_until_it_is_released():
-    from topleft._base import memory
+    from topleft._core.base import memory
 
     tl.release_memory()
     tl.fill(SQUARE, HALVES, [1, 2], SIZE)
@@ -208,7 +208,7 @@ def test_module_level_calls_keep_scratch_until_it_is_released():
 
 
 def test_module_level_calls_do_not_keep_more_than_the_bound(monkeypatch):
-    from topleft._base import memory
+    from topleft._core.base import memory
 
     tl.release_memory()
     monkeypatch.setattr(memory, "MAX_SCRATCH_BYTES", 63)
@@ -219,7 +219,7 @@ def test_module_level_calls_do_not_keep_more_than_the_bound(monkeypatch):
 
 @pytest.mark.parametrize("n_bytes", [0, 1, 4 << 20, (4 << 20) + 1, 9_000_001])
 def test_large_memory_is_aligned_to_huge_pages(n_bytes):
-    from topleft._base.memory import allocate
+    from topleft._core.base.memory import allocate
 
     block = allocate(n_bytes)
     assert block.size >= n_bytes

@@ -8,15 +8,15 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, Drawn, flat_grid, on, small_views
 
 import topleft as tl
-from topleft import _engine
-from topleft._base.memory import FreshMemory
-from topleft._base.options import Sink
-from topleft._raster import choices
-from topleft._raster.choices import ClusterRoute
-from topleft._raster.cluster_draw import ClusteredMesh
-from topleft._raster.clusters import Clusters
-from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
-from topleft._raster.view import View
+from topleft._core import engine
+from topleft._core.base.memory import FreshMemory
+from topleft._core.base.options import Sink
+from topleft._core.raster import choices
+from topleft._core.raster.choices import ClusterRoute
+from topleft._core.raster.cluster_draw import ClusteredMesh
+from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
+from topleft._core.raster.view import View
 
 SIZE = (160, 120)
 
@@ -169,8 +169,8 @@ def test_bounds_hide_the_same_clusters(isa, sink):
         seen = ClusteredMesh(clusters, View.parse(size, {"transform": camera.clip_from_world(size)}))
         drawn = []
         for is_bounded in (False, True):
-            target = _engine.Target(sink, np.empty(size[::-1], np.int32), np.empty(size[::-1], np.float32), None)
-            bounds = np.full(_engine.Target.bounds_shape(*size[::-1]), np.nan, np.float32)
+            target = engine.Target(sink, np.empty(size[::-1], np.int32), np.empty(size[::-1], np.float32), None)
+            bounds = np.full(engine.Target.bounds_shape(*size[::-1]), np.nan, np.float32)
             if is_bounded:
                 target.keep_bounds(bounds)
             with on(isa):
@@ -195,8 +195,8 @@ def test_masks_and_counts_have_the_same_bits(isa, sink):
             expected = whole(FreshMemory(), *mesh, view, None)
         with on(isa):
             pixels = np.empty_like(expected)
-            covered = np.empty(_engine.Target.covered_shape(SIZE[1], SIZE[0]), np.uint64)
-            target = _engine.Target(sink, pixels, None, covered)
+            covered = np.empty(engine.Target.covered_shape(SIZE[1], SIZE[0]), np.uint64)
+            target = engine.Target(sink, pixels, None, covered)
             if not ClusteredMesh(clusters, view).draw(FreshMemory(), target, ClusterRoute.CLUSTERS):
                 continue  # a vertex does not fit 32 bits
         assert_same(pixels, expected)
@@ -241,7 +241,7 @@ def count_drawn(mesh, **view):
     """Clusters that a view draws, and those that it would draw if none was hidden."""
     clusters = Clusters(*mesh)
     scene = ClusteredMesh(clusters, View.parse(SIZE, view))
-    target = _engine.Target(Sink.NEAREST, np.empty(SIZE[::-1], np.int32), np.empty(SIZE[::-1], np.float32), None)
+    target = engine.Target(Sink.NEAREST, np.empty(SIZE[::-1], np.int32), np.empty(SIZE[::-1], np.float32), None)
     seen = scene._seen(Sink.NEAREST)
     room, others = np.empty(3 * len(clusters) + 1, np.int32), np.empty(len(mesh[1]) + 1, np.int32)
     how = target, 0, SIZE[1], room, others, True, True
@@ -462,8 +462,8 @@ def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatc
     view = {"transform": camera.clip_from_world(SIZE), "threads": 1}
     expected = draw(mesh, None, "less", **view)
     listed = []
-    marked = _engine.mark_vertices
-    monkeypatch.setattr(_engine, "mark_vertices", lambda *arrays: listed.append(1) or marked(*arrays))
+    marked = engine.mark_vertices
+    monkeypatch.setattr(engine, "mark_vertices", lambda *arrays: listed.append(1) or marked(*arrays))
     for pays in (False, True):
         monkeypatch.setattr(choices, "pays_to_snap_all", lambda *_, pays=pays: pays)
         got = draw(mesh, Clusters(*mesh), "less", **view)
@@ -475,8 +475,8 @@ def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatc
 def test_only_used_blocks_of_vertices_are_marked():
     corners = np.array([[0, 1, 2], [16, 3, 40], [33, 34, 35]], np.int32)
     is_used = np.zeros(4, np.uint8)
-    _engine.mark_vertices(np.array([-1, 0, 0, -1, 2], np.int32), corners, 64, is_used)
+    engine.mark_vertices(np.array([-1, 0, 0, -1, 2], np.int32), corners, 64, is_used)
     assert is_used.tolist() == [1, 0, 1, 0]
-    _engine.mark_vertices(np.array([1], np.int32), corners, 64, is_used)
+    engine.mark_vertices(np.array([1], np.int32), corners, 64, is_used)
     assert is_used.tolist() == [1, 1, 1, 0]
-    assert _engine.mark_vertices(np.array([0, 1], np.int32), corners, 40, is_used) == 1
+    assert engine.mark_vertices(np.array([0, 1], np.int32), corners, 40, is_used) == 1

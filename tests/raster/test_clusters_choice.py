@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._base.options import Sink
-from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredMesh, Survey
-from topleft._raster.clusters import Backoff, Clusters
-from topleft._raster.view import View
-from topleft._render import instances
-from topleft._render.instances import PlacedScene, count_layers, survey_instances
-from topleft._render.through_lens import scene_through
+from topleft._core.base.options import Sink
+from topleft._core.raster import choices
+from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
+from topleft._core.raster.clusters import Backoff, Clusters
+from topleft._core.raster.view import View
+from topleft._meshes.picture import instances
+from topleft._meshes.picture.instances import PlacedScene, count_layers, survey_instances
+from topleft._meshes.picture.through_lens import scene_through
 
 SIZE = (160, 120)
 CAMERA = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)

@@ -108,7 +108,7 @@ def test_composite_of_vertices_is_that_of_their_interpolated_colors(isa, dtype, 
     with on(isa):
         got = tl.composite(layers, colors, background=background)
         pictures = np.stack([layers.layer(k).interpolate(colors) for k in range(6)], 2)
-        module = __import__("sys").modules["topleft._raster.composite"]
+        module = __import__("sys").modules["topleft._core.raster.composite"]
         monkeypatch.setattr(module, "BAND_BYTES", 5000)
         monkeypatch.setattr(module, "MIN_PIXELS_PER_THREAD", 50)
         for threads in (None, 1, 3, 8):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from strategies import CLIP_SCENES, clip_scenes, soup, with_depth
 
 import topleft as tl
-from topleft import _engine
+from topleft._core import engine
 from topleft.methods import reference
 from topleft.methods.reference import sampling
 
@@ -263,11 +263,11 @@ def count(vertices, size, band):
     """Draw counts with bands of a width other than the proved one."""
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     out = np.empty(size[::-1], np.int32)
-    exact = _engine.UnsnappedPoints(vertices, triangles, band=band)
+    exact = engine.UnsnappedPoints(vertices, triangles, band=band)
     how, records = (0, 0, 8, 0, 0, 0), np.empty(0, np.uint8)
-    source = _engine.Source(vertices)
-    mesh = _engine.SnappedMesh(source, records, None, triangles, None, how, None, exact=exact)
-    mesh.draw(_engine.Target(1, out, None, None), 0, size[1])
+    source = engine.Source(vertices)
+    mesh = engine.SnappedMesh(source, records, None, triangles, None, how, None, exact=exact)
+    mesh.draw(engine.Target(1, out, None, None), 0, size[1])
     return out
 
 

@@ -10,10 +10,10 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 from strategies import CLIP_SCENES, PIXEL_SCENES, soup, with_depth
 
 import topleft as tl
-from topleft._base.memory import FreshMemory
-from topleft._raster import lines
-from topleft._raster.snap import snap_mesh
-from topleft._raster.view import View
+from topleft._core.base.memory import FreshMemory
+from topleft._core.raster import lines
+from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.view import View
 from topleft.methods.reference import lines as ref
 
 TRIANGLE = [[0.5, 0.5], [4.5, 0.5], [0.5, 4.5]]

@@ -9,7 +9,7 @@ from engine_cases import ON_EACH_ISA, THREADS, mixed, on
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, with_depth
 
 import topleft as tl
-from topleft._raster import peel as peel_module
+from topleft._core.raster import peel as peel_module
 from topleft.methods.reference import peel as ref
 
 LAST = {"less": np.inf, "greater": -np.inf}

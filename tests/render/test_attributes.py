@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._base.texels import halve
+from topleft._core.base.texels import halve
 
 SIZE = (40, 30)
 MESH = tl.Mesh(*tl.scenes.shape("torus-knot"))

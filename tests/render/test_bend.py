@@ -10,10 +10,10 @@ from engine_cases import on
 
 import topleft as tl
 from topleft import scenes
-from topleft._camera.camera import Camera
-from topleft._model.mesh import Mesh
-from topleft._render import bend as bend_file
-from topleft._render.bend import bend
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture import bend as bend_file
+from topleft._meshes.picture.bend import bend
 
 SIZE = (160, 120)
 K = np.array([[110.0, 0.0, 80.0], [0.0, 110.0, 60.0], [0.0, 0.0, 1.0]])

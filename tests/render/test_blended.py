@@ -8,11 +8,11 @@ import shading_reference as reference
 from comparing import assert_same
 
 import topleft as tl
-from topleft._base.memory import SCRATCH
-from topleft._raster.peel import peel_meshes
-from topleft._render.blended import blended_masks
-from topleft._render.instances import draw_nearest, place
-from topleft._shade.shade import ShadingOptions
+from topleft._core.base.memory import SCRATCH
+from topleft._core.raster.peel import peel_meshes
+from topleft._meshes.picture.blended import blended_masks
+from topleft._meshes.picture.instances import draw_nearest, place
+from topleft._meshes.picture.shade import ShadingOptions
 
 SIZE = (120, 90)
 CAMERA = tl.Camera.look_at((0.3, 0.2, 4))

@@ -11,7 +11,7 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
-from topleft._base.color import srgb_tables
+from topleft._core.base.color import srgb_tables
 
 SIZE = (64, 48)
 RNG = np.random.default_rng(11)

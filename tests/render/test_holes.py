@@ -10,10 +10,10 @@ from layer_views import look
 from leaf_cases import CAMERA, HOLES, LEAF, N_LAYERS, SIZE, cut, layers
 
 import topleft as tl
-from topleft import _engine
-from topleft._engine.isa import build_info
-from topleft._render.holes import cut_of, cut_out, cuts_of
-from topleft._render.transparent import solid_layers
+from topleft._core import engine
+from topleft._core.engine.isa import build_info
+from topleft._meshes.picture.holes import cut_of, cut_out, cuts_of
+from topleft._meshes.picture.transparent import solid_layers
 
 ORDER = (2, 0, 3, 1)
 ON_EACH_BITS = pytest.mark.parametrize("bits", [8, "exact"])
@@ -74,11 +74,11 @@ def test_cutout_threads_and_windows_change_no_bit(sampling, bits):
 def test_cutout_each_isa_gives_the_same_bits(bits):
     mesh, name, found = layers((2, 0, 3, 1)), build_info()["isa"], []
     try:
-        for isa in _engine.isa_available():
-            _engine.use_isa(isa)
+        for isa in engine.isa_available():
+            engine.use_isa(isa)
             found.append(cut(mesh, sampling="msaa4", subpixel_bits=bits).samples_triangle)
     finally:
-        _engine.use_isa(name)
+        engine.use_isa(name)
     for other in found[1:]:
         assert_same(other, found[0])
 

@@ -8,8 +8,8 @@ from comparing import assert_same
 from layer_views import CAMERAS, CUBE, FLOAT32, FRONT, LENSES, SIZE, SNAP_PX, SPHERE, look, pierced, pixels, scene
 
 import topleft as tl
-from topleft._camera.camera import Camera
-from topleft._render.layers import LAYERS
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.picture.layers import LAYERS
 
 # Lenses
 

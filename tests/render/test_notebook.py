@@ -8,8 +8,8 @@ import numpy as np
 from PIL import Image
 
 import topleft as tl
-from topleft._base.color import id_colors
-from topleft._render.notebook import MESH_SIZE
+from topleft._core.base.color import id_colors
+from topleft._meshes.picture.notebook import MESH_SIZE
 
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from topleft import scenes
-from topleft._base.color import id_colors
-from topleft._camera.camera import Camera
-from topleft._io import load as files
-from topleft._model.mesh import Mesh
-from topleft._render.edges import EDGE_COLOR, depth_behind
-from topleft._render.render import rasterize_mesh, render
-from topleft._render.scene_shade import shade
-from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance
+from topleft._core.base.color import id_colors
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.io import load as files
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.edges import EDGE_COLOR, depth_behind
+from topleft._meshes.picture.render import rasterize_mesh, render
+from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance
 
 SHARED_MESHES = Path(__file__).resolve().parents[3] / "shared" / "meshes"
 SIZE = (64, 48)

@@ -9,15 +9,15 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
-from topleft import _engine
-from topleft._base.color import srgb_tables
-from topleft._camera.camera import Camera
-from topleft._raster import choices
-from topleft._raster.snap import Snapped
-from topleft._render import instances
-from topleft._render.fragments import SceneFragments
-from topleft._render.render import rasterize_mesh
-from topleft._scene import scene as placed
+from topleft._core import engine
+from topleft._core.base.color import srgb_tables
+from topleft._core.raster import choices
+from topleft._core.raster.snap import Snapped
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.picture import instances
+from topleft._meshes.picture.fragments import SceneFragments
+from topleft._meshes.picture.render import rasterize_mesh
+from topleft._meshes.scene import scene as placed
 from topleft.methods.reference.sampling import mean
 
 
@@ -160,7 +160,7 @@ def test_instances_of_ids_are_those_of_a_search(isa):
         found = np.empty_like(ids)
         boxes = np.tile(np.array([120, 9, 0, 0], np.int32), (n, 1))
         with on(isa):
-            _engine.find_instances(ids, first_ids, found, boxes)
+            engine.find_instances(ids, first_ids, found, boxes)
         expected = np.where(ids < 0, -1, np.searchsorted(first_ids, ids, side="right") - 1)
         assert_same(found, expected.astype(np.int32))
         for i, box in enumerate(boxes.tolist()):

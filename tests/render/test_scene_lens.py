@@ -8,7 +8,7 @@ from comparing import assert_same
 from layer_views import CAMERAS, CUBE, FRONT, LENSES, SIZE, SNAP_PX, SPHERE, look, pierced, pixels, scene
 
 import topleft as tl
-from topleft._render.layers import LAYERS
+from topleft._meshes.picture.layers import LAYERS
 
 ON_EACH_LENS = pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
 STRAIGHT = CAMERAS["off-centre"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._model.normals import unit_or_zero
+from topleft._meshes.model.normals import unit_or_zero
 
 SIZE = (96, 80)
 CAMERA = tl.Camera.look_at((2, 3, 6), fov_y_deg=35)

@@ -9,7 +9,7 @@ from engine_cases import ON_EACH_ISA, on
 from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
-from topleft._render import transparent
+from topleft._meshes.picture import transparent
 
 
 @ON_EACH_ISA

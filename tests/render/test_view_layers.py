@@ -8,11 +8,11 @@ from comparing import assert_same
 from layer_views import CAMERAS, CUBE, FLOAT32, ON_EACH_CAMERA, SIZE, SNAP_PX, SPHERE, look, pixels, scene
 
 import topleft as tl
-from topleft._camera.camera import Camera
-from topleft._render import view_layers
-from topleft._render.gbuffer import GBuffer
-from topleft._render.layers import LAYERS
-from topleft._render.view_layers import render_layers
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.picture import view_layers
+from topleft._meshes.picture.gbuffer import GBuffer
+from topleft._meshes.picture.layers import LAYERS
+from topleft._meshes.picture.view_layers import render_layers
 
 
 def corners_world(subject, found):

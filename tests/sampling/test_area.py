@@ -10,11 +10,12 @@ from engine_cases import ON_EACH_ISA, THREADS, mixed, on
 from strategies import Scene, needles, perspective, soup
 
 import topleft as tl
-from topleft import _engine, scenes
-from topleft._base.memory import KeptMemory
-from topleft._raster import sampling
-from topleft._raster.snap import snap_mesh
-from topleft._raster.view import View
+from topleft import scenes
+from topleft._core import engine
+from topleft._core.base.memory import KeptMemory
+from topleft._core.raster import sampling
+from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.view import View
 from topleft.methods.reference import area as ref
 
 UNIT = 2.0**-24
@@ -300,11 +301,11 @@ def test_shallow_edge_across_the_left_border_needs_no_wide_cells():
     corners = np.array([[0.82, 18.04], [-13.3, 15.85], [-7.85, 4.55]])
     view = View.parse((40, 30), {"sampling": "area"})
     snapped = snap_mesh(KeptMemory(), corners, np.array([[0, 1, 2]], np.int32), view, with_depth=False, out=None)
-    cells = KeptMemory().constant("cells", 30 * _engine.area_stride(40), _engine.CELL_CLEAR)
+    cells = KeptMemory().constant("cells", 30 * engine.area_stride(40), engine.CELL_CLEAR)
     narrow, wide = np.empty((30, 40), np.float32), np.empty((30, 40), np.float32)
-    assert snapped.mesh.draw_area(narrow, _engine.as_bytes(cells), 0, 30, False, True) == -1
+    assert snapped.mesh.draw_area(narrow, engine.as_bytes(cells), 0, 30, False, True) == -1
     wide_cells = np.zeros(len(cells), np.int64)
-    assert snapped.mesh.draw_area(wide, _engine.as_bytes(wide_cells), 0, 30, True, True) == -1
+    assert snapped.mesh.draw_area(wide, engine.as_bytes(wide_cells), 0, 30, True, True) == -1
     assert (narrow == wide).all()
     assert narrow[:, 0].any()
 
@@ -316,9 +317,9 @@ def test_edges_across_the_right_border_need_no_wide_cells(isa):
         view = View.parse((width, 30), {"sampling": "area"})
         with on(isa):
             snapped = snap_mesh(KeptMemory(), vertices[:, :2], triangles, view, with_depth=False, out=None)
-            cells = KeptMemory().constant("cells", 30 * _engine.area_stride(width), _engine.CELL_CLEAR)
+            cells = KeptMemory().constant("cells", 30 * engine.area_stride(width), engine.CELL_CLEAR)
             pixels = np.empty((30, width), np.float32)
-            assert snapped.mesh.draw_area(pixels, _engine.as_bytes(cells), 0, 30, False, True) == -1
+            assert snapped.mesh.draw_area(pixels, engine.as_bytes(cells), 0, 30, False, True) == -1
 
 
 @pytest.mark.parametrize("far", [0, 1])
@@ -365,11 +366,11 @@ def test_many_triangles_are_summed_in_one_band():
     assert sampling.area_band(1, height, width, 1) < 40
     assert sampling.area_band(100_000, height, width, 1) == height
     assert sampling.area_band(100_000, height, width, 2) == height // 2
-    assert sampling.area_cells(100_000, height, width, 2) == height * _engine.area_stride(width)
+    assert sampling.area_cells(100_000, height, width, 2) == height * engine.area_stride(width)
 
 
 def test_a_picture_beyond_the_bound_of_cells_is_summed_in_several_bands(monkeypatch):
-    monkeypatch.setattr(sampling, "MAX_CELLS", 7 * _engine.area_stride(40))
+    monkeypatch.setattr(sampling, "MAX_CELLS", 7 * engine.area_stride(40))
     vertices, triangles, _ = scenes.random_triangles(300, 20, 40, 30)
     whole = tl.overdraw(vertices[:, :2], triangles, (40, 30), sampling="area", threads=1)
     monkeypatch.undo()

@@ -9,7 +9,7 @@ import pytest
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
-from topleft._raster import choices, sampling
+from topleft._core.raster import choices, sampling
 
 SIZE = (333, 301)
 TESTS = [None, "less", "greater"]

@@ -10,7 +10,7 @@ from engine_cases import ON_EACH_ISA, THREADS, mixed, on
 from strategies import Scene, fan, jittered_grid, perspective, soup
 
 import topleft as tl
-from topleft._raster.sampling import POSITIONS
+from topleft._core.raster.sampling import POSITIONS
 from topleft.methods import reference as exact
 from topleft.methods.reference import blend as ref
 from topleft.methods.reference.sampling import mean

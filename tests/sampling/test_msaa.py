@@ -10,7 +10,7 @@ from pages import before_a_page, behind_a_page
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, slivers, with_depth
 
 import topleft as tl
-from topleft._raster.sampling import POSITIONS
+from topleft._core.raster.sampling import POSITIONS
 from topleft.methods.reference import sampling as ref
 
 COUNTS = (2, 4, 8, 16)

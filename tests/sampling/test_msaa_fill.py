@@ -9,7 +9,7 @@ from engine_cases import ON_EACH_ISA, THREADS, mixed, on
 from strategies import floor
 
 import topleft as tl
-from topleft._base.color import srgb_tables
+from topleft._core.base.color import srgb_tables
 from topleft.methods.reference.sampling import mean
 
 COUNTS = (2, 4, 8, 16)

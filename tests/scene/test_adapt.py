@@ -11,9 +11,9 @@ import pytest
 
 import topleft as tl
 from topleft import scenes
-from topleft._camera.camera import Camera
-from topleft._model.mesh import Mesh
-from topleft._scene.adapt import as_mesh, as_polygons
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.scene.adapt import as_mesh, as_polygons
 
 SIZE = (64, 48)
 VERTICES, TRIANGLES = scenes.shape("icosahedron")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._scene.scene import as_subject, meshes_of, scene_of
+from topleft._meshes.scene.scene import as_subject, meshes_of, scene_of
 
 MESH = tl.Mesh(*tl.scenes.shape("cube"))
 POINTS = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n"

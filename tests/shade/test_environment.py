@@ -7,8 +7,8 @@ import pytest
 import shading_reference as reference
 
 import topleft as tl
-from topleft._model import environment as module
-from topleft._model.normals import unit_or_zero
+from topleft._meshes.model import environment as module
+from topleft._meshes.model.normals import unit_or_zero
 
 RNG = np.random.default_rng(4)
 DIRECTIONS = unit_or_zero(RNG.normal(size=(300, 3)))

@@ -10,10 +10,10 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
-from topleft._base.color import id_colors, srgb_tables
-from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredMesh
-from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, colors_of_numbers
+from topleft._core.base.color import id_colors, srgb_tables
+from topleft._core.raster import choices
+from topleft._core.raster.cluster_draw import ClusteredMesh
+from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, colors_of_numbers
 from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
@@ -92,7 +92,7 @@ def test_a_triangle_is_shaded_once_in_a_pixel(monkeypatch):
         shaded.append(len(ids))
         return colors_of_numbers(ids, *arguments)
 
-    monkeypatch.setattr(sys.modules["topleft._shade.shade"], "colors_of_numbers", count)
+    monkeypatch.setattr(sys.modules["topleft._meshes.picture.shade"], "colors_of_numbers", count)
     tl.render(KNOT, size=SIZE, sampling="msaa8", shading="ids")
     ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa8").samples_triangle
     pairs = sum(len(set(pixel) - {-1}) for row in ids.tolist() for pixel in row)

@@ -12,8 +12,8 @@ from comparing import assert_same
 from engine_cases import hashes_on_each_isa
 
 import topleft as tl
-from topleft._base.color import srgb_tables
-from topleft._render.scene_shade import shade
+from topleft._core.base.color import srgb_tables
+from topleft._meshes.picture.scene_shade import shade
 
 SIZE = (150, 110)
 RNG = np.random.default_rng(6)

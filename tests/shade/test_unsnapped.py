@@ -8,8 +8,8 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
-from topleft._render.scene_shade import shade
-from topleft._shade.shade import shade_normals
+from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.shade import shade_normals
 
 SIZE = (150, 70)
 CAMERA = tl.Camera.look_at((0, 0, 4), ortho_height=2.0, near=1.0, far=9.0)

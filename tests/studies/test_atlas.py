@@ -15,7 +15,7 @@ from benchmarks.exact.clip import draw_clip, pieces_picture
 from benchmarks.exact.unsnapped import draw_unsnapped
 from benchmarks.harness.machine import IMAGES, PAGES, RECORDS, ROOT
 
-from topleft._explore.race import PRODUCTION, Entry, entries
+from topleft._apps.explore.race import PRODUCTION, Entry, entries
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS, reference
 from topleft.methods.reference.integers import draw_points, snapped_points, true_points

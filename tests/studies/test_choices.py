@@ -18,7 +18,7 @@ from benchmarks.harness.machine import ROOT
 from benchmarks.harness.ways import Way, check_same_bits, take_rounds
 from benchmarks.scenes.arrays import strewn_arrays
 
-from topleft._raster import choices
+from topleft._core.raster import choices
 
 TINY = bench.Options(rounds=1, seconds=0.0, scale=0.02)
 

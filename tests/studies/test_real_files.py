@@ -48,7 +48,7 @@ def test_drawing_that_raises_is_a_crash(folder, tmp_path, monkeypatch):
     def fall(_):
         raise KeyError("x")
 
-    monkeypatch.setattr("topleft.cli.main", fall)
+    monkeypatch.setattr("topleft._apps.cli.main", fall)
     assert drawing.draw(folder / "plain.obj", tmp_path / "a.png") == {"outcome": "crashed", "line": "KeyError: 'x'"}
 
 

@@ -6,7 +6,7 @@ import pytest
 from benchmarks import cli
 from PIL import Image
 
-from topleft._base.options import Sampling
+from topleft._core.base.options import Sampling
 
 
 def test_samplings_command_draws_a_panel_for_each(tmp_path, capsys):

@@ -12,7 +12,7 @@ from benchmarks.static import study as static
 from benchmarks.static import tables as static_tables
 
 import topleft as tl
-from topleft._raster import choices
+from topleft._core.raster import choices
 
 SCALE = 0.02
 CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n" + "".join(

@@ -16,7 +16,7 @@ from int64_loop import DEPTH_TESTS
 from strategies import soup
 
 import topleft as tl
-from topleft import _engine
+from topleft._core import engine
 
 THREADS = (1, 2, 3, 8)
 
@@ -27,12 +27,12 @@ ON_EACH_ISA = pytest.mark.parametrize("isa", tl.build_info()["isa_available"])
 @contextmanager
 def on(isa):
     """Run on the kernels of one instruction set."""
-    before = _engine.isa_in_use()
-    _engine.use_isa(isa)
+    before = engine.isa_in_use()
+    engine.use_isa(isa)
     try:
         yield
     finally:
-        _engine.use_isa(before)
+        engine.use_isa(before)
 
 
 PRINT_HASH = """
@@ -123,7 +123,7 @@ def cases(make, *arguments):
 def sharing(is_shared):
     """Threads share the triangles of any scene, or set up all of them in each."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules["topleft._raster.choices"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
+        patch.setattr(sys.modules["topleft._core.raster.choices"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
         yield
 
 

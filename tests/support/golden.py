@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import topleft as tl
-from topleft._render.layers import LAYERS
+from topleft._meshes.picture.layers import LAYERS
 from topleft.testing import HARD_SCENES, SIZE, hard_scenes, words_of
 
 FILE = pathlib.Path(__file__).with_name("golden.json")

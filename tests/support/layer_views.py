@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._camera.camera import Camera
-from topleft._render.view_layers import render_layers
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.picture.view_layers import render_layers
 
 SIZE = (80, 60)
 SNAP_PX = 2.0**-9  # half a sub-pixel

@@ -3,7 +3,7 @@
 import numpy as np
 
 import topleft as tl
-from topleft._render.holes import cut_of, cut_out
+from topleft._meshes.picture.holes import cut_of, cut_out
 
 SIZE = (90, 70)
 CAMERA = tl.Camera.look_at((0.4, 0.3, 3), near=0.5, far=9)

@@ -13,7 +13,7 @@ torch = pytest.importorskip("torch")
 
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
-from topleft._raster.verbs import rasterize as draw  # noqa: E402
+from topleft._core.raster.verbs import rasterize as draw  # noqa: E402
 
 CTX = dr.RasterizeContext(threads=1)
 F64 = torch.float64

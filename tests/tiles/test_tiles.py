@@ -300,7 +300,7 @@ def test_windows_go_on_in_a_forked_child():
 
 
 def test_error_of_a_later_block_comes_in_its_turn(monkeypatch):
-    monkeypatch.setattr("topleft._tiles.spans.BLOCK", 8)
+    monkeypatch.setattr("topleft._apps.tiles.spans.BLOCK", 8)
     points = POINTS.copy()
     points[TRIANGLES[41, 0]] = np.nan
     points[TRIANGLES[20, 0]] = np.nan

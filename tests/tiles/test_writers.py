@@ -16,9 +16,9 @@ from comparing import files_of
 from PIL import Image
 
 import topleft as tl
-from topleft._tiles.deepzoom import halved_colors
-from topleft._tiles.geotiff import differences, sums
-from topleft._tiles.levels import halved
+from topleft._apps.tiles.deepzoom import halved_colors
+from topleft._apps.tiles.geotiff import differences, sums
+from topleft._apps.tiles.levels import halved
 
 SRC = str(Path(tl.__file__).parents[1])
 RNG = np.random.default_rng(6)
@@ -170,7 +170,7 @@ def test_geotiff_is_cloud_optimised(tmp_path, kind):
 
 def test_geotiff_beyond_4_gb_is_bigtiff(tmp_path, monkeypatch):
     tifffile = pytest.importorskip("tifffile", reason="tifffile is not installed")
-    monkeypatch.setattr("topleft._tiles.geotiff.LIMIT_CLASSIC", 1000)
+    monkeypatch.setattr("topleft._apps.tiles.geotiff.LIMIT_CLASSIC", 1000)
     raster = raster_of("height_map")
     raster.to_geotiff(tmp_path / "a.tif", tile=32, compression="none")
     with tifffile.TiffFile(tmp_path / "a.tif") as file:

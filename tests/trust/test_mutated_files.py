@@ -15,8 +15,8 @@ from mutations import N_MUTATIONS, mutated_bytes, mutated_tree
 from PIL import Image
 
 import topleft as tl
-from topleft._plan.costs import Costs, load_costs
-from topleft.cli.targets import read_texture
+from topleft._apps.cli.targets import read_texture
+from topleft._meshes.plan.costs import Costs, load_costs
 from topleft.errors import ImageError, MeshError
 
 N = int(os.environ.get("TOPLEFT_MUTATIONS", str(N_MUTATIONS // 2)))

@@ -5,9 +5,9 @@ Shares no code with them but the snap and the halvings of textures. All vertices
 
 import numpy as np
 
-from topleft._model.environment import DEFAULT_ENVIRONMENT
-from topleft._model.normals import face_normals, unit_or_zero
-from topleft._model.texture import LIGHT_OF_BYTE, Encoding, halved_along
+from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT
+from topleft._meshes.model.normals import face_normals, unit_or_zero
+from topleft._meshes.model.texture import LIGHT_OF_BYTE, Encoding, halved_along
 
 TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
 

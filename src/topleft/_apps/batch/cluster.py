@@ -1,0 +1,345 @@
+"""Hands the jobs of a batch to the workers of a Dask cluster.
+
+Input: a `dask.distributed.Client`, and jobs. Output: futures of outcomes. A mesh is a task of its own: the client sends
+it to the scheduler once, each worker that draws it gets it once, and when a worker dies another one makes it again.
+
+What may happen to a task is answered here: Dask tries it again when its worker dies; jobs that were together when
+workers died over them are tried one by one, so that one of them that kills workers is told alone; tasks that were lost
+with the scheduler, or cancelled by a restart of the cluster, are sent again.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import OrderedDict, deque
+from collections.abc import Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from topleft._apps.batch.jobs import Job, JobRunner, Outcome
+from topleft._apps.batch.workers import N_SPOOLED, Jobs, Workers, coarser_levels_of, needs_levels
+from topleft._core.base.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
+from topleft._meshes.lod.levels import Level, Levels, keep_levels
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.plan.plan import plan
+from topleft.errors import MissingPackageError, TopleftError
+
+__all__ = ["ClusterWorkers"]
+
+MESH_KEY = "topleft-mesh"
+"""How the keys of tasks begin that hold a mesh."""
+
+GONE = ("cancelled", "lost", "error")
+"""What has become of the future of a mesh that is no longer there."""
+
+TASK_MS = 200.0
+"""What a task should take: about a hundred times what handing it over costs."""
+
+MOST_TOGETHER = 64
+UNKNOWN_TOGETHER = 4
+"""Jobs of a task whose mesh only the worker reads."""
+
+MOST_TRIALS = 2
+"""How often a job that workers died over is tried by itself."""
+
+GRACE_S = 5.0
+"""How long a job may take to end once its time is over, before its process is ended."""
+
+
+class HeldScene:
+    """A mesh or scene in the memory of a worker, with its coarser levels."""
+
+    def __init__(self, scene: Any, coarser: list[tuple[Mesh, tuple[Level, ...]]]) -> None:
+        self.scene, self.coarser = scene, coarser
+
+    def __call__(self) -> Any:
+        """Return it."""
+        for mesh, levels in self.coarser:
+            keep_levels(mesh, Levels(mesh, levels))
+        return self.scene
+
+
+def hold_scene(held: HeldScene) -> HeldScene:
+    """Keep a scene as the result of a task."""
+    return held
+
+
+@dataclass
+class _Kept:
+    scene: Any  # held, so that no other object gets its id
+    future: Any
+    n_users: int = 0
+
+
+class ClusterWorkers(Workers):
+    """Workers of a Dask cluster."""
+
+    def __init__(self, client: Any, time_limit: float | None = None) -> None:
+        self._client = client
+        self._time_limit = time_limit
+        self._lock = threading.RLock()
+        self._kept: OrderedDict[tuple[int, bool], _Kept] = OrderedDict()
+        self._ends = False
+        self._suspects: deque[tuple[tuple[int, Job], Future[list[Outcome]], int]] = deque()
+        self._is_trying = False
+        self._dropped: set[Future[list[Outcome]]] = set()
+        self._token = f"{os.getpid()}-{os.urandom(6).hex()}"
+        self._together: dict[int, int] = {}
+
+    @property
+    def n_workers(self) -> int:  # type: ignore[override]
+        """Threads of all workers, at least one: some may be still to come."""
+        return max(1, sum(self._client.nthreads().values()))
+
+    def start(self) -> None:
+        """Look whether all workers have the package.
+
+        Raises
+        ------
+        MissingPackageError
+            If one has not.
+        TopleftError
+            If one has another version.
+        """
+        check_workers(self._client)
+
+    def prepare(self, jobs: Jobs) -> Jobs:
+        """Return jobs, once the levels of detail are made that their mesh is sent with."""
+        if needs_levels(jobs[0][1]):
+            coarser_levels_of(jobs[0][1].scene)
+        return jobs
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Submit jobs together, their mesh by itself."""
+        promise: Future[list[Outcome]] = Future()
+        self._send(list(jobs), promise)
+        return promise
+
+    def _send(
+        self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int = 0, n_trials: int = 0
+    ) -> None:
+        with_levels = needs_levels(jobs[0][1])
+        held = self._hold(jobs[0][1].scene, with_levels)
+        light = [(index, replace(job, scene=None) if held is not None else job) for index, job in jobs]
+        with quiet():
+            task = self._client.submit(
+                draw_on_worker, self._token, light, held, self._time_limit, pure=False, retries=0
+            )  # fmt: skip
+
+        def end(done: Any) -> None:
+            try:
+                self._end(done, jobs, promise, n_restarts, n_trials)
+            except BaseException as error:
+                if not promise.done():
+                    promise.set_exception(error)
+
+        task.add_done_callback(end)
+
+        def drop(made: Future[list[Outcome]]) -> None:
+            if made.cancelled():
+                task.cancel()
+                if not made.running() and made not in self._dropped:
+                    self._dropped.add(made)
+                    made.set_running_or_notify_cancel()  # whoever waits learns of it
+
+        promise.add_done_callback(drop)
+
+    def _end(
+        self, task: Any, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int, n_trials: int
+    ) -> None:
+        """Hand on what a task came to, or try again."""
+        if n_trials:
+            self._is_trying = False
+        if promise.done():
+            return
+        outcomes, error = came_of(task)
+        if outcomes is not None:
+            promise.set_result(outcomes)
+        elif error is None and not self._ends and n_restarts < MOST_RESTARTS:
+            self._is_trying = self._is_trying or n_trials > 0
+            again = partial(self._send_again, jobs, promise, n_restarts + 1, n_trials)
+            threading.Thread(target=again, daemon=True).start()
+        elif type(error).__name__ == "KilledWorker" and n_trials < MOST_TRIALS and not self._ends:
+            self._suspect(jobs, promise, n_trials + 1)
+        else:
+            promise.set_exception(error or TopleftError(f"the cluster has lost the job {1 + n_restarts} times"))
+        self._try_next()
+
+    def _send_again(
+        self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int, n_trials: int
+    ) -> None:
+        """Send jobs once more as soon as there is a scheduler; until then a client forgets what it is given."""
+        try:
+            wait_for_scheduler(self._client, lambda: self._ends)
+            if self._ends or promise.done():
+                promise.cancel()
+                return
+            self._forget_cancelled()
+            self._send(jobs, promise, n_restarts, n_trials)
+        except BaseException as error:
+            if not promise.done():
+                promise.set_exception(error)
+
+    def _suspect(self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_trials: int) -> None:
+        """Let each job be tried by itself, and no two at a time: workers died over them, but maybe for another job."""
+        if len(jobs) == 1:
+            self._suspects.append((jobs[0], promise, n_trials))
+            return
+        parts: list[Future[list[Outcome]]] = [Future() for _ in jobs]
+        outcomes: dict[int, Outcome] = {}
+
+        def collect(i: int, part: Future[list[Outcome]]) -> None:
+            try:
+                (outcomes[i],) = part.result()
+            except Exception as error:
+                outcomes[i] = Outcome(jobs[i][0], error=error)
+            if len(outcomes) == len(jobs) and not promise.done():
+                promise.set_result([outcomes[k] for k in range(len(jobs))])
+
+        for i, (part, job) in enumerate(zip(parts, jobs, strict=True)):
+            part.add_done_callback(partial(collect, i))
+            self._suspects.append((job, part, n_trials))
+
+    def _try_next(self) -> None:
+        """Send a job that workers died over, if none of these is on the way."""
+        with self._lock:
+            if self._is_trying or not self._suspects or self._ends:
+                return
+            self._is_trying = True
+            job, promise, n_trials = self._suspects.popleft()
+        self._send([job], promise, n_trials=n_trials)
+
+    def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
+        """How many jobs of a scene make a task: by what the plan of the first one says."""
+        key = id(job.scene)
+        if key not in self._together:
+            self._together[key] = jobs_of_task(job)
+        return self._together[key]
+
+    def _hold(self, scene: Any, with_levels: bool) -> Any:
+        """Return the future of a mesh on the cluster; None for names and functions, which stay as they are."""
+        if isinstance(scene, str | os.PathLike) or callable(scene):
+            return None
+        key = id(scene), with_levels
+        with self._lock:
+            kept = self._kept.get(key)
+            if kept is None:
+                held = HeldScene(scene, coarser_levels_of(scene) if with_levels else [])
+                with quiet():
+                    future = self._client.submit(
+                        hold_scene, held, key=f"{MESH_KEY}-{self._token}-{key[0]}-{os.urandom(4).hex()}"
+                    )
+                kept = self._kept[key] = _Kept(scene, future)
+                idle = [one for one, entry in self._kept.items() if not entry.n_users and one != key]
+                for one in idle[: max(0, len(self._kept) - N_SPOOLED)]:
+                    del self._kept[one]
+            self._kept.move_to_end(key)
+            kept.n_users += 1
+            return kept.future
+
+    def _forget_cancelled(self) -> None:
+        """Forget the meshes that went with the cluster; they are sent again."""
+        with self._lock:
+            for key in [key for key, kept in self._kept.items() if kept.future.status in GONE]:
+                del self._kept[key]
+
+    def release(self, jobs: Jobs) -> None:
+        """Free their mesh."""
+        if not jobs:
+            return
+        with self._lock:
+            kept = self._kept.get((id(jobs[0][1].scene), needs_levels(jobs[0][1])))
+            if kept is not None:
+                kept.n_users -= 1
+
+    def cancel(self, futures: Sequence[Future[Any]]) -> None:
+        """Drop what has not begun; what is lost from now on is not sent again."""
+        self._ends = True
+        super().cancel(futures)
+
+    def stop(self) -> None:
+        """Free the meshes."""
+        with self._lock:
+            self._kept.clear()
+
+
+def came_of(task: Any) -> tuple[list[Outcome] | None, BaseException | None]:
+    """What a task has given, or its error; neither of them where it was cancelled or lost with the scheduler."""
+    outcomes, error = result_of(task)
+    # workers died while a mesh was made again there, for whatever jobs
+    is_of_mesh = type(error).__name__ == "KilledWorker" and str(getattr(error, "task", "")).startswith(MESH_KEY)
+    return outcomes, None if error is None or is_of_mesh else told(error)
+
+
+def told(error: BaseException) -> BaseException:
+    """Return the error of a task, in one line where the worker lacks the package."""
+    if isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0] == "topleft":
+        return MissingPackageError("a worker that has joined the cluster has no topleft: install it there")
+    return error
+
+
+def jobs_of_task(job: Job) -> int:
+    """How many jobs like this one take about `TASK_MS`, by the planner."""
+    if not isinstance(job.scene, Mesh) or callable(job.camera) or job.camera is None:
+        return UNKNOWN_TOGETHER
+    try:
+        estimated = plan(job.scene, job.camera, job.size, outputs="triangle", threads=1).estimated_ms
+    except Exception:  # what is wrong with a job is told when it is drawn
+        return 1
+    # ids and depth are a part of a picture: light, background and the file take as long again or more
+    return max(1, min(MOST_TOGETHER, int(TASK_MS / max(0.1, 3 * estimated))))
+
+
+_runner: tuple[str, JobRunner] | None = None
+
+
+def draw_on_worker(
+    token: str, jobs: list[tuple[int, Job]], held: HeldScene | None, time_limit: float | None
+) -> list[Outcome]:
+    """Draw jobs on a worker, which keeps what it has read for the rest of the batch."""
+    global _runner
+    known = _runner
+    if known is None or known[0] != token:
+        known = _runner = token, JobRunner()
+    own = [(index, replace(job, scene=held) if held is not None else job) for index, job in jobs]
+    if time_limit is None:
+        return known[1].draw(own)
+    return [outcome for one in own for outcome in draw_in_time(known[1], one, time_limit)]
+
+
+class _TimeIsOver(BaseException):
+    """Raised in a thread whose job takes too long."""
+
+
+def draw_in_time(runner: JobRunner, job: tuple[int, Job], time_limit: float) -> list[Outcome]:
+    """Draw a job, or give it up after so many seconds; end the process if it does not let itself be given up."""
+    import ctypes
+
+    thread, lock = threading.get_ident(), threading.Lock()
+    is_done = False
+
+    def give_up() -> None:
+        with lock:
+            if not is_done:
+                raise_in = ctypes.pythonapi.PyThreadState_SetAsyncExc
+                raise_in(ctypes.c_ulong(thread), ctypes.py_object(_TimeIsOver))
+
+    timers = [threading.Timer(time_limit, give_up), threading.Timer(time_limit + GRACE_S, os._exit, (1,))]
+    for timer in timers:
+        timer.daemon = True
+        timer.start()
+    try:
+        outcomes = runner.draw([job])
+        with lock:
+            is_done = True
+        return outcomes
+    except _TimeIsOver:
+        error = TimeoutError(f"job {job[0]} took longer than its time limit of {time_limit:g} s")
+        return [Outcome(job[0], error=error)]
+    finally:
+        is_done = True
+        for timer in timers:
+            timer.cancel()

@@ -1,0 +1,292 @@
+"""Draws jobs, one after the other: each a mesh or scene, a camera and where the picture goes.
+
+Input: `Job`. Output: arrays, or files that are whole or not there.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+from topleft._core.base.arrays import as_size, shown
+from topleft._core.base.remote import Place, as_place, place_of
+from topleft._core.raster.verbs import Rasterizer
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.io.images import save_image
+from topleft._meshes.io.layer_files import layer_paths, save_layers
+from topleft._meshes.io.load import load
+from topleft._meshes.io.notes import listening, tell
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.points import Points
+from topleft._meshes.picture.layers import check_layers, draw_layers
+from topleft._meshes.picture.render import DEFAULT_SIZE, render
+from topleft._meshes.picture.transparent import render_transparent
+from topleft._meshes.picture.view_layers import gbuffer_of
+from topleft._meshes.scene.adapt import MeshLike, as_mesh
+from topleft._meshes.scene.scene import Scene
+from topleft.typing import LayerOption
+
+__all__ = ["Job", "JobRunner", "MeshFile", "Outcome", "as_job"]
+
+Array = npt.NDArray[Any]
+CameraMaker = Callable[[Any, tuple[int, int]], Camera]
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One picture to be made.
+
+    Parameters
+    ----------
+    scene : Mesh, Scene, Points, whatever `as_mesh` takes, path, or function without arguments that returns one of them
+        A file is read where it is drawn, once for jobs that follow each other. The same goes for what a function makes
+        where functions are equal; for worker processes it must be picklable. A mesh of another library is made ours
+        once, and must not change between its jobs.
+    camera : Camera, or function of the mesh (or scene) and the size that returns one, optional
+        As for `render`.
+    size : (width, height), pixels
+    options : mapping
+        Other options of `render`, by name; with "opacity" those of `render_transparent`; for "flow" among the layers
+        also "camera_to" and "transforms_to" of `render_layers`.
+    destination : path or URL, optional
+        The file to be written; its folder is made. A URL is whatever fsspec can write to where the job is drawn.
+        `{layer}` in the name stands for the name of a layer. None: the picture is returned.
+    layers : sequence of str
+        What is wanted besides, or instead of, the picture: names that `render_layers` knows. None: the picture alone.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> job = tl.Job(ball, size=(32, 24), options={"color": "gold"})
+    >>> [result.picture.shape for result in tl.render_batch([job])]
+    [(24, 32, 4)]
+    """
+
+    scene: Any
+    camera: Camera | CameraMaker | None = None
+    size: int | tuple[int, int] = DEFAULT_SIZE
+    options: Mapping[str, Any] = field(default_factory=dict)
+    destination: str | os.PathLike[str] | None = None
+    layers: Sequence[LayerOption | str] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.options, Mapping) or not all(isinstance(name, str) for name in self.options):
+            raise TypeError(f"options must map names of options of render to values, got {shown(self.options)}")
+        if isinstance(self.camera, type):
+            raise TypeError(f"camera must be a Camera, a function of the mesh and the size or None, got {self.camera}")
+        if self.destination is not None:
+            as_place("destination", self.destination)
+
+    def __repr__(self) -> str:
+        """One line: what is drawn, how large, where to."""
+        scene = os.fspath(self.scene) if isinstance(self.scene, str | os.PathLike) else type(self.scene).__name__
+        words = [str(scene), f"size={self.size}"]
+        words += [f"layers={tuple(self.layers)}"] if self.layers else []
+        words += [f"options={', '.join(self.options)}"] if self.options else []
+        words += [f"destination={os.fspath(self.destination)!r}"] if self.destination is not None else []
+        return f"Job({', '.join(words)})"
+
+    @property
+    def files(self) -> tuple[Place, ...]:
+        """The files that it writes.
+
+        Raises
+        ------
+        ImageError
+            If the format is unknown, or several layers would have one file that can hold one.
+        ValueError
+            If there is no such layer.
+        """
+        if self.destination is None:
+            return ()
+        path = place_of(self.destination)
+        return tuple(dict.fromkeys(layer_paths(path, check_layers(self.layers) or ("color",)).values()))
+
+    @property
+    def name(self) -> str:
+        """A word for it in messages."""
+        scene = os.fspath(self.scene) if isinstance(self.scene, (str, os.PathLike)) else type(self.scene).__name__
+        return str(scene) if self.destination is None else f"{scene} -> {os.fspath(self.destination)}"
+
+
+def as_job(item: object, index: int) -> Job:
+    """Return a job as it is, or that of a tuple of its fields.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    """
+    if isinstance(item, Job):
+        return item
+    names = [entry.name for entry in fields(Job)]
+    if isinstance(item, tuple) and 1 <= len(item) <= len(names):
+        return Job(*item)
+    raise TypeError(f"jobs[{index}] must be a Job or a tuple ({', '.join(names)}), got {type(item).__name__}")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of one job: the picture, unless it went to a file, or the error."""
+
+    index: int
+    picture: Array | dict[str, Array] | None = None
+    error: Exception | None = None
+    warnings: tuple[str, ...] = ()
+    """What its mesh lacks of its file."""
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh that is in a file."""
+
+    path: str
+
+    def __call__(self) -> Mesh | Points:
+        """Read it."""
+        return load(self.path)
+
+
+class ForeignMesh:
+    """A mesh of another library, to be made ours; equal where it is the same object."""
+
+    def __init__(self, subject: MeshLike) -> None:
+        self.subject = subject
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ForeignMesh) and self.subject is other.subject
+
+    def __hash__(self) -> int:
+        return id(self.subject)
+
+    def __call__(self) -> Mesh:
+        """Make it."""
+        return as_mesh(self.subject)
+
+
+class MeshCache:
+    """Meshes that were made, or the errors that came instead: the `n` latest, shared by all threads."""
+
+    def __init__(self, n: int) -> None:
+        self._n = n
+        self._made: OrderedDict[Hashable, tuple[Any, Exception | None, list[str]]] = OrderedDict()
+        # One at a time: readers are not safe in threads (they change the process's warning filters).
+        self._lock = threading.Lock()
+
+    def get(self, make: Callable[[], Any]) -> Any:
+        """Return what an equal function has made, or make it."""
+        found = self._made.get(make)
+        if found is None:
+            with self._lock:
+                found = self._made.get(make)
+                if found is None:
+                    found = self._made[make] = self._call(make)
+                    if len(self._made) > self._n:
+                        self._made.popitem(last=False)
+        scene, error, lines = found
+        tell(lines, stacklevel=1)
+        if error is not None:
+            raise error.with_traceback(None)
+        return scene
+
+    @staticmethod
+    def _call(make: Callable[[], Any]) -> tuple[Any, Exception | None, list[str]]:
+        with listening() as lines:
+            try:
+                made = make()
+                return made if isinstance(made, Scene | Points) else as_mesh(made), None, lines
+            except Exception as error:
+                return None, error, lines
+
+
+class JobRunner:
+    """Draws jobs: each thread on one thread and in memory of its own, which it keeps from picture to picture.
+
+    Parameters
+    ----------
+    n_meshes : int
+        How many meshes that were read are kept for jobs to come.
+    """
+
+    def __init__(self, n_meshes: int = 4) -> None:
+        self._cache = MeshCache(n_meshes)
+        self._threads = threading.local()
+
+    def draw(self, jobs: Sequence[tuple[int, Job]]) -> list[Outcome]:
+        """Return what came of each job; an error of one does not stop the next."""
+        outcomes = []
+        for index, job in jobs:
+            with listening() as lines:
+                try:
+                    picture = self.draw_one(job)
+                    outcomes.append(Outcome(index, picture, warnings=tuple(lines)))
+                except Exception as error:
+                    _clear_frames(error)
+                    outcomes.append(Outcome(index, error=error, warnings=tuple(lines)))
+        return outcomes
+
+    def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
+        """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
+        layers = check_layers(job.layers)
+        path = None if job.destination is None else place_of(job.destination)
+        files = job.files  # before any work: a format that is none
+        for file in files:
+            if isinstance(file, Path) and not file.parent.is_dir():
+                file.parent.mkdir(parents=True, exist_ok=True)
+        scene = self._scene(job.scene)
+        size = as_size(job.size)
+        camera = job.camera(scene, size) if callable(job.camera) else job.camera
+        options = {"threads": 1, **job.options}
+        rasterizer = self._rasterizer(size)
+        if not layers:
+            if "opacity" in options:
+                picture = render_transparent(scene, camera, size, **options)
+            else:
+                picture = render(scene, camera, size, rasterizer=rasterizer, **options)
+            if path is None:
+                return picture
+            save_image(files[0], picture, background=_opaque(job))
+            return None
+        gbuffer = gbuffer_of(scene, camera, size, rasterizer=rasterizer, **options)
+        arrays = draw_layers(layers, gbuffer)
+        if path is None:
+            return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
+        matrix = None if gbuffer.camera.lens is not None else gbuffer.camera.clip_from_world(size)
+        save_layers(path, arrays, matrix=matrix, background=_opaque(job))
+        return None
+
+    def _scene(self, scene: Any) -> Any:
+        if isinstance(scene, (str, os.PathLike)):
+            scene = MeshFile(os.fspath(scene))
+        elif not isinstance(scene, Mesh | Scene | Points) and not callable(scene):
+            scene = ForeignMesh(scene)
+        return self._cache.get(scene) if callable(scene) else scene
+
+    def _rasterizer(self, size: tuple[int, int]) -> Rasterizer:
+        kept: Rasterizer | None = getattr(self._threads, "rasterizer", None)
+        if kept is None or kept.size != size:
+            kept = self._threads.rasterizer = Rasterizer(size, threads=1)
+        return kept
+
+
+def _clear_frames(error: BaseException | None) -> None:
+    """Free what the frames of an error hold, pictures among it: results carry errors for long."""
+    import traceback
+
+    while error is not None:
+        traceback.clear_frames(error.__traceback__)
+        error = error.__cause__ or error.__context__
+
+
+def _opaque(job: Job) -> tuple[int, int, int]:
+    """What JPEG shows for the background: white if it is transparent."""
+    color = tuple(job.options.get("background", (255, 255, 255)))
+    return color[:3] if len(color) < 4 or color[3] else (255, 255, 255)

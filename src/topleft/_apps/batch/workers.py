@@ -1,0 +1,319 @@
+"""Hands the jobs of a batch to threads or processes, and meshes to processes through files.
+
+Input: the `executor` of a batch, and jobs. Output: futures of outcomes.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from topleft._apps.batch.jobs import Job, JobRunner, Outcome
+from topleft._core.base.arrays import as_size
+from topleft._meshes.lod.levels import Level, Levels, keep_levels
+from topleft._meshes.lod.simplify import levels_of
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.scene.scene import Scene
+from topleft.errors import MissingPackageError
+
+__all__ = ["Workers", "signals_put_off", "workers_of"]
+
+Jobs = Sequence[tuple[int, Job]]
+
+MOST_OF_A_THREAD, SMALL_PX = 4, 1 << 20
+"""How many jobs a thread gets together, and of how large pictures."""
+
+N_SPOOLED = 8
+"""Meshes whose files are kept for jobs to come, besides those that a job on the way needs."""
+
+
+@contextmanager
+def signals_put_off() -> Iterator[None]:
+    """Let SIGINT and SIGTERM wait for their handlers in Python, which may raise, until the block is left.
+
+    A mask would not do: another thread gets the signal then, and the handler runs in the main thread all the same.
+    """
+    if threading.current_thread() is threading.main_thread():
+        with _put_off(signal.SIGINT), _put_off(signal.SIGTERM):
+            yield
+    else:
+        yield
+
+
+@contextmanager
+def _put_off(number: signal.Signals) -> Iterator[None]:
+    handler = signal.getsignal(number)
+    if not callable(handler):
+        yield
+        return
+    came: list[int] = []
+    try:
+        signal.signal(number, lambda number, _: came.append(number))
+        yield
+    finally:
+        signal.signal(number, handler)
+        if came:
+            signal.raise_signal(number)
+
+
+def workers_of(executor: object) -> Workers | None:
+    """Return the workers that draw: None for the calling thread.
+
+    Raises
+    ------
+    TypeError
+        If it is neither a number nor an executor.
+    ValueError
+        If the number is below 1.
+    """
+    if executor is None:
+        return None
+    if isinstance(executor, int) and not isinstance(executor, bool):
+        if executor < 1:
+            raise ValueError(f"executor must be at least 1 thread, got {executor}")
+        return OwnThreads(executor)
+    from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor  # which take multiprocessing with them
+
+    if not isinstance(executor, Executor):
+        raise TypeError(f"executor must be None, a number of threads or an Executor, got {type(executor).__name__}")
+    if isinstance(executor, ThreadPoolExecutor):
+        return BorrowedThreads(executor)
+    return LocalProcesses(executor) if isinstance(executor, ProcessPoolExecutor) else RemoteWorkers(executor)
+
+
+class Workers:
+    """Workers of an executor that the caller owns; jobs are sent as they are."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self.n_workers: int = getattr(executor, "_max_workers", 0) or os.cpu_count() or 1
+
+    def start(self) -> None:
+        """Get ready; called before the first job."""
+
+    def prepare(self, jobs: Jobs) -> Jobs:
+        """Return jobs as they are submitted; what takes long is done here, where signals are heard."""
+        return jobs
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Submit jobs together, as `prepare` returns them."""
+        raise NotImplementedError
+
+    def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
+        """How many jobs of a scene are handed over together unless the caller says; of `n_left`, if that is known."""
+        return 1
+
+    def release(self, jobs: Jobs) -> None:
+        """Free what jobs needed that are done."""
+
+    def restart_after_fork(self) -> bool:
+        """Return whether a fork had ended the workers, which have been started again."""
+        return False
+
+    def cancel(self, futures: Sequence[Future[Any]]) -> None:
+        """Drop what has not begun."""
+        for future in futures:
+            future.cancel()
+
+    def stop(self) -> None:
+        """Free what the batch has kept; called when all that had begun is finished."""
+
+
+class BorrowedThreads(Workers):
+    """Threads of the caller's executor: they see the meshes as they are."""
+
+    def start(self) -> None:
+        """Get ready."""
+        self._runner = JobRunner(max(4, 2 * self.n_workers))
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Submit jobs together."""
+        return self._executor.submit(self._runner.draw, jobs)
+
+    def together(self, job: Job, n_left: int | None) -> int:
+        """Several small pictures of many that are listed: each time the caller is woken workers wait for the GIL.
+
+        Of few one by one, so that no thread draws the last four while the others have nothing to do.
+        """
+        try:
+            width, height = as_size(job.size)
+        except (TypeError, ValueError):  # what is wrong with a job is told when it is drawn
+            return 1
+        return max(1, min(MOST_OF_A_THREAD, (n_left or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
+
+
+class OwnThreads(BorrowedThreads):
+    """Threads of the batch's own, which end with it."""
+
+    def __init__(self, n_workers: int) -> None:
+        self.n_workers = n_workers
+
+    def start(self) -> None:
+        """Start no thread yet: they come with the first jobs."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        super().start()
+        self._executor = ThreadPoolExecutor(self.n_workers, thread_name_prefix="topleft-batch")
+        self._pid = os.getpid()
+
+    def restart_after_fork(self) -> bool:
+        """Start again in a forked child: the threads stayed with the parent, and so did locks that they held."""
+        if self._pid == os.getpid():
+            return False
+        self.start()
+        return True
+
+    def stop(self) -> None:
+        """End the threads."""
+        if self._pid == os.getpid():
+            self._executor.shutdown(cancel_futures=True)
+
+
+class RemoteWorkers(Workers):
+    """Workers that may be on other machines: each job carries all that it needs."""
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Submit jobs together."""
+        return self._executor.submit(draw_in_process, str(os.getpid()), list(jobs))
+
+
+class LocalProcesses(Workers):
+    """Processes on this machine: meshes reach them through files that each reads once."""
+
+    def start(self) -> None:
+        """Get ready."""
+        self._spool = Spool()
+
+    def prepare(self, jobs: Jobs) -> Jobs:
+        """Return jobs with their meshes replaced by where to find them."""
+        return [(index, replace(job, scene=self._spool.hold(job.scene, needs_levels(job)))) for index, job in jobs]
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Submit jobs together."""
+        return self._executor.submit(draw_in_process, self._spool.token, list(jobs))
+
+    def release(self, jobs: Jobs) -> None:
+        """Free their meshes."""
+        for _, job in jobs:
+            self._spool.release(job.scene, needs_levels(job))
+
+    def stop(self) -> None:
+        """Remove the files."""
+        self._spool.close()
+
+
+@dataclass(frozen=True)
+class SpooledMesh:
+    """A mesh that another process has put into a file, and its levels of detail."""
+
+    path: str
+
+    def __call__(self) -> Any:
+        """Read it."""
+        import pickle
+
+        with open(self.path, "rb") as file:
+            scene, coarser = pickle.load(file)
+        for mesh, levels in coarser:
+            keep_levels(mesh, Levels(mesh, levels))
+        return scene
+
+
+@dataclass
+class _Spooled:
+    scene: Any  # held, so that no other object gets its id
+    at: SpooledMesh
+    n_users: int = 0
+
+
+class Spool:
+    """Meshes in files of a temporary folder, each pickled once; those in use and the latest others."""
+
+    def __init__(self) -> None:
+        import tempfile
+
+        self._pid = os.getpid()
+        self._folder = tempfile.mkdtemp(prefix="topleft-")
+        self._entries: OrderedDict[tuple[int, bool], _Spooled] = OrderedDict()
+        self._n_written = 0
+
+    @property
+    def token(self) -> str:
+        """What tells this batch from others."""
+        return self._folder
+
+    def hold(self, scene: Any, with_levels: bool = False) -> Any:
+        """Return what stands for a mesh, which stays in its file until it is released; names stay as they are.
+
+        Levels of detail are made here where they are needed, once, and not in each worker.
+        """
+        if isinstance(scene, (str, os.PathLike)) or callable(scene):
+            return scene
+        key = id(scene), with_levels
+        entry = self._entries.get(key)
+        if entry is None:
+            import pickle
+
+            path = Path(self._folder, f"{self._n_written}.pickle")
+            self._n_written += 1
+            coarser = coarser_levels_of(scene) if with_levels else []
+            with open(path, "xb") as file:
+                pickle.dump((scene, coarser), file, pickle.HIGHEST_PROTOCOL)
+            entry = self._entries[key] = _Spooled(scene, SpooledMesh(str(path)))
+            self._trim()
+        self._entries.move_to_end(key)
+        entry.n_users += 1
+        return entry.at
+
+    def release(self, scene: Any, with_levels: bool = False) -> None:
+        """One job less needs it."""
+        entry = self._entries.get((id(scene), with_levels))
+        if entry is not None:
+            entry.n_users -= 1
+
+    def _trim(self) -> None:
+        idle = [key for key, entry in self._entries.items() if not entry.n_users]
+        for key in idle[: max(0, len(self._entries) - N_SPOOLED)]:
+            os.unlink(self._entries.pop(key).at.path)
+
+    def close(self) -> None:
+        """Remove the files; in a forked child they are the parent's."""
+        import shutil
+
+        if self._pid == os.getpid():
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...]]]:
+    """The meshes of a scene, each with its coarser levels; none where they cannot be made, which the job will tell."""
+    if not isinstance(scene, Mesh | Scene):
+        return []
+    meshes = [scene] if isinstance(scene, Mesh) else [instance.mesh for instance in scene]
+    try:
+        return [(mesh, levels_of(mesh)[1:]) for mesh in dict.fromkeys(meshes)]
+    except MissingPackageError:
+        return []
+
+
+def needs_levels(job: Job) -> bool:
+    """Tell whether a job may be drawn with levels of detail."""
+    return bool(job.options.get("tolerance", 0))
+
+
+_runner: tuple[str, JobRunner] | None = None
+
+
+def draw_in_process(token: str, jobs: Jobs) -> list[Outcome]:
+    """Draw jobs in a worker process, which keeps what it has read for the rest of the batch."""
+    global _runner
+    if _runner is None or _runner[0] != token:
+        _runner = token, JobRunner()
+    return _runner[1].draw(jobs)

@@ -1,0 +1,119 @@
+"""The command line: `topleft render`, `mask`, `raster`, `explore`, `explain`, `calibrate`, `doctor` and `info`.
+
+Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
+--strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
+
+animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
+arguments.py  defines what `topleft render` takes
+doctor.py     runs `topleft doctor`
+explain.py    runs `topleft explain` and `topleft calibrate`
+explore.py    runs `topleft explore`
+job_file.py   reads jobs from TOML or JSON
+mask.py       runs `topleft mask`
+raster.py     runs `topleft raster`
+render.py     runs `topleft render`: from arguments to files
+sheet.py      puts many pictures, reduced, on one
+targets.py    finds which picture goes to which file, before anything is drawn
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import NoReturn
+
+from topleft._apps.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
+from topleft._apps.cli.doctor import add_doctor_command
+from topleft._apps.cli.explain import add_plan_commands
+from topleft._apps.cli.explore import add_explore_command
+from topleft._apps.cli.mask import add_mask_command
+from topleft._apps.cli.raster import add_raster_command
+from topleft._apps.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
+from topleft._core.engine.isa import build_info
+from topleft._meshes.io.notes import listening
+from topleft.errors import TopleftError
+
+__all__ = ["FAILED", "REFUSED", "UsageError", "main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Return the exit status of the command line, `sys.argv` unless arguments are given."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.run is None:
+        parser.print_help()
+        return 0
+    try:
+        with warnings.catch_warnings(), listening() as lacks, hearing_sigterm():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy, for numbers that overflow: lines of its own
+            status: int = options.run(options)
+        complain_of_lacks(lacks)
+    except (TopleftError, OSError, ValueError, MemoryError) as error:
+        complain(one_line(error))
+        return REFUSED
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return 130
+    except Terminated:
+        complain("terminated")
+        return 143
+    except RuntimeError as error:
+        if type(error).__name__ != "BrokenProcessPool":  # whose module is not imported for one mesh
+            raise
+        complain("a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume")
+        return FAILED
+    return status
+
+
+class Terminated(BaseException):
+    """SIGTERM: like Ctrl-C it ends what goes on, and processes and temporary files with it."""
+
+
+@contextmanager
+def hearing_sigterm() -> Iterator[None]:
+    """Raise `Terminated` on SIGTERM meanwhile, in the main thread, which alone may say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> NoReturn:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def run_info(_: argparse.Namespace) -> int:
+    """Print what was built and what runs."""
+    for name, value in build_info().items():
+        if isinstance(value, Mapping):
+            print(f"{name}:", *(f"  {key}: {item}" for key, item in value.items()), sep="\n")
+        else:
+            print(f"{name}:", *(value if isinstance(value, (list, tuple)) else [value]), file=sys.stdout)
+    return 0
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="topleft", description="Exact triangle rasterization on the CPU.")
+    parser.add_argument("--version", action="version", version=f"topleft {build_info()['version']}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+    parser.set_defaults(run=None)
+    info = commands.add_parser("info", help="print the version and what was built", description=run_info.__doc__)
+    info.set_defaults(run=run_info)
+    render = commands.add_parser("render", help="render meshes to pictures", description="Render meshes to pictures.")
+    add_render_arguments(render)
+    render.set_defaults(run=run_render)
+    add_plan_commands(commands)
+    add_mask_command(commands)
+    add_raster_command(commands)
+    add_explore_command(commands)
+    add_doctor_command(commands)
+    return parser

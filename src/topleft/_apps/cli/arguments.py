@@ -1,0 +1,317 @@
+"""What `topleft render` takes: its arguments, as words of the command line or as keys of a job file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from typing import Literal, NoReturn
+
+from topleft._apps.cli.animation import ANIMATION_SUFFIXES
+from topleft._core.base.arrays import as_point_size
+from topleft._core.base.color import DEFAULT_COLOR
+from topleft._core.base.options import Cull, Sampling
+from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
+from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
+from topleft._meshes.io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._meshes.model.mesh import DEFAULT_CREASE, as_crease
+from topleft._meshes.model.points import DEFAULT_POINT_SIZE
+from topleft._meshes.picture.layers import LAYERS, check_layers
+from topleft._meshes.picture.render import DEFAULT_SIZE
+from topleft._meshes.picture.shade import Shading
+from topleft.errors import TopleftError
+from topleft.scenes import SHAPES
+
+__all__ = [
+    "REFUSED", "SUBPIXEL_BITS_HELP", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments", "meant",
+    "positive", "size", "subpixel_bits", "tolerance",
+]  # fmt: skip
+
+REFUSED = 2
+"""Exit status: nothing could be done."""
+
+UP_HELP = "the axis that points up: z for most CAD, print, scan and map files; never guessed (default y)"
+
+SUBPIXEL_BITS_HELP = "vertices snap to 2^-N pixels, 0 to 16, or stay where they are: exact (default 8)"
+
+LAYERS_OF_ONE_VIEW = tuple(name for name in LAYERS if name != "flow")
+"""Flow needs a second camera, or a second place."""
+
+RENDER_HELP = f"""\
+MESH is a file (OBJ, PLY, glTF, GLB, STL, OFF, and what else trimesh reads) or the name of a built-in shape:
+{", ".join(SHAPES)}.
+
+OUT is a file or a folder:
+  knot.png           one picture; with --views 12: knot-000.png to knot-011.png
+  pictures/          a folder, made if need be: pictures/bunny.png, or pictures/bunny-000.png, ...
+  a/{{name}}-{{view}}.jpg   a pattern: {{name}} of the mesh, {{view}} and {{index}} of the mesh in the list, as numbers,
+                     {{layer}}; several layers without it: knot-color.png, knot-depth.png, ...
+Meshes of one name and different formats have the format in theirs: bunny-obj.png, bunny-ply.png.
+Formats: {" ".join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
+
+--layers: {", ".join(LAYERS_OF_ONE_VIEW[:8])},
+{", ".join(LAYERS_OF_ONE_VIEW[8:])}; id is short for triangle.
+.npz holds all layers of a view in one file, and clip_from_world, the 4x4 matrix; without --layers color, triangle and
+depth. .npy and TIFF hold ids as int32 (-1: nothing) and all other numbers as float32 (depth and distances: +inf where
+nothing is). In a PNG they are 16-bit numbers, 0 where nothing is: ids plus 1, distances in thousandths, depth from 1
+to 65535; normals and barycentrics are 8-bit. Text chunks say it: number = topleft:offset + topleft:scale * value.
+--shading ids, depth or normals makes pictures of them to look at, and .npy files with the numbers behind.
+
+--jobs-file: TOML or JSON. Keys are the long options without dashes in front, and mesh; each job may have its own, and
+what stands outside of jobs, or on the command line, holds where a job does not say otherwise:
+  size = [512, 512]                          {{"size": [512, 512],
+  [[job]]                                     "job": [
+  mesh = ["bunny.obj", "spot.obj"]              {{"mesh": ["bunny.obj", "spot.obj"],
+  out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
+  views = 12                                     "views": 12}}]}}
+
+The picture fills the frame but for 5 %; those of --views keep one distance, so that the size does not change. What a
+mesh lacks of its file (textures that are not there, say) is told in one line at the end.
+
+Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written, or --strict and a
+mesh lacks something; 2, nothing was written.
+"""
+
+MAX_VIEWS = 100_000
+"""Most views of a turntable: each is a job that is made before the first is drawn."""
+
+
+class UsageError(TopleftError):
+    """What was asked for makes no sense."""
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that complains in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with exit status 2."""
+        words = message.split() if message.startswith("unrecognized") else []
+        unknown = [word.partition("=")[0] for word in words if word.startswith("-")]
+        guess = meant(unknown[0], self._options()) if unknown else ""
+        self.exit(REFUSED, f"topleft: {message}{guess} (try: {self.prog} --help)\n")
+
+    def _options(self) -> list[str]:
+        """The options of this parser and of its commands."""
+        found = [name for action in self._actions for name in action.option_strings]
+        commands = [action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        return found + [name for parsers in commands for parser in parsers.values() for name in parser._options()]
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """What a person may have meant by a word that is not known, as the end of a message."""
+    from difflib import get_close_matches  # 3 ms that only errors need
+
+    found = get_close_matches(word, list(known), 1)
+    return f"; did you mean {found[0]}?" if found else ""
+
+
+def add_render_arguments(parser: Parser) -> None:
+    """Add all that `topleft render` takes."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = RENDER_HELP
+    parser.add_argument("meshes", nargs="*", metavar="MESH", help="a file or a built-in shape")
+    add_picture_arguments(parser)
+    many = parser.add_argument_group("many pictures")
+    add = many.add_argument
+    add("--jobs", type=positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
+    add("--dask", metavar="local|ADDRESS", help="draw on a Dask cluster: tcp://HOST:PORT, or --jobs processes here")
+    add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
+    add("--resume", action="store_true", help="leave out pictures whose files are there")
+    add("--strict", action="store_true", help="exit with 1 if a mesh lacks something of its file: a texture, say")
+    add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
+    add(
+        "--animation",
+        metavar="FILE",
+        help=f"the views of a mesh one after the other ({{name}} of the mesh): {' '.join(ANIMATION_SUFFIXES)}",
+    )
+    add("--fps", type=_rate, default=20.0, metavar="N", help="views a second of an animation (default 20)")
+
+
+def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what a job of a job file may say, too."""
+    azimuth, elevation = THREE_QUARTER_DEG
+    width, height = DEFAULT_SIZE
+    add = parser.add_argument
+    add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
+    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
+    add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
+    add(
+        "--threads",
+        type=positive,
+        default=None,
+        metavar="N",
+        help="of a picture (default: as many as there are cores, 1 with --jobs)",
+    )
+    add = parser.add_argument_group("camera").add_argument
+    add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
+    add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
+    add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
+    add("--ortho", action="store_true", help="no perspective")
+    add("--camera", type=_index, default=None, metavar="N", help="the camera N of a glTF file, from 0")
+    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
+    add = parser.add_argument_group("look").add_argument
+    add(
+        "--shading",
+        choices=[str(mode) for mode in Shading],
+        default="smooth",
+        metavar="NAME",
+        help=f"{', '.join(Shading)} (default smooth)",
+    )
+    add("--color", type=_rgb, default=DEFAULT_COLOR, metavar="COLOR", help="of a mesh without colours")
+    add(
+        "--background",
+        type=_rgba,
+        default=(255, 255, 255, 255),
+        metavar="COLOR",
+        help="a name, #rrggbb[aa] or transparent (default white)",
+    )
+    add(
+        "--crease",
+        type=_crease,
+        default=DEFAULT_CREASE,
+        metavar="DEG",
+        help="edges that bend by more are sharp, of a mesh without normals; 0: all, 180: none (default %(default)g)",
+    )
+    add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
+    add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
+    add(
+        "--environment",
+        metavar="SKY,GROUND",
+        help="light from all around: a colour, one above and one below, or a picture of all directions",
+    )
+    add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
+    add(
+        "--tolerance",
+        type=tolerance,
+        default=0.0,
+        metavar="PX",
+        help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)",
+    )
+    add("--wireframe", action="store_true", help="draw the edges over it")
+    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
+    add(
+        "--sampling",
+        choices=samplings,
+        default=None,
+        metavar="NAME",
+        help=f"samples of a pixel: {', '.join(samplings)} (default msaa4; center with --layers, .npz, --opacity and "
+        "--shading ids or depth)",
+    )
+    add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
+    add(
+        "--point-size",
+        type=_point_size,
+        default=DEFAULT_POINT_SIZE,
+        metavar="PX",
+        help="of clouds of points: the diameter of a point, pixels (default %(default)g)",
+    )
+
+
+def size(text: str) -> tuple[int, int]:
+    """The width and height of a picture."""
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 1280x720 say, got {text!r}")
+    return int(width), int(height)
+
+
+def views(text: str) -> int:
+    """A number of views."""
+    n = positive(text)
+    if n > MAX_VIEWS:
+        raise argparse.ArgumentTypeError(f"must be at most {MAX_VIEWS}, got {n:,}" if n < 10**18 else "is too large")
+    return n
+
+
+def positive(text: str) -> int:
+    """A positive whole number."""
+    if not (text.isdecimal() and int(text)):
+        raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text!r}")
+    return int(text)
+
+
+def subpixel_bits(text: str) -> int | Literal["exact"]:
+    """The grid that vertices snap to."""
+    if text == "exact":
+        return "exact"
+    if not (text.isdecimal() and int(text) <= 16):
+        raise argparse.ArgumentTypeError(f"must be a whole number from 0 to 16, or exact, got {text!r}")
+    return int(text)
+
+
+def _index(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number from 0, got {text!r}")
+    return int(text)
+
+
+def _share(text: str) -> float:
+    try:
+        share = float(text)
+    except ValueError:
+        share = -1.0
+    if not 0 <= share <= 1:
+        raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
+    return share
+
+
+def _point_size(text: str) -> float:
+    try:
+        return float(as_point_size("--point-size", float(text), 1))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a positive number of pixels, got {text!r}") from None
+
+
+def _crease(text: str) -> float:
+    try:
+        return as_crease(float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be an angle from 0 to 180 degrees, got {text!r}") from None
+
+
+def tolerance(text: str) -> float:
+    """A number of pixels, 0 or more."""
+    try:
+        pixels = float(text)
+    except ValueError:
+        pixels = -1.0
+    if not 0 <= pixels < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a number of pixels, 0 or more, got {text!r}")
+    return pixels
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = 0.0
+    if not 0.1 <= rate <= 100:  # what the hundredths of a second of a GIF, or patience, can tell apart
+        raise argparse.ArgumentTypeError(f"must be a number from 0.1 to 100, got {text!r}")
+    return rate
+
+
+def _layers(text: str) -> tuple[str, ...]:
+    try:
+        given = (name.strip() for name in text.split(","))
+        names = check_layers("triangle" if name == "id" else name for name in given)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    if "flow" in names:
+        raise argparse.ArgumentTypeError("layer 'flow' needs two cameras: see topleft.render_layers")
+    return names
+
+
+def _rgba(text: str) -> tuple[int, ...]:
+    if text.lower() in ("transparent", "none"):
+        return (0, 0, 0, 0)
+    from PIL import ImageColor
+
+    try:
+        return ImageColor.getcolor(text, "RGBA")  # type: ignore[return-value]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a colour name or #rrggbb, got {text!r}") from None
+
+
+def _rgb(text: str) -> tuple[int, ...]:
+    return _rgba(text)[:3]

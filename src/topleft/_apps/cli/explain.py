@@ -1,0 +1,92 @@
+"""`topleft explain`: how a view of a mesh is drawn, and why. `topleft calibrate`: what this machine takes for it."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from topleft._apps.cli.arguments import (
+    SUBPIXEL_BITS_HELP,
+    UP_HELP,
+    UsageError,
+    positive,
+    size,
+    subpixel_bits,
+    tolerance,
+)
+from topleft._apps.cli.targets import MeshSource, Orbit
+from topleft._core.base.options import Cull, Sampling
+from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
+from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
+from topleft._meshes.model.points import Points
+from topleft._meshes.picture.render import DEFAULT_SIZE
+from topleft._meshes.plan.costs import save_costs
+from topleft._meshes.plan.plan import plan
+
+__all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
+
+
+def run_explain(options: argparse.Namespace) -> int:
+    """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""
+    mesh = MeshSource(options.mesh)()
+    if isinstance(mesh, Points):
+        raise UsageError(f"{options.mesh!r} holds points, of which there is no plan")
+    orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
+    camera = orbit(mesh, options.size)
+    outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))
+    explained = plan(
+        mesh,
+        camera,
+        options.size,
+        outputs=outputs,
+        tolerance=options.tolerance,
+        cull=options.cull,
+        sampling=options.sampling,
+        subpixel_bits=options.subpixel_bits,
+        threads=options.threads,
+    )
+    if options.measure:
+        explained.measure()
+    if options.json:
+        import json
+
+        print(json.dumps(explained.to_dict(), indent=1))
+    else:
+        print(explained.explain())
+    return 0
+
+
+def run_calibrate(_: argparse.Namespace) -> int:
+    """Measure this machine for some ten seconds and keep what estimates are made from."""
+    from topleft._meshes.plan.calibrate import calibrate
+
+    costs = calibrate()
+    print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual['worst']:.1f}")
+    return 0
+
+
+def add_plan_commands(commands: Any) -> None:
+    """Add both commands to the parsers of the command line."""
+    azimuth, elevation = THREE_QUARTER_DEG
+    width, height = DEFAULT_SIZE
+    explain = commands.add_parser("explain", help="tell how a mesh is drawn, and why", description=run_explain.__doc__)
+    explain.set_defaults(run=run_explain)
+    add = explain.add_argument
+    add("mesh", metavar="MESH", help="a file or a built-in shape")
+    verbs = ["rasterize", "coverage", "overdraw", "fill"]
+    add("--verb", choices=verbs, default=verbs[0], help="(default %(default)s)")
+    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
+    add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
+    add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
+    add("--ortho", action="store_true", help="no perspective")
+    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
+    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
+    add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
+    add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
+    add("--threads", type=positive, default=None, metavar="N", help="(default: as many as pay)")
+    add("--measure", action="store_true", help="draw it, and show what the stages took")
+    add("--json", action="store_true", help="numbers and sentences as JSON")
+    calibrate = commands.add_parser("calibrate", help="measure this machine", description=run_calibrate.__doc__)
+    calibrate.set_defaults(run=run_calibrate)

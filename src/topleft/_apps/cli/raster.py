@@ -1,0 +1,180 @@
+"""`topleft raster`: a mesh to a raster of any size, in GeoTIFF, Zarr or Deep Zoom."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from topleft._apps.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, positive, size, subpixel_bits
+from topleft._apps.cli.render import client_of, complain
+from topleft._apps.tiles.blocks import Triangles, mapped_npy, triangles_of
+from topleft._apps.tiles.drawing import KINDS
+from topleft._apps.tiles.tiles import WINDOW, Tiles, extent_of, tiles
+from topleft._core.base.remote import Place, RemotePath, place_of
+from topleft._core.base.threads import available_threads
+
+if TYPE_CHECKING:
+    from topleft._apps.tiles.levels import Written
+
+__all__ = ["add_raster_command", "run_raster"]
+
+RASTER_HELP = """\
+MESH is a mesh file, or two .npy files with a comma between them: vertices.npy,triangles.npy. Binary STL, binary PLY of
+triangles and .npy are mapped and need not fit memory. x and y are the plane, z is the height.
+
+OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder, or a URL that fsspec reaches) or .dzi (Deep Zoom). Heights
+of the upper surface are written unless --labels, --values or --kind asks for something else. --resume goes on with what
+an interrupted run has left of the same raster, and draws no window again that is whole.
+
+examples:
+  topleft raster terrain.ply -o heights.tif --pixel-size 1 --crs EPSG:25832
+  topleft raster v.npy,t.npy -o labels.zarr --pixel-size 0.5 --labels --levels 5 --resume
+  topleft raster mesh.ply -o depth.tif --pixel-size 10 --values water_depth --nodata -9999
+"""
+
+SUFFIXES = (".tif", ".tiff", ".zarr", ".dzi")
+
+
+def run_raster(options: argparse.Namespace) -> int:
+    """Write a raster of a mesh, of any size."""
+    path = place_of(options.out)
+    if path.suffix.lower() not in SUFFIXES:
+        raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
+    is_tiff, is_zarr = path.suffix.lower() in (".tif", ".tiff"), path.suffix.lower() == ".zarr"
+    if isinstance(path, RemotePath) and not is_zarr:
+        raise UsageError(f"-o {options.out}: {path.suffix} goes to a path of this machine, .zarr to a URL as well")
+    if options.crs is not None and not is_tiff:
+        raise UsageError(f"--crs is for .tif, got {path.name}")
+    if options.levels is not None and not is_zarr:
+        raise UsageError(f"--levels is for .zarr, got {path.name}")
+    if options.uncompressed and not (is_tiff or is_zarr):
+        raise UsageError(f"--uncompressed is for .tif and .zarr, got {path.name}")
+    if options.nodata is not None and not (is_tiff or options.values is not None):
+        raise UsageError("--nodata is for --values and .tif: other pixels without triangles are -1, NaN or 0")
+    try:
+        with ExitStack() as stack:
+            raster = raster_of(options)
+            n_workers = options.threads or available_threads()
+            client = None if options.dask is None else client_of(options.dask, n_workers, stack)
+            written = write(raster, path, options, client)
+    except IndexError as error:  # a triangle that names no vertex
+        raise ValueError(f"{options.mesh}: {error}") from None
+    if not options.quiet:
+        width, height = raster.size
+        print(
+            f"{options.out}: {width} x {height} {raster.dtype}, {written.n_drawn} windows drawn, "
+            f"{written.n_kept} kept, {written.n_blank} blank"
+        )
+    if not (written.n_drawn or written.n_kept):
+        complain(f"no triangle of {options.mesh} lies within {options.out}: all of it is blank")
+    return 0
+
+
+def write(raster: Tiles, path: Place, options: argparse.Namespace, client: Any) -> Written:
+    """Write the raster in the format that the name asks for."""
+    progress = True if not options.quiet and sys.stderr.isatty() else None
+    how: dict[str, Any] = {"resume": options.resume, "progress": progress, "executor": client}
+    suffix = path.suffix.lower()
+    if suffix == ".zarr":
+        return raster.to_zarr(options.out, levels=options.levels or 1, compression=compression(options, "gzip"), **how)
+    assert isinstance(path, Path)
+    if suffix == ".dzi":
+        return raster.to_deepzoom(path, **how)
+    how |= {"nodata": options.nodata, "compression": compression(options, "deflate")}
+    return raster.to_geotiff(path, crs=options.crs, **how)
+
+
+def compression(options: argparse.Namespace, usual: str) -> Any:
+    """How pixels are stored."""
+    return "none" if options.uncompressed else usual
+
+
+def raster_of(options: argparse.Namespace) -> Tiles:
+    """Return the raster that is asked for."""
+    named = options.mesh.split(",")
+    mesh = tuple(named) if len(named) == 2 and all(name.endswith(".npy") for name in named) else options.mesh
+    triangles = triangles_of(mesh, options.folder)
+    values = None
+    kind: Any = options.kind or ("labels" if options.labels else "height_map")
+    more: dict[str, Any] = {}
+    if options.values is not None:
+        kind, values = "field", values_of(options.values, triangles, options.mesh)
+    if sum((options.labels, options.values is not None, options.kind is not None)) > 1:
+        raise UsageError("--labels, --values and --kind each say what is drawn: give one of them")
+    if kind == "height_map":
+        more["surface"] = options.surface or "upper"
+    elif options.surface is not None:
+        raise UsageError(f"--surface is for heights, got the kind {kind}")
+    if options.subpixel_bits != 8:
+        more["subpixel_bits"] = options.subpixel_bits
+    if kind == "field" and options.nodata is not None:
+        more["nodata"] = options.nodata
+    if (options.pixel_size is None) == (options.size is None):
+        raise UsageError("either --pixel-size or --size must say how large the raster is")
+    step = options.pixel_size
+    return tiles(
+        triangles,
+        options.size,
+        kind=kind,
+        values=values,
+        window=options.window,
+        extent=options.extent or extent_of(triangles),
+        pixel_size=step if step is None or len(step) > 1 else step[0],
+        threads=options.threads,
+        folder=options.folder,
+        **more,
+    )
+
+
+def values_of(name: str, triangles: Triangles, mesh: str) -> Any:
+    """Return the values of a .npy file, or those that a PLY file has of its vertices or faces."""
+    if name.endswith(".npy"):
+        return mapped_npy(Path(name))
+    named = getattr(triangles, "named", {})
+    if name in named:
+        return named[name]
+    there = ", ".join(one for one, array in named.items() if np.ndim(array) == 1) or "none"
+    raise UsageError(f"--values {name}: a .npy file, or what {mesh} has of its vertices or faces by name ({there})")
+
+
+def add_raster_command(commands: Any) -> None:
+    """Add the command to the parsers of the command line."""
+    raster = commands.add_parser(
+        "raster",
+        help="write a raster of any size: heights, values, labels",
+        description=run_raster.__doc__,
+        epilog=RASTER_HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    raster.set_defaults(run=run_raster)
+    raster.add_argument("mesh", metavar="MESH", help="a mesh file, or vertices.npy,triangles.npy")
+    raster.add_argument("-o", "--out", required=True, metavar="OUT", help="a file .tif or .dzi, or a folder .zarr")
+    raster.add_argument(
+        "--pixel-size", type=float, nargs="+", metavar="N", help="width, and height if it differs, of a pixel in units"
+    )
+    raster.add_argument("--size", type=size, metavar="WxH", help="how many pixels, instead")
+    raster.add_argument(
+        "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="what is shown (all)"
+    )
+    raster.add_argument("--crs", metavar="CRS", help="what x and y are: EPSG:25832, say")
+    raster.add_argument("--labels", action="store_true", help="write which triangle shows, -1 for none")
+    raster.add_argument("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
+    raster.add_argument("--kind", choices=[one for one in KINDS if one not in ("field", "fill")], help="what is drawn")
+    raster.add_argument("--surface", choices=("upper", "lower"), help="whose height counts (upper)")
+    raster.add_argument("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
+    raster.add_argument("--nodata", type=float, metavar="N", help="what stands where nothing is, in values and .tif")
+    raster.add_argument("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
+    raster.add_argument("--uncompressed", action="store_true", help="store pixels as they are")
+    raster.add_argument("--window", type=positive, default=WINDOW, metavar="N", help=f"side of a window ({WINDOW})")
+    raster.add_argument("--resume", action="store_true", help="go on with what an interrupted run has left")
+    raster.add_argument("--folder", metavar="DIR", help="where temporary files go")
+    raster.add_argument("--threads", type=positive, metavar="N", help="how many at most")
+    raster.add_argument(
+        "--dask", metavar="ADDRESS", help="let the workers of a Dask cluster draw: its scheduler, or local"
+    )
+    raster.add_argument("--quiet", action="store_true", help="show no bar and print nothing")

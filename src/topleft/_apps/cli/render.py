@@ -1,0 +1,293 @@
+"""`topleft render`: from arguments to files.
+
+Every mesh is rendered; one that fails does not stop the rest, and is listed at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import tempfile
+import threading
+import warnings
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from topleft._apps.batch.batch import Result, render_batch
+from topleft._apps.batch.jobs import Job
+from topleft._apps.cli.animation import check_animation, save_animation
+from topleft._apps.cli.arguments import UsageError
+from topleft._apps.cli.job_file import read_jobs
+from topleft._apps.cli.sheet import make_sheet
+from topleft._apps.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
+from topleft._core.base.remote import is_url
+from topleft._meshes.io.images import PICTURE_SUFFIXES, save_image
+from topleft.errors import MeshWarning, MissingPackageError, TopleftError
+
+__all__ = ["FAILED", "client_of", "complain", "complain_of_lacks", "one_line", "run_render"]
+
+FAILED = 1
+"""Exit status: a part of the work failed."""
+
+MOST_VIEWS_TOGETHER = 16
+"""Views of a mesh that a process draws before it gives word: it reads the mesh once for them."""
+
+
+CONNECT_S = 20
+"""How long a scheduler has to answer."""
+
+MOST_LACKS = 8
+"""What meshes lack that one line tells."""
+
+
+def run_render(options: argparse.Namespace) -> int:
+    """Render every mesh and return the exit status."""
+    with ExitStack() as stack:
+        groups = _plan(options, stack)
+        animations = _animations(groups, options)
+        extras = [path for path, _ in animations] + ([Path(options.sheet)] if options.sheet else [])
+        for path, _ in animations:
+            check_animation(path)
+        if extras:
+            _check_pictures(groups, options)
+        check_targets(groups, extras)
+        failed, lacks = _render(groups, options)
+        for _, message in failed:
+            complain(message)
+        complain_of_lacks(lacks)
+        for path, group in animations:
+            if all(file.is_file() for file in _color_files(group)):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                background = group.jobs[0].options["background"]
+                opaque = background[:3] if background[3] else (255, 255, 255)
+                save_animation(path, _color_files(group), fps=options.fps, background=opaque)
+        if options.sheet:
+            Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
+            sheet = make_sheet([_color_files(group) for group in groups], [group.name for group in groups])
+            save_image(options.sheet, sheet)
+    if failed:
+        sources = list(dict.fromkeys(source for source, _ in failed))
+        complain(f"{len(sources)} of {len(groups)} meshes failed: {' '.join(sources)}")
+        return FAILED
+    return FAILED if lacks and options.strict else 0
+
+
+def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
+    """Return the jobs of the command line or the job file, by mesh."""
+    if options.jobs_file and options.meshes:
+        raise UsageError("a job file names its meshes itself: give MESH or --jobs-file, not both")
+    if not options.jobs_file and not options.meshes:
+        raise UsageError("there is nothing to render: give MESH or --jobs-file (try: topleft render --help)")
+    given = read_jobs(Path(options.jobs_file), options) if options.jobs_file else [options]
+    groups: list[MeshJobs] = []
+    for each in given:
+        if each.out is None:
+            if not (options.sheet or options.animation):
+                raise UsageError("say where pictures go: -o/--out, --sheet or --animation (try: topleft render --help)")
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="topleft-"))
+            each.out = str(Path(folder, "{index}-{view}.png"))
+        if each.threads is None and options.jobs > 1:
+            each.threads = 1
+        groups += plan_jobs(each, len(groups))
+    return groups
+
+
+def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[list[tuple[str, str]], list[str]]:
+    """Render all; the sources of what failed, each with the reason, once, and what meshes lack of their files."""
+    jobs = [job for group in groups for job in group.jobs]
+    if options.dask is not None:
+        jobs = [_elsewhere(job) for job in jobs]
+    source_of = [group.source for group in groups for _ in group.jobs]
+    failed: dict[tuple[str, str], None] = {}
+    lacks: dict[str, None] = {}
+    with ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings())
+        warnings.simplefilter("ignore", MeshWarning)  # results have them
+        bar = stack.enter_context(_Progress(len(jobs)))
+        executor = (
+            _executor(groups, options.jobs, stack)
+            if options.dask is None
+            else client_of(options.dask, options.jobs, stack)
+        )
+        chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
+        results = stack.enter_context(
+            render_batch(
+                jobs, executor=executor, progress=bar.step, on_error="collect", order="completed",
+                resume=options.resume, chunk=None if options.dask or isinstance(executor, int) else chunk,
+            )
+        )  # fmt: skip
+        for result in results:
+            lacks |= dict.fromkeys(result.warnings)
+            if result.error is None:
+                continue
+            known = isinstance(result.error, (TopleftError, OSError, ValueError, MemoryError))
+            if len(groups) == 1 or isinstance(result.error, MissingPackageError) or not known:
+                raise result.error
+            failed[source_of[result.index], one_line(result.error)] = None
+    order = {group.source: i for i, group in reversed(list(enumerate(groups)))}
+    return sorted(failed, key=lambda entry: order[entry[0]]), list(lacks)
+
+
+def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor | int | None:
+    """Who draws: processes for several meshes, since readers are Python and so one thread's work; else threads."""
+    if n == 1 or len(groups) == 1:
+        return n if n > 1 else None
+    from concurrent.futures import ProcessPoolExecutor
+
+    class Processes(ProcessPoolExecutor):
+        """Processes that Ctrl-C does not reach, also while `submit` starts them, or the server that they fork from."""
+
+        def submit(self, *arguments: Any, **options: Any) -> Any:
+            with _interrupts_blocked():
+                return super().submit(*arguments, **options)
+
+    pool = Processes(min(n, len(groups)), initializer=_depend_on_parent)
+    stack.callback(pool.shutdown, cancel_futures=True)
+    return pool
+
+
+def _elsewhere(job: Job) -> Job:
+    """A job with the whole names of its files: workers may run in other folders."""
+    scene, path = job.scene, job.destination
+    if isinstance(scene, str | os.PathLike):
+        scene = Path(scene).absolute()
+    if path is not None and not is_url(path):
+        path = Path(path).absolute()
+    return replace(job, scene=scene, destination=path)
+
+
+def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
+    """A client of the Dask cluster that is asked for, or of one of this machine that ends with the command."""
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise MissingPackageError("--dask needs the package distributed: pip install 'topleft[dask]'") from None
+    if address == "local":
+        stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": "30s"}))
+        cluster = LocalCluster(
+            n_workers=n_workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+        )  # fmt: skip
+        stack.enter_context(cluster)
+        return stack.enter_context(Client(cluster, set_as_default=False))
+    if "://" not in address:
+        raise UsageError(f"--dask {address}: must be local, or the address of a scheduler, tcp://HOST:PORT")
+    try:
+        return stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
+    except OSError as error:
+        raise UsageError(f"--dask {address}: no scheduler answers there ({one_line(error)})") from None
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Let Ctrl-C wait; processes that are started meanwhile never see it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _depend_on_parent() -> None:
+    """Leave Ctrl-C to the parent, which lets the pictures on the way be finished, and end when it has ended."""
+    warnings.simplefilter("ignore", RuntimeWarning)  # as in `main`
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    import multiprocessing
+    from multiprocessing.connection import wait
+
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def _animations(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tuple[Path, MeshJobs]]:
+    if not options.animation:
+        return []
+    check_words("--animation", Path(options.animation), ("name", "index"))
+    if len(groups) > 1 and "{name}" not in options.animation and "{index}" not in options.animation:
+        raise UsageError(f"several meshes need {{name}} in --animation, got {options.animation!r}")
+    return [
+        (Path(options.animation.replace("{name}", group.name).replace("{index}", f"{i:03d}")), group)
+        for i, group in enumerate(groups)
+    ]
+
+
+def _check_pictures(groups: Sequence[MeshJobs], options: argparse.Namespace) -> None:
+    """Raise an error if there are no pictures for a sheet or an animation."""
+    if options.sheet and Path(options.sheet).suffix.lower() not in PICTURE_SUFFIXES:
+        raise UsageError(f"--sheet must end in one of {' '.join(PICTURE_SUFFIXES)}, got {options.sheet!r}")
+    if is_url(options.sheet) or is_url(options.animation):
+        raise UsageError("--sheet and --animation are written to this machine: give a path, not a URL")
+    for job in (job for group in groups for job in group.jobs):
+        if is_url(job.destination):
+            raise UsageError("--sheet and --animation need pictures on this machine: OUT must be a path, not a URL")
+        if job.layers and "color" not in job.layers:
+            raise UsageError(f"--sheet and --animation show the layer color, got --layers {','.join(job.layers)}")
+        if Path(os.fspath(job.destination or "")).suffix.lower() not in PICTURE_SUFFIXES:
+            known = " ".join(PICTURE_SUFFIXES)
+            raise UsageError(f"--sheet and --animation need pictures: OUT must end in one of {known}")
+
+
+def _color_files(group: MeshJobs) -> list[Path]:
+    """The pictures of a mesh, view by view."""
+    return [Path(os.fspath(job.destination or "").replace("{layer}", "color")) for job in group.jobs]
+
+
+class _Progress:
+    """A bar on stderr when a person looks at it and there is more than one picture; nothing otherwise."""
+
+    def __init__(self, n_pictures: int) -> None:
+        self._bar: Any = None
+        if n_pictures > 1 and sys.stderr.isatty():
+            try:
+                from tqdm import tqdm
+            except ImportError:
+                return
+            self._bar = tqdm(total=n_pictures, unit="picture", file=sys.stderr)
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def step(self, _: Result) -> None:
+        if self._bar is not None:
+            self._bar.update()
+
+
+def complain(message: str) -> None:
+    """Print one line on stderr."""
+    print(f"topleft: {message}", file=sys.stderr)
+
+
+def complain_of_lacks(lines: Sequence[str]) -> None:
+    """Print what meshes lack of their files, in one line."""
+    if lines:
+        more = f"; and {len(lines) - MOST_LACKS} more" if len(lines) > MOST_LACKS else ""
+        complain("; ".join(lines[:MOST_LACKS]) + more)
+
+
+def one_line(error: BaseException) -> str:
+    """What is wrong, in one line."""
+    if isinstance(error, MemoryError):
+        return "not enough memory for a mesh or picture of this size"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}: {error.filename!r}" if error.filename else error.strerror
+    return " ".join(str(error).split())

@@ -1,0 +1,348 @@
+"""Finds which picture goes to which file, before anything is drawn: from arguments to jobs.
+
+Input: parsed arguments. Output: a list of `MeshJobs`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._apps.batch.jobs import Job
+from topleft._apps.cli.arguments import UsageError, meant
+from topleft._core.base.options import Sampling
+from topleft._core.base.remote import Place, RemotePath, place_of
+from topleft._core.base.whole_file import remove_stale_parts
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.file_cameras import load_cameras
+from topleft._meshes.io.images import SUFFIXES
+from topleft._meshes.io.load import load
+from topleft._meshes.io.references import decoded
+from topleft._meshes.model.environment import Environment
+from topleft._meshes.model.material import Material
+from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh
+from topleft._meshes.model.points import DEFAULT_POINT_SIZE, Points
+from topleft._meshes.model.texture import Texture
+from topleft._meshes.picture.shade import Shading
+from topleft.errors import ImageError, MeshError, MissingPackageError
+from topleft.scenes import SHAPES, shape
+
+__all__ = ["MeshJobs", "MeshSource", "Orbit", "check_targets", "check_words", "plan_jobs"]
+
+SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth", "normals": "camera_normal"}
+"""Shadings that are a layer made visible: .npy holds the layer."""
+
+MAX_FOLDERS = 200
+"""Most folders of a path of a picture, one in the other."""
+
+
+@dataclass(frozen=True)
+class MeshSource:
+    """The mesh of a file, or the built-in shape of that name."""
+
+    name: str
+    texture: str | None = None
+    crease: float = DEFAULT_CREASE
+    point_size: float = DEFAULT_POINT_SIZE
+
+    def __call__(self) -> Mesh | Points:
+        """Read it."""
+        mesh = self._mesh()
+        if isinstance(mesh, Points):
+            return replace(mesh, size=self.point_size)
+        if self.texture is None:
+            return mesh
+        if mesh.uv is None:
+            raise MeshError(f"--texture needs texture coordinates, and {self.name!r} has none")
+        return replace(mesh, materials=(Material(texture=read_texture(self.texture)),), material_of_triangle=None)
+
+    def _mesh(self) -> Mesh | Points:
+        if self.name in SHAPES:
+            return Mesh(*shape(self.name), crease=self.crease)
+        if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
+            raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
+        return load(self.name, crease=self.crease)
+
+
+def read_texture(path: str) -> Texture:
+    """The picture of a file; errors as of `read_image`."""
+    return Texture(read_image(path))
+
+
+def read_environment(text: str, up: str) -> Environment:
+    """The light from all around that a colour, two of them, or the picture of a file tells.
+
+    Raises
+    ------
+    UsageError
+        If it is neither.
+    ImageError, OSError
+        As of `read_image`.
+    """
+    from PIL import ImageColor
+
+    top = (0.0, 0.0, 1.0) if up == "z" else (0.0, 1.0, 0.0)
+    try:
+        colors = [ImageColor.getcolor(name.strip(), "RGB") for name in text.split(",")]
+    except ValueError:
+        if not Path(text).suffix:
+            raise UsageError(f"--environment must be one or two colours or a picture, got {text!r}") from None
+        return Environment(image=read_image(text)[..., :3], up=top)
+    if len(colors) > 2:
+        raise UsageError(f"--environment must be one or two colours, got {len(colors)}")
+    return Environment(colors[0], colors[1] if len(colors) == 2 else None, up=top)  # type: ignore[arg-type]
+
+
+def read_image(path: str) -> npt.NDArray[np.uint8]:
+    """The picture (H, W, 4) of a file.
+
+    Raises
+    ------
+    ImageError
+        If it is none that Pillow reads.
+    OSError
+        If it cannot be read.
+    """
+    if not Path(path).is_file() and Path(path).exists():
+        raise ImageError(f"cannot read {path!r}: it is no file")
+    try:
+        return decoded(Path(path).read_bytes())
+    except MeshError as error:
+        raise ImageError(f"cannot read {path!r}: it is {error}") from None
+    except (OSError, ValueError, SyntaxError, EOFError) as error:
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
+        raise ImageError(f"cannot read {path!r}: it is no picture that Pillow knows") from None
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """The camera of `Camera.framing`, for whatever mesh; `fits`: its picture fills the frame."""
+
+    azimuth_deg: float
+    elevation_deg: float
+    fov_y_deg: float
+    up: Any
+    ortho: bool
+    fits: bool = True
+
+    def __call__(self, mesh: Mesh | Points, size: tuple[int, int]) -> Camera:
+        """Return it."""
+        return Camera.framing(
+            mesh,
+            azimuth_deg=self.azimuth_deg,
+            elevation_deg=self.elevation_deg,
+            fov_y_deg=self.fov_y_deg,
+            up=self.up,
+            ortho=self.ortho,
+            aspect=size[0] / size[1],
+            fit="silhouette" if self.fits else "sphere",
+        )
+
+
+@dataclass(frozen=True)
+class FileCamera:
+    """A camera of the file of the mesh."""
+
+    path: str
+    index: int
+
+    def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:  # noqa: ARG002
+        """Read it."""
+        cameras = [] if self.path in SHAPES else load_cameras(self.path)
+        if self.index >= len(cameras):
+            raise MeshError(f"--camera {self.index}: {self.path!r} has {len(cameras)} cameras")
+        return cameras[self.index]
+
+
+@dataclass(frozen=True)
+class MeshJobs:
+    """A mesh and its jobs, one for each view."""
+
+    source: str
+    name: str
+    jobs: tuple[Job, ...]
+
+
+def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
+    """Return the jobs of each mesh of the arguments; `start` is the index of the first mesh.
+
+    Raises
+    ------
+    UsageError
+        If OUT cannot hold the pictures.
+    """
+    if options.camera is not None and options.views > 1:
+        raise UsageError("--camera does not go with --views: a camera of a file stands still")
+    pattern = _pattern(options.out, options)
+    drawing = _render_options(options)
+    groups = []
+    names = names_of(options.meshes)
+    for i_mesh, source in enumerate(options.meshes, start):
+        name = names[i_mesh - start]
+        mesh = MeshSource(source, options.texture, options.crease, options.point_size)
+        jobs = []
+        for i_view in range(options.views):
+            # Not str.format: a folder may have other braces in its name.
+            filled = pattern.replace("{view}", f"{i_view:03d}").replace("{index}", f"{i_mesh:03d}")
+            azimuth_deg = options.azimuth + 360 * i_view / options.views
+            camera: Orbit | FileCamera = Orbit(
+                azimuth_deg, options.elevation, options.fov, options.up, options.ortho, fits=options.views == 1
+            )
+            if options.camera is not None:
+                camera = FileCamera(source, options.camera)
+            path = filled.replace("{name}", name)
+            layers = _layers(path, options)
+            jobs.append(Job(mesh, camera, options.size, drawing, path, layers))
+        groups.append(MeshJobs(source, name, tuple(jobs)))
+    return groups
+
+
+def names_of(sources: Sequence[str]) -> list[str]:
+    """What {name} stands for: the file without its suffix, or with it where another file differs in nothing else."""
+    stems = [source if source in SHAPES else Path(source).stem for source in sources]
+    suffixes = [Path(source).suffix.casefold().removeprefix(".") for source in sources]
+    suffixes_of: dict[str, set[str]] = {}
+    for stem, suffix in zip(stems, suffixes, strict=True):
+        suffixes_of.setdefault(stem.casefold(), set()).add(suffix)
+    return [
+        f"{stem}-{suffix}" if suffix and len(suffixes_of[stem.casefold()]) > 1 else stem
+        for stem, suffix in zip(stems, suffixes, strict=True)
+    ]
+
+
+def default_sampling(options: argparse.Namespace) -> str:
+    """Several samples where light is shown, one where numbers are written or pixels stand for ids or distances."""
+    is_light = options.shading not in (Shading.IDS, Shading.DEPTH) and options.opacity is None
+    is_picture = not options.layers and Path(options.out).suffix.lower() != ".npz"
+    return str(Sampling.MSAA4 if is_light and is_picture else Sampling.CENTER)
+
+
+def _render_options(options: argparse.Namespace) -> dict[str, Any]:
+    if (options.shading == Shading.MATCAP) != (options.matcap is not None):
+        raise UsageError("--shading matcap and --matcap FILE go together")
+    drawing = {
+        "shading": options.shading,
+        "color": options.color,
+        "background": options.background,
+        "cull": options.cull,
+        "subpixel_bits": options.subpixel_bits,
+        "tolerance": options.tolerance,
+        "threads": options.threads,
+    }
+    if options.matcap is not None:
+        drawing["matcap"] = read_texture(options.matcap)
+    if options.environment is not None:
+        drawing["environment"] = read_environment(options.environment, options.up)
+    if options.opacity is None:
+        return drawing | {"edges": options.wireframe, "sampling": options.sampling or default_sampling(options)}
+    if options.wireframe or options.sampling not in (None, Sampling.CENTER):
+        raise UsageError("--opacity goes with neither --wireframe nor --sampling")
+    return drawing | {"opacity": options.opacity}
+
+
+def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
+    suffix = Path(path).suffix.lower()
+    if not options.layers and suffix == ".npz":
+        return ("color", "triangle", "depth")
+    if not options.layers and suffix == ".npy" and options.shading in SHADINGS_WITH_NUMBERS:
+        return (SHADINGS_WITH_NUMBERS[options.shading],)
+    return tuple(options.layers)
+
+
+def _pattern(out: str, options: argparse.Namespace) -> str:
+    """OUT as a file name with {name}, {view}, {index} and {layer} where several pictures need them."""
+    path = place_of(out)
+    check_words("OUT", path, ("name", "view", "index", "layer"))
+    is_folder = out.endswith(("/", "\\")) or not path.suffix or (isinstance(path, Path) and path.is_dir())
+    if not out or (path.suffix.lower() not in SUFFIXES and not is_folder):
+        raise UsageError(f"OUT must end in one of {' '.join(SUFFIXES)}, or in / for a folder, got {out!r}")
+    several_layers = len(options.layers) > 1 and path.suffix.lower() != ".npz"
+    if is_folder:
+        words = ["{name}"] + ["{view}"] * (options.views > 1) + ["{layer}"] * several_layers
+        return str(path / ("-".join(words) + ".png"))
+    if len(options.meshes) > 1 and "{name}" not in out and "{index}" not in out:
+        raise UsageError(f"several meshes need a folder or {{name}} in OUT, got {out!r}")
+    stem = path.stem
+    if options.views > 1 and "{view}" not in out:
+        stem += "-{view}"
+    if several_layers and "{layer}" not in out:
+        stem += "-{layer}"
+    return str(path.with_name(stem + path.suffix))
+
+
+def check_words(what: str, path: Place, known: Sequence[str]) -> None:
+    """Raise a `UsageError` for a word in braces that stands for nothing, unless a folder is called so."""
+    folder = Path()
+    for part in path.parts if isinstance(path, Path) else (str(path),):
+        folder /= part
+        for word in re.findall(r"\{(\w*)\}", part):
+            if word not in known and (isinstance(path, RemotePath) or not folder.exists()):
+                words = ", ".join(f"{{{each}}}" for each in known)
+                raise UsageError(f"{what} may have {words}, got {{{word}}} in {str(path)!r}{meant(word, known)}")
+
+
+def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> None:
+    """Raise an error if what is to be written cannot be, as far as that shows before anything is.
+
+    `others` are files that are written besides: sheets and animations.
+
+    Raises
+    ------
+    UsageError
+        If two pictures would have the same name, or a picture that of a mesh, or a folder cannot be written to.
+    """
+    owner_of: dict[str, str] = {}
+    targets: list[tuple[Place, str]] = [
+        (file, group.source) for group in groups for job in group.jobs for file in job.files
+    ]
+    targets += [(path, str(path)) for path in others]
+    for target, source in targets:
+        # on some disks Bunny.png is bunny.png
+        key = str(target.absolute()).casefold() if isinstance(target, Path) else str(target)
+        if key in owner_of:
+            raise UsageError(
+                f"{owner_of[key]!r} and {source!r} would both be written to {str(target)!r}; "
+                "put {index} into OUT or give each a folder"
+            )
+        owner_of[key] = source
+    files = (Path(group.source) for group in groups if group.source not in SHAPES)
+    meshes = {(status.st_dev, status.st_ino) for status in (file.stat() for file in files if file.exists())}
+    paths = [target for target, _ in targets if isinstance(target, Path)]
+    for target in paths:
+        if target.exists() and (target.stat().st_dev, target.stat().st_ino) in meshes:
+            raise UsageError(f"OUT would overwrite the mesh {str(target)!r}")
+    for folder in dict.fromkeys(path.parent for path in paths):
+        _check_writable(folder)
+    for url in dict.fromkeys(target.parent for target, _ in targets if isinstance(target, RemotePath)):
+        _check_reached(url)
+    remove_stale_parts(paths)
+
+
+def _check_writable(folder: Path) -> None:
+    """Find out before any work whether pictures can be put into a folder, made or yet to be made."""
+    if len(folder.parts) > MAX_FOLDERS:
+        raise UsageError(f"OUT must lie in at most {MAX_FOLDERS} folders, got {len(folder.parts)}")
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise UsageError(f"cannot write to the folder {str(folder)!r}: {str(existing)!r} is a file")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise UsageError(f"cannot write to the folder {str(folder)!r}: permission denied")
+
+
+def _check_reached(folder: RemotePath) -> None:
+    """Find out before any work whether fsspec reaches what a URL names."""
+    try:
+        folder.exists()
+    except MissingPackageError:
+        raise
+    except Exception as error:  # of whatever package reaches it
+        raise UsageError(f"cannot write to {folder}: {' '.join(str(error).split()) or type(error).__name__}") from None

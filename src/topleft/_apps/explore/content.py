@@ -1,0 +1,164 @@
+"""Makes what is shown of what is given: arrays, a mesh, a file, the name of a scene, or a link that was copied."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft import failure_scenes, scenes
+from topleft._apps.explore.session import Content
+from topleft._core.base.arrays import as_checked_triangles, as_size, as_vertices
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.scene.adapt import as_mesh
+from topleft.errors import MeshError
+
+__all__ = ["MAX_SIDE_PX", "MAX_TRIANGLES", "SCENES", "content_of", "content_of_name", "scene"]
+
+MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000
+"""Of what is drawn magnified."""
+
+SCENES: tuple[str, ...] = ("shared-edge", *scenes.TUTORIAL_SCENES, *failure_scenes.FAILURE_SCENES)
+"""Names of what is drawn magnified, in the order of the page."""
+
+SHARED_EDGE = {
+    "vertices": [[2.5, 2.5], [13.5, 1.5], [3.5, 11.5], [12.5, 10.5]], "triangles": [[0, 1, 2], [1, 3, 2]],
+    "size": [16, 13], "origin": [0, 0], "other": "bresenham_scanline", "exact": True,
+}  # fmt: skip
+"""What the page begins with: an edge through pixel centres, and what one classic makes of it."""
+
+REDUCTION, THIN_PX = 10, 10
+PRESET_SIZE = (scenes.TUTORIAL_SIZE[0] // REDUCTION, scenes.TUTORIAL_SIZE[1] // REDUCTION)
+MARGIN_PX = 3
+
+
+def content_of(vertices: Any, triangles: ArrayLike | None, size: Any) -> Content:
+    """Return what `topleft.explore` shows of its arguments."""
+    if triangles is not None:
+        return Content("pixels", magnified(vertices, triangles, size), name="arrays")
+    if isinstance(vertices, (str, os.PathLike)):
+        return content_of_name(os.fspath(vertices), size)
+    mesh = as_mesh(vertices)
+    return Content("mesh", mesh=mesh, name=getattr(mesh, "name", "") or "mesh")
+
+
+def content_of_name(name: str, size: Any = None) -> Content:
+    """Return what stands behind a word of the command line.
+
+    Raises
+    ------
+    MeshError
+        If it is neither a scene nor a file that can be read.
+    """
+    if "#" in name and (name.startswith(("#", "http://127.0.0.1:", "http://localhost:", "http://[::1]:"))):
+        return Content(fragment=name.partition("#")[2])
+    if name in SCENES:
+        return Content("pixels", {"scene": name}, name=name)
+    if name in scenes.SHAPES:
+        return Content("mesh", mesh=Mesh(*scenes.shape(name)), name=name)
+    path = Path(name)
+    if path.suffix.lower() == ".npz":
+        return content_of_arrays(path, size)
+    if not path.exists():
+        raise MeshError(f"{name}: neither a file nor a scene; scenes are {', '.join((*SCENES, *scenes.SHAPES))}")
+    return Content("mesh", mesh=as_mesh(path), name=path.name)
+
+
+def content_of_arrays(path: Path, size: Any) -> Content:
+    """Return what an .npz file with `vertices`, `triangles` and maybe `size` holds: pixels, or a mesh."""
+    try:
+        with np.load(path, allow_pickle=False) as found:
+            arrays = {name: found[name] for name in ("vertices", "triangles", "size") if name in found}
+    except (OSError, ValueError, EOFError) as error:
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise MeshError(f"{path}: not an .npz file of arrays") from error
+    if missing := [name for name in ("vertices", "triangles") if name not in arrays]:
+        raise MeshError(f"{path}: must hold arrays vertices and triangles, {' and '.join(missing)} not among them")
+    vertices, triangles = arrays["vertices"], arrays["triangles"]
+    if size is None and "size" in arrays:
+        size = tuple(arrays["size"].reshape(-1).tolist())
+    if vertices.ndim == 2 and vertices.shape[1] == 3 and size is None:
+        return Content("mesh", mesh=Mesh(vertices, triangles), name=path.name)
+    return Content("pixels", magnified(vertices, triangles, size), name=path.name)
+
+
+def magnified(vertices: ArrayLike, triangles: ArrayLike, size: Any) -> dict[str, Any]:
+    """Return arrays as the page holds them, after every check.
+
+    Raises
+    ------
+    ValueError
+        If they are not in pixels, or more than can be shown.
+    """
+    points = as_vertices(vertices, has_transform=False).astype(np.float64)
+    if points.shape[1] > 3:
+        raise ValueError(f"vertices must be in pixels, (V, 2) or (V, 3), got shape {points.shape}")
+    if not np.isfinite(points).all():
+        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise ValueError(f"vertices must be finite, got {points[row].tolist()} in row {row}")
+    corners = as_checked_triangles(triangles, len(points))
+    if len(corners) > MAX_TRIANGLES or len(points) > MAX_VERTICES:
+        raise ValueError(
+            f"at most {MAX_TRIANGLES} triangles and {MAX_VERTICES} vertices are drawn magnified, got {len(corners)} "
+            f"and {len(points)}: take those of a window"
+        )
+    origin = (0, 0)
+    if size is None:
+        origin, size = window_of(points)
+    size = as_size(size, smallest=1)
+    if max(size) > MAX_SIDE_PX:
+        raise ValueError(f"size must be at most {MAX_SIDE_PX} pixels a side, got {size}: draw a window")
+    return {"vertices": points.tolist(), "triangles": corners.tolist(), "size": list(size), "origin": list(origin)}
+
+
+def window_of(points: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return origin and size of the window that holds all vertices, with a margin."""
+    if not len(points):
+        return (0, 0), (16, 16)
+    low = np.floor(points[:, :2].min(axis=0)) - MARGIN_PX
+    high = np.ceil(points[:, :2].max(axis=0)) + MARGIN_PX
+    x, y, width, height = (int(value) for value in (*low, *(high - low)))
+    origin = (0 if 0 <= x + MARGIN_PX < 8 else x, 0 if 0 <= y + MARGIN_PX < 8 else y)
+    return origin, (min(width + x - origin[0], MAX_SIDE_PX + 1), min(height + y - origin[1], MAX_SIDE_PX + 1))
+
+
+def scene(name: str) -> dict[str, Any]:
+    """Return a named scene as the page holds it.
+
+    A single triangle of the tutorials is shown at a tenth of its size; along an axis on which it is thin it keeps what
+    it measures.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name.
+    """
+    if name == SCENES[0]:
+        return dict(SHARED_EDGE)
+    if name in failure_scenes.FAILURE_SCENES:
+        found = failure_scenes.FAILURE_SCENES[name]
+        origin, size = window_of(found.shape()[0])
+        if max(size) > PRESET_SIZE[0]:
+            origin, size = found.origin, found.size
+        wrong = [one for one in found.got if one.subpixel_bits == found.subpixel_bits] or list(found.got)
+        return {
+            "vertices": [list(point) for point in found.points], "triangles": [list(row) for row in found.triangles],
+            "size": list(size), "origin": list(origin), "method": wrong[0].method,
+            "subpixel_bits": wrong[0].subpixel_bits, "exact": True,
+        }  # fmt: skip
+    if name not in scenes.TUTORIAL_SCENES:
+        raise ValueError(f"scene must be one of {', '.join(SCENES)}, got {name[:40]!r}")
+    vertices, triangles = scenes.TUTORIAL_SCENES[name]()
+    low, extent = vertices.min(axis=0), vertices.max(axis=0) - vertices.min(axis=0)
+    if len(triangles) == 1:
+        thin = extent < THIN_PX
+        vertices = np.where(thin, vertices - low + PRESET_SIZE[1] // 2, vertices / REDUCTION)
+        size = PRESET_SIZE
+    else:
+        vertices = vertices - low + MARGIN_PX
+        size = tuple((extent + 2 * MARGIN_PX).astype(int).tolist())
+    return {"vertices": vertices.tolist(), "triangles": triangles.tolist(), "size": list(size), "origin": [0, 0]}

@@ -1,0 +1,100 @@
+"""Packs questions and answers: a JSON header, and arrays behind it as the bytes that they are.
+
+A frame, for either direction: the length of the header (4 bytes, little-endian), the header as UTF-8, padded with
+spaces to a multiple of 8 bytes, then each part, padded with zeros to a multiple of 8, so that a page can lay typed
+arrays over them without a copy. The header holds `parts`, the lengths of the parts; that of an answer `arrays`, too:
+dtype, shape and part of each array by its name.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft._apps.explore.session import Reply, Request
+
+__all__ = ["pack", "read_header", "split", "unpack"]
+
+MAX_HEADER_BYTES = 4 << 20
+"""Of a question: a thousand triangles and their vertices need a tenth of it."""
+
+
+def split(reply: Reply) -> tuple[dict[str, Any], list[memoryview]]:
+    """Return the header of an answer and its parts, as a notebook sends them."""
+    parts: list[memoryview] = []
+    arrays: dict[str, dict[str, Any]] = {}
+    for name, value in reply.arrays.items():
+        array = np.frombuffer(value, np.uint8) if isinstance(value, bytes) else np.ascontiguousarray(value)
+        if array.dtype == np.bool_:
+            array = array.view(np.uint8)
+        arrays[name] = {"dtype": array.dtype.name, "shape": array.shape, "part": len(parts)}
+        parts.append(as_memory(array))
+    return {**reply.header, "arrays": arrays}, parts
+
+
+def as_memory(array: NDArray[Any]) -> memoryview:
+    """The bytes of an array, not copied."""
+    return array.reshape(-1).view(np.uint8).data
+
+
+def pack(header: dict[str, Any], parts: list[memoryview]) -> bytes:
+    """Return a frame."""
+    text = json.dumps({**header, "parts": [len(part) for part in parts]}, separators=(",", ":")).encode()
+    text += b" " * (-(4 + len(text)) % 8)
+    pieces: list[bytes | memoryview] = [struct.pack("<I", len(text)), text]
+    for part in parts:
+        pieces += [part, bytes(-len(part) % 8)]
+    return b"".join(pieces)
+
+
+def unpack(frame: bytes) -> Request:
+    """Return the question in a frame.
+
+    Raises
+    ------
+    ValueError
+        If it is not one.
+    """
+    if len(frame) < 4:
+        raise ValueError(f"a message must begin with the length of its header, got {len(frame)} bytes")
+    (length,) = struct.unpack_from("<I", frame)
+    if length > min(len(frame) - 4, MAX_HEADER_BYTES):
+        raise ValueError(f"a message must hold its header of at most {MAX_HEADER_BYTES} bytes, got {length}")
+    header = read_header(frame[4 : 4 + length])
+    lengths = header.pop("parts", [])
+    if not isinstance(lengths, list) or not all(type(n) is int and n >= 0 for n in lengths):
+        raise ValueError("parts must be a list of lengths")
+    view, start, parts = memoryview(frame), 4 + length, []
+    for n in lengths:
+        if start + n > len(frame):
+            raise ValueError(f"a message must hold its parts, got {len(frame)} bytes for parts of {lengths[:9]}")
+        parts.append(view[start : start + n])
+        start += n + -n % 8
+    return {**header, "parts": parts}
+
+
+def read_header(text: bytes | str) -> dict[str, Any]:
+    """Return the JSON object of a header.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or holds a number that JSON does not have.
+    """
+
+    def refuse(constant: str) -> NoReturn:
+        raise ValueError(f"numbers must be finite, got {constant}")
+
+    try:
+        header = json.loads(text, parse_constant=refuse)
+    except RecursionError:
+        raise ValueError("a message must not be nested so deeply") from None
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ValueError(f"a message must begin with JSON: {error}") from None
+    if not isinstance(header, dict):
+        raise ValueError(f"a message must begin with a JSON object, got {type(header).__name__}")
+    return header

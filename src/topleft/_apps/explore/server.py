@@ -1,0 +1,228 @@
+"""Serves the page and its socket: on the loopback, under an address that holds a token.
+
+Whoever lacks the token, comes from a page of another origin or calls the machine by another name is refused with a
+sentence. A question that takes long does not hold up others: each is answered in a thread. The server ends itself when
+every page has been closed for a while.
+
+Based on: I. Fette, A. Melnikov, RFC 6455, The WebSocket Protocol, 2011; the checks of Host and Origin are those against
+DNS rebinding and cross-site WebSocket hijacking.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import socket
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from importlib.resources import files
+from typing import Any
+
+from topleft._apps.explore.handlers import answer
+from topleft._apps.explore.messages import pack, read_header, split, unpack
+from topleft._apps.explore.session import Content, Reply, Session
+from topleft.errors import MissingPackageError
+
+try:
+    import uvicorn
+    import websockets  # noqa: F401 -- what uvicorn speaks to sockets with
+    from starlette.applications import Starlette
+    from starlette.requests import Request
+    from starlette.responses import PlainTextResponse, Response
+    from starlette.routing import Route, WebSocketRoute
+    from starlette.websockets import WebSocket, WebSocketDisconnect
+    from websockets.exceptions import InvalidState
+except ImportError as error:
+    raise MissingPackageError(
+        f"the explorer needs {error.name or 'starlette'}: pip install 'topleft[explore]'"
+    ) from error
+
+__all__ = ["LOOPBACK", "MAX_MESSAGE_BYTES", "Server"]
+
+LOOPBACK = "127.0.0.1"
+
+MAX_MESSAGE_BYTES = 256 << 20
+"""Of a question: a mesh file that is dropped on the page."""
+
+MAX_PAGES = 16
+"""Open at a time."""
+
+FILES: Mapping[str, str] = {
+    "": "text/html; charset=utf-8",
+    "explore.css": "text/css; charset=utf-8",
+    "explore.js": "text/javascript; charset=utf-8",
+}
+"""All that is served, with its type; the first is the page itself."""
+
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+"""Nothing is fetched from elsewhere, nothing is kept, and no other page may hold this one."""
+
+
+class Server:
+    """The page of a content at an address, until it is closed or nobody looks at it any more.
+
+    Parameters
+    ----------
+    content : Content
+    host : str
+        The loopback, unless others shall see it, too.
+    port : int
+        0 takes a free one.
+    idle : float
+        Seconds after the last page was closed until the server ends; infinite for never.
+    """
+
+    def __init__(self, content: Content, host: str = LOOPBACK, port: int = 0, idle: float = 30.0) -> None:
+        self.content, self.host, self.idle = content, host, idle
+        self.token = secrets.token_urlsafe(24)
+        self._socket = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+        self.port: int = self._socket.getsockname()[1]
+        self._pages = 0
+        self._end: asyncio.Event | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._closing: asyncio.TimerHandle | None = None
+        self._is_ready = threading.Event()
+        self._error: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name="topleft-explore", daemon=True)
+
+    @property
+    def url(self) -> str:
+        """The address of the page, with the token."""
+        name = f"[{self.host}]" if ":" in self.host else self.host
+        shown = LOOPBACK if self.host in ("", "0.0.0.0") else name
+        fragment = f"#{self.content.fragment}" if self.content.fragment else ""
+        return f"http://{shown}:{self.port}/{self.token}/{fragment}"
+
+    def start(self) -> None:
+        """Begin to serve, in a thread, and return when the page can be opened."""
+        self._thread.start()
+        self._is_ready.wait()
+        if self._error is not None:
+            raise self._error
+
+    def wait(self) -> None:
+        """Return when the server has ended."""
+        self._thread.join()
+
+    def close(self) -> None:
+        """End the server; pages that are open say so."""
+        if self._loop is not None and self._end is not None and self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._end.set)
+            self._thread.join()
+        self._socket.close()
+
+    def app(self) -> Starlette:
+        """The page, its files and its socket."""
+        return Starlette(
+            routes=[
+                WebSocketRoute("/{path:path}", self._talk),
+                Route("/{path:path}", self._serve_file, methods=["GET"]),
+            ]
+        )
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except Exception as error:
+            self._error = error
+        finally:
+            self._is_ready.set()
+
+    async def _serve(self) -> None:
+        self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
+        config = uvicorn.Config(
+            self.app(), log_level="critical", lifespan="off", ws="websockets-sansio", ws_max_size=MAX_MESSAGE_BYTES,
+            ws_per_message_deflate=False, ws_ping_interval=None, server_header=False, date_header=False,
+            timeout_graceful_shutdown=2,
+        )  # fmt: skip
+        config.load()
+        serving = EventServer(config, self._end)
+        self._close_in(600.0 if self.idle < float("inf") else self.idle)  # for a browser that never comes
+        self._loop.call_soon(self._is_ready.set)
+        with suppress(InvalidState):  # raised by the end of a page that is being closed at this moment
+            await serving.serve(sockets=[self._socket])
+
+    def _close_in(self, seconds: float) -> None:
+        """End the server after so many seconds, unless a page comes."""
+        if self._closing is not None:
+            self._closing.cancel()
+        if self._loop is not None and self._end is not None and seconds < float("inf"):
+            self._closing = self._loop.call_later(seconds, self._end.set)
+
+    # What comes in
+
+    def refusal(self, headers: Mapping[str, str], token: str, *, is_socket: bool) -> str:
+        """Return why somebody is refused, "" when nobody is."""
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if self.host == LOOPBACK and host not in (f"{LOOPBACK}:{self.port}", f"localhost:{self.port}"):
+            return f"Host must be {LOOPBACK}:{self.port}: this page is for this machine alone."
+        if (origin is not None or is_socket) and origin != f"http://{host}":
+            return "Origin must be this page: others may not talk to it."
+        if not secrets.compare_digest(token.encode(), self.token.encode()):
+            return "The address must hold the token that the terminal shows."
+        return ""
+
+    async def _serve_file(self, request: Request) -> Response:
+        token, _, name = request.path_params["path"].partition("/")
+        if why := self.refusal(request.headers, token, is_socket=False):
+            return PlainTextResponse(why + "\n", 403, HEADERS)
+        if name not in FILES:
+            return PlainTextResponse("There is no such file here.\n", 404, HEADERS)
+        content = files("topleft._apps.explore").joinpath("page", name or "index.html").read_bytes()
+        return Response(content, headers={**HEADERS, "Content-Type": FILES[name]})
+
+    async def _talk(self, page: WebSocket) -> None:
+        token, _, name = page.path_params["path"].partition("/")
+        why = self.refusal(page.headers, token, is_socket=True)
+        if not why and name != "socket":
+            why = "There is no such socket here."
+        if not why and self._pages >= MAX_PAGES:
+            why = f"At most {MAX_PAGES} pages may be open at a time."
+        if why:
+            await page.send_denial_response(PlainTextResponse(why + "\n", 403, HEADERS))
+            return
+        await page.accept()
+        self._pages += 1
+        self._close_in(float("inf"))
+        try:
+            await self._answer_all(page, Session(self.content))
+        except WebSocketDisconnect:
+            pass
+        finally:
+            self._pages -= 1
+            if not self._pages:
+                self._close_in(self.idle)
+
+    async def _answer_all(self, page: WebSocket, session: Session) -> None:
+        while True:
+            message: Mapping[str, Any] = await page.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            try:
+                frame = message.get("bytes")
+                request = unpack(frame) if frame is not None else {**read_header(message["text"]), "parts": []}
+            except ValueError as error:
+                reply = Reply({"id": None, "error": str(error)})
+            else:
+                reply = await asyncio.to_thread(answer, session, request)
+            await page.send_bytes(pack(*split(reply)))
+
+
+class EventServer(uvicorn.Server):
+    """A server that sleeps until an event ends it: uvicorn's own looks ten times a second whether it shall end."""
+
+    def __init__(self, config: uvicorn.Config, end: asyncio.Event) -> None:
+        super().__init__(config)
+        self._end_event = end
+
+    async def main_loop(self) -> None:
+        """Return when the server shall end."""
+        await self._end_event.wait()

@@ -1,0 +1,123 @@
+"""Hands a raster to Dask, a chunk a window, and to xarray with coordinates.
+
+Input: a raster. Output: a lazy array. A task of the graph is a `WindowJob`, which takes its triangles out of the mesh
+when it is sent to another process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._apps.tiles.ahead import kept_memory
+from topleft._apps.tiles.blocks import Triangles
+from topleft._apps.tiles.drawing import Painter, Payload, without_values
+from topleft._core.base.arrays import as_aligned
+from topleft.errors import MissingPackageError
+
+if TYPE_CHECKING:
+    from topleft._apps.tiles.tiles import Tiles
+
+__all__ = ["dask_array_of", "data_array_of"]
+
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class WindowJob:
+    """A window to be drawn elsewhere: it carries the triangles that touch it, taken out when it is sent."""
+
+    raster: Tiles
+    row: int
+    column: int
+
+    def __call__(self) -> Array:
+        """Draw it."""
+        return self.raster.draw_window(self.row, self.column, threads=1)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raster = self.raster
+        (x, y), size = raster.place(self.row, self.column)
+        which = raster.index.of_window(self.row, self.column)
+        if raster.is_mapped:
+            return MappedJob, (raster.triangles, raster.painter, which, (x, y), size)
+        payload = raster.painter.gather(raster.triangles, which)
+        return SentJob, (without_values(raster.painter), payload, (x, y), size)
+
+
+@dataclass(frozen=True)
+class SentJob:
+    """A window with all that it needs."""
+
+    painter: Painter
+    payload: Payload
+    origin: tuple[int, int]
+    size: tuple[int, int]
+
+    def __call__(self) -> Array:
+        """Draw it."""
+        return self.painter.window(self.payload, self.origin, self.size, 1, None)
+
+
+@dataclass(frozen=True)
+class MappedJob:
+    """A window of a mesh in files: it carries their names and the indices of its triangles."""
+
+    triangles: Triangles
+    painter: Painter
+    which: npt.NDArray[np.int32]
+    origin: tuple[int, int]
+    size: tuple[int, int]
+
+    def __call__(self) -> Array:
+        """Draw it."""
+        which = as_aligned(self.which)  # bytes that were received lie anywhere
+        payload = self.painter.gather(self.triangles, which, kept_memory())
+        return self.painter.window(payload, self.origin, self.size, 1, None)
+
+
+def run_job(job: Callable[[], Any]) -> Any:
+    """Draw a window."""
+    return job()
+
+
+def dask_array_of(raster: Tiles) -> Any:
+    """`Tiles.to_dask`."""
+    try:
+        import dask.array as da
+    except ImportError:
+        raise MissingPackageError("to_dask needs the package dask: pip install 'topleft[dask]'") from None
+    t, (w, h) = raster.tiling, raster.window_size
+    name = f"topleft-{raster.kind}-{raster.fingerprint}"
+    tail = (0,) * len(raster.painter.channels)
+    raster.index  # noqa: B018  (made once, here)
+    graph = {
+        (name, row, column, *tail): (run_job, WindowJob(raster, row, column))
+        for row in range(t.n_rows)
+        for column in range(t.n_columns)
+    }
+    rows = tuple(min(h, t.height - row * h) for row in range(t.n_rows))
+    columns = tuple(min(w, t.width - column * w) for column in range(t.n_columns))
+    chunks = (rows or (0,), columns or (0,), *((n,) for n in raster.painter.channels))
+    if not graph:
+        return da.zeros(raster.shape, dtype=raster.dtype)
+    return da.Array(graph, name, chunks, meta=np.empty((0,) * len(raster.shape), raster.dtype))
+
+
+def data_array_of(raster: Tiles) -> Any:
+    """`Tiles.to_xarray`."""
+    try:
+        import xarray as xr
+    except ImportError:
+        raise MissingPackageError("to_xarray needs the package xarray: pip install xarray") from None
+    grid = raster.grid
+    coordinates = {} if grid is None else {"y": grid.y_centers, "x": grid.x_centers}
+    names = ["y", "x", "channel"][: len(raster.shape)]
+    nodata = raster.painter.nodata
+    attributes = {} if nodata is None else {"nodata": nodata}
+    return xr.DataArray(dask_array_of(raster), dims=names, coords=coordinates, name=raster.kind, attrs=attributes)

@@ -1,0 +1,447 @@
+"""Draws what a window of a raster shows: masks, counts, labels, depth, colours, fields, heights.
+
+Input: the triangles of the window with what belongs to them, and where it lies. Output: the array, the crop of the
+whole raster to the bit.
+
+A `Painter` has two halves. `gather` takes what a window needs out of the mesh; `draw` makes the picture of that alone,
+so it can be sent to another process. Each triangle has three corners of its own there: their pixels are computed from
+the same numbers by the same operations as for the whole mesh, so they are the same.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._apps.tiles.ahead import kept_memory
+from topleft._apps.tiles.blocks import Triangles
+from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
+from topleft._core.base.grid import Grid
+from topleft._core.base.memory import FRESH, Memory
+from topleft._core.base.options import Per, Sampling, Sink, check_choice, parse
+from topleft._core.raster.rasterize import Asked, draw_fragments
+from topleft._core.raster.verbs import coverage, fill, overdraw
+from topleft._core.raster.view import View
+from topleft._meshes.field.field import depth_of, dtype_of_field, fill_planes, is_per_face, nodata_of, visible
+
+__all__ = ["KINDS", "Painter", "Payload", "painter_of"]
+
+Array = npt.NDArray[Any]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+Size = tuple[int, int]
+
+VIEW_OPTIONS = ("cull", "subpixel_bits")
+
+RANGE_ROWS = 1 << 20
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What a window needs of the mesh: its triangles, ascending, their corners, and values of either."""
+
+    triangles: I32
+    corners: Array
+    values: Array | None = None
+
+    __setstate__ = set_aligned
+
+
+@dataclass
+class Painter:
+    """One kind of raster: what its options are, what its pixels are, how a window is drawn."""
+
+    grid: Grid | None
+    options: dict[str, Any]
+    view: dict[str, Any]
+    n_components: int
+    own: ClassVar[tuple[str, ...]] = ()
+    takes_values: ClassVar[bool] = False
+    needs_depth: ClassVar[bool] = False
+
+    __setstate__ = set_aligned
+
+    dtype: Any = field(default=np.dtype(bool), init=False)
+    empty: Any = field(default=False, init=False)
+    """What a pixel without triangles has: a number, or one a channel."""
+    nodata: float | None = field(default=None, init=False)
+    """What a file calls the pixels without data, where it can tell."""
+    channels: tuple[int, ...] = field(default=(), init=False)
+    low: float = field(default=np.inf, init=False)
+    high: float = field(default=-np.inf, init=False)
+    """The range of heights, depths or values, once the index is made."""
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether vertices stay where they are, and are not snapped."""
+        return bool(self.view.get("subpixel_bits") == "exact")
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:
+        """Check options and values against the mesh."""
+
+    def check(self, corners: Array, where: Callable[[int], str]) -> None:
+        """Look at a block of corners (N, 3, C) while the index is made."""
+        if self.needs_depth and corners.shape[2] == 3:
+            with np.errstate(over="ignore", invalid="ignore"):
+                is_bad = ~np.isfinite(corners[..., 2].astype(np.float32)).all(axis=1)
+            if is_bad.any():
+                row = int(np.argmax(is_bad))
+                at = corners[row].tolist()
+                if not np.isfinite(corners[row]).all():
+                    raise ValueError(f"vertices must be finite where a triangle uses them, got {at} {where(row)}")
+                raise ValueError(f"vertices must have a depth that float32 can hold, got {at} {where(row)}")
+
+    def widen(self, low: float, high: float) -> None:
+        """Note the lowest and the highest value of a block."""
+        with _checking:  # blocks are looked at on several threads
+            self.low, self.high = min(self.low, low), max(self.high, high)
+
+    def to_pixels(self, points: Array) -> F64:
+        """Pixels (N, 2) of points (N, C)."""
+        if self.grid is not None:
+            return self.grid.to_pixels(points)
+        return np.ascontiguousarray(points[:, :2], np.float64)
+
+    def points(self, payload: Payload) -> Array:
+        """The corners as vertices (3 N, 2 or 3) of a verb: in pixels, with their depth."""
+        flat = payload.corners.reshape(-1, self.n_components)
+        if self.grid is None:
+            return flat
+        pixels = self.grid.to_pixels(flat)
+        return np.column_stack([pixels, flat[:, 2]]) if self.n_components == 3 and self.needs_depth else pixels
+
+    def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
+        """Take out of the mesh what a window needs."""
+        return Payload(which, triangles.corners(which, memory))
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W)."""
+        raise NotImplementedError
+
+    def blank(self, size: Size, out: Array | None = None) -> Array:
+        """Return pixels without triangles."""
+        array = np.empty((*size[::-1], *self.channels), self.dtype) if out is None else out
+        array[...] = self.empty
+        return array
+
+    def window(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None) -> Array:
+        """Return the pixels of a window, drawn or blank."""
+        if not len(payload.triangles):
+            return self.blank(size, out)
+        return self.draw(payload, origin, size, threads, out)
+
+    def view_at(self, origin: Size, threads: int | None) -> dict[str, Any]:
+        """The options of a verb."""
+        return {**self.view, "origin": origin, "threads": threads}
+
+
+_rows = np.empty((0, 3), np.int32)
+
+
+def rows(n: int) -> I32:
+    """Return triangles (n, 3) that have three corners each of their own."""
+    global _rows
+    known = _rows
+    if len(known) < n:
+        known = np.arange(3 * max(n, 1 << 16), dtype=np.int32).reshape(-1, 3)
+        known.flags.writeable = False
+        _rows = known
+    return known[:n]
+
+
+_checking = threading.Lock()
+
+
+class CoveragePainter(Painter):
+    """`coverage`: bool, or float32 for several samples and "area"."""
+
+    own = ("sampling",)
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
+        """Check options and values against the mesh."""
+        sampling = parse(Sampling, "sampling", self.options.get("sampling", "center"))
+        is_share = sampling is Sampling.AREA or sampling.n_samples > 1
+        self.dtype, self.empty = (np.dtype(np.float32), 0.0) if is_share else (np.dtype(bool), False)
+        self.view["sampling"] = str(sampling)
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W)."""
+        n = len(payload.triangles)
+        return coverage(self.points(payload), rows(n), size, out=out, **self.view_at(origin, threads))
+
+
+class OverdrawPainter(Painter):
+    """`overdraw`: int32, or float32 for "area"."""
+
+    own = ("sampling",)
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
+        """Check options and values against the mesh."""
+        sampling = parse(Sampling, "sampling", self.options.get("sampling", "center"))
+        if sampling.n_samples > 1:
+            raise ValueError(f"sampling must be of one number a pixel for overdraw in tiles, got {str(sampling)!r}")
+        is_area = sampling is Sampling.AREA
+        self.dtype, self.empty = (np.dtype(np.float32), 0.0) if is_area else (np.dtype(np.int32), 0)
+        self.view["sampling"] = str(sampling)
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W)."""
+        n = len(payload.triangles)
+        return overdraw(self.points(payload), rows(n), size, out=out, **self.view_at(origin, threads))
+
+
+class FragmentsPainter(Painter):
+    """`rasterize`: labels, int32, or depth, float32."""
+
+    own = ("depth_test", "background_depth")
+    needs_depth = True
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
+        """Check options and values against the mesh."""
+        asked = Asked.parse(self.options.get("depth_test", "less"), self.options.get("background_depth"), None)
+        self.asked = asked
+        self.depth_test = self.options.get("depth_test", "less")
+
+    def draw_into(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Any) -> None:
+        """Draw a window into ids or depth, the other one into memory that the thread's next window overwrites."""
+        view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
+        points, own, names = self.points(payload), rows(len(payload.triangles)), payload.triangles
+        draw_fragments(kept_memory(), points, own, view, self.depth_test, self.asked.background, out, names)
+
+
+class LabelsPainter(FragmentsPainter):
+    """The index of the triangle that shows, -1 for none."""
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:
+        """Check options and values against the mesh."""
+        super().prepare(triangles, values)
+        self.dtype, self.empty, self.nodata = np.dtype(np.int32), -1, -1
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W)."""
+        ids = out if out is not None and out.flags.carray else np.empty(size[::-1], np.int32)
+        self.draw_into(payload, origin, size, threads, (ids, None))
+        if out is not None and ids is not out:
+            out[...] = ids
+        return ids if out is None else out
+
+
+class DepthPainter(FragmentsPainter):
+    """The depth of the triangle that shows."""
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:
+        """Check options and values against the mesh."""
+        super().prepare(triangles, values)
+        self.dtype = np.dtype(np.float32)
+        self.empty = self.nodata = float(np.float32(self.asked.background))
+        self.low, self.high = (np.inf, -np.inf) if triangles.n_components == 3 else (0.0, 0.0)
+
+    def check(self, corners: Array, where: Callable[[int], str]) -> None:
+        """Look at a block of corners (N, 3, C) while the index is made."""
+        super().check(corners, where)
+        if len(corners) and corners.shape[2] == 3:
+            self.widen(float(corners[..., 2].min()), float(corners[..., 2].max()))
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W)."""
+        depth = np.empty(size[::-1], np.float32) if out is None else out
+        self.draw_into(payload, origin, size, threads, (None, depth))
+        return depth
+
+
+class FillPainter(Painter):
+    """`fill`: colours of triangles or vertices, or labels of triangles with `dtype`."""
+
+    own = ("alpha", "background", "blend", "dtype", "per", "resolve", "sampling")
+    takes_values = True
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:
+        """Check options and values against the mesh."""
+        if values is None:
+            raise ValueError("kind 'fill' needs values: the colours of triangles or vertices")
+        dtype = self.options.get("dtype")
+        colors = as_array("colors", values)
+        self.values = colors if dtype is not None else as_colors(colors)
+        per = parse(Per, "per", self.options.get("per", "auto"))
+        self.is_flat = dtype is not None or _is_flat(self.values, triangles, per)
+        self.view["sampling"] = self.options.get("sampling", "center")
+        self.style = {name: value for name, value in self.options.items() if name not in self.view and name != "per"}
+        self.style["per"] = "triangle" if self.is_flat else "vertex"
+        self.channels = self.values.shape[1:]
+        # one pixel of nothing tells dtype and background, and what is wrong with the options
+        nothing = Payload(np.empty(0, np.int32), np.empty((0, 3, self.n_components)), self.values[:0])
+        sample = self.draw(nothing, (0, 0), (1, 1), 1)
+        self.dtype, self.empty = sample.dtype, sample[0, 0].copy()
+
+    def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
+        """Take out of the mesh what a window needs."""
+        at = which if self.is_flat else triangles.indices(which).ravel()
+        return Payload(which, triangles.corners(which, memory), np.ascontiguousarray(self.values[at]))
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W) or (H, W, C)."""
+        assert payload.values is not None
+        n, view = len(payload.triangles), self.view_at(origin, threads)
+        if out is not None:  # `fill` draws over what is there
+            out[...] = self.empty
+        return fill(self.points(payload), rows(n), payload.values, size, out=out, **self.style, **view)
+
+
+class FieldPainter(Painter):
+    """`field`: values of vertices or faces on a grid."""
+
+    own = ("nodata", "per")
+    takes_values = True
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:
+        """Check options and values against the mesh."""
+        if values is None:
+            raise ValueError("kind 'field' needs values of the vertices or the faces")
+        array = as_array("values", values)
+        if array.dtype.kind not in "fiub":
+            raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+        per = parse(Per, "per", self.options.get("per", "auto"))
+        self.is_of_faces = is_per_face(array, triangles.n_vertices, triangles.n_faces, per)
+        self.faces = triangles.faces
+        nodata = self.options.get("nodata")
+        self.dtype = np.dtype(dtype_of_field(array.dtype, is_of_faces=self.is_of_faces, has_nodata=nodata is not None))
+        self.empty = nodata_of(nodata, self.dtype.type)[0]
+        self.has_nodata, self.nodata = nodata is not None, float(self.empty)
+        self.values = array
+
+    def find_range(self) -> None:
+        """Note the lowest and the highest value, block by block: values may be mapped."""
+        for first in range(0, len(self.values), RANGE_ROWS):
+            part = self.values[first : first + RANGE_ROWS]
+            part = part[np.isfinite(part)] if part.dtype.kind == "f" else part
+            if len(part):
+                self.widen(float(part.min()), float(part.max()))
+
+    def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
+        """Take out of the mesh what a window needs."""
+        if self.is_of_faces:
+            values = self.values[which if self.faces is None else self.faces[which]]
+        else:
+            values = self.values[triangles.indices(which).ravel()].astype(np.float64, copy=False)
+        return Payload(which, triangles.corners(which, memory), values)
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W)."""
+        assert self.grid is not None
+        assert payload.values is not None
+        points = self.grid.to_pixels(payload.corners.reshape(-1, self.n_components))
+        view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
+        canvas = out if out is not None and out.flags.carray else np.empty(size[::-1], self.dtype)
+        ids = visible(points, rows(len(payload.triangles)), view, Sink.LABEL)
+        if self.is_of_faces:
+            np.take(np.append(payload.values.astype(self.dtype), self.empty), ids, out=canvas, mode="wrap")
+        else:
+            fill_planes(ids, points, rows(len(payload.triangles)), payload.values, view, canvas)
+            if self.has_nodata:
+                canvas[ids < 0] = self.empty
+        if out is not None and canvas is not out:
+            out[...] = canvas
+        return canvas if out is None else out
+
+
+class HeightPainter(Painter):
+    """`height_map`: the upper or lower surface on a grid."""
+
+    own = ("surface",)
+
+    def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
+        """Check options and values against the mesh."""
+        self.surface = self.options.get("surface", "upper")
+        check_choice("surface", self.surface, ("upper", "lower"))
+        if triangles.n_components != 3:
+            raise ValueError(f"a height map needs points of shape (V, 3), got (V, {triangles.n_components})")
+        self.dtype, self.empty, self.nodata = np.dtype(np.float64), np.nan, np.nan
+
+    def check(self, corners: Array, where: Callable[[int], str]) -> None:
+        """Look at a block of corners (N, 3, C) while the index is made."""
+        if not len(corners):
+            return
+        is_bad = ~np.isfinite(corners[..., 2]).all(axis=1)
+        if is_bad.any():
+            row = int(np.argmax(is_bad))
+            raise ValueError(
+                f"vertices must be finite where a triangle uses them, got {corners[row].tolist()} {where(row)}"
+            )
+        heights = corners[..., 2]
+        self.widen(float(heights.min()), float(heights.max()))
+
+    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window (H, W)."""
+        assert self.grid is not None
+        flat = payload.corners.reshape(-1, 3)
+        points, heights = self.grid.to_pixels(flat), np.ascontiguousarray(flat[:, 2], np.float64)
+        view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
+        sink = Sink.FARTHEST if self.surface == "upper" else Sink.NEAREST
+        canvas = out if out is not None and out.flags.carray else np.empty(size[::-1], np.float64)
+        own = rows(len(payload.triangles))
+        ids = visible(np.column_stack([points, depth_of(heights, self.low, self.high)]), own, view, sink)
+        fill_planes(ids, points, own, heights, view, canvas)
+        if out is not None and canvas is not out:
+            out[...] = canvas
+        return canvas if out is None else out
+
+
+KINDS: dict[str, type[Painter]] = {
+    "coverage": CoveragePainter,
+    "overdraw": OverdrawPainter,
+    "labels": LabelsPainter,
+    "depth": DepthPainter,
+    "fill": FillPainter,
+    "field": FieldPainter,
+    "height_map": HeightPainter,
+}
+
+ON_GRIDS = ("field", "height_map")
+
+
+def painter_of(kind: str, grid: Grid | None, triangles: Triangles, values: Any, options: dict[str, Any]) -> Painter:
+    """Return what draws windows of a kind of raster.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no such kind, the kind has no such option, or an option or the values do not fit.
+    """
+    made = KINDS[kind]
+    known = (*made.own, *VIEW_OPTIONS)
+    unknown = sorted(options.keys() - set(known))
+    if unknown:
+        raise TypeError(f"kind {kind!r} has no option {unknown[0]!r}; its options are {', '.join(known)}")
+    if values is not None and not made.takes_values:
+        raise ValueError(f"values are for the kinds 'fill' and 'field', got {shown(values)} for {kind!r}")
+    view = {name: options[name] for name in VIEW_OPTIONS if name in options}
+    View.parse(1, view)  # type: ignore[arg-type]
+    painter = made(grid, options, view, triangles.n_components)
+    painter.prepare(triangles, values)
+    return painter
+
+
+def without_values(painter: Painter) -> Painter:
+    """Return a painter that draws what it is given, without the arrays from which that is gathered."""
+    light = replace(painter)
+    vars(light).update({**vars(painter), "values": None, "faces": None})
+    return light
+
+
+def _is_flat(colors: Array, triangles: Triangles, per: Per) -> bool:
+    fits_triangles, fits_vertices = len(colors) == triangles.n, len(colors) == triangles.n_vertices
+    if per is Per.AUTO and fits_triangles and fits_vertices:
+        raise ValueError(f"colors has {len(colors)} rows, as many as triangles and as vertices: say per=")
+    if fits_triangles and per is not Per.VERTEX:
+        return True
+    if fits_vertices and per is not Per.TRIANGLE:
+        return False
+    raise ValueError(
+        f"colors must have {triangles.n} rows, one per triangle, or {triangles.n_vertices}, one per vertex, "
+        f"got {len(colors)}"
+    )

@@ -1,0 +1,217 @@
+"""Regular grids over data: which part of the plane a picture shows, in units of the data.
+
+Input: an extent and a size, or what the grid is to be laid round. Output: `Grid`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.arrays import as_array, as_real, as_size, shown
+from topleft._core.base.options import check_choice
+from topleft.typing import YOption
+
+if TYPE_CHECKING:
+    from topleft._meshes.scene.adapt import MeshLike
+
+F64 = npt.NDArray[np.float64]
+Extent = tuple[float, float, float, float]
+ExtentLike: TypeAlias = Sequence[float] | npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A picture laid over the plane of the data.
+
+    Parameters
+    ----------
+    size : (width, height), pixels
+    extent : (x_min, x_max, y_min, y_max)
+        Outer sides of the outermost pixels, data units; the order of matplotlib's `imshow(extent=)`.
+    y : {"up", "down"}
+        Where y grows in the picture. "up": row 0 is at `y_max`, as on a map (`imshow(origin="upper")`); "down": row 0
+        is at `y_min` (`origin="lower"`).
+
+    Raises
+    ------
+    ValueError
+        If the extent is empty or not finite, or `y` is neither "up" nor "down".
+
+    Examples
+    --------
+    >>> grid = Grid((4, 2), (500000.0, 500002.0, 10.0, 11.0))
+    >>> grid.pixel_size
+    (0.5, 0.5)
+    >>> grid.y_centers.tolist()
+    [10.75, 10.25]
+    """
+
+    size: tuple[int, int]
+    extent: Extent
+    y: str = "up"
+
+    if TYPE_CHECKING:  # what is given may be any four numbers; what is kept is as above
+
+        def __init__(self, size: int | tuple[int, int], extent: ExtentLike, y: YOption = "up") -> None: ...
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", as_size(self.size))
+        try:
+            x_min, x_max, y_min, y_max = map(float, self.extent)
+        except (TypeError, ValueError):
+            raise ValueError(f"extent must be (x_min, x_max, y_min, y_max), got {self.extent!r}") from None
+        if not (np.isfinite([x_min, x_max, y_min, y_max]).all() and x_min < x_max and y_min < y_max):
+            raise ValueError(
+                f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
+            )
+        object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
+        check_choice("y", self.y, get_args(YOption))
+
+    @classmethod
+    def around(
+        cls,
+        subject: MeshLike,
+        *,
+        size: int | tuple[int, int] | None = None,
+        pixel_size: float | tuple[float, float] | None = None,
+        extent: ExtentLike | None = None,
+        y: YOption = "up",
+    ) -> Grid:
+        """The grid round a mesh, of so many pixels or of pixels so large.
+
+        Parameters
+        ----------
+        subject : mesh
+            Whatever `as_mesh` takes; x and y of the points that its triangles use count.
+        size : (width, height), optional
+            How many pixels.
+        pixel_size : float or (float, float), optional
+            Width and height of a pixel, data units; instead of `size`. The grid begins at (x_min, y_min) of the extent
+            and has as many whole pixels as cover it.
+        extent : (x_min, x_max, y_min, y_max), optional
+            Data units; the box of the mesh unless given.
+        y : {"up", "down"}
+            As for `Grid`.
+
+        Raises
+        ------
+        ValueError
+            If neither or both of `size` and `pixel_size` are given, the mesh has no triangles or no area, or a number
+            is outside its range.
+        """
+        from topleft._meshes.field.field import extent_around  # which imports this module
+
+        return grid_around(extent_around(subject, extent), size, pixel_size, y)
+
+    @classmethod
+    def from_transform(cls, transform: Any, size: int | tuple[int, int]) -> Grid:
+        """The grid of a raster of rasterio, GDAL or a world file.
+
+        Parameters
+        ----------
+        transform : affine.Affine, or six numbers (a, b, c, d, e, f)
+            x = a column + b row + c and y = d column + e row + f, from corners of pixels: rasterio's `src.transform`.
+            GDAL's `GetGeoTransform()` has them in another order: (c, a, b, f, d, e).
+        size : (width, height), pixels
+            rasterio's `src.width, src.height`.
+
+        Raises
+        ------
+        ValueError
+            If the grid is turned, sheared or mirrored (b or d is not 0, or a is not positive).
+        TypeError
+            If these are no numbers.
+
+        Examples
+        --------
+        >>> Grid.from_transform((0.5, 0.0, 500000.0, 0.0, -0.5, 11.0), (4, 2))
+        Grid(size=(4, 2), extent=(500000.0, 500002.0, 10.0, 11.0), y='up')
+        """
+        numbers = as_real("transform", transform).ravel()
+        if len(numbers) not in (6, 9) or not np.isfinite(numbers).all():
+            raise ValueError(f"transform must be six finite numbers (a, b, c, d, e, f), got {shown(transform)}")
+        a, b, c, d, e, f = numbers[:6].tolist()
+        if b or d or a <= 0 or e == 0:
+            raise ValueError(
+                f"transform must neither turn nor mirror: b = d = 0, a > 0, e not 0, got {(a, b, c, d, e, f)}"
+            )
+        width, height = as_size(size, smallest=1)
+        y_first, y_last = f, f + e * height
+        extent = (c, c + a * width, min(y_first, y_last), max(y_first, y_last))
+        return cls((width, height), extent, "up" if e < 0 else "down")
+
+    @property
+    def transform(self) -> tuple[float, float, float, float, float, float]:
+        """(a, b, c, d, e, f) as `from_transform` takes it: ``affine.Affine(*grid.transform)`` for rasterio."""
+        x_min, _, y_min, y_max = self.extent
+        a, e = self.pixel_size
+        return (a, 0.0, x_min, 0.0, -e, y_max) if self.y == "up" else (a, 0.0, x_min, 0.0, e, y_min)
+
+    @property
+    def pixel_size(self) -> tuple[float, float]:
+        """Width and height of a pixel, data units."""
+        x_min, x_max, y_min, y_max = self.extent
+        width, height = self.size
+        return (x_max - x_min) / max(width, 1), (y_max - y_min) / max(height, 1)
+
+    @property
+    def x_centers(self) -> F64:
+        """The x (W,) of the middle of each column."""
+        return np.add(self.extent[0], (np.arange(self.size[0]) + 0.5) * self.pixel_size[0], dtype=np.float64)
+
+    @property
+    def y_centers(self) -> F64:
+        """The y (H,) of the middle of each row."""
+        steps = (np.arange(self.size[1]) + 0.5) * self.pixel_size[1]
+        first, sign = (self.extent[3], -1) if self.y == "up" else (self.extent[2], 1)
+        return np.add(first, sign * steps, dtype=np.float64)
+
+    def to_pixels(self, points: npt.NDArray[Any]) -> F64:
+        """Pixels (N, 2) float64, x right and y down the picture, of the x and y of points (N, 2 or more).
+
+        Notes
+        -----
+        The difference to the side of the extent is taken first and in float64, so coordinates may be large: the result
+        has three roundings of 2**-53 each, relative to itself, besides the one of the data.
+        """
+        points = as_array("points", points)
+        if points.dtype.kind not in "fiu":
+            raise TypeError(f"points must be real numbers, got {shown(points)}")
+        if points.ndim != 2 or points.shape[1] < 2:
+            raise ValueError(f"points must have shape (N, 2) or more columns, got {points.shape}")
+        width, height = self.size
+        x_min, x_max, y_min, y_max = self.extent
+        pixels = np.empty((len(points), 2))
+        np.multiply(np.subtract(points[:, 0], x_min, dtype=np.float64), width / (x_max - x_min), out=pixels[:, 0])
+        from_top = np.asarray(points[:, 1], np.float64) - y_min if self.y == "down" else y_max - points[:, 1]
+        np.multiply(from_top, height / (y_max - y_min), out=pixels[:, 1])
+        return pixels
+
+
+def grid_around(
+    extent: ExtentLike, size: int | tuple[int, int] | None, pixel_size: float | tuple[float, float] | None, y: YOption
+) -> Grid:
+    """The grid over an extent, of so many pixels or of pixels so large; see `Grid.around`."""
+    if (size is None) == (pixel_size is None):
+        raise ValueError("a grid needs either size or pixel_size")
+    if pixel_size is None:
+        return Grid(as_size(size), extent, y)
+    x_min, x_max, y_min, y_max = Grid((1, 1), extent, y).extent
+    step = as_real("pixel_size", pixel_size)
+    if step.shape not in ((), (2,)):
+        raise ValueError(f"pixel_size must be one number or two, got {shown(pixel_size)}")
+    step = np.broadcast_to(step, 2)
+    if not (np.isfinite(step).all() and (step > 0).all()):
+        raise ValueError(f"pixel_size must be positive, got {pixel_size}")
+    # A box of 3.0000000000000004 pixels, after the roundings of its sides, has three.
+    with np.errstate(over="ignore"):
+        counts = np.maximum(np.ceil(np.array([x_max - x_min, y_max - y_min]) / step - 1e-9), 1)
+    if not np.isfinite(counts).all():
+        raise ValueError(f"pixel_size must give a grid of countable pixels, got {pixel_size} for {extent}")
+    width, height = as_size((int(counts[0]), int(counts[1])))
+    return Grid((width, height), (x_min, x_min + width * step[0], y_min, y_min + height * step[1]), y)

@@ -1,0 +1,240 @@
+"""Memory of a call: fresh arrays, arrays that are kept from call to call, and scratch that a thread keeps."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from topleft._core import engine
+
+__all__ = ["FreshMemory", "KeptMemory", "Memory", "MemoryOf", "ScratchMemory", "check_fits", "empty", "fits",
+           "release_memory", "times_that_fit"]  # fmt: skip
+
+HUGE_PAGE = 2 << 20
+CACHE_LINE = 64
+
+#: Arrays below it are NumPy's own: what the system keeps for them costs no page faults.
+MIN_BLOCK_BYTES = 4 << 10
+
+#: Several arrays of so many bytes together are asked for at once before the first of them is touched.
+MIN_CHECKED_BYTES = 1 << 30
+
+#: Most bytes of arrays that have died which the process keeps for arrays to come: ids and depth of four samples a pixel
+#: in a picture of 4096x4096.
+MAX_WAITING_BYTES = 512 << 20
+
+#: Most bytes that one name of a thread's scratch keeps between module-level calls; `SCRATCH_NAMES` are all.
+MAX_SCRATCH_BYTES = 64 << 20
+
+#: What no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
+SCRATCH_NAMES = frozenset(
+    {
+        "bands",
+        "bins",
+        "covered",
+        "labels",
+        "others",
+        "packed",
+        "points",
+        "records",
+        "sample colors",
+        "sample labels",
+        "sample mask",
+        "triangles",
+    }
+    | {"edge highs", "edge last_low", "edge starts", "edges"}
+    | {"chains", "depth of heights", "planes", "polygon points"}
+)
+
+
+class Memory(Protocol):
+    """Where arrays come from."""
+
+    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array."""
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`; who changes them puts that back."""
+
+
+class FreshMemory:
+    """Every array is new: results stay valid for as long as anyone holds them."""
+
+    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:  # noqa: ARG002
+        """Return an uninitialised array."""
+        return empty(shape, dtype)
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:  # noqa: ARG002
+        """Return n int32 that are all `value`."""
+        array: NDArray[np.int32] = empty((n,), np.int32)
+        array.fill(value)
+        return array
+
+
+class KeptMemory:
+    """One block of memory per name, which only grows: the next call overwrites what this one returned."""
+
+    def __init__(self) -> None:
+        self._blocks: dict[str, NDArray[np.uint8]] = {}
+        self._constants: dict[str, NDArray[np.int32]] = {}
+
+    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array at the start of the block of that name."""
+        n_bytes = _size(shape, dtype)
+        block = self._blocks.get(name)
+        if block is None or block.size < n_bytes:
+            block = self._blocks[name] = allocate(n_bytes)
+        return block[:n_bytes].view(dtype).reshape(shape)
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`: filled once, put back by whoever changed them."""
+        block = self._constants.get(name)
+        if block is None or block.size < n:
+            block = self._constants[name] = FRESH.constant(name, n, value)
+        return block[:n]
+
+
+class ScratchMemory(FreshMemory):
+    """Results are new; scratch is the calling thread's own and kept, up to `MAX_SCRATCH_BYTES` a name."""
+
+    def __init__(self) -> None:
+        self.threads = threading.local()  # `kept`: of each thread
+
+    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array."""
+        if name not in SCRATCH_NAMES or _size(shape, dtype) > MAX_SCRATCH_BYTES:
+            return super().empty(name, shape, dtype)
+        return self._kept().empty(name, shape, dtype)
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`."""
+        if 4 * n > MAX_SCRATCH_BYTES:
+            return super().constant(name, n, value)
+        return self._kept().constant(name, n, value)
+
+    def _kept(self) -> KeptMemory:
+        kept: KeptMemory | None = getattr(self.threads, "kept", None)
+        if kept is None:
+            kept = self.threads.kept = KeptMemory()
+        return kept
+
+    def release(self) -> None:
+        """Give the calling thread's scratch back."""
+        self.threads.kept = None
+
+
+class MemoryOf:
+    """Another memory, under names of its own: what it holds outlives what others ask that one for."""
+
+    def __init__(self, memory: Memory, owner: str) -> None:
+        self.memory, self.owner = memory, owner
+
+    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array."""
+        return self.memory.empty(f"{name} of {self.owner}", shape, dtype)
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`."""
+        return self.memory.constant(f"{name} of {self.owner}", n, value)
+
+
+FRESH = FreshMemory()
+SCRATCH = ScratchMemory()
+
+
+engine.keep_blocks(MAX_WAITING_BYTES)
+
+
+def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """Return an uninitialised array, in memory of one that has died where there is some of about that size.
+
+    Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The memory is nobody else's until
+    the array and all its views have died; then it waits for another array, `MAX_WAITING_BYTES` at most.
+    """
+    n_bytes = _size(shape, dtype)
+    if n_bytes < MIN_BLOCK_BYTES:
+        return np.empty(shape, dtype)
+    if n_bytes > sys.maxsize:
+        allocate(n_bytes)  # whose error says how much it is
+    return np.ndarray(shape, dtype, engine.lease_block(n_bytes, allocate))
+
+
+def fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> bool:
+    """Whether the system has memory for arrays of a shape together.
+
+    One by one it may promise what it has not: Linux refuses a single array larger than all memory, but gives two of
+    half that size and ends the process when they are written.
+    """
+    n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
+    if n_bytes >= MIN_CHECKED_BYTES:
+        try:
+            np.empty(n_bytes, np.uint8)
+        except (MemoryError, ValueError):
+            return False
+    return True
+
+
+def check_fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> None:
+    """Raise a MemoryError unless the system has memory for arrays of a shape together."""
+    if not fits(shape, *dtypes):
+        n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
+        what = f"{len(dtypes)} arrays of {n_bytes:,} bytes together" if len(dtypes) > 1 else f"{n_bytes:,} bytes"
+        raise MemoryError(f"no memory for {what}, which this size or scene needs")
+
+
+def times_that_fit(most: int, shape: tuple[int, ...], *dtypes: DTypeLike) -> int:
+    """Return how many times there is memory for arrays of a shape, `most` at most; a MemoryError where not once."""
+    check_fits(shape, *dtypes)
+    return next(n for n in range(most, 0, -1) if n == 1 or fits((n, *shape), *dtypes))
+
+
+def release_memory() -> None:
+    """Give back the memory that calls keep for calls to come.
+
+    These are results that have died, 512 MiB of the process at most, and the scratch of `coverage`, `overdraw`, `fill`
+    and `wireframe` for the calling thread: snapped vertices, converted indices, labels, cells and edges, at most 64 MiB
+    each, nothing once the thread has ended. `Rasterizer` objects keep their own memory for as long as they live.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> _ = tl.coverage([(0, 0), (400, 0), (0, 400)], [(0, 1, 2)], (400, 400))
+    >>> tl.release_memory()
+    """
+    SCRATCH.release()
+    engine.keep_blocks(0)
+    engine.keep_blocks(MAX_WAITING_BYTES)
+
+
+def allocate(n_bytes: int) -> NDArray[np.uint8]:
+    """Return uninitialised memory that begins at a cache line, and that whole huge pages can back where it is large.
+
+    NumPy asks the system for huge pages from 4 MiB on, but the system uses them only for what is aligned to them.
+    """
+    step = CACHE_LINE if n_bytes < 2 * HUGE_PAGE else HUGE_PAGE
+    n_whole = -(-n_bytes // step) * step
+    try:
+        block = _fresh_bytes(n_whole + step)
+    except (MemoryError, ValueError):  # ValueError: beyond what addresses can tell
+        raise MemoryError(f"no memory for an array of {n_bytes:,} bytes, which this size or scene needs") from None
+    skip = -block.ctypes.data % step
+    return block[skip : skip + n_whole]
+
+
+def _fresh_bytes(n_bytes: int) -> NDArray[np.uint8]:
+    """Return fresh memory; where there is none, what waits for an array goes back to the system first."""
+    try:
+        return np.empty(n_bytes, np.uint8)
+    except MemoryError:
+        engine.keep_blocks(0)
+        engine.keep_blocks(MAX_WAITING_BYTES)
+        return np.empty(n_bytes, np.uint8)
+
+
+def _size(shape: tuple[int, ...], dtype: DTypeLike) -> int:
+    return math.prod(shape) * np.dtype(dtype).itemsize

@@ -1,0 +1,164 @@
+"""Files behind URLs that fsspec reaches: whole or not there, as those of a disk.
+
+Input: a URL. Output: what `pathlib.Path` says and does of a file, as far as writing needs it. A URL that begins with
+file:// is a path of this machine.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from topleft._core.base.arrays import shown
+from topleft.errors import MissingPackageError
+
+__all__ = ["Place", "RemotePath", "as_place", "is_url", "place_of"]
+
+#: File systems on which what is being written shows before it is whole: there it gets another name first. Stores of
+#: objects show an object when all of it is there.
+SHOWS_PARTS = frozenset({"arrow_hdfs", "dbfs", "ftp", "hdfs", "sftp", "smb", "ssh", "webhdfs"})
+
+OF_THIS_MACHINE = ("file://", "local://")
+
+
+def is_url(value: object) -> bool:
+    """Whether a name is a URL and no path."""
+    return isinstance(value, str) and "://" in value
+
+
+def place_of(value: str | os.PathLike[str]) -> Path | RemotePath:
+    """Return where a file is: a path, or what fsspec reaches by a URL."""
+    if isinstance(value, RemotePath):
+        return value
+    text = os.fspath(value)
+    if not is_url(text):
+        return Path(text)
+    if text.startswith(OF_THIS_MACHINE):
+        from urllib.request import url2pathname
+
+        return Path(url2pathname(text.partition("://")[2]))
+    return RemotePath(text)
+
+
+def as_place(name: str, value: object) -> Place:
+    """Return where a file is, of what a caller gave."""
+    if not isinstance(value, str | os.PathLike):
+        raise TypeError(f"{name} must be a path or a URL, got {shown(value)}")
+    return place_of(value)
+
+
+@dataclass(frozen=True)
+class RemotePath:
+    """A file or a folder behind a URL."""
+
+    url: str
+    storage: tuple[tuple[str, Any], ...] = ()  # what fsspec needs besides
+
+    def __str__(self) -> str:
+        return self.url
+
+    def __fspath__(self) -> str:
+        return self.url  # goes wherever a name goes, and `place_of` makes it out
+
+    @cached_property
+    def _reached(self) -> tuple[Any, str]:
+        """The file system, and the name that the file has there."""
+        try:
+            from fsspec.core import url_to_fs
+        except ImportError:
+            raise MissingPackageError(
+                f"writing to {self.url} needs the package fsspec: pip install 'topleft[tiles]'"
+            ) from None
+        try:
+            found: tuple[Any, str] = url_to_fs(self.url, **dict(self.storage))
+        except ImportError as error:  # of the package for that kind of URL
+            raise MissingPackageError(f"writing to {self.url}: {error}") from None
+        except ValueError as error:  # a kind of URL that is unknown
+            raise ValueError(f"cannot write to {self.url}: {error}") from None
+        return found
+
+    @property
+    def name(self) -> str:
+        """What stands behind the last slash."""
+        return self.url.rstrip("/").rpartition("/")[2]
+
+    @property
+    def suffix(self) -> str:
+        """The end of the name, from its last point on."""
+        return PurePosixPath(self.name).suffix
+
+    @property
+    def stem(self) -> str:
+        """The name without its suffix."""
+        return PurePosixPath(self.name).stem
+
+    @property
+    def parent(self) -> RemotePath:
+        """The folder that it is in."""
+        return replace(self, url=self.url.rstrip("/").rpartition("/")[0])
+
+    def with_name(self, name: str) -> RemotePath:
+        """Return the file of another name in the same folder."""
+        return self.parent / name
+
+    def __truediv__(self, name: str) -> RemotePath:
+        return replace(self, url=f"{self.url.rstrip('/')}/{name}")  # fsspec keeps file systems: the same one
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"url": self.url, "storage": self.storage}  # and not how it was reached
+
+    def exists(self) -> bool:
+        """Whether anything is there."""
+        fs, name = self._reached
+        return bool(fs.exists(name))
+
+    def is_file(self) -> bool:
+        """Whether a file is there."""
+        fs, name = self._reached
+        return bool(fs.isfile(name))
+
+    def is_dir(self) -> bool:
+        """Whether it is a folder that the store knows; folders need not be made."""
+        fs, name = self._reached
+        return bool(fs.isdir(name))
+
+    def size(self) -> int:
+        """How many bytes the file has; 0 where there is none."""
+        fs, name = self._reached
+        try:
+            return int(fs.info(name).get("size") or 0)
+        except FileNotFoundError:
+            return 0
+
+    def read_bytes(self) -> bytes:
+        """Return what the file holds."""
+        fs, name = self._reached
+        return bytes(fs.cat_file(name))
+
+    def write_bytes(self, content: bytes) -> None:
+        """Write the file, whole or not at all."""
+        fs, name = self._reached
+        protocols = {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
+        if not protocols & SHOWS_PARTS:
+            fs.pipe_file(name, content)
+            return
+        folder = name.rpartition("/")[0]
+        if folder:
+            fs.makedirs(folder, exist_ok=True)
+        part = f"{folder}/.{self.name[:100]}.{os.urandom(4).hex()}.part"
+        try:
+            fs.pipe_file(part, content)
+            if fs.exists(name):
+                fs.rm_file(name)
+            fs.mv(part, name)
+        except BaseException:
+            if fs.exists(part):
+                fs.rm_file(part)
+            raise
+
+
+Place = Path | RemotePath
+"""Where a file is."""

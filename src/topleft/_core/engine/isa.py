@@ -1,0 +1,64 @@
+"""Choose the kernels once, at import: the widest that this machine can run, or what ``TOPLEFT_ISA`` says."""
+
+import os
+from typing import Any
+
+from topleft._core.engine import kernels
+
+NAMES = ("scalar", "avx2", "avx512")
+
+
+def select() -> str:
+    """Return the name of the instruction set to use.
+
+    Returns
+    -------
+    str
+        ``TOPLEFT_ISA`` when it is set, else the widest instruction set that was built and that this machine can run.
+
+    Raises
+    ------
+    ValueError
+        When ``TOPLEFT_ISA`` names an instruction set that does not exist, was not built, or cannot run here.
+    """
+    available = kernels.isa_available()
+    name = os.environ.get("TOPLEFT_ISA", "").strip().lower()
+    if not name:
+        return available[-1]
+    if name in available:
+        return name
+    if name not in NAMES:
+        reason = "which is no instruction set that topleft knows"
+    elif name not in kernels.isa_built():
+        reason = "which was not built"
+    else:
+        reason = "which this machine cannot run"
+    raise ValueError(f"TOPLEFT_ISA must be one of {', '.join(available)}, got {name!r}, {reason}")
+
+
+def build_info() -> dict[str, Any]:
+    """Return how this copy of topleft was built and what it runs on.
+
+    Returns
+    -------
+    dict
+        ``version``; ``compiler``; ``flags``, the compiler flags of each kernel unit; ``isa_built``, the instruction
+        sets in the binary; ``isa_available``, those of them that this machine can run; ``isa``, the one in use. Every
+        instruction set gives the same bits.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> info = tl.build_info()
+    >>> "scalar" in info["isa_built"], info["isa"] in info["isa_available"]
+    (True, True)
+    """
+    return {
+        **kernels.compiler_info(),
+        "isa_built": kernels.isa_built(),
+        "isa_available": kernels.isa_available(),
+        "isa": kernels.isa_in_use(),
+    }
+
+
+kernels.use_isa(select())

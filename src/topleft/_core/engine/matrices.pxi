@@ -1,0 +1,299 @@
+# Small matrices, sines and roots, the same on every machine: sums in one order, no fused multiply-add, no library whose
+# last bit depends on the processor.
+
+from libc.math cimport fabs, floor, fmod, frexp, ldexp, rint
+
+cdef double PI = 3.141592653589793
+cdef double RADIANS_A_DEGREE = PI / 180.0
+cdef double[13] ODD_PARTS = [1.0 / k for k in range(1, 26, 2)]
+
+
+cdef object as_numbers(values, int n_dims):
+    array = np.asarray(values, np.float64)
+    if array.ndim != n_dims:
+        raise ValueError(f"an array must have {n_dims} dimensions here, got shape {array.shape}")
+    return array
+
+
+cdef void multiply(const double[:, :] left, const double[:, :] right, double[:, ::1] out) noexcept nogil:
+    cdef Py_ssize_t i, j, k
+    cdef double total
+    for i in range(left.shape[0]):
+        for j in range(right.shape[1]):
+            total = 0.0
+            for k in range(left.shape[1]):
+                total = total + left[i, k] * right[k, j]
+            out[i, j] = total
+
+
+def product(a, b):
+    """Return the matrix product of float64 arrays (n, k) and (k, m); either may be a vector (k,)."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    is_row, is_column = a.ndim == 1, b.ndim == 1
+    cdef const double[:, :] left = as_numbers(a[None] if is_row else a, 2)
+    cdef const double[:, :] right = as_numbers(b[:, None] if is_column else b, 2)
+    if left.shape[1] != right.shape[0]:
+        raise ValueError(f"matrices must fit, got shapes {a.shape} and {b.shape}")
+    result = np.empty((left.shape[0], right.shape[1]))
+    cdef double[:, ::1] out = result
+    if left.shape[0] < HELD_VERTICES:
+        multiply(left, right, out)
+    else:
+        with nogil:
+            multiply(left, right, out)
+    if is_row and is_column:
+        return float(result[0, 0])
+    return result[0] if is_row else result[:, 0] if is_column else result
+
+
+cdef int invert(double[8] *rows, Py_ssize_t n) except -1:
+    """Turn the rows of a matrix (n, n), n at most 4, into those of its inverse, n numbers further on in each row."""
+    cdef Py_ssize_t i, j, k, best
+    cdef double factor, pivot
+    for i in range(n):
+        for j in range(n):
+            rows[i][n + j] = 1.0 if i == j else 0.0
+    for k in range(n):  # the largest number of each column becomes the pivot
+        best = k
+        for i in range(k + 1, n):
+            if fabs(rows[i][k]) > fabs(rows[best][k]):
+                best = i
+        if rows[best][k] == 0.0:
+            raise np.linalg.LinAlgError("Singular matrix")
+        if best != k:
+            for j in range(2 * n):
+                rows[k][j], rows[best][j] = rows[best][j], rows[k][j]
+        pivot = rows[k][k]
+        for i in range(n):
+            if i != k:
+                factor = rows[i][k] / pivot
+                for j in range(k, 2 * n):
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+    for i in range(n):
+        for j in range(n):
+            rows[i][n + j] = rows[i][n + j] / rows[i][i]
+    return 0
+
+
+def inverse(a):
+    """Return the inverse of a float64 matrix (n, n), n at most 4; a LinAlgError if it is singular."""
+    cdef const double[:, :] given = as_numbers(a, 2)
+    cdef Py_ssize_t n = given.shape[0], i, j
+    cdef double[4][8] rows
+    if given.shape[1] != n or n > 4:
+        raise ValueError(f"a matrix must be square, of 4 rows at most, got shape {np.shape(a)}")
+    for i in range(n):
+        for j in range(n):
+            rows[i][j] = given[i, j]
+    invert(rows, n)
+    result = np.empty((n, n))
+    cdef double[:, ::1] out = result
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = rows[i][n + j]
+    return result
+
+
+cdef double determinant_of(const double[:, :] m) noexcept:
+    """That of the first three rows and columns."""
+    return (
+        m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
+        - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
+        + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
+    )
+
+
+def determinant(a):
+    """Return the determinant of a float64 matrix (3, 3)."""
+    cdef const double[:, :] m = as_numbers(a, 2)
+    if m.shape[0] != 3 or m.shape[1] != 3:
+        raise ValueError(f"a matrix must have shape (3, 3), got {np.shape(a)}")
+    return determinant_of(m)
+
+
+@cython.cdivision(True)  # IEEE: no number where there is none
+def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width, double height):
+    """Return how a camera sees a space whose origin is at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
+
+    `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale. The rows: eye,
+    four of rays, three to eye space, origin.
+    """
+    cdef double[4][4] clip
+    cdef double[3] offset
+    cdef double[4][8] rows
+    cdef Py_ssize_t i, j, k
+    cdef double total, unit
+    for i in range(4):
+        for j in range(4):
+            total = 0.0
+            for k in range(4):
+                total = total + clip_from_eye[i, k] * view[k, j]
+            clip[i][j] = total
+    cdef bint has_perspective = clip[3][0] != 0.0 or clip[3][1] != 0.0 or clip[3][2] != 0.0
+    cdef int[3] own = [0, 1, 3 if has_perspective else 2]
+    for i in range(3):
+        for j in range(3):
+            rows[i][j] = clip[own[i]][j]
+    invert(rows, 3)
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            total = total + rows[i][3 + k] * clip[own[k]][3]
+        offset[i] = total
+    # the corner, one column, one row and the whole depth, of clip space
+    cdef double[4][3] ends = [[-1.0, 1.0, 1.0 if has_perspective else -1.0], [2.0 / width, 0.0, 0.0], [0.0, -2.0 / height, 0.0], [0.0, 0.0, 2.0]]
+    result = np.empty((9, 3))
+    cdef double[:, ::1] out = result
+    for i in range(4):
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                total = total + ends[i][k] * rows[j][3 + k]
+            out[1 + i, j] = total
+    if has_perspective:
+        for j in range(3):
+            out[0, j] = -offset[j] - center[j]
+    else:
+        for j in range(3):
+            out[1, j] = out[1, j] - (offset[j] + center[j])
+        unit = length(result[4])
+        for j in range(3):
+            out[0, j] = -out[4, j] / unit
+    unit = cube_root(determinant_of(view))
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            out[5 + i, k] = view[i, k] / unit
+            total = total + view[i, k] * center[k]
+        out[8, i] = total + view[i, 3]
+    return has_perspective, result, unit
+
+
+def row_products(a, b):
+    """Return the products (N,) of rows of float64 arrays (N, 3) with a row, or each with the same row of the other."""
+    cdef const double[:, :] left = as_numbers(a, 2)
+    cdef const double[:, :] right = np.broadcast_to(as_numbers(b, np.ndim(b)), np.shape(a))
+    cdef Py_ssize_t i, n = left.shape[0]
+    if left.shape[1] != 3:
+        raise ValueError(f"rows must have three numbers, got shape {np.shape(a)}")
+    result = np.empty(n)
+    cdef double[::1] out = result
+    with nogil:
+        for i in range(n):
+            out[i] = (left[i, 0] * right[i, 0] + left[i, 1] * right[i, 1]) + left[i, 2] * right[i, 2]
+    return result
+
+
+def length(vector):
+    """Return the root of the sum of the squares of a vector of float64."""
+    cdef const double[:] given = as_numbers(vector, 1)
+    cdef double total = 0.0
+    cdef Py_ssize_t i
+    for i in range(given.shape[0]):
+        total = total + given[i] * given[i]
+    return sqrt(total)
+
+
+def cosine_and_sine(double degrees):
+    """Return the cosine and the sine of an angle in degrees; of whole quarters 0, 1 and -1 as they are."""
+    cdef double turns = fmod(degrees, 360.0)
+    cdef int quarter = <int>rint(turns / 90.0)
+    cdef double x = (turns - 90.0 * quarter) * RADIANS_A_DEGREE, square = x * x
+    # Taylor's series within an eighth of a turn: the next terms are below half a last bit.
+    cdef double sine = 1.0 / 355687428096000.0
+    sine = sine * square - 1.0 / 1307674368000.0
+    sine = sine * square + 1.0 / 6227020800.0
+    sine = sine * square - 1.0 / 39916800.0
+    sine = sine * square + 1.0 / 362880.0
+    sine = sine * square - 1.0 / 5040.0
+    sine = sine * square + 1.0 / 120.0
+    sine = sine * square - 1.0 / 6.0
+    sine = x + x * (square * sine)
+    cdef double cosine = 1.0 / 20922789888000.0
+    cosine = cosine * square - 1.0 / 87178291200.0
+    cosine = cosine * square + 1.0 / 479001600.0
+    cosine = cosine * square - 1.0 / 3628800.0
+    cosine = cosine * square + 1.0 / 40320.0
+    cosine = cosine * square - 1.0 / 720.0
+    cosine = cosine * square + 1.0 / 24.0
+    cosine = 1.0 - (0.5 * square - square * (square * cosine))
+    if quarter & 1:
+        cosine, sine = -sine, cosine
+    if quarter & 2:
+        cosine, sine = -cosine, -sine
+    return cosine + 0.0, sine + 0.0  # no -0
+
+
+def log2(double a):
+    """Return the binary logarithm of a positive float64, within two of its last bits, or of those of 1."""
+    cdef int exponent, k
+    cdef double m = frexp(a, &exponent), total = 0.0, t
+    if m < 0.7071067811865476:
+        m, exponent = 2.0 * m, exponent - 1
+    t = (m - 1.0) / (m + 1.0)
+    for k in range(12, -1, -1):  # ln m = 2 artanh t
+        total = ODD_PARTS[k] + t * t * total
+    return exponent + 2.8853900817779268 * t * total
+
+
+def cube_root(double a):
+    """Return the cube root of a finite float64, within two of its last bits."""
+    cdef int exponent, thirds, k
+    cdef double m = frexp(fabs(a), &exponent), root = 1.0
+    if a == 0.0:
+        return a
+    thirds = <int>floor(exponent / 3.0)
+    m = ldexp(m, exponent - 3 * thirds)  # from 1/2 to 4
+    for k in range(7):  # Newton's method
+        root = (2.0 * root + m / (root * root)) / 3.0
+    root = ldexp(root, thirds)
+    return -root if a < 0.0 else root
+
+
+cdef double arc_tangent(double t) noexcept nogil:
+    """Of 0 to 1, in radians."""
+    cdef double square, total = 0.0
+    cdef int k
+    for k in range(2):  # of a quarter of the angle, 0.2 at most
+        t = t / (1.0 + sqrt(1.0 + t * t))
+    square = t * t
+    for k in range(12, -1, -1):  # Gregory's series
+        total = ODD_PARTS[k] - square * total
+    return 4.0 * t * total
+
+
+def arc_sine(double sine):
+    """Return the angle in degrees, -90 to 90, of a sine of -1 to 1, within four of its last bits."""
+    cdef double half = arc_tangent(fabs(sine) / (1.0 + sqrt((1.0 - sine) * (1.0 + sine))))
+    cdef double angle = min(90.0, 2.0 * half / RADIANS_A_DEGREE)
+    return -angle if sine < 0.0 else angle
+
+
+@cython.cdivision(True)  # 0 over 0 is no number, and is not read
+def off_axis(points):
+    """Return the distances (N,) of points (N, 3) from the z axis, and their angles from where it points, in radians."""
+    cdef const double[:, :] given = as_numbers(points, 2)
+    cdef Py_ssize_t i, n = given.shape[0]
+    cdef double x, y, z, most, far
+    distances, angles = np.empty(n), np.empty(n)
+    cdef double[::1] off = distances
+    cdef double[::1] angle = angles
+    with nogil:
+        for i in range(n):
+            x, y, z = given[i, 0], given[i, 1], given[i, 2]
+            most = max(fabs(x), fabs(y))
+            if most > 0.0 or most != most:
+                x, y = x / most, y / most
+                off[i] = most * sqrt(x * x + y * y)
+            else:
+                off[i] = 0.0
+            most = max(off[i], fabs(z))
+            x, z = off[i] / most, z / most
+            far = sqrt(x * x + z * z)
+            if most == 0.0:
+                angle[i] = 0.0
+            elif z >= 0.0:
+                angle[i] = 2.0 * arc_tangent(x / (far + z))
+            else:
+                angle[i] = PI - 2.0 * arc_tangent(x / (far - z))
+    return distances, angles

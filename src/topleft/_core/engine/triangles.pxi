@@ -1,0 +1,565 @@
+# Snapped triangles, and the passes that draw them: whole, by bands of rows, in layers.
+
+
+cdef inline tl_share no_share() noexcept nogil:
+    """A share of nothing, of no clusters, that lists nothing."""
+    cdef tl_share share
+    memset(&share, 0, sizeof(share))
+    return share
+
+
+cdef inline tl_exact_counts no_counts() noexcept nogil:
+    """Nothing that was decided."""
+    cdef tl_exact_counts counts
+    memset(&counts, 0, sizeof(counts))
+    return counts
+
+
+cdef class SnappedMesh:
+    """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
+
+    cdef tl_snapped snapped
+    cdef int64_t x_px, y_px
+    cdef readonly int subpixel_bits
+    cdef tl_test test
+    cdef object arrays
+    cdef readonly Viewport viewport
+    cdef readonly UnsnappedPoints exact  # vertices that are not snapped; None: they are
+    cdef const uint8_t[::1] is_used  # the blocks of vertices that have been snapped; None: all
+
+    def __init__(
+        self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
+        Pieces pieces, how, Viewport viewport, const uint8_t[::1] is_used=None, UnsnappedPoints exact=None,
+    ):
+        """`how`: that of a view, see `topleft._core.raster.view.How`; with `exact` there are no records."""
+        cdef int test
+        self.viewport, self.is_used, self.exact = viewport, is_used, exact
+        self.arrays = (source, records, wide, triangles, pieces)
+        self.snapped.mesh.vertices = <const tl_vertex *>data(records)
+        self.snapped.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
+        self.snapped.mesh.inv_w = NULL
+        self.snapped.mesh.source = &source.source if source.is_clip_space else NULL
+        self.snapped.mesh.n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex)
+        self.snapped.mesh.exact = NULL
+        if exact is not None:
+            self.snapped.mesh.exact, self.snapped.mesh.n_vertices = &exact.points, exact.n_vertices
+        self.snapped.n_triangles = triangles.shape[0]
+        self.snapped.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
+        self.snapped.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
+        self.snapped.first_id, self.snapped.names = 0, NULL
+        self.x_px, self.y_px, self.subpixel_bits, self.snapped.cull, self.snapped.method, test = how
+        self.test = <tl_test>test
+
+    def __reduce__(self):
+        raise TypeError("what has been drawn refers to memory of this process and is not pickled or copied deeply: take "
+                        "its arrays, such as .triangle and .depth")
+
+    def seen_from(self, int32_t x_fx, int32_t y_fx):
+        """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
+        cdef SnappedMesh seen = self.copy()
+        seen.snapped.mesh.sample_x_fx, seen.snapped.mesh.sample_y_fx = x_fx, y_fx
+        return seen
+
+    def numbered_from(self, int32_t first_id):
+        """Return the same mesh with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
+        cdef SnappedMesh named = self.copy()
+        named.snapped.first_id = first_id
+        return named
+
+    def named(self, const int32_t[::1] names):
+        """Return the same mesh with other ids in the buffers that `draw` fills: triangle i is called names[i]."""
+        cdef SnappedMesh named = self.copy()
+        named.snapped.names = &names[0] if names.shape[0] else NULL
+        named.arrays = (self.arrays, names)
+        return named
+
+    @property
+    def is_named(self):
+        """Whether buffers hold other ids than the indices of triangles."""
+        return self.snapped.names != NULL or self.snapped.first_id != 0
+
+    def moved(self, int64_t x_px, int64_t y_px):
+        """Return the same mesh behind a window that begins x_px columns and y_px rows later."""
+        cdef SnappedMesh part = self.copy()
+        part.x_px += x_px
+        part.y_px += y_px
+        return part
+
+    def finds_inverse_w(self, int64_t n_pixels):
+        """Whether a picture of so many pixels is shaded sooner with 1/w of the vertices that show than with that of all."""
+        cdef const tl_source *source = self.snapped.mesh.source
+        return source != NULL and source.matrix != NULL and self.snapped.mesh.n_vertices > n_pixels
+
+    def with_inverse_w(self, int64_t n_pixels, empty=np.empty):
+        """Return the same mesh with 1/w of all vertices at hand, if so many pixels ask for enough of them.
+
+        `empty(shape, dtype)` gives memory for them.
+        """
+        cdef const tl_source *source = self.snapped.mesh.source
+        cdef double[::1] inv_w
+        cdef SnappedMesh other
+        if source == NULL or source.is_affine or self.snapped.mesh.inv_w != NULL or self.snapped.mesh.n_vertices > 2 * n_pixels:
+            return self
+        inv_w = empty((max(1, self.snapped.mesh.n_vertices),), np.float64)
+        with nogil:
+            K.inverse_w(source, 0, self.snapped.mesh.n_vertices, &inv_w[0])
+        other = self.copy()
+        other.snapped.mesh.inv_w = &inv_w[0]
+        other.arrays = (self.arrays, inv_w)
+        return other
+
+    cdef SnappedMesh copy(self):
+        cdef SnappedMesh other = SnappedMesh.__new__(SnappedMesh)
+        other.snapped, other.arrays = self.snapped, self.arrays
+        other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        other.viewport, other.is_used, other.exact = self.viewport, self.is_used, self.exact
+        return other
+
+    cdef void note(self, const tl_exact_counts *counts):
+        if self.exact is not None:
+            self.exact.add(counts)
+
+    cdef const tl_view *clip_view(self) noexcept nogil:
+        """How clip space maps to pixels; NULL where vertices are in pixels."""
+        return &self.viewport.view if self.viewport is not None else NULL
+
+    cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:
+        cdef tl_window w
+        w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
+        w.width, w.height, w.test, w.pause = width, n_rows, self.test, pause_of_thread()
+        return w
+
+    def guess_seen(self, int64_t width, int64_t height):
+        """Return about how many triangles reach into the picture, how often they cover each pixel, and their rows in all.
+
+        From the boxes and areas of up to 128 of them; one with a vertex that is wide or outside of a clip plane counts as
+        if it covered the picture.
+        """
+        if self.exact is not None:
+            return self.exact.guess_seen(self.x_px, self.y_px, width, height)
+        cdef const tl_vertex *v = self.snapped.mesh.vertices
+        cdef const tl_vertex *a
+        cdef const tl_vertex *b
+        cdef const tl_vertex *c
+        cdef int64_t n = min(self.snapped.n_triangles, 128), i, n_seen = 0, last = self.snapped.mesh.n_vertices - 1
+        cdef const int32_t *given
+        cdef int32_t t[3]
+        cdef double unit = 2.0**self.subpixel_bits, area, total = 0, n_rows = 0, n_pixels = <double>width * height
+        cdef double left = self.x_px * unit, top = self.y_px * unit, cols, rows, each
+        cdef double right = (self.x_px + width) * unit, bottom = (self.y_px + height) * unit
+        for i in range(n):
+            given = self.snapped.triangles + 3 * (i * self.snapped.n_triangles // n)
+            t[0], t[1], t[2] = given[0], given[1], given[2]
+            if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
+                return 0.0, 0.0, 0.0  # an error that draw finds
+            a, b, c = &v[t[0]], &v[t[1]], &v[t[2]]
+            cols = min(<double>max(a.x_fx, b.x_fx, c.x_fx), right) - max(<double>min(a.x_fx, b.x_fx, c.x_fx), left)
+            rows = min(<double>max(a.y_fx, b.y_fx, c.y_fx), bottom) - max(<double>min(a.y_fx, b.y_fx, c.y_fx), top)
+            if a.x_fx == TL_SPECIAL or b.x_fx == TL_SPECIAL or c.x_fx == TL_SPECIAL:
+                n_seen += 1
+                total += n_pixels
+                n_rows += height
+                continue
+            if cols <= 0 or rows <= 0:
+                continue
+            n_seen += 1
+            n_rows += rows / unit
+            area = (<double>b.x_fx - a.x_fx) * (<double>c.y_fx - a.y_fx)
+            area -= (<double>b.y_fx - a.y_fx) * (<double>c.x_fx - a.x_fx)
+            total += min(0.5 * abs(area), cols * rows) / (unit * unit)
+        if not n or not n_pixels:
+            return 0.0, 0.0, 0.0
+        each = self.snapped.n_triangles / <double>n
+        return n_seen * each, total * each / n_pixels, n_rows * each
+
+    def guess_scatter(self, int64_t n_rows):
+        """Return the share of triangles that are taller than `n_rows` or lie farther from the next, from up to 64 of them.
+
+        0 where vertices are not snapped.
+        """
+        if self.exact is not None:
+            return 0.0
+        cdef const tl_vertex *v = self.snapped.mesh.vertices
+        cdef const int32_t *t
+        cdef int64_t n = min(self.snapped.n_triangles - 1, 64), i, k, last = self.snapped.mesh.n_vertices - 1, n_far = 0
+        cdef double far = n_rows * 2.0**self.subpixel_bits, low, high
+        for i in range(n):
+            t = self.snapped.triangles + 3 * (i * (self.snapped.n_triangles - 1) // n)
+            low, high = 2.0**62, -2.0**62
+            for k in range(4):  # its corners, and one of the next
+                if 0 <= t[k] <= last:
+                    low, high = min(low, <double>v[t[k]].y_fx), max(high, <double>v[t[k]].y_fx)
+            n_far += high - low > far
+        return n_far / <double>max(1, n)
+
+    def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
+        """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.
+
+        Returns the first bad row or -1, and triangles, samples in their boxes, and covered samples of each `tl_class`.
+        """
+        cdef tl_window window = self.window(0, height, width)
+        cdef tl_target target
+        cdef tl_census census
+        cdef int64_t bad_row
+        memset(&census, 0, sizeof(census))
+        memset(&target, 0, sizeof(target))
+        census.sink = <tl_sink>sink
+        if samples is not None:
+            target.samples_fx, target.sample_bits = &samples[0, 0], samples.shape[0].bit_length() - 1
+        with nogil:
+            bad_row = K.count_classes(&self.snapped, &window, &target, &census)
+        raise_if_given_up()
+        return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
+
+    def drop_sides(self, const uint8_t[::1] is_single, int64_t first, int64_t end, int32_t[:, ::1] triangles):
+        """Copy triangles [first, end), those collapsed that are single-sided and turned the way that this mesh culls."""
+        if end > first:
+            with nogil:
+                K.drop_sides(&self.snapped, &is_single[0], first, end, &triangles[0, 0])
+
+    def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
+        """Draw rows of a picture, which the first of several meshes clears and the last one finishes.
+
+        Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
+        """
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width)
+        cdef tl_share share = no_share()
+        cdef tl_exact_counts counts = no_counts()
+        cdef int64_t bad_row
+        share.first, share.end, share.is_first, share.is_last = 0, self.snapped.n_triangles, is_first, is_last
+        share.counts = &counts
+        if n_rows == target.height and (n_rows * target.width + 64) * self.snapped.n_triangles < HELD_DRAWN_PX:
+            bad_row = K.draw(&self.snapped, &window, &rows, &share)
+        else:
+            with nogil:
+                bad_row = K.draw(&self.snapped, &window, &rows, &share)
+        self.note(&counts)
+        raise_if_given_up()
+        return bad_row
+
+    def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first, int32_t[::1] others):
+        """Clear rows of a picture and draw there the triangles from `first` on for which `others` has room, 16 numbers left.
+
+        What of them lies in other rows is listed in `others`; returns the first bad row or -1, and how many those are.
+        """
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
+        cdef tl_share share = no_share()
+        cdef tl_exact_counts counts = no_counts()
+        cdef int64_t bad_row
+        share.others, share.picture, share.counts = &others[0], &picture, &counts
+        share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
+        with nogil:
+            bad_row = K.draw(&self.snapped, &window, &rows, &share)
+        self.note(&counts)
+        raise_if_given_up()
+        return bad_row, share.n_others
+
+    def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
+        """Draw the triangles listed over what the rows hold."""
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width)
+        cdef tl_share share = no_share()
+        cdef tl_exact_counts counts = no_counts()
+        share.ids, share.counts = &ids[0] if ids.shape[0] else NULL, &counts
+        share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
+        with nogil:
+            K.draw(&self.snapped, &window, &rows, &share)
+        self.note(&counts)
+        raise_if_given_up()
+
+    def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide, bint is_clamped):
+        """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
+
+        `cells`: those of these rows, clear. Returns as `draw` does, or AREA_OVERFLOW when the cells must be wide.
+        """
+        cdef tl_area target
+        cdef tl_window window = self.window(first_row, n_rows, pixels.shape[1])
+        cdef int64_t status
+        if n_rows == 0 or pixels.shape[1] == 0:
+            return -1
+        target.pixels, target.stride_px, target.cells = &pixels[first_row, 0], pixels.shape[1], &cells[0]
+        target.is_wide, target.is_clamped = is_wide, is_clamped
+        with nogil:
+            status = K.draw_area(&self.snapped, &window, &target)
+        raise_if_given_up()
+        return status
+
+    def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
+              bint is_flat, bint is_u8, int n_channels, const uint8_t[::1] ground=None):
+        """Colour the rows [first_row, first_row + n_rows) by their labels; `ground`, of flat ones: the colour elsewhere."""
+        cdef int64_t width = labels.shape[1]
+        cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+        cdef const void *under = data(ground) if ground is not None else NULL
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        if width == 0 or n_rows == 0 or self.snapped.n_triangles == 0:
+            return
+        with nogil:
+            if is_flat:
+                K.paint_flat(&labels[first_row, 0], n_rows * width, <const uint8_t *>data(colors), pixel_bytes,
+                             <const uint8_t *>under, &pixels[first_row * width * pixel_bytes])
+            else:
+                K.paint_gouraud(&self.snapped, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
+                                &pixels[first_row * width * pixel_bytes])
+
+    def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
+              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells,
+              bint is_few=False):
+        """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
+
+        `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. `is_few`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows. Returns as `draw` does.
+        """
+        cdef tl_canvas canvas
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+        cdef int64_t bad_row
+        if width == 0 or n_rows == 0 or self.snapped.n_triangles == 0:
+            return -1
+        canvas.pixels, canvas.stride_px = &pixels[first_row * width * pixel_bytes], width
+        canvas.colors, canvas.n_channels, canvas.is_u8, canvas.is_flat = data(colors), n_channels, is_u8, is_flat
+        canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
+        canvas.band_rows = band_rows
+        canvas.ground = &ground[0] if ground is not None else NULL
+        canvas.is_few = is_few
+        canvas.packed = &packed[0 if is_few else first_row * width] if packed is not None else NULL
+        canvas.cells = &cells[0] if cells is not None else NULL
+        with nogil:
+            bad_row = K.blend(&self.snapped, &window, &canvas)
+        raise_if_given_up()
+        return bad_row
+
+    def is_few(self, int64_t width, int64_t height, int n_samples, int most):
+        """Tell whether a picture of the mesh is to be written row by row: large triangles, which are snapped.
+
+        `most`: FEW_OF_BITS, FEW_STORED or FEW_LABELLED, by what is done otherwise.
+        """
+        cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
+        return self.snapped.mesh.exact == NULL and tl_are_few(n, n_samples, width, height, <tl_few>most)
+
+    def blends_few(self, int64_t width, int64_t height):
+        """Tell whether flat colours are to be blended over a background row by row: large triangles, which are snapped."""
+        cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
+        return self.snapped.mesh.exact == NULL and tl_few_are_blended(n, width, height)
+
+    def fill_few(self, pixels, int64_t first_row, int64_t n_rows, colors, Transfer transfer, const uint8_t[::1] ground,
+                 const int32_t[:, ::1] samples_fx):
+        """Fill rows of (H, W[, C]) pixels with `ground` and the flat colours of triangles; of samples their mean.
+
+        Returns as `draw` does.
+        """
+        cdef tl_canvas canvas
+        cdef int64_t bad_row, width = pixels.shape[1]
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        cdef uint8_t[::1] flat = as_bytes(pixels)
+        cdef const uint8_t[::1] palette = as_bytes(colors)
+        cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+        cdef int sample_bits = int(samples_fx.shape[0]).bit_length() - 1
+        memset(&canvas, 0, sizeof(canvas))
+        canvas.n_channels, canvas.is_u8 = 1 if pixels.ndim == 2 else pixels.shape[2], pixels.dtype == np.uint8
+        canvas.pixels = &flat[first_row * width * canvas.n_channels * (1 if canvas.is_u8 else 4)]
+        canvas.stride_px, canvas.colors, canvas.ground, canvas.is_flat = width, data(palette), &ground[0], True
+        with nogil:
+            bad_row = K.fill_few(&self.snapped, &window, &canvas, &samples_fx[0, 0], sample_bits, own)
+        raise_if_given_up()
+        return bad_row
+
+    def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
+        """Write the weights of the three vertices of the triangle at each pixel."""
+        cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
+        if ids.shape[0] and ids.shape[1]:
+            with nogil:
+                K.barycentric(&self.snapped, &window, &ids[0, 0], &out[0, 0, 0])
+
+    def interpolate(self, const int32_t[:, ::1] ids, const float[:, ::1] values, bint per_corner, float background,
+                    float[:, :, ::1] out):
+        """Write the interpolated values at each pixel; `values` has a row per vertex, or per corner of each triangle."""
+        cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
+        cdef int n_values = out.shape[2]
+        if ids.shape[0] and ids.shape[1] and n_values:
+            with nogil:
+                K.interpolate(&self.snapped, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
+                              per_corner, background, &out[0, 0, 0])
+
+
+cdef class Bins:
+    """The triangles that reach into each band of 2**band_bits rows of a picture."""
+
+    cdef tl_bins bins
+    cdef int64_t[::1] starts
+    cdef int32_t[::1] listed
+    cdef int32_t[:, ::1] columns
+    cdef object room
+    cdef readonly int band_bits
+    cdef readonly int64_t bad_row, n_bands, n_listed
+
+    def __init__(self, SnappedMesh mesh, int64_t height, int64_t width, int32_t reach_fx, int band_bits, int32_t[:, ::1] room):
+        """`room`: (3, n_triangles + 16), or 5 rows of them, to know the columns of each band, too.
+
+        `bad_row` is -1, or a triangle has an index outside the vertices.
+        """
+        cdef tl_window window = mesh.window(0, height, width)
+        self.room, self.band_bits, self.n_bands = room, band_bits, (height + (1 << band_bits) - 1) >> band_bits
+        self.starts = np.empty(self.n_bands + 2, np.int64)
+        self.bins.n = self.n_listed = 0
+        self.bins.ids, self.bins.first_band, self.bins.last_band = &room[0, 0], &room[1, 0], &room[2, 0]
+        self.bins.first_col = self.bins.end_col = NULL
+        if room.shape[0] == 5:
+            self.bins.first_col, self.bins.end_col = &room[3, 0], &room[4, 0]
+            self.columns = np.empty((self.n_bands, 2), np.int32)
+        with nogil:
+            self.bad_row = K.bin(&mesh.snapped, &window, reach_fx, band_bits, &self.bins)
+            if self.bad_row < 0:
+                K.list_bins(&self.bins, self.n_bands, &self.starts[0], NULL)
+                self.n_listed = self.starts[self.n_bands + 1]
+                if self.bins.first_col != NULL and self.n_bands:
+                    K.find_columns(&self.bins, self.n_bands, &self.columns[0, 0])
+
+    def fill(self, int32_t[::1] listed):
+        """Sort the triangles into `listed`, which has room for `n_listed` and one more."""
+        self.listed = listed
+        with nogil:
+            K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
+
+    cdef const int32_t *backwards(self, int64_t band) noexcept nogil:
+        """Return the triangles of a band after they have been turned round: from the last to the first."""
+        cdef int32_t *ids = &self.listed[0] + self.starts[band]
+        cdef int64_t i, n = self.starts[band + 1] - self.starts[band]
+        cdef int32_t other
+        for i in range(n // 2):
+            other = ids[i]
+            ids[i], ids[n - 1 - i] = ids[n - 1 - i], other
+        return ids
+
+
+def draw_bands(meshes, targets, Bins bins, int64_t first_band, int64_t end_band):
+    """Clear and draw bands of several pictures, a mesh each, one band of all after the other."""
+    cdef SnappedMesh mesh
+    cdef Target target
+    cdef tl_target rows
+    cdef tl_window window
+    cdef tl_share share = no_share()
+    cdef int64_t band, first_row
+    cdef list pairs = list(zip(meshes, targets, strict=True))
+    share.is_first = share.is_last = True
+    for band in range(first_band, end_band):
+        first_row = band << bins.band_bits
+        share.ids = &bins.listed[0] + bins.starts[band]
+        share.end = bins.starts[band + 1] - bins.starts[band]
+        for mesh, target in pairs:
+            rows = target.rows(first_row)
+            window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
+            with nogil:
+                K.draw(&mesh.snapped, &window, &rows, &share)
+            raise_if_given_up()
+
+
+cdef class Split:
+    """Pixels whose samples see several triangles, row by row: their columns, and what their samples but the first see."""
+
+    cdef readonly object rows, columns, ids, depth
+    cdef tl_split split
+
+    def __init__(self, int64_t[:, ::1] rows, int32_t[::1] columns, int32_t[:, ::1] ids, float[:, ::1] depth):
+        """Take room (H, 2) for where pixels of a row begin and end, and for `room_of` pixels and S - 1 samples of each."""
+        self.rows, self.columns, self.ids, self.depth = rows.base, columns.base, ids.base, depth.base
+        self.split.rows, self.split.columns, self.split.ids = &rows[0, 0], &columns[0], &ids[0, 0]
+        self.split.depth, self.split.room = &depth[0, 0], columns.shape[0]
+
+    @staticmethod
+    def room_of(int64_t height, int64_t width, int64_t n_bands):
+        """Return for how many pixels there must be room where a picture is drawn in bands."""
+        return height * width + 16 * n_bands
+
+    def spread_ids(self, const int32_t[:, ::1] first_ids, int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows):
+        """Write rows of the ids that the samples see, planes (S, H, W), from those that the first sees."""
+        cdef tl_split rows = self.from_row(first_row)
+        cdef int64_t width = first_ids.shape[1]
+        cdef int k
+        with nogil:
+            for k in range(1, ids.shape[0] if n_rows and width else 0):
+                K.spread_ids(&rows, k, n_rows, width, &first_ids[first_row, 0], &ids[k, first_row, 0])
+
+    cdef tl_split from_row(self, int64_t row) noexcept:
+        cdef tl_split split = self.split
+        split.rows += 2 * row
+        return split
+
+
+def draw_split_bands(meshes, Target first, int32_t[:, ::1] ids, float[:, ::1] depth, Split split, Bins bins, int64_t first_band,
+                     int64_t end_band):
+    """Clear and draw bands of the picture that the first sample sees, and list the pixels of which others see more.
+
+    `meshes`: as each sample sees it; `ids` and `depth`: memory for what the others see in a band, (S - 1, rows * (W + 16)).
+    """
+    cdef tl_snapped seen[16]
+    cdef SnappedMesh mesh
+    cdef tl_target rows, other
+    cdef tl_window window
+    cdef tl_seen_samples found
+    cdef tl_share share = no_share()
+    cdef int k, n_samples = len(meshes)
+    cdef int64_t band, first_row, at = (first_band << bins.band_bits) * first.width + 16 * first_band
+    for k in range(n_samples):
+        mesh = meshes[k]
+        seen[k] = mesh.snapped
+    memset(&found, 0, sizeof(found))
+    found.sample_bits, found.ids, found.depth, found.plane = n_samples.bit_length() - 1, &ids[0, 0], &depth[0, 0], ids.shape[1]
+    found.first_stride = first.width
+    share.is_first = share.is_last = True
+    for band in range(first_band, end_band):
+        first_row = band << bins.band_bits
+        rows = other = first.rows(first_row)
+        window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, first.height - first_row), first.width)
+        share.ids = &bins.listed[0] + bins.starts[band]
+        share.end = bins.starts[band + 1] - bins.starts[band]
+        found.first_ids = <int32_t *>rows.pixels
+        found.row0, found.n_rows = first_row, window.height
+        found.col0, found.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
+        found.stride = other.stride_px = (found.n_cols + 15) & ~<int64_t>15
+        with nogil:
+            K.draw(&seen[0], &window, &rows, &share)
+            window.x_px += found.col0
+            window.width = found.n_cols
+            for k in range(1, n_samples if found.n_cols else 0):
+                other.pixels, other.depth = &ids[k - 1, 0], &depth[k - 1, 0]
+                K.draw(&seen[k], &window, &other, &share)
+            at = K.split_pixels(&found, &split.split, at)
+        raise_if_given_up()
+
+
+def peel(meshes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_farthest, int band_bits,
+         int64_t first_band, int64_t end_band):
+    """Write the nearest layers of all meshes together, as planes (K, H, W), in bands of 2**band_bits rows.
+
+    `bins`: those of each mesh, or None, where a band is to look at all triangles. Returns as `SnappedMesh.draw` does.
+    """
+    cdef tl_peeled peeled
+    cdef tl_target target
+    cdef tl_window window
+    cdef tl_share share = no_share()
+    cdef SnappedMesh mesh
+    cdef Bins own
+    cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
+    cdef list pairs = list(zip(meshes, bins, strict=True))
+    cdef int64_t i, n = len(pairs)
+    peeled.n_layers, peeled.is_farthest = ids.shape[0], is_farthest
+    peeled.plane_px = height * width
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, width, &peeled
+    for band in range(first_band, end_band):
+        first_row = band << band_bits
+        peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
+        for i in range(n):
+            mesh, own = pairs[i]
+            share.ids, share.end = NULL, mesh.snapped.n_triangles
+            if own is not None:
+                share.ids, share.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
+            share.is_first, share.is_last = i == 0, i == n - 1
+            window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
+            with nogil:
+                bad_row = K.draw(&mesh.snapped, &window, &target, &share)
+            raise_if_given_up()
+            if bad_row >= 0:
+                return bad_row
+    return bad_row

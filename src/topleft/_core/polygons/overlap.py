@@ -1,0 +1,320 @@
+"""`overlap`: the exact share of each pixel in each polygon, as a sparse table.
+
+Input: rings and a size. Output: `Overlap`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from itertools import pairwise
+from threading import Condition, Lock
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_real
+from topleft._core.base.grid import Grid
+from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
+from topleft._core.base.options import parse
+from topleft._core.base.threads import run_parts
+from topleft._core.polygons.draw import cells_for
+from topleft._core.polygons.polygons import Rule, frame_of
+from topleft._core.polygons.prepared import Prepared, prepare
+from topleft._core.polygons.rings import as_points, as_rings, rings_of_triangles
+from topleft.typing import RuleOption
+
+__all__ = ["Overlap", "overlap"]
+
+#: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
+MAX_ENTRIES_AT_ONCE = 1 << 27
+
+#: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
+MAX_BLOCK_ENTRIES = 1 << 16
+
+#: What the kernel writes beyond the last entry: a whole vector.
+TAIL = 16
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """The areas that polygons and pixels share: a sparse matrix, a row for each polygon and a column for each pixel.
+
+    Parameters
+    ----------
+    starts : ndarray of int64, shape (P + 1,)
+        The entries of polygon i are ``[starts[i], starts[i + 1])``: `indptr` of a CSR matrix.
+    pixels : ndarray of int32 (int64 for pictures of 2**31 pixels), shape (E,)
+        ``row * width + column`` of each entry, ascending within a polygon: `indices`.
+    areas : ndarray of float32, shape (E,)
+        The area of the pixel that lies in the polygon, in pixels, above 0 and at most 1: `data`.
+    size : (int, int)
+        Width and height of the picture.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> found = tl.overlap([[[(0.5, 0), (2, 0), (2, 1), (0.5, 1)]]], (3, 1))
+    >>> found.pixels.tolist(), found.areas.tolist()
+    ([0, 1], [0.5, 1.0])
+    >>> found.means([[2.0, 8.0, 9.0]]).tolist()
+    [6.0]
+    """
+
+    starts: npt.NDArray[np.int64]
+    pixels: npt.NDArray[Any]
+    areas: npt.NDArray[np.float32]
+    size: tuple[int, int]
+    _room: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]] = field(
+        default_factory=list, repr=False, compare=False
+    )
+
+    def __len__(self) -> int:
+        """Return the number of polygons."""
+        return len(self.starts) - 1
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Polygons, pixels."""
+        return len(self), self.size[0] * self.size[1]
+
+    @property
+    def polygons(self) -> npt.NDArray[np.int32]:
+        """The polygon (E,) of each entry."""
+        return np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.starts))
+
+    @property
+    def rows_columns(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Row and column (E,) of the pixel of each entry."""
+        return self.pixels // max(1, self.size[0]), self.pixels % max(1, self.size[0])
+
+    def to_scipy(self) -> Any:
+        """Return the table as `scipy.sparse.csr_array` (P, H * W), without a copy."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.areas, self.pixels, self.starts), shape=self.shape)
+
+    def sums(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return the integral (P,) of a raster (H, W) over each polygon; NaN counts as nothing."""
+        values = self._values_of(raster)
+        return self._added(np.where(np.isnan(values), 0.0, values) * self.areas)
+
+    def means(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return the mean (P,) of a raster (H, W) over each polygon; where that is NaN does not count."""
+        values = self._values_of(raster)
+        is_known = ~np.isnan(values)
+        weights = self._added(self.areas * is_known)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self._added(np.where(is_known, values, 0.0) * self.areas) / weights
+
+    def totals(self) -> npt.NDArray[np.float64]:
+        """Return the area (P,) of each polygon inside of the frame, in pixels."""
+        return self._added(self.areas)
+
+    def spread(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return a raster (H, W): the values (P,) of polygons, each pixel with as much of them as it shares.
+
+        Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
+        """
+        own = as_real("values", values)
+        if own.shape != (len(self),):
+            raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {own.shape}")
+        weights = np.repeat(own, np.diff(self.starts)) * self.areas
+        picture: npt.NDArray[np.float64] = np.bincount(self.pixels, weights, minlength=self.shape[1])  # type: ignore[assignment]
+        return picture.reshape(self.size[::-1])
+
+    def _values_of(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        values = as_array("raster", raster)
+        if values.shape != self.size[::-1]:
+            raise ValueError(f"raster must have shape {self.size[::-1]}, got {values.shape}")
+        return values.reshape(-1)[self.pixels].astype(np.float64)
+
+    def _added(self, entries: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        """Return the sum over the entries of each polygon."""
+        is_full = np.diff(self.starts) > 0
+        result = np.zeros(len(self))
+        if is_full.any():
+            result[is_full] = np.add.reduceat(entries.astype(np.float64), self.starts[:-1][is_full])
+        return result
+
+
+def overlap(
+    rings: Any,
+    size: int | tuple[int, int] | Grid,
+    *,
+    triangles: npt.ArrayLike | None = None,
+    rule: RuleOption = "evenodd",
+    origin: tuple[int, int] = (0, 0),
+    subpixel_bits: int = 8,
+    assume_valid: bool = False,
+    threads: int | None = None,
+    out: Overlap | None = None,
+) -> Overlap:
+    """Return the exact area that each polygon shares with each pixel, a sparse table.
+
+    Parameters
+    ----------
+    rings, size, rule, origin, subpixel_bits, assume_valid, threads
+        As in `polygons`.
+    triangles : array_like of integers, shape (T, 3), optional
+        Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
+    out : Overlap, optional
+        A table that is no longer needed: its memory is used again, where it is large enough.
+
+    Returns
+    -------
+    Overlap
+        ``.starts``, ``.pixels`` and ``.areas``, the arrays of a CSR matrix; ``.means(raster)`` and ``.sums(raster)``
+        over polygons, ``.spread(values)`` to pixels, ``.to_scipy()``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As in `polygons`.
+    IndexError
+        For an index outside the vertices; names the row.
+
+    Notes
+    -----
+    Each area has an error below ``2**-24`` for each edge that passes its pixel. Where polygons tile a pixel, its areas
+    sum to 1 within as much; those of a polygon sum to its area inside of the frame.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> table = tl.overlap([[[(0, 0), (2, 0), (0, 2)]], [[(2, 0), (2, 2), (0, 2)]]], (2, 2))
+    >>> table.starts, table.pixels, table.areas
+    (array([0, 3, 6]), array([0, 1, 2, 1, 2, 3], dtype=int32), array([1. , 0.5, 0.5, 0.5, 0.5, 1. ], dtype=float32))
+    >>> table.means([[1, 2], [3, 4]])
+    array([1.75, 3.25])
+    """
+    is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
+    if triangles is None:
+        given = as_rings(rings)
+    else:
+        vertices = as_points(rings, "vertices")
+        given = rings_of_triangles(vertices, as_checked_triangles(triangles, len(vertices)))
+    found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1)
+    prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+    prepared.certify(assume_valid=assume_valid)
+    if out is not None and not isinstance(out, Overlap):
+        raise TypeError(f"out must be an Overlap, got {type(out).__name__}")
+    return list_areas(prepared, [] if out is None else out._room)
+
+
+Chunk = tuple[npt.NDArray[Any], npt.NDArray[np.float32]]
+
+
+def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
+    """Return the table of snapped polygons; `used` is memory to take, if it fits."""
+    size, n = prepared.frame.size, len(prepared)
+    boxes = prepared.compiled.boxes_px.astype(np.int64)
+    widths, heights = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
+    before = np.concatenate([[0], np.cumsum(widths * heights)])  # entries that there can be before each polygon
+    dtype = np.int32 if size[0] * size[1] <= INT32_MAX else np.int64
+    starts = np.zeros(n + 1, np.int64)
+    if not n or 0 in size:
+        return Overlap(starts, np.empty(0, dtype), np.empty(0, np.float32), size)
+    n_threads = max(1, min(prepared.threads_with_pieces(), n))
+    most = max(MAX_BLOCK_ENTRIES, int((widths * heights).max())) + TAIL  # that a thread keeps for itself
+    if n_threads > 1 and not fits((n_threads, most), dtype, np.float32):
+        n_threads = 1
+    n_cells = cells_for(prepared, size[1])
+    cells = SCRATCH.constant("cells", n_cells * n_threads, engine.CELL_CLEAR).reshape(n_threads, n_cells)
+
+    def take_room(n_entries: int) -> Chunk:
+        for i, (pixels, areas) in enumerate(used):
+            if len(pixels) >= n_entries + TAIL and pixels.dtype == dtype:
+                del used[i]
+                return pixels, areas
+        return FRESH.empty("pixels", (n_entries + TAIL,), dtype), FRESH.empty("areas", (n_entries + TAIL,), np.float32)
+
+    rooms: list[Chunk] = []
+    done, n_listed, entries = 0, 0, []
+    while done < n:  # as many polygons as there is room for, all of them but for huge tables
+        end = end_of_room(before, done, MAX_ENTRIES_AT_ONCE)
+        n_room = int(before[end] - before[done])
+        check_fits((n_listed + n_room,), dtype, np.float32)
+        room = take_room(n_room)
+        list_range(prepared, before, (done, end), starts, room, cells)
+        n_entries = int(starts[end] - starts[done])
+        entries.append((room[0][:n_entries], room[1][:n_entries]))
+        rooms.append(room)
+        done, n_listed = end, n_listed + n_entries
+    if len(entries) == 1:
+        return Overlap(starts, *entries[0], size, rooms)
+    check_fits((2 * n_listed,), dtype, np.float32)
+    return Overlap(starts, np.concatenate([c[0] for c in entries]), np.concatenate([c[1] for c in entries]), size)
+
+
+def end_of_room(before: npt.NDArray[np.int64], first: int, n_entries: int) -> int:
+    """Return up to which polygon from `first` on so many entries have room; at least one."""
+    end = int(np.searchsorted(before, before[first] + n_entries, "right")) - 1
+    return min(len(before) - 1, max(end, first + 1))
+
+
+def list_range(
+    prepared: Prepared,
+    before: npt.NDArray[np.int64],
+    polygons: tuple[int, int],
+    starts: npt.NDArray[np.int64],
+    room: Chunk,
+    cells: npt.NDArray[np.int32],
+) -> None:
+    """Write the entries of a range of polygons to the begin of `room`, and where each ends to `starts`.
+
+    One thread, with a row of `cells` each, writes them there. Several take blocks of polygons in turn; those whose
+    block is the next one write it there, the others copy theirs to where the blocks before it have ended.
+    """
+    begin, last = polygons
+    pixels, areas = room
+    if len(cells) == 1:
+        before_all, starts[begin] = int(starts[begin]), 0
+        prepared.compiled.list_shares(begin, last, starts, pixels, areas, cells[0], prepared.piece_scratch())
+        starts[begin : last + 1] += before_all
+        return
+    bounds = [begin]
+    while bounds[-1] < last:
+        bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
+    most = int(np.diff(before[bounds]).max()) + TAIL
+    waiting, free = deque(pairwise(bounds)), deque(cells)
+    taking, turn = Lock(), Condition()
+    done = begin
+    is_lost = False
+
+    def list_blocks(*_: int) -> None:
+        nonlocal done, is_lost
+        scratch, own_cells = prepared.piece_scratch(), free.popleft()
+        own_starts = np.empty(len(starts), np.int64)
+        own = np.empty(most, pixels.dtype), np.empty(most, np.float32)
+        try:
+            while True:
+                with taking:
+                    if not waiting:
+                        return
+                    first, end = waiting.popleft()
+                own_starts[first] = 0
+                is_next = done == first  # all before it have ended: no copy
+                at = int(starts[first] - starts[begin])
+                to = (pixels[at:], areas[at:]) if is_next else own
+                prepared.compiled.list_shares(first, end, own_starts, *to, own_cells, scratch)
+                with turn:
+                    while not is_lost and done != first:
+                        turn.wait()
+                    if is_lost:
+                        return
+                    at, n_entries = int(starts[first] - starts[begin]), int(own_starts[end])
+                    starts[first + 1 : end + 1] = own_starts[first + 1 : end + 1] + starts[first]
+                    done = end
+                    turn.notify_all()
+                if not is_next:
+                    pixels[at : at + n_entries], areas[at : at + n_entries] = own[0][:n_entries], own[1][:n_entries]
+        except BaseException:
+            with turn:  # who waits for this block waits no longer
+                is_lost = True
+                turn.notify_all()
+            raise
+
+    run_parts(list_blocks, len(cells), len(cells))

@@ -1,0 +1,305 @@
+"""What the caller gives as polygons becomes points and offsets.
+
+In: arrays, lists of rings, offset arrays, flat COCO lists, `__geo_interface__`, shapely geometries. Out: `RingSet`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.arrays import apart_from, as_aligned, as_array
+
+__all__ = ["RingSet", "as_rings", "rings_of_triangles"]
+
+I64 = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class RingSet:
+    """Polygon i has the rings `[polygons[i], polygons[i + 1])`, ring k the points `[rings[k], rings[k + 1])`."""
+
+    points: npt.NDArray[Any]  # (N, 2), contiguous float32, float64 or int64
+    rings: I64
+    polygons: I64
+
+    def __len__(self) -> int:
+        return len(self.polygons) - 1
+
+    def apart_from(self, out: object) -> RingSet:
+        """Return it with copies of what `out` may share memory with."""
+        overlap = np.may_share_memory
+        if out is None or (
+            isinstance(out, np.ndarray)
+            and not (overlap(self.points, out) or overlap(self.rings, out) or overlap(self.polygons, out))
+        ):
+            return self
+        points, rings, polygons = (
+            np.asarray(apart_from(out, "rings", each)) for each in (self.points, self.rings, self.polygons)
+        )
+        return RingSet(points, rings, polygons)
+
+
+def as_rings(values: Any) -> RingSet:
+    """Return polygons as points and offsets.
+
+    Raises
+    ------
+    ValueError
+        For shapes that are none of these, offsets that do not fit, and rings of fewer than three points.
+    TypeError
+        For what is no polygon, and coordinates that are no real numbers.
+    """
+    if isinstance(values, RingSet):
+        return values
+    values = _without_tensors(values)
+    found = _from_offsets(values)
+    if found is not None:
+        return _bounded(found)
+    found = _from_shapely(values)
+    if found is None:
+        listed = [_rings_of_geometry(g) for g in _geometries(values)] if _is_geometry(values) else _nested(values)
+        found = _join(listed)
+    return _checked(found)
+
+
+def rings_of_triangles(points: npt.NDArray[Any], triangles: npt.NDArray[np.int32]) -> RingSet:
+    """Return the triangles as polygons of three points."""
+    offsets = np.arange(0, 3 * len(triangles) + 1, 3, dtype=np.int64)
+    corners = as_points(points, "vertices")[np.asarray(triangles).reshape(-1)]
+    return RingSet(corners, offsets, np.arange(len(triangles) + 1, dtype=np.int64))
+
+
+def as_points(values: Any, name: str) -> npt.NDArray[Any]:
+    """Return (N, 2) points as a contiguous float32, float64 or int64 array."""
+    array = as_array(name, values)
+    if array.size == 0:
+        return np.empty((0, 2))
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name} must be real numbers, got dtype {array.dtype}")
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise ValueError(f"{name} must have shape (N, 2), got {array.shape}")
+    if array.dtype.kind == "u" and array.dtype.itemsize == 8:
+        array = np.minimum(array, np.uint64(2**63 - 1))  # out of range either way
+    single = array.dtype.kind == "f" and array.dtype.itemsize <= 4
+    dtype = np.int64 if array.dtype.kind in "iu" else np.float32 if single else np.float64
+    array = np.ascontiguousarray(array, dtype)
+    return as_aligned(array)
+
+
+def _without_tensors(values: Any) -> Any:
+    """Return arrays of other libraries as NumPy's, by themselves or in lists, as the first elements tell."""
+    if _is_tensor(values):
+        return as_array("rings", values)
+    if isinstance(values, (list, tuple)) and _has_tensors(values):
+        return [*map(_without_tensors, values)] if isinstance(values, list) else (*map(_without_tensors, values),)
+    return values
+
+
+def _is_tensor(value: Any) -> bool:
+    if isinstance(value, (np.ndarray, np.generic)) or hasattr(value, "to_numpy") or hasattr(value, "__geo_interface__"):
+        return False
+    return hasattr(value, "__dlpack__") or hasattr(value, "__array__")
+
+
+def _has_tensors(values: Any) -> bool:
+    if isinstance(values, (list, tuple)):
+        return bool(len(values)) and _has_tensors(values[0])
+    return _is_tensor(values)
+
+
+def _from_offsets(values: Any) -> RingSet | None:
+    """Return (coordinates, ring_offsets[, polygon_offsets]), or what `shapely.to_ragged_array` gives; else None."""
+    if not isinstance(values, tuple) or not 2 <= len(values) <= 3:
+        return None
+    if len(values) == 3 and isinstance(values[2], tuple) and not isinstance(values[0], (list, np.ndarray)):
+        return _from_ragged(np.asarray(values[1]), values[2])
+    if np.ndim(values[0]) != 2 or np.ndim(values[1]) != 1 or np.ndim(values[-1]) != 1:
+        return None
+    points = as_points(values[0], "coordinates")
+    rings = _as_offsets(values[1], "ring_offsets", len(points), "coordinates")
+    if len(values) == 2:
+        return RingSet(points, rings, np.array([0, len(rings) - 1], np.int64))
+    return RingSet(points, rings, _as_offsets(values[2], "polygon_offsets", len(rings) - 1, "rings"))
+
+
+def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
+    offsets = as_array(name, values)
+    if offsets.dtype.kind not in "iu":
+        raise TypeError(f"{name} must be integers, got dtype {offsets.dtype}")
+    if offsets.ndim != 1 or len(offsets) < 1:
+        raise ValueError(f"{name} must have shape (n + 1,), got {offsets.shape}")
+    offsets = np.array(offsets, np.int64)  # a copy: what has been checked is what is used
+    steps = offsets[1:] - offsets[:-1]
+    least = np.minimum.reduce(steps, initial=3)
+    if offsets[0] != 0 or offsets[-1] != n or least < 0:
+        raise ValueError(f"{name} must rise from 0 to the number of {of}, {n}; got {_short(offsets)}")
+    if least < 3 and name == "ring_offsets":
+        raise _too_few(steps)
+    return offsets
+
+
+def _short(offsets: I64) -> str:
+    if len(offsets) <= 6:
+        return str(offsets.tolist())
+    return f"{', '.join(map(str, offsets[:3].tolist()))}, ..., {', '.join(map(str, offsets[-2:].tolist()))}"
+
+
+def _from_ragged(coordinates: npt.NDArray[Any], offsets: Sequence[Any]) -> RingSet:
+    """Return `shapely.to_ragged_array`: polygons (rings, geometries) or multipolygons (rings, parts, geometries)."""
+    if len(offsets) not in (2, 3):
+        raise TypeError(f"shapely geometries must be polygons or multipolygons, got {len(offsets)} levels of offsets")
+    points = as_points(coordinates[:, :2] if coordinates.ndim == 2 else coordinates, "coordinates")
+    rings = _as_offsets(offsets[0], "ring_offsets", len(points), "coordinates")
+    parts = _as_offsets(offsets[1], "polygon_offsets", len(rings) - 1, "rings")
+    if len(offsets) == 3:
+        parts = parts[_as_offsets(offsets[2], "geometry_offsets", len(parts) - 1, "polygons")]
+    return RingSet(points, rings, np.ascontiguousarray(parts))
+
+
+def _from_shapely(values: Any) -> RingSet | None:
+    """Return shapely geometries, one or a sequence or a GeoSeries; None when it is none of these. Imports nothing."""
+    shapely: Any = sys.modules.get("shapely")
+    if shapely is None:
+        return None
+    if (
+        hasattr(values, "geometry")
+        and not isinstance(values, shapely.Geometry)
+        and hasattr(values.geometry, "to_numpy")
+    ):
+        values = values.geometry  # a GeoDataFrame
+    if isinstance(values, shapely.Geometry):
+        values = [values]
+    elif hasattr(values, "to_numpy"):
+        values = values.to_numpy()
+    if (
+        not isinstance(values, (list, tuple, np.ndarray))
+        or (isinstance(values, np.ndarray) and not values.ndim)
+        or not len(values)
+        or not isinstance(values[0], shapely.Geometry)
+    ):
+        return None
+    geometries = np.asarray(values, dtype=object)
+    kinds = np.unique(shapely.get_type_id(geometries))
+    if not set(kinds.tolist()) <= {3, 6}:
+        names = sorted({g.geom_type for g in geometries.tolist() if g is not None} - {"Polygon", "MultiPolygon"})
+        raise TypeError(f"shapely geometries must be polygons or multipolygons, got {', '.join(names) or 'None'}")
+    _, coordinates, offsets = shapely.to_ragged_array(geometries)
+    return _from_ragged(coordinates, offsets)
+
+
+def _is_geometry(values: Any) -> bool:
+    if isinstance(values, (list, tuple)) and len(values):
+        values = values[0]
+    return isinstance(values, dict) or hasattr(values, "__geo_interface__")
+
+
+def _geometries(values: Any) -> list[Any]:
+    """Return a GeoJSON geometry for each polygon: of features, collections, objects with `__geo_interface__`."""
+    if isinstance(values, (list, tuple)):
+        return [g for value in values for g in _geometries(value)]
+    values = getattr(values, "__geo_interface__", values)
+    if isinstance(values, dict) and values.get("type") == "FeatureCollection":
+        return [feature.get("geometry") for feature in values["features"]]
+    return [values]
+
+
+def _rings_of_geometry(geometry: Any) -> list[Any]:
+    """Return the rings of a GeoJSON geometry."""
+    if geometry is None:
+        return []
+    kind = geometry.get("type") if isinstance(geometry, dict) else type(geometry).__name__
+    if kind == "Feature":
+        return _rings_of_geometry(geometry.get("geometry"))
+    if kind == "GeometryCollection":
+        return [ring for part in geometry["geometries"] for ring in _rings_of_geometry(part)]
+    if kind == "Polygon":
+        return [_xy(ring) for ring in geometry["coordinates"]]
+    if kind == "MultiPolygon":
+        return [_xy(ring) for part in geometry["coordinates"] for ring in part]
+    raise TypeError(f"geometries must be Polygon or MultiPolygon, got {kind}")
+
+
+def _xy(ring: Iterable[Sequence[float]]) -> list[tuple[float, float]]:
+    return [(p[0], p[1]) for p in ring]
+
+
+def _depth(values: Any) -> int:
+    """Return how many levels of lists there are, as the first elements tell."""
+    if isinstance(values, np.ndarray):
+        return values.ndim
+    if isinstance(values, (list, tuple)):
+        return 1 + (_depth(values[0]) if len(values) else 0)
+    return int(np.ndim(values)) if hasattr(values, "__array__") else 0
+
+
+def _is_flat(ring: Any) -> bool:
+    """Whether a list of numbers is a ring in the form of COCO, x, y, x, y, and no point."""
+    return _depth(ring) == 1 and len(ring) != 2
+
+
+def _nested(values: Any) -> list[list[Any]]:
+    """Return lists of rings, one for each polygon, of nested lists and arrays."""
+    depth = _depth(values)
+    if isinstance(values, (list, tuple)) and not len(values):
+        return []
+    if depth == 0:
+        raise TypeError(
+            "rings must be an array (N, 2), a list of rings or of polygons, (coordinates, ring_offsets, "
+            f"polygon_offsets), or have __geo_interface__, got {type(values).__name__}"
+        )
+    if depth == 1:
+        return [[_unflat(values)]]
+    if depth == 2:
+        if isinstance(values, np.ndarray) or not _is_flat(values[0]):
+            return [[values]]
+        return [[_unflat(ring) for ring in values]]
+    if depth == 3:
+        if isinstance(values, np.ndarray) or not (
+            _depth(values[0]) == 2 and not isinstance(values[0], np.ndarray) and _is_flat(values[0][0])
+        ):
+            return [list(values)]
+        return [[_unflat(ring) for ring in rings] for rings in values]
+    return [list(rings) for rings in values]
+
+
+def _unflat(ring: Any) -> npt.NDArray[Any]:
+    numbers = np.asarray(ring)
+    if numbers.ndim != 1 or len(numbers) % 2:
+        raise ValueError(f"flat rings must hold x, y, x, y, an even number of numbers, got shape {numbers.shape}")
+    return numbers.reshape(-1, 2)
+
+
+def _join(listed: list[list[Any]]) -> RingSet:
+    points = [as_points(ring, "rings") for rings in listed for ring in rings]
+    lengths = np.array([0, *map(len, points)], np.int64)
+    counts = np.array([0, *map(len, listed)], np.int64)
+    if len({array.dtype for array in points}) > 1:
+        points = [array.astype(np.float64) for array in points]
+    joined = np.concatenate(points) if points else np.empty((0, 2))
+    return RingSet(joined, np.cumsum(lengths), np.cumsum(counts))
+
+
+def _checked(found: RingSet) -> RingSet:
+    """Return rings of at least three points each."""
+    lengths = found.rings[1:] - found.rings[:-1]
+    if np.minimum.reduce(lengths, initial=3) < 3:
+        raise _too_few(lengths)
+    return _bounded(found)
+
+
+def _too_few(lengths: I64) -> ValueError:
+    k = int(np.argmax(lengths < 3))
+    return ValueError(f"rings must have at least 3 points, ring {k} has {lengths[k]}")
+
+
+def _bounded(found: RingSet) -> RingSet:
+    """Return as many points and rings as kernels can number."""
+    if max(len(found.points), len(found.rings)) > 2**31 - 1:
+        raise ValueError(f"rings must have at most {2**31 - 1} points, got {len(found.points)}")
+    return found

@@ -1,0 +1,198 @@
+"""Clusters: a mesh sorted once, so that a view leaves out what cannot show in it.
+
+In: the vertices and triangles of a mesh in object space. Out: copies of them in clusters and in meshlets.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft._core import engine
+from topleft._core.base.memory import allocate
+from topleft._core.base.threads import count_threads, run_parts
+
+__all__ = ["Backoff", "Clusters", "Meshlets"]
+
+#: `tl_cluster` of csrc/clusters.h, as far as Python reads it.
+RECORD = np.dtype({"names": ["first_triangle", "n_triangles"], "formats": [np.int64, np.int32], "offsets": [96, 112],
+                   "itemsize": engine.CLUSTER_BYTES})  # fmt: skip
+
+#: How much is hidden is found out once in so many pictures: cameras move little between pictures, and 45 microseconds
+#: are 2.5 % of 70,000 triangles in 512x512.
+PICTURES_A_LOOK = 4
+
+
+class Backoff:
+    """Exponential back-off: how long a mesh is drawn whole before its clusters are asked again whether they pay.
+
+    After a picture for which they did not, that is not found out for the next two, then four, then eight pictures:
+    cameras move little between pictures, and finding out takes 5 % of a small one.
+    """
+
+    def __init__(self) -> None:
+        self._n_left = self._n_refused = 0
+
+    def is_over(self) -> bool:
+        """Tell whether to find out, for one picture more."""
+        self._n_left -= 1
+        return self._n_left < 0
+
+    def note(self, *, pays: bool) -> None:
+        """Note what was found out."""
+        self._n_refused = 0 if pays else min(3, self._n_refused + 1)
+        self._n_left = 2**self._n_refused if self._n_refused else 0
+
+
+class Clusters:
+    """A mesh in object space, and a copy of it in clusters: few triangles that are neighbours, measured together.
+
+    Attributes
+    ----------
+    points : ndarray, shape (V, 3), contiguous float32 or float64
+        The vertices of the mesh.
+    triangles : ndarray of int32, shape (T, 3)
+        Its triangles, whose indices have been checked.
+    n_pictures : int
+        How many pictures of the mesh there have been that might have been drawn in clusters.
+    hidden : float
+        The share of the clusters in view that picture `hidden_at` hid, one of the last `PICTURES_A_LOOK`.
+    own_points : ndarray, shape (N, 3)
+        The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
+    n_bytes : int
+        How much memory the copy takes.
+    """
+
+    def __init__(self, points: NDArray[Any], triangles: NDArray[np.int32], threads: int | None = None) -> None:
+        """Sort and measure (V, 3) contiguous points and (T, 3) checked triangles that nobody writes to."""
+        self.points, self.triangles, self.backoff = points, triangles, Backoff()
+        self.n_pictures, self.hidden, self.hidden_at = 0, 0.0, -PICTURES_A_LOOK
+        n_triangles = len(triangles)
+        order: NDArray[np.int32] = np.empty(n_triangles, np.int32)
+        keys: NDArray[np.uint32] = np.empty(n_triangles, np.uint32)
+        room: NDArray[np.uint64] = np.empty((2, n_triangles), np.uint64)
+        engine.order_triangles(engine.Source(points), triangles, box_of(points), keys, room, order)
+        clusters: NDArray[np.uint8] = np.empty(max(1, n_triangles) * engine.CLUSTER_BYTES, np.uint8)
+        vertices: NDArray[np.int32] = np.empty(3 * n_triangles, np.int32)
+        own_corners: NDArray[np.uint8] = np.empty((n_triangles, 3), np.uint8)
+        seen: NDArray[np.int32] = np.full(len(points), -1, np.int32)
+        n, n_vertices = engine.cut_clusters(triangles, order, seen, clusters, vertices, own_corners)
+        records = clusters[: n * engine.CLUSTER_BYTES].copy()
+        self.own_points = np.zeros((n_vertices + engine.CLUSTER_TAIL, 3), points.dtype)
+        np.take(points, vertices[:n_vertices], axis=0, out=self.own_points[:n_vertices])
+        group_boxes: NDArray[np.float64] = np.empty((-(-n // engine.CLUSTER_GROUP), 6))
+        source = engine.Source(self.own_points)
+
+        def measure(first: int, end: int) -> None:
+            first, end = first * engine.CLUSTER_GROUP, min(end * engine.CLUSTER_GROUP, n)
+            engine.measure_clusters(source, own_corners, records, group_boxes, first, end)
+
+        run_parts(measure, len(group_boxes), count_threads(threads, n_triangles))
+        self.engine = engine.Clustered(records, group_boxes, own_corners, order)
+        self._records, self.order = records, order
+        arrays = self.own_points, records, group_boxes, own_corners, order
+        self.n_bytes = sum(array.nbytes for array in arrays)
+
+    @cached_property
+    def is_float32(self) -> bool:
+        """Whether all coordinates are float32 numbers, as those of most files are, whatever their dtype."""
+        with np.errstate(over="ignore"):
+            return bool((self.points == self.points.astype(np.float32)).all())
+
+    @cached_property
+    def meshlets(self) -> Meshlets:
+        """The same triangles in meshlets, made when they are first asked for (`pays_to_grow` in `choices.py`)."""
+        return Meshlets(self)
+
+    @property
+    def has_meshlets(self) -> bool:
+        """Whether they have been made."""
+        return "meshlets" in self.__dict__
+
+    def __len__(self) -> int:
+        return len(self.engine)
+
+    def is_look_due(self) -> bool:
+        """Tell whether it is to be found out how much this picture hides, and note that it is."""
+        is_due = self.n_pictures - self.hidden_at >= PICTURES_A_LOOK
+        if is_due:
+            self.hidden_at = self.n_pictures
+        return is_due
+
+    @property
+    def n_triangles(self) -> int:
+        """How many triangles the mesh has."""
+        return len(self.triangles)
+
+    def of_triangles(self) -> NDArray[np.int32]:
+        """Return which cluster each triangle of the mesh is in, (T,) int32."""
+        found: NDArray[np.int32] = np.empty(self.n_triangles, np.int32)
+        sizes = self._records.view(RECORD)["n_triangles"]
+        found[self.order] = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
+        return found
+
+
+class Meshlets:
+    """A copy of a mesh in meshlets: up to 64 vertices and 96 triangles each.
+
+    Attributes
+    ----------
+    blocks : (N * MESHLET_BYTES,) uint8
+        `tl_meshlet` of ``csrc/meshlets.h``: vertices, corners, and which triangle of the mesh each is.
+    bounds : (MESHLET_BOUNDS, N + MESHLET_TAIL) float32
+        What is known of each.
+    counts : (N + MESHLET_TAIL,) uint8
+        Their triangles, with the empty ones.
+    n_bytes : int
+        How much memory the copy takes.
+    """
+
+    def __init__(self, clusters: Clusters) -> None:
+        """Grow the triangles of clusters with float32 numbers, in the order that these have along a curve."""
+        points, triangles, order = clusters.points.astype(np.float32, copy=False), clusters.triangles, clusters.order
+        n = len(triangles)
+        source = engine.Source(points)
+        n_pieces = -(-n // engine.MESHLET_PIECE)
+        n_parts = min(n_pieces, count_threads(None, n))
+
+        def grow(first_piece: int, end_piece: int) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.uint8]]:
+            first, end = first_piece * engine.MESHLET_PIECE, min(end_piece * engine.MESHLET_PIECE, n)
+            most = engine.most_meshlets(end - first)
+            meshlets: NDArray[np.uint8] = np.empty(most * engine.MESHLET_BYTES, np.uint8)
+            records: NDArray[np.float32] = np.empty((most, engine.MESHLET_BOUNDS), np.float32)
+            n_triangles: NDArray[np.uint8] = np.empty(most, np.uint8)
+            numbers: NDArray[np.int32] = np.full(len(points), -1, np.int32)
+            room: NDArray[np.uint8] = np.empty(engine.GROW_ROOM, np.uint8)
+            place = first, end, numbers, room
+            n_grown = engine.grow_meshlets(source, triangles, order, *place, meshlets, records, n_triangles)
+            return meshlets[: n_grown * engine.MESHLET_BYTES], records[:n_grown], n_triangles[:n_grown]
+
+        parts = run_parts(grow, n_pieces, n_parts)
+        n_meshlets = sum(len(part[2]) for part in parts)
+        meshlets = allocate(n_meshlets * engine.MESHLET_BYTES)[: n_meshlets * engine.MESHLET_BYTES]
+        np.concatenate([part[0] for part in parts], out=meshlets)
+        bounds: NDArray[np.float32] = np.zeros((engine.MESHLET_BOUNDS, n_meshlets + engine.MESHLET_TAIL), np.float32)
+        np.concatenate([part[1].T for part in parts], axis=1, out=bounds[:, :n_meshlets])
+        counts: NDArray[np.uint8] = np.zeros(n_meshlets + engine.MESHLET_TAIL, np.uint8)
+        np.concatenate([part[2] for part in parts], out=counts[:n_meshlets])
+        middle, radius = np.abs(bounds[:3, :n_meshlets].astype(np.float64)), bounds[3, :n_meshlets].astype(np.float64)
+        self.engine = engine.Grown(meshlets, bounds, counts, (middle + radius).max(axis=1, initial=0).tolist())
+        self.blocks, self.bounds, self.counts = meshlets, bounds, counts
+        self.n_bytes = meshlets.nbytes + bounds.nbytes + counts.nbytes
+
+    def __len__(self) -> int:
+        return len(self.engine)
+
+
+def box_of(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the lowest and the highest of the finite coordinates of each axis, (6,)."""
+    if not len(points):
+        return np.zeros(6)
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not np.isfinite([low, high]).all():
+        finite = points[np.isfinite(points).all(axis=1)]
+        low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.zeros(3), np.zeros(3))
+    return np.concatenate([low, high]).astype(np.float64)

@@ -1,0 +1,437 @@
+"""Fills a picture with the colours of triangles: of the one that shows in a pixel, or blended one after the other.
+
+Several samples are resolved: what they see is averaged, values or the light that these stand for. With straight alpha
+colours count as much as they are opaque: the mean of premultiplied colours, made straight again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import apart_from, as_array, as_background, as_colors, shown
+from topleft._core.base.color import srgb_tables
+from topleft._core.base.memory import Memory
+from topleft._core.base.options import Alpha, Blend, Per, Resolve, Sampling, Sink, parse
+from topleft._core.base.threads import run_parts
+from topleft._core.raster import choices
+from topleft._core.raster.classic import fill_classic, refuse_classic
+from topleft._core.raster.rasterize import canvas_of, draw, draw_all_samples
+from topleft._core.raster.sampling import SAMPLE_GRID_BITS, draw_means, sample_positions
+from topleft._core.raster.snap import Snapped, snap_mesh
+from topleft._core.raster.view import View
+from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
+
+__all__ = ["Style", "draw_fill"]
+
+BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csrc/topleft.h
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """The options of `fill` besides those that all verbs share, not yet checked."""
+
+    per: PerOption
+    background: ArrayLike | None
+    blend: BlendOption
+    alpha: AlphaOption
+    resolve: ResolveOption
+    dtype: DTypeLike | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Blending:
+    """How `fill` puts a colour into a pixel."""
+
+    mode: Blend
+    alpha: Alpha
+    by_area: bool
+    has_alpha: bool
+
+    @classmethod
+    def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending:
+        """Check the options of a call.
+
+        Raises
+        ------
+        ValueError
+            If an option is unknown, "over" lacks alpha, or a classic is to blend.
+        """
+        n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+        modes = parse(Blend, "blend", mode), parse(Alpha, "alpha", alpha)
+        chosen = cls(*modes, by_area=view.sampling is Sampling.AREA, has_alpha=n_channels in (2, 4))
+        if chosen.mode is Blend.OVER and not chosen.has_alpha:
+            raise ValueError(
+                f"colors must have 2 or 4 channels, the last of them alpha, for blend 'over', got {n_channels}"
+            )
+        if view.classic and chosen.mode is not Blend.REPLACE:
+            raise ValueError(f"blend must be 'replace' for method {view.classic.name!r}, got {str(chosen.mode)!r}")
+        return chosen
+
+    @property
+    def is_needed(self) -> bool:
+        """False when a triangle simply replaces what its samples held."""
+        return self.by_area or self.mode is not Blend.REPLACE
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the mode treats the last channel as alpha that colours have not been multiplied by."""
+        return self.has_alpha and self.alpha is Alpha.STRAIGHT and self.mode in (Blend.OVER, Blend.REPLACE)
+
+
+def draw_fill(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, colors: ArrayLike, view: View, style: Style, out: object
+) -> NDArray[Any]:
+    """`fill`, on the memory given."""
+    if view.sampling in (Sampling.OUTER, Sampling.INNER):
+        raise ValueError(
+            f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"
+        )
+    colors = apart_from(out, "colors", colors)
+    if style.dtype is not None:
+        return draw_labels(memory, vertices, triangles, colors, view, style, out)
+    palette = as_colors(colors)
+    blending = Blending.parse(style.blend, style.alpha, palette, view)
+    transfer = parse_resolve(style.resolve, palette, view, is_straight=blending.is_straight)
+    if view.classic:
+        return fill_classic(view.classic, memory, vertices, triangles, palette, view, style.per, style.background, out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
+    is_flat = colors_are_flat(len(palette), snapped, style.per)
+    shape = (*view.size[::-1], *palette.shape[1:])
+    ground = as_background(style.background, palette)
+    with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
+        if ground is None and out is None:
+            ground = np.zeros((), palette.dtype)
+        is_drawn = bool(canvas.size and snapped.n_triangles)
+        is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
+        has_samples = view.sampling.n_samples > 1
+        can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and not has_samples
+        can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_share(view)))
+        if blending.is_needed:
+            is_few = is_drawn and choices.blends_few(snapped, view, palette, is_flat=is_flat)
+        else:
+            is_few = is_drawn and choices.fills_few(snapped, view, palette, is_flat=is_flat)
+        if ground is not None and not (can_lay or is_few):
+            lay_ground(canvas, ground)
+            ground = None
+        if not is_drawn:
+            pass
+        elif is_few and not blending.is_needed and ground is not None:
+            fill_few(snapped, view, palette, canvas, ground, transfer)
+        elif is_blended:
+            options = blending, transfer, is_few and ground is not None
+            blend(memory, snapped, view, palette, canvas, *options, is_flat=is_flat, ground=ground)
+        elif has_samples:
+            paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat, ground=ground)
+        else:
+            paint(memory, snapped, view, palette, canvas, is_flat=is_flat, ground=ground)
+    view.mark("shade")
+    return result
+
+
+def draw_labels(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, labels: ArrayLike, view: View, style: Style, out: object
+) -> NDArray[Any]:
+    """`fill` with integers that are no colours: each pixel has exactly the label of its triangle."""
+    try:
+        dtype = np.dtype(style.dtype)
+    except (TypeError, ValueError):
+        raise TypeError(f"dtype must be one of integers, for labels, got {shown(style.dtype)}") from None
+    if dtype.kind not in "iub":
+        raise TypeError(f"dtype must be one of integers, for labels, got {dtype}")
+    array = as_array("colors", labels)
+    if array.dtype.kind not in "iub" or array.ndim not in (1, 2):
+        raise TypeError(f"colors must be integers of shape (T,) or (T, C) with dtype=, got {array.dtype} {array.shape}")
+    own = array.astype(dtype)
+    if not np.array_equal(own, array):
+        raise ValueError(f"colors must fit {dtype}, got {array.min()}..{array.max()}")
+    wishes = (
+        ("per", style.per, ("auto", "triangle")), ("blend", style.blend, ("replace",)),
+        ("sampling", str(view.sampling), ("center",)),
+    )  # fmt: skip
+    for name, value, choices_of in wishes:
+        if value not in choices_of:
+            raise ValueError(f"{name} must be {choices_of[-1]!r} for labels, which do not mix, got {value!r}")
+    refuse_classic(view, "labels")
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
+    if len(own) != snapped.n_triangles:
+        raise ValueError(f"colors must have {snapped.n_triangles} rows, one per triangle, for labels, got {len(own)}")
+    ground = as_array("background", 0 if style.background is None else style.background)
+    if ground.shape not in ((), own.shape[1:]) or not np.array_equal(ground.astype(dtype), ground):
+        raise ValueError(f"background must be one {dtype}, or one for each channel, got {shown(style.background)}")
+    ids: NDArray[np.int32] = memory.empty("labels", view.size[::-1], np.int32)
+    draw(memory, snapped, view, choices.drawing(view, snapped, Sink.LABEL), ids)
+    if 0 in view.size or not snapped.n_triangles:
+        ids[...] = -1
+    shape = (*ids.shape, *own.shape[1:])
+    with canvas_of(memory, "fill", out, shape, dtype.type, keep=style.background is None) as (result, canvas):
+        if out is not None and style.background is None:
+            canvas[ids >= 0] = own[ids[ids >= 0]]
+        else:
+            rows = np.concatenate([own, np.broadcast_to(ground.astype(dtype), (1, *own.shape[1:]))])
+            np.take(rows, ids, axis=0, out=canvas, mode="wrap")  # id -1 is the last
+    return result
+
+
+def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
+    """Tell whether a row of colours belongs to a triangle; otherwise it belongs to a vertex."""
+    choice = parse(Per, "per", per)
+    n_triangles = snapped.n_triangles
+    fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
+    if choice is Per.AUTO and fits_triangles and fits_vertices and n_colors:
+        raise ValueError(
+            f"colors has {n_colors} rows, and there are as many triangles as vertices: "
+            "say per='triangle' or per='vertex'"
+        )
+    if choice is not Per.VERTEX and fits_triangles:
+        return True
+    if choice is not Per.TRIANGLE and fits_vertices:
+        return False
+    wish = {
+        Per.TRIANGLE: f"{n_triangles} rows, one per triangle",
+        Per.VERTEX: f"{snapped.n_vertices} rows, one per vertex",
+        Per.AUTO: f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
+    }[choice]
+    raise ValueError(f"colors must have {wish}, got {n_colors}")
+
+
+def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
+    """Give all pixels one colour: the first row, and the others row by row, which NumPy copies fast."""
+    pixels[:1] = ground
+    pixels[1:] = pixels[:1]
+
+
+def fill_few(
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    ground: NDArray[Any],
+    transfer: engine.Transfer | None,
+) -> None:
+    """Write every pixel once, row by row: few triangles, of which a row meets fewer."""
+    n_samples = view.sampling.n_samples
+    positions = sample_positions(n_samples, view.grid_bits) if n_samples > 1 else sample_positions(1, SAMPLE_GRID_BITS)
+    under = engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+
+    def fill_rows(first: int, end: int) -> int:
+        return snapped.mesh.fill_few(pixels, first, end - first, colors, transfer, under, positions)
+
+    if max(run_parts(fill_rows, view.size[1], choices.threads_to_draw(view, snapped, Sink.LABEL))) >= 0:
+        snapped.refuse()
+    view.mark("draw")
+
+
+def paint(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    *,
+    is_flat: bool,
+    ground: NDArray[Any] | None = None,
+) -> None:
+    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour.
+
+    `ground`, for flat colours: that of pixels where none shows.
+    """
+    width, height = view.size
+    labels = memory.empty("labels", (height, width), np.int32)
+    drawing = choices.drawing(view, snapped, Sink.LABEL)
+    draw(memory, snapped, view, drawing, labels)
+    palette, flat = engine.as_bytes(colors), engine.as_bytes(pixels)
+    n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
+    under = None if ground is None else engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+
+    def paint_rows(first: int, end: int) -> None:
+        snapped.mesh.paint(labels, palette, flat, first, end - first, is_flat, is_u8, n_channels, under)
+
+    run_parts(paint_rows, height, drawing.n_threads)
+
+
+def paint_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: engine.Transfer | None,
+    *,
+    is_flat: bool,
+    ground: NDArray[Any] | None,
+) -> None:
+    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples.
+
+    `ground`, for flat colours: the colour that all pixels get before.
+    """
+    width, height = view.size
+    positions = sample_positions(view.sampling.n_samples, view.grid_bits)
+    drawing = choices.drawing(view, snapped, Sink.LABEL)
+    n_threads = drawing.n_threads
+    if is_flat and choices.can_share(view):
+        palette = engine.Palette(colors, transfer)
+        if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, ground, n_threads):
+            snapped.refuse()
+        view.mark("draw")
+        return
+    labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
+    draw_all_samples(memory, snapped, view, positions, drawing, labels, None)
+    if is_flat:
+        resolve_flat(labels, colors, pixels, transfer, n_threads)
+        return
+    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
+    resolve_gouraud(memory, meshes, labels, colors, pixels, transfer, n_threads)
+
+
+def blend(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    blending: Blending,
+    transfer: engine.Transfer | None,
+    is_few: bool,
+    *,
+    is_flat: bool,
+    ground: NDArray[Any] | None = None,
+) -> None:
+    """Blend coloured triangles into contiguous pixels; with several samples a pixel each is a picture of its own.
+
+    `ground`, for uint8 with one sample a pixel, or `is_few`: the colour that all pixels get before.
+    """
+    n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
+    if view.sampling.n_samples == 1:
+        pictures, meshes = pixels[None], [snapped.mesh]
+    else:
+        positions = sample_positions(view.sampling.n_samples, view.grid_bits).tolist()
+        meshes = [snapped.mesh.seen_from(x, y) for x, y in positions]
+        pictures = memory.empty("sample colors", (len(meshes), *pixels.shape), colors.dtype)
+        pictures[...] = pixels
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    pixel_bytes = 4 if colors.dtype == np.uint8 else 4 * n_channels
+    row_bytes = pixel_bytes * view.size[0]
+    lays_ground = ground is not None
+    band_rows = 0 if is_few else choices.rows_to_blend(view, snapped, row_bytes, lays_ground=lays_ground)
+    for mesh, picture in zip(meshes, pictures, strict=True):
+        if blend_colors(memory, mesh, colors, picture, blending, n_threads, band_rows, is_flat=is_flat, ground=ground):
+            snapped.refuse()
+    view.mark("draw")
+    if view.sampling.n_samples > 1:
+        resolve_colors(pictures, pixels, transfer, n_threads)
+
+
+def blend_colors(
+    memory: Memory,
+    mesh: engine.SnappedMesh,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    blending: Blending,
+    n_threads: int,
+    band_rows: int,
+    *,
+    is_flat: bool,
+    ground: NDArray[Any] | None = None,
+) -> bool:
+    """Blend a mesh into contiguous pixels; returns whether a triangle has an index outside the vertices.
+
+    `band_rows`: so many are finished before the next; 0: few triangles, row by row. `ground`, for uint8 or few
+    triangles: the colour that all pixels get before.
+    """
+    height, width = pixels.shape[:2]
+    n_parts = min(height, n_threads)
+    n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
+    flat, palette = engine.as_bytes(pixels), engine.as_bytes(colors)
+    n_packed = width * (n_parts * engine.BLENDED_ROWS if band_rows == 0 else height)
+    packed = memory.empty("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
+    n_cells = engine.blend_cells(width)
+    cells = memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
+    under = None if ground is None else engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+    code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
+
+    def blend_part(i: int, _: int) -> int:
+        first, end = height * i // n_parts, height * (i + 1) // n_parts
+        own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
+        room = packed[engine.BLENDED_ROWS * width * i :] if packed is not None and band_rows == 0 else packed
+        return mesh.blend(
+            flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
+            code, is_premultiplied, band_rows, under, room, own, is_few=band_rows == 0,
+        )  # fmt: skip
+
+    return max(run_parts(blend_part, n_parts, n_parts)) >= 0
+
+
+def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> engine.Transfer | None:
+    """Return what is averaged; None when it is the values as they are.
+
+    Raises
+    ------
+    ValueError
+        If the option is unknown, or light is asked for and the colours are no uint8.
+    """
+    is_linear = parse(Resolve, "resolve", resolve) is Resolve.LINEAR
+    if is_linear and colors.dtype != np.uint8:
+        raise ValueError(
+            f"resolve 'linear' takes sRGB colours of uint8, got {colors.dtype}: float32 is averaged as it is"
+        )
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    if view.sampling.n_samples == 1 or not (is_linear or is_straight):
+        return None
+    return engine.Transfer(srgb_tables() if is_linear else None, n_channels - (n_channels in (2, 4)), is_straight)
+
+
+def resolve_flat(
+    labels: NDArray[np.int32],
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: engine.Transfer | None,
+    n_threads: int,
+) -> None:
+    """Write the mean colour of the triangles that the samples see, labels (S, H, W), over (H, W[, C]) pixels."""
+    palette = engine.Palette(colors, transfer)
+
+    def resolve_rows(first: int, end: int) -> None:
+        palette.mean_flat(labels, pixels, first, end - first)
+
+    run_parts(resolve_rows, labels.shape[1], n_threads)
+
+
+def resolve_gouraud(
+    memory: Memory,
+    meshes: list[engine.SnappedMesh],
+    labels: NDArray[np.int32],
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: engine.Transfer | None,
+    n_threads: int,
+) -> None:
+    """Write the mean of the colours at the samples, interpolated at each of them, over (H, W[, C]) pixels."""
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    painted = memory.empty("sample colors", (len(labels), *pixels.shape), colors.dtype)
+    palette = engine.as_bytes(colors)
+
+    def resolve_rows(first: int, end: int) -> None:
+        painted[:, first:end] = pixels[first:end]
+        for mesh, own, picture in zip(meshes, labels, painted, strict=True):
+            flat = engine.as_bytes(picture)
+            mesh.paint(own, palette, flat, first, end - first, False, colors.dtype == np.uint8, n_channels)
+        engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
+
+    run_parts(resolve_rows, labels.shape[1], n_threads)
+
+
+def resolve_colors(
+    painted: NDArray[Any], pixels: NDArray[Any], transfer: engine.Transfer | None, n_threads: int
+) -> None:
+    """Write the mean of what the samples hold, (S, H, W[, C]), over (H, W[, C]) pixels."""
+    n_channels = 1 if pixels.ndim == 2 else pixels.shape[2]
+
+    def resolve_rows(first: int, end: int) -> None:
+        engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
+
+    run_parts(resolve_rows, len(pixels), n_threads)

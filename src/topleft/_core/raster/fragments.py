@@ -1,0 +1,487 @@
+"""The visibility buffer: which triangle shows in each pixel, how deep, and attributes on top of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, Literal, NamedTuple, Protocol, Self, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_array, as_checked_triangles, as_number, as_places, as_values, shown
+from topleft._core.base.memory import empty
+from topleft._core.base.texels import as_levels
+from topleft._core.raster.sampling import SplitSamples
+from topleft.typing import EncodingOption, FilterOption, WrapOption
+
+__all__ = ["Fragments", "GivenCorners", "as_sample", "view_of"]
+
+#: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
+PartOfMesh = Callable[..., engine.SnappedMesh]
+
+
+class Viewer(Protocol):
+    """What `distance` asks of a camera."""
+
+    @property
+    def view(self) -> NDArray[np.float64]:
+        """Eye from world, (4, 4)."""
+
+
+class GivenCorners(NamedTuple):
+    """What a visibility buffer was drawn from, as it was given: what changes from pixel to pixel is found in it."""
+
+    vertices: ArrayLike
+    triangles: ArrayLike
+    transform: ArrayLike | None
+    viewport: tuple[int, int]
+
+    def homogeneous(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Corners of triangles (N, 3, 3) float64 as (x w, y w, w), x and y in pixels, not snapped."""
+        rows = np.asarray(as_array("triangles", self.triangles))[ids].astype(np.intp)
+        points = as_array("vertices", self.vertices)[rows].astype(np.float64)
+        if self.transform is not None:
+            matrix = np.asarray(as_array("transform", self.transform), np.float64)
+            moved = engine.product(points.reshape(-1, points.shape[-1]), matrix[:, :3].T) + matrix[:, 3]
+            points = moved.reshape(*points.shape[:-1], 4)
+        if points.shape[-1] < 4:
+            return np.stack([points[..., 0], points[..., 1], np.ones(points.shape[:-1])], axis=-1)
+        (width, height), (x, y, _, w) = self.viewport, np.moveaxis(points, -1, 0)
+        return np.stack([(w + x) * (width / 2), (w - y) * (height / 2), w], axis=-1)
+
+    def steps(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
+        """What l of each corner changes by along x and y, and its w: (N, 3, 3) float64.
+
+        The weights of a pixel are l / (l0 + l1 + l2), and l = M^-1 (x, y, 1), where the columns of M are the corners.
+        """
+        corners = self.homogeneous(ids)
+        crossed = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
+        area = engine.row_products(corners[:, 0], crossed[:, 0])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            steps = crossed / area[:, None, None]
+        steps[..., 2] = corners[..., 2]
+        steps[~np.isfinite(steps).all(axis=(1, 2))] = 0  # of triangles without area before the snap
+        return steps
+
+
+class Fragments:
+    """What `rasterize` returns.
+
+    Attributes, and samples but the first, are computed when they are asked for, from the `triangles` that were passed
+    in, and for clip space from the `vertices` too: do not change those arrays before.
+
+    Attributes
+    ----------
+    triangle : ndarray of int32, shape (H, W)
+        Index of the triangle that shows in the pixel, -1 where there is none.
+    depth : ndarray of float32, shape (H, W)
+        Depth of that triangle at the pixel's centre; the background's value elsewhere.
+    mask : ndarray of bool, shape (H, W)
+        Where there is a triangle.
+    id, instance : ndarray of int32, shape (H, W)
+        The same as `triangle`, and 0 where there is one: of several instances `SceneFragments` tells more.
+    samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
+        The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
+        the first sample, which is nearest to the centre; `sample` gives those of another.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> frags = tl.rasterize([(0, 0, 0.0), (4, 0, 1.0), (0, 4, 0.0)], [(0, 1, 2)], (4, 2))
+    >>> frags.triangle.tolist()
+    [[0, 0, 0, -1], [0, 0, -1, -1]]
+    >>> frags.depth[0, :3].tolist()
+    [0.125, 0.375, 0.625]
+    >>> frags.interpolate([10.0, 20.0, 30.0])[0, 0].tolist()
+    13.75
+    """
+
+    #: Fragments of each sample when there are several.
+    _samples: tuple[Fragments, ...] = ()
+    #: What these see, until somebody asks for their planes.
+    _split: SplitSamples | None = None
+    #: What it was drawn from; None where that is not kept.
+    corners: GivenCorners | None = None
+    #: Ids and depth of these, (S, H, W).
+    _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
+
+    def __init__(
+        self,
+        triangle: NDArray[np.int32],
+        depth: NDArray[np.float32] | float,
+        snapped: engine.SnappedMesh | PartOfMesh,
+        n_vertices: int,
+        n_triangles: int,
+    ) -> None:
+        self.id = triangle
+        self._depth = depth
+        self._snapped_or_maker = snapped
+        self._n_vertices = n_vertices
+        self._n_triangles = n_triangles
+
+    def drawn_from(self, corners: GivenCorners) -> Self:
+        """Keep what it was drawn from, for derivatives and distances; returns itself."""
+        self.corners = corners
+        for sample in self._samples:
+            sample.corners = corners
+        return self
+
+    def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
+        """Return the fragments of each of several samples, and their planes (S, H, W), drawn now if they were not."""
+        if self._split is not None:
+            self._set_planes(*self._split.planes(), self._split.meshes)
+            self._split = None
+        return self._samples, self._planes
+
+    def _set_planes(
+        self, ids: NDArray[np.int32], depth: NDArray[np.float32], meshes: Sequence[engine.SnappedMesh | PartOfMesh]
+    ) -> None:
+        """Take ids and depth of several samples, (S, H, W), and the mesh as each sample sees it."""
+        numbers = self._n_vertices, self._n_triangles
+        self._samples = tuple(Fragments(*planes, *numbers) for planes in zip(ids, depth, meshes, strict=True))
+        self._planes = ids, depth
+        self.id, self._depth = ids[0], depth[0]
+        if self.corners is not None:
+            self.drawn_from(self.corners)
+
+    def __repr__(self) -> str:
+        height, width = self.triangle.shape
+        return f"Fragments({width}x{height}, {self._n_triangles} triangles)"
+
+    def _repr_png_(self) -> bytes | None:
+        from topleft._meshes.picture.notebook import png_of_fragments  # which imports this module
+
+        return png_of_fragments(self)
+
+    @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle that shows in the pixel, int32 (H, W), -1 where there is none."""
+        return self.id
+
+    @property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the mesh that shows in the pixel, int32 (H, W): 0, -1 where there is none."""
+        return np.minimum(self.id, 0)
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Depth of each pixel, float32 (H, W); made now where all triangles lie at 0."""
+        if not isinstance(self._depth, np.ndarray):
+            self._depth = np.where(self.mask, np.float32(0.0), np.float32(self._depth))
+        return self._depth
+
+    @property
+    def samples_triangle(self) -> NDArray[np.int32]:
+        """Indices of triangles by sample, int32 (H, W, S)."""
+        if self._split is not None:
+            return np.moveaxis(self._split.sample_ids, 0, -1)
+        _, planes = self._sampled()
+        return self.id[..., None] if planes is None else np.moveaxis(planes[0], 0, -1)
+
+    @property
+    def samples_depth(self) -> NDArray[np.float32]:
+        """Depth by sample, float32 (H, W, S)."""
+        _, planes = self._sampled()
+        return self.depth[..., None] if planes is None else np.moveaxis(planes[1], 0, -1)
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Where there is a triangle, bool (H, W)."""
+        return self.id >= 0
+
+    @classmethod
+    def of_samples(
+        cls,
+        triangle: NDArray[np.int32],
+        depth: NDArray[np.float32],
+        meshes: Sequence[engine.SnappedMesh | PartOfMesh],
+        n_vertices: int,
+        n_triangles: int,
+    ) -> Fragments:
+        """Return the fragments of several samples: planes (S, H, W), and the mesh as each sample sees it."""
+        frags = cls(triangle[0], depth[0], meshes[0], n_vertices, n_triangles)
+        frags._set_planes(triangle, depth, meshes)
+        return frags
+
+    @classmethod
+    def of_split(cls, split: SplitSamples, n_vertices: int, n_triangles: int) -> Fragments:
+        """Return the fragments of several samples whose planes are drawn when they are asked for."""
+        frags = cls(split.ids, split.depth, split.meshes[0], n_vertices, n_triangles)
+        frags._split = split
+        return frags
+
+    @overload
+    def sample(self, texture: int) -> Fragments: ...
+    @overload
+    def sample(
+        self,
+        texture: object,
+        uv: Any,
+        *,
+        filter: FilterOption = "trilinear",
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
+        background: float = 0.0,
+    ) -> NDArray[np.float32]: ...
+    def sample(
+        self,
+        texture: Any,
+        uv: Any = None,
+        *,
+        filter: FilterOption = "trilinear",  # noqa: A002
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
+        background: float = 0.0,
+    ) -> Any:
+        """Return a texture at each visible pixel; or, of a number alone, the fragments at that sample of each pixel.
+
+        Parameters
+        ----------
+        texture : Texture, or array_like of real numbers, shape (H, W) or (H, W, C); or int
+            Any number of channels. Row 0 is the top, where v = 1; bytes are taken as 0 to 1. A `Texture` says itself
+            what follows. A number without `uv`: ids, depth and attributes at that sample, with several a pixel.
+        uv : array_like, shape (V, 2) per vertex or (T, 3, 2) per corner; of a scene one for each instance
+            Where the vertices lie in the texture: u from left to right, v from the bottom up, 0 to 1.
+        filter : {"trilinear", "bilinear", "nearest"}
+            "trilinear": between texels, and between the two halvings next to the longer side of the pixel's footprint,
+            which is that of the analytic derivatives of `uv`.
+        wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
+            What lies beyond 0 and 1.
+        encoding : {"linear", "srgb"}, optional
+            "linear", unless given: values are taken as they are. "srgb": the first three channels are decoded, and
+            what is returned is light.
+        background : float
+            Value where there is no triangle.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W, C), or (H, W) for a texture of shape (H, W)
+            Of a `Texture` linear light and opacity, (H, W, 4), 0 to 1.
+
+        Raises
+        ------
+        ValueError
+            If a shape does not fit or an option is unknown.
+        TypeError
+            If the texture holds no real numbers.
+
+        References
+        ----------
+        L. Williams, Pyramidal Parametrics, 1983.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+        >>> frags.sample([[0.0, 10.0]], [[0, 0], [1, 0], [0, 1]], filter="nearest")
+        array([[ 0.,  0., 10.,  0.],
+               [ 0.,  0.,  0.,  0.]], dtype=float32)
+        """
+        if uv is None:
+            return self._at_sample(texture)
+        levels = as_levels(texture, filter, wrap, encoding)
+        ground = as_number("background", background)
+        if len(levels.rows) > 1:
+            found, slopes = self.interpolate(uv, derivatives=True)
+        else:
+            found, slopes = self.interpolate(uv), None
+        if found.shape[2:] != (2,):
+            raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
+        of_pixels = None if slopes is None else slopes.reshape(-1, 2, 2)
+        out = levels.look_up(self._ids().reshape(-1), found.reshape(-1, 2), of_pixels, ground)
+        return out.reshape(self.id.shape if levels.is_flat else (*self.id.shape, levels.n_channels))
+
+    def _at_sample(self, i: int) -> Fragments:
+        """Return ids, depth and attributes at one sample of each pixel."""
+        samples = self._sampled()[0] or (self,)
+        return samples[as_sample(i, len(samples))]
+
+    def distance(self, camera: Viewer) -> NDArray[np.float32]:
+        """Return the distance along the view of what each pixel shows ("metric z"), in units of the world.
+
+        Parameters
+        ----------
+        camera : Camera
+            Who looked.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W)
+            +inf where there is no triangle. Computed from the vertices, not from the depth buffer, so a far plane far
+            away costs no digits: the relative error is that of float32.
+
+        Raises
+        ------
+        ValueError
+            If the vertices were not given in the world: pixels, or clip space.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> mesh = tl.Mesh([[0, 0, -3], [1, 0, -3], [0, 1, -3]], [[0, 1, 2]])
+        >>> camera = tl.Camera.look_at((0, 0, 0), (0, 0, -1), near=1, far=9)
+        >>> tl.rasterize_mesh(mesh, camera, (4, 4)).distance(camera)[1].tolist()
+        [inf, inf, 3.0, inf]
+        """
+        view = view_of(camera)
+        if self.corners is None or self.corners.transform is None:
+            raise ValueError("distance needs vertices (V, 3) in the world, drawn with transform= or by rasterize_mesh")
+        points = np.asarray(as_array("vertices", self.corners.vertices), np.float64)
+        return self.interpolate(-(engine.product(points, view[2, :3]) + view[2, 3]), background=np.inf)
+
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        rows, cols = as_places(rows, cols, self.triangle.shape)
+        triangle = np.full_like(self.triangle, -1)
+        triangle[rows, cols] = self.triangle[rows, cols]
+        found = Fragments(triangle, self.depth, self._snapped_or_maker, self._n_vertices, self._n_triangles)
+        found.corners = self.corners
+        return found
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the three vertices of the triangle that shows in each pixel.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W, 3)
+            In the order of the triangle's row in `triangles`; they sum to 1. 0 where there is no triangle.
+            Perspective-correct for clip-space vertices, screen-linear for pixels.
+
+        Notes
+        -----
+        The weights come from the exact edge functions of the snapped triangle, so none is below 0 and the rounding of
+        float32 is the only error, 2**-23 at most; for triangles cut by a clip plane 2**-21.
+
+        References
+        ----------
+        J. F. Blinn, Hyperbolic Interpolation, 1992.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [2, 0], [0, 2]], [[0, 1, 2]], (2, 2))
+        >>> frags.barycentric()[0, 0]
+        array([0.5 , 0.25, 0.25], dtype=float32)
+        """
+        out = empty((*self.triangle.shape, 3), np.float32)
+        self._snapped.with_inverse_w(self.id.size, empty).barycentric(self._ids(), out)
+        return out
+
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[False] = False
+    ) -> NDArray[np.float32]: ...
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[True]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: bool = False
+    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return an attribute of the vertices at each visible pixel, and what it changes by from pixel to pixel.
+
+        Parameters
+        ----------
+        values : array_like of real numbers, shape (V, K) or (V,) per vertex, or (T, 3, K) per corner of each triangle
+            Used as float32.
+        background : float
+            Value where there is no triangle.
+        derivatives : bool
+            Whether to return the derivatives, too.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W, K), or (H, W) for values of shape (V,)
+            Perspective-correct for clip-space vertices, screen-linear for pixels. With `derivatives` a pair of this and
+            (H, W, K, 2), or (H, W, 2): the derivatives along x (to the right) and y (down), per pixel, 0 where there
+            is no triangle. They are those of the triangle before the snap, in float64, not differences of pixels.
+
+        Raises
+        ------
+        ValueError
+            If the number of rows is not that of the vertices or triangles.
+        TypeError
+            If the values are no real numbers.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+        >>> frags.interpolate([0.0, 4.0, 0.0])
+        array([[0.5, 1.5, 2.5, 0. ],
+               [0.5, 1.5, 0. , 0. ]], dtype=float32)
+        """
+        checked = self._checked(values)
+        found = self._interpolated(checked, as_number("background", background))
+        return (found, self._derivatives(checked)) if derivatives else found
+
+    def _checked(self, values: Any) -> Any:
+        """What the two following methods take of an attribute."""
+        return as_values(values, self._n_vertices, self._n_triangles)
+
+    def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
+        """The attribute of checked values."""
+        channels = array.shape[-1] if array.ndim > 1 else 1
+        out: NDArray[Any] = empty((*self.triangle.shape, channels), np.float32)
+        rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
+        snapped = self._snapped.with_inverse_w(self.id.size, empty)
+        snapped.interpolate(self._ids(), rows, array.ndim == 3, background, out)
+        return out if array.ndim > 1 else out[..., 0]
+
+    def _derivatives(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The derivatives of checked values along x and y, (H, W, K, 2) or (H, W, 2) float32."""
+        if self.corners is None:
+            raise ValueError("derivatives are those of rasterize and rasterize_mesh, not of layers")
+        channels = array.shape[-1] if array.ndim > 1 else 1
+        out = np.empty((*self.triangle.shape, channels, 2), np.float32)
+        ids = np.maximum(self._ids().reshape(-1), -1)  # a copy: what has been checked is what is used
+        is_seen = np.zeros(self._n_triangles + 1, np.bool_)
+        if ids.size and ids.max() >= self._n_triangles:  # the caller has written into them
+            raise IndexError(f"triangle must hold ids below {self._n_triangles}, got {ids.max()}")
+        is_seen[ids] = True  # the last, too, by -1
+        seen = np.flatnonzero(is_seen[:-1]).astype(np.int32)
+        slot = np.empty(self._n_triangles, np.int32)
+        slot[seen] = np.arange(len(seen), dtype=np.int32)
+        if array.ndim == 3:
+            rows = (3 * seen[:, None] + np.arange(3)).astype(np.int32)
+        else:
+            rows = as_checked_triangles(as_array("triangles", self.corners.triangles)[seen], len(array))
+        engine.fill_slopes(
+            ids, self.barycentric().reshape(-1, 3), slot, self.corners.steps(seen), rows,
+            array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32),
+            out.reshape(-1, channels, 2),
+        )  # fmt: skip
+        return out if array.ndim > 1 else out[..., 0, :]
+
+    @cached_property
+    def _snapped(self) -> engine.SnappedMesh:
+        """The triangles that show, snapped; maybe the others too."""
+        return self._snapped_with()
+
+    def _snapped_with(self, *triangles: NDArray[np.int32]) -> engine.SnappedMesh:
+        """Return the triangles that show and these, snapped; maybe the others too."""
+        if isinstance(self._snapped_or_maker, engine.SnappedMesh):
+            return self._snapped_or_maker
+        return self._snapped_or_maker(self.id, *triangles)
+
+    def _ids(self) -> NDArray[np.int32]:
+        return np.require(self.triangle, np.int32, ["C", "A"])
+
+
+def as_sample(i: object, n: int) -> int:
+    """Return which of n samples a number means, the last for -1."""
+    if not isinstance(i, int | np.integer):
+        raise TypeError(f"sample takes the number of a sample, or a texture and uv, got {shown(i)} alone")
+    if not -n <= i < n:
+        raise IndexError(f"the number of a sample must lie in 0 to {n - 1}, got {i}")
+    return int(i) % n
+
+
+def view_of(camera: object) -> NDArray[np.float64]:
+    """Return eye from world, (4, 4), of a camera."""
+    view = getattr(camera, "view", None)
+    if not isinstance(view, np.ndarray) or view.shape != (4, 4):
+        raise TypeError(f"camera must be a Camera, got {shown(camera)}")
+    return view

@@ -1,0 +1,238 @@
+"""Depth peeling: the nearest layers of every pixel, sorted.
+
+In: meshes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and attributes of each.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import shown
+from topleft._core.base.memory import FRESH, SCRATCH, Memory, check_fits
+from topleft._core.base.options import DepthTest, Sampling, parse
+from topleft._core.base.threads import count_threads, run_parts
+from topleft._core.raster.choices import can_share
+from topleft._core.raster.classic import refuse_classic
+from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.sampling import bits_of_bands
+from topleft._core.raster.snap import Snapped, snap_mesh
+from topleft._core.raster.view import View, ViewOptions
+from topleft.typing import DepthTestOption
+
+__all__ = ["DepthLayers", "check_peel", "peel", "peel_meshes"]
+
+#: All layers of a band of rows, which stay in a cache while the band is drawn.
+BAND_BYTES = 1 << 20
+
+
+class DepthLayers:
+    """What `peel` returns: of every pixel the triangles that cover its centre, the nearest first.
+
+    Attributes
+    ----------
+    triangle : ndarray of int32, shape (H, W, K)
+        Index of the triangle, -1 where there are fewer layers.
+    depth : ndarray of float32, shape (H, W, K)
+        Its depth; +inf where there are fewer, -inf with ``depth_test="greater"``.
+    planes : (ndarray of int32, ndarray of float32), each of shape (K, H, W)
+        The same numbers as they lie in memory.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> far, near = [(0, 0, 0.9), (4, 0, 0.9), (0, 4, 0.9)], [(0, 0, 0.1), (4, 0, 0.1), (0, 4, 0.1)]
+    >>> layers = tl.peel([*far, *near], [(0, 1, 2), (3, 4, 5)], (2, 1))
+    >>> layers.triangle[0, 0].tolist(), layers.count.tolist()
+    ([1, 0, -1, -1], [[2, 2]])
+    """
+
+    def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], snapped: Snapped) -> None:
+        """Take planes (K, H, W) of a mesh."""
+        self.planes = ids, depth
+        self._snapped = snapped
+
+    def __repr__(self) -> str:
+        n, height, width = self.planes[0].shape
+        return f"{type(self).__name__}({width}x{height}, {n} layers, {self.n_triangles} triangles)"
+
+    def __len__(self) -> int:
+        return len(self.planes[0])
+
+    @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle of each layer, int32 (H, W, K), -1 where there are fewer."""
+        return np.moveaxis(self.planes[0], 0, -1)
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Depth of each layer, float32 (H, W, K)."""
+        return np.moveaxis(self.planes[1], 0, -1)
+
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of the mesh that was peeled."""
+        return self._snapped.n_triangles
+
+    @property
+    def n_vertices(self) -> int | None:
+        """Vertices of the mesh that was peeled; None where there are several meshes."""
+        return self._snapped.n_vertices
+
+    @property
+    def count(self) -> NDArray[np.int32]:
+        """How many layers a pixel has, at most K: int32 (H, W)."""
+        return (self.planes[0] >= 0).sum(0, dtype=np.int32)
+
+    def layer(self, k: int) -> Fragments:
+        """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
+        return self.rows(k, 0, self.planes[0].shape[1])
+
+    def rows(self, k: int, top: int, n_rows: int) -> Fragments:
+        """Return rows [top, top + n_rows) of layer k in the same way."""
+        n = len(self.planes[0])
+        if not isinstance(k, int | np.integer):
+            raise TypeError(f"k must be an integer, got {shown(k)}")
+        if not -n <= k < n:
+            raise IndexError(f"k must be a layer in [0, {n}), got {k}")
+        (ids, depth), box = self.planes, (k, slice(top, top + n_rows))
+        snapped = self._snapped
+        return Fragments(ids[box], depth[box], snapped.mesh.moved(0, top), snapped.n_vertices, snapped.n_triangles)
+
+
+def peel(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: int | tuple[int, int],
+    *,
+    layers: int = 4,
+    depth_test: DepthTestOption = "less",
+    **view: Unpack[ViewOptions],
+) -> DepthLayers:
+    """Return the nearest layers of every pixel: ids and depths, sorted, as depth peeling gives them.
+
+    Parameters
+    ----------
+    vertices, triangles, size, **view
+        As in `rasterize`, one sample a pixel.
+    layers : int, 1 to 16
+        How many layers are kept of a pixel.
+    depth_test : "less" or "greater"
+        Which depth comes first.
+
+    Returns
+    -------
+    DepthLayers
+        ``.triangle`` (H, W, K) int32 with -1 for none, ``.depth`` (H, W, K) float32, ``.count`` (H, W), and
+        ``.layer(k)``, the visibility buffer of one layer.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As in `rasterize`; also a number of layers outside 1 to 16, or several samples a pixel.
+
+    Notes
+    -----
+    The layers of a pixel are the triangles that cover its centre, by their depth, at equal depth by their index; each
+    has the id and the depth that `rasterize` gives it when it is drawn alone. So layer 0 is what `rasterize` returns,
+    and layer k what it would return if what the layers before show were gone. Vertices (V, 2) lie at depth 0: their
+    layers are the triangles in the order of their indices.
+
+    References
+    ----------
+    C. Everitt, Interactive Order-Independent Transparency, 2001.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> vertices = [[0, 0, 5], [4, 0, 5], [0, 4, 5], [0, 0, 0], [2, 0, 2], [0, 2, 2]]
+    >>> tl.peel(vertices, [[0, 1, 2], [3, 4, 5]], (4, 1), layers=2).triangle
+    array([[[ 1,  0],
+            [ 0, -1],
+            [ 0, -1],
+            [-1, -1]]], dtype=int32)
+    """
+    checked = View.parse(size, view)
+    n, is_farthest = check_peel(checked, layers, depth_test)
+    # Layers refer to what they were drawn from, so nothing of it can be reused.
+    snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
+    ids, depth = peel_meshes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
+    return DepthLayers(ids, depth, snapped)
+
+
+def check_peel(view: View, layers: int, depth_test: str) -> tuple[int, bool]:
+    """Return how many layers are wanted, and whether the larger depth comes first, after checking the options."""
+    refuse_classic(view, "depth")
+    if view.sampling is not Sampling.CENTER:
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no sorted layers: peel takes 'center'")
+    return as_layers(layers), parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
+
+
+def as_layers(layers: object) -> int:
+    """Return a number of layers after checking it."""
+    try:
+        n = operator.index(layers)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"layers must be an integer, got {layers!r}") from None
+    if not 1 <= n <= engine.MAX_LAYERS:
+        raise ValueError(f"layers must lie in 1 to {engine.MAX_LAYERS}, got {n}")
+    return n
+
+
+def peel_meshes(
+    memory: Memory,
+    meshes: Sequence[Snapped],
+    view: View,
+    n_layers: int,
+    *,
+    is_farthest: bool,
+    at_fx: tuple[int, int] = (0, 0),
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids.
+
+    `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre.
+    """
+    meshes = [replace(snapped, mesh=snapped.mesh.seen_from(*at_fx)) for snapped in meshes] if any(at_fx) else meshes
+    reach_fx = max(map(abs, at_fx))
+    width, height = view.size
+    check_fits((n_layers, height, width), np.int32, np.float32)
+    ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
+    depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
+    if 0 in view.size:
+        return ids, depth
+    n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
+    # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
+    n_pixels = BAND_BYTES // (8 * n_layers) if can_share(view) else min(height * width, 2**31 - 1)
+    band_bits = bits_of_bands((height, width), n_pixels, n_threads)
+    bins = [bins_of(memory, snapped, view, band_bits, reach_fx) for snapped in meshes]
+    n_bands = -(-height >> band_bits)
+
+    def peel_bands(first: int, end: int) -> int:
+        drawn = [snapped.mesh for snapped in meshes]
+        return engine.peel(drawn, bins, ids, depth, is_farthest, band_bits, first, end)
+
+    if max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
+        for snapped in meshes:
+            snapped.given.check_indices()
+        meshes[0].refuse()
+    return ids, depth
+
+
+def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int, reach_fx: int) -> engine.Bins | None:
+    """Return the triangles of each band of rows; None where every band looks at all of them."""
+    width, height = view.size
+    if not (snapped.n_triangles and can_share(view)):
+        return None
+    bins = engine.Bins(
+        snapped.mesh, height, width, reach_fx, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
+    )
+    if bins.bad_row >= 0:
+        snapped.refuse()
+    bins.fill(np.empty(bins.n_listed + 1, np.int32))
+    return bins

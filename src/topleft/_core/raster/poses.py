@@ -1,0 +1,264 @@
+"""Draws many poses of one mesh: a visibility buffer for each, one behind the other.
+
+Input: vertices (B, V, C) or transforms (B, 4, 4), and triangles that all poses share. Output: `FragmentsBatch`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal, cast, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._core.base.arrays import as_array, as_checked_triangles, as_out, as_triangles
+from topleft._core.base.memory import FRESH, empty
+from topleft._core.base.threads import available_threads, run_parts
+from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.rasterize import Asked, draw_fragments, refuse_many
+from topleft._core.raster.view import Planned, View, ViewOptions
+from topleft.typing import DepthTestOption, EncodingOption, FilterOption, WrapOption
+
+__all__ = ["FragmentsBatch", "draw_batch", "n_poses"]
+
+
+class FragmentsBatch(Sequence[Fragments]):
+    """What `rasterize` returns of a batch: a visibility buffer for each of B poses, behind each other.
+
+    Attributes
+    ----------
+    triangle : ndarray of int32, shape (B, H, W)
+        Index of the triangle that shows in the pixel, -1 where there is none.
+    depth : ndarray of float32, shape (B, H, W)
+        Its depth.
+    samples_triangle, samples_depth : ndarray of int32 and of float32, shape (B, H, W, S)
+        The same for each sample, with several a pixel; all else is then of the first sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> poses = np.array([np.eye(4), np.diag([0.5, 0.5, 1, 1])])
+    >>> corners = [(-1, -1, 0), (1, -1, 0), (-1, 1, 0)]
+    >>> batch = tl.rasterize(corners, [(0, 1, 2)], (4, 4), transform=poses)
+    >>> batch.triangle.shape, batch.mask.sum(axis=(1, 2)).tolist()
+    ((2, 4, 4), [6, 1])
+    """
+
+    def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
+        self.triangle, self.depth = triangle, depth
+        self._frags = tuple(frags)
+
+    def __repr__(self) -> str:
+        n, height, width = self.triangle.shape
+        return f"FragmentsBatch({n} of {width}x{height})"
+
+    def __len__(self) -> int:
+        return len(self._frags)
+
+    @overload
+    def __getitem__(self, i: int) -> Fragments: ...
+    @overload
+    def __getitem__(self, i: slice) -> Sequence[Fragments]: ...
+    def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
+        """Return one of them, whose arrays are views."""
+        return self._frags[i]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Where there is a triangle, bool (B, H, W)."""
+        return self.triangle >= 0
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the triangles' vertices, (B, H, W, 3) float32; see `Fragments.barycentric`."""
+        return self._stacked([frags.barycentric() for frags in self], (3,))
+
+    @classmethod
+    def stacked(cls, frags: Sequence[Fragments], size: tuple[int, int]) -> FragmentsBatch:
+        """Return the batch of visibility buffers (H, W), each of which keeps its arrays."""
+        shape = (0, *size[::-1])
+        triangle = np.stack([one.triangle for one in frags]) if frags else empty(shape, np.int32)
+        depth = np.stack([one.depth for one in frags]) if frags else empty(shape, np.float32)
+        return cls(triangle, depth, frags)
+
+    @property
+    def samples_triangle(self) -> NDArray[np.int32]:
+        """Indices of triangles by sample, int32 (B, H, W, S)."""
+        found = [frags.samples_triangle for frags in self]
+        return np.stack(found) if found else self.triangle[..., None]
+
+    @property
+    def samples_depth(self) -> NDArray[np.float32]:
+        """Depth by sample, float32 (B, H, W, S)."""
+        found = [frags.samples_depth for frags in self]
+        return np.stack(found) if found else self.depth[..., None]
+
+    @overload
+    def sample(self, texture: int) -> FragmentsBatch: ...
+    @overload
+    def sample(
+        self,
+        texture: object,
+        uv: Any,
+        *,
+        filter: FilterOption = "trilinear",
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
+        background: float = 0.0,
+    ) -> NDArray[np.float32]: ...
+    def sample(self, texture: Any, uv: Any = None, **options: Any) -> Any:
+        """Return a texture at each visible pixel, (B, H, W, C) float32; or, of a number alone, that sample of pixels.
+
+        Parameters
+        ----------
+        texture, **options
+            As `Fragments.sample` takes them.
+        uv : array_like
+            Those of all, (V, 2), say; or with a leading axis of B, (B, V, 2).
+
+        Raises
+        ------
+        ValueError, TypeError, IndexError
+            As `Fragments.sample`; also for neither one nor B arrays of uv.
+        """
+        if uv is None:
+            height, width = self.triangle.shape[1:]
+            return FragmentsBatch.stacked([frags.sample(texture) for frags in self], (width, height))
+        found = [frags.sample(texture, one, **options) for frags, one in zip(self, self._each(uv), strict=True)]
+        channels = np.shape(getattr(texture, "image", texture))[2:]
+        return self._stacked(found, channels)
+
+    @overload
+    def interpolate(
+        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[False] = False
+    ) -> NDArray[np.float32]: ...
+    @overload
+    def interpolate(
+        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[True]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+    def interpolate(
+        self, values: ArrayLike, *, background: float = 0.0, derivatives: bool = False
+    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return an attribute of the vertices at each visible pixel, (B, H, W, K) or (B, H, W) float32.
+
+        Parameters
+        ----------
+        values : array_like of real numbers
+            Those of all, as `Fragments.interpolate` takes them, (V, K), say; or with a leading axis of B, (B, V, K).
+        background : float
+            Value where there is no triangle.
+        derivatives : bool
+            Whether to return the derivatives, too, (B, H, W, K, 2) or (B, H, W, 2).
+
+        Raises
+        ------
+        ValueError
+            If there are neither one nor B arrays of values, or they do not fit.
+        """
+        own = self._each(values)
+        channels = () if np.ndim(own[0] if len(own) else as_array("values", values)) < 2 else own[0].shape[-1:]
+        pairs = zip(self, own, strict=True)
+        if not derivatives:
+            return self._stacked([frags.interpolate(one, background=background) for frags, one in pairs], channels)
+        both = [frags.interpolate(one, background=background, derivatives=True) for frags, one in pairs]
+        return (
+            self._stacked([found for found, _ in both], channels),
+            self._stacked([slopes for _, slopes in both], (*channels, 2)),
+        )
+
+    def _each(self, values: ArrayLike) -> Sequence[NDArray[Any]]:
+        """Return the values of each pose: its own, or those of all."""
+        array = as_array("values", values)
+        has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
+        if has_own and len(array) != len(self):
+            raise ValueError(f"values must be those of all, or {len(self)} of them, got {len(array)}")
+        return list(array) if has_own else [array] * len(self)
+
+    def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
+        shape = *self.triangle.shape, *channels
+        return np.stack(found) if found else empty(shape, np.float32)
+
+
+def n_poses(vertices: object, transform: object) -> int | None:
+    """How many poses vertices (B, V, C) or transforms (B, 4, 4) have; None where they have no leading axis."""
+    counts = {}
+    for name, array in (("vertices", vertices), ("transform", transform)):
+        shape = getattr(array, "shape", ())
+        if len(shape) == 3 or depth_of_lists(array) == 3:
+            counts[name] = len(cast("Sequence[Any]", array))
+    if len(set(counts.values())) > 1:
+        raise ValueError(f"vertices and transform must have one number of poses, got {counts}")
+    return next(iter(counts.values()), None)
+
+
+def depth_of_lists(values: object) -> int:
+    """How many axes nested lists have, told by their first items."""
+    if isinstance(values, list | tuple):
+        return 1 + (depth_of_lists(values[0]) if values else 0)
+    return 0
+
+
+def draw_batch(
+    n: int,
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: object,
+    options: ViewOptions,
+    depth_test: DepthTestOption | None,
+    background_depth: float | None,
+    out: object,
+) -> FragmentsBatch:
+    """`rasterize` of n poses: each is drawn by one thread, so many side by side as there are.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As `rasterize`.
+    """
+    view = View.parse(size, options, has_poses=True)
+    refuse_many(view, "rasterize")
+    asked = Asked.parse(depth_test, background_depth, out)
+    (width, height), n_samples = view.size, view.sampling.n_samples
+    shape = (n, height, width) if n_samples == 1 else (n, height, width, n_samples)
+    outs: list[NDArray[Any] | None] = []
+    for name, array, dtype in (("triangle", asked.ids_out, np.int32), ("depth", asked.depth_out, np.float32)):
+        if array is not None:
+            outs.append(as_out(f"out {name}", array, shape, dtype))
+        else:  # the planes of samples are each pose's own
+            outs.append(empty(shape, dtype) if n_samples == 1 else None)
+    points = as_array("vertices", vertices)
+    corners = triangles if view.plan is not None else as_triangles(triangles)
+    if isinstance(corners, np.ndarray) and corners.dtype == np.int64 and view.plan is None:  # once, not for each pose
+        corners = as_checked_triangles(corners, points.shape[-2] if points.ndim > 1 else 0)
+    matrices = view.transform
+    n_threads = min(n, available_threads() if view.threads is None else view.threads)
+    one = replace(view, threads=1) if n_threads > 1 else view
+    if view.plan is not None:
+        one = replace(one, plan=PlanOfPoses(view.plan))
+
+    def draw_some(first: int, end: int) -> list[Fragments]:
+        found = []
+        for i in range(first, end):
+            own = points[i] if points.ndim == 3 else points
+            transform = matrices[i] if matrices is not None and matrices.ndim == 3 else matrices
+            pose, arrays = replace(one, transform=transform), tuple(None if to is None else to[i] for to in outs)
+            found.append(draw_fragments(FRESH, own, corners, pose, depth_test, background_depth, arrays))
+        return found
+
+    drawn = [frags for part in run_parts(draw_some, n, n_threads) for frags in part] if n else []
+    ids, depth = outs
+    if n_samples == 1 and ids is not None and depth is not None:
+        return FragmentsBatch(ids, depth, drawn)
+    return FragmentsBatch.stacked(drawn, view.size)
+
+
+class PlanOfPoses(Planned):
+    """A plan whose triangles many poses use at once: it notes no times, and draws no clusters."""
+
+    def __init__(self, plan: Planned) -> None:
+        self._plan = plan
+
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+        """Return the plan's own triangles, as `Planned` does."""
+        return self._plan.triangles_of(triangles, n_vertices)

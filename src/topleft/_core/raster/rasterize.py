@@ -1,0 +1,424 @@
+"""Draws masks, counts and visibility buffers.
+
+Each verb checks what it is asked for, snaps the mesh (read, transform, snap, clip), chooses a route and draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_number, as_out
+from topleft._core.base.memory import Memory, MemoryOf, check_fits, empty
+from topleft._core.base.options import DepthTest, Sampling, Sink, parse
+from topleft._core.base.threads import run_parts
+from topleft._core.raster import choices
+from topleft._core.raster.choices import Drawing, Route
+from topleft._core.raster.classic import draw_classic, refuse_classic
+from topleft._core.raster.cluster_draw import ClusteredMesh
+from topleft._core.raster.fragments import Fragments, GivenCorners
+from topleft._core.raster.sampling import (
+    draw_planes,
+    draw_sorted,
+    draw_split,
+    lay_background,
+    sample_positions,
+    sum_areas,
+)
+from topleft._core.raster.snap import Snapped, snap_mesh, snap_to_cover
+from topleft._core.raster.view import View
+from topleft.typing import DepthTestOption
+
+__all__ = [
+    "Asked",
+    "canvas_of",
+    "draw",
+    "draw_all_samples",
+    "draw_coverage",
+    "draw_fragments",
+    "draw_overdraw",
+    "refuse_many",
+]
+
+
+def draw(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    drawing: Drawing,
+    pixels: NDArray[Any],
+    *,
+    depth: NDArray[np.float32] | None = None,
+    earlier_wins: bool = False,
+) -> None:
+    """Clear contiguous buffers and draw a mesh into them, in bands of rows."""
+    (width, height), (sink, n_parts, is_shared, is_bounded, in_bands) = view.size, drawing
+    if 0 in view.size:
+        return
+    covered: NDArray[np.uint64] | None = None
+    samples: NDArray[np.int32] | None = None
+    if sink is Sink.SAMPLES:
+        samples = sample_positions(view.sampling.n_samples, view.grid_bits)
+    if sink in (Sink.MASK, Sink.SAMPLES):
+        n_samples = 1 if samples is None else len(samples)
+        covered = memory.empty("covered", engine.Target.covered_shape(height, width, n_samples), np.uint64)
+    bounds = memory.empty("bounds", engine.Target.bounds_shape(height, width), np.float32) if is_bounded else None
+    target = engine.Target(sink, pixels, depth, covered, samples, earlier_wins, bounds)
+
+    def draw_rows(first: int, end: int) -> int:
+        return snapped.mesh.draw(target, first, end - first)
+
+    if in_bands:
+        mesh, n, shape = snapped.mesh, snapped.n_triangles, (height, width)
+        is_bad = draw_sorted(memory, mesh, n, sample_positions(1, view.grid_bits), [target], shape, n_parts)
+    elif is_shared and snapped.can_share:
+        is_bad = max(draw_shared(memory, snapped, target, height, n_parts)) >= 0
+    else:
+        is_bad = max(run_parts(draw_rows, height, n_parts)) >= 0
+    if is_bad:
+        snapped.refuse()
+    view.mark("draw")
+
+
+def draw_shared(memory: Memory, snapped: Snapped, target: engine.Target, height: int, n_parts: int) -> list[int]:
+    """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
+    mesh, n = snapped.mesh, snapped.n_triangles
+    rows = [height * i // n_parts for i in range(n_parts + 1)]
+    shares = [n * i // n_parts for i in range(n_parts + 1)]
+    room: NDArray[np.int32] = memory.empty("others", (n + 16 * n_parts,), np.int32)
+    others = [room[shares[i] + 16 * i : shares[i + 1] + 16 * (i + 1)] for i in range(n_parts)]
+
+    def draw_own(i: int, _: int) -> tuple[int, int]:
+        return mesh.draw_share(target, rows[i], rows[i + 1] - rows[i], shares[i], others[i])
+
+    def draw_found(i: int, _: int) -> None:
+        finders = [k for k in range(n_parts) if k != i]
+        for k in finders:
+            mesh.draw_listed(target, rows[i], rows[i + 1] - rows[i], others[k][: counts[k]], k == finders[-1])
+
+    bad_rows, counts = zip(*run_parts(draw_own, n_parts, n_parts), strict=True)
+    if max(bad_rows) < 0:
+        run_parts(draw_found, n_parts, n_parts)
+    return list(bad_rows)
+
+
+@contextmanager
+def canvas_of(
+    memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type, *, keep: bool = False
+) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+    """Give the array to return and a contiguous aligned one to draw into; afterwards both are the same picture.
+
+    `keep`: what is in `out` shows through where nothing is drawn.
+    """
+    result, canvas = open_canvas(memory, name, out, shape, dtype)
+    if keep and canvas is not result:
+        canvas[...] = result
+    yield result, canvas
+    if canvas is not result:
+        result[...] = canvas
+
+
+def open_canvas(
+    memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the array to return, and a contiguous aligned one: the same wherever that one is."""
+    result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
+    return result, result if result.flags.carray else empty(shape, dtype)
+
+
+def draw_area(
+    memory: Memory, name: str, snapped: Snapped, view: View, out: object, *, is_clamped: bool
+) -> NDArray[np.float32]:
+    """Return the area that triangles cover of each pixel, or at most 1 of it."""
+    with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
+        n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
+        if sum_areas(memory, snapped.mesh, snapped.n_triangles, canvas, n_threads, is_clamped=is_clamped):
+            snapped.refuse()
+    view.mark("draw")
+    return result
+
+
+def refuse_many(view: View, verb: str) -> None:
+    """Raise an error where a pixel needs one triangle, and areas or squares are of many."""
+    if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center' and 'msaa2' to 'msaa16'")
+
+
+def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
+    """`coverage`, on the memory given."""
+    if view.classic:
+        return draw_classic(view.classic, memory, vertices, triangles, view, Sink.MASK, out)
+    snapped = snap_to_cover(memory, vertices, triangles, view, out=out)
+    if view.sampling is Sampling.AREA:
+        return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
+    if view.sampling.n_samples > 1 and view.is_exact:
+        return draw_share_of_masks(memory, snapped, view, out)
+    if view.sampling.n_samples > 1:
+        with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
+            draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), canvas)
+        return result
+    with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
+        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.MASK), canvas)
+    return result
+
+
+def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.float32]:
+    """Return the share of samples that triangles cover, from a mask of each sample."""
+    n, shape = view.sampling.n_samples, view.size[::-1]
+    mask: NDArray[np.bool_] = memory.empty("sample mask", shape, np.bool_)
+    with canvas_of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
+        canvas[...] = 0.0
+        for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
+            seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
+            draw(memory, seen, view, choices.drawing(view, seen, Sink.MASK), mask)
+            np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
+    return result
+
+
+def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.int32]:
+    """Return how many triangles cover each sample, (H, W, S): a plane a sample in memory."""
+    n, (width, height) = view.sampling.n_samples, view.size
+    planes = memory.empty("sample counts", (n, height, width), np.int32)
+    for plane, at in zip(planes, sample_positions(n, view.grid_bits).tolist(), strict=True):
+        seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
+        draw(memory, seen, view, choices.drawing(view, seen, Sink.COUNT), plane)
+    counts = np.moveaxis(planes, 0, -1)
+    if out is None:
+        return counts
+    result = as_out("out", out, counts.shape, np.int32)
+    result[...] = counts
+    return result
+
+
+def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
+    """`overdraw`, on the memory given."""
+    if view.classic:
+        return draw_classic(view.classic, memory, vertices, triangles, view, Sink.COUNT, out)
+    snapped = snap_to_cover(memory, vertices, triangles, view, out=out)
+    if view.sampling is Sampling.AREA:
+        return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
+    if view.sampling.n_samples > 1:
+        return draw_sample_counts(memory, snapped, view, out)
+    with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
+        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.COUNT), canvas)
+    return result
+
+
+def draw_all_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    positions: NDArray[np.int32],
+    drawing: Drawing,
+    pixels: NDArray[np.int32],
+    depth: NDArray[np.float32] | None,
+) -> None:
+    """Clear (S, H, W) planes and draw what each sample sees."""
+    width, height = view.size
+    if not (width and height):
+        return
+    sink, n_threads, *_ = drawing
+    is_near = snapped.n_triangles > 0 and choices.can_share(view)
+    if draw_planes(
+        memory, snapped.mesh, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
+    ):
+        snapped.refuse()
+    view.mark("draw")
+
+
+class Asked(NamedTuple):
+    """What `rasterize` is asked for besides the options of all verbs."""
+
+    test: DepthTest | None
+    background: float  # depth where nothing is
+    ids_out: object
+    depth_out: object
+
+    @classmethod
+    def parse(cls, depth_test: str | None, background_depth: float | None, out: object) -> Asked:
+        """Check the options of a call."""
+        test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+        if background_depth is None:
+            background_depth = -np.inf if test is DepthTest.GREATER else np.inf
+        background_depth = as_number("background_depth", background_depth)
+        try:
+            ids_out, depth_out = (None, None) if out is None else cast("tuple[object, object]", out)
+        except (TypeError, ValueError):
+            raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
+        return cls(test, background_depth, ids_out, depth_out)
+
+
+def draw_fragments(
+    memory: Memory,
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    view: View,
+    depth_test: DepthTestOption | None,
+    background_depth: float | None,
+    out: object,
+    names: NDArray[np.int32] | None = None,
+) -> Fragments:
+    """`rasterize`, on the memory given; with `names` triangle i is called names[i], which ascend."""
+    refuse_classic(view, "depth")
+    refuse_many(view, "rasterize")
+    asked = Asked.parse(depth_test, background_depth, out)
+    corners = GivenCorners(vertices, triangles, view.transform, view.viewport)
+    frags = draw_clusters(memory, vertices, view, asked)
+    if frags is not None:
+        return frags.drawn_from(corners)
+    if view.sampling.n_samples > 1:  # which are drawn from the snapped mesh when they are asked for
+        memory = MemoryOf(memory, "samples")
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
+    if names is not None:
+        snapped = replace(snapped, mesh=snapped.mesh.named(names))
+    route, drawing = choices.route(view, snapped, asked.test, wants_depth=asked.depth_out is not None)
+    return ROUTES[route](memory, snapped, view, asked, drawing).drawn_from(corners)
+
+
+Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
+
+
+def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids of triangles at depth 0, which is written when it is asked for."""
+    with canvas_of(memory, "triangle", asked.ids_out, view.size[::-1], np.int32) as (ids, canvas):
+        draw(memory, snapped, view, drawing, canvas)
+    return Fragments(ids, asked.background, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_flat(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids of triangles that all lie at one depth, and write it where they are."""
+    earlier_wins = choices.earlier_wins(asked.test, has_depth=snapped.has_depth)
+    flat_depth = choices.first_depth(snapped.given.points, has_depth=snapped.has_depth)
+    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+        draw(memory, snapped, view, drawing, ids_canvas, earlier_wins=earlier_wins)
+
+        def set_depth(first: int, end: int) -> None:
+            n_rows, background = end - first, asked.background
+            engine.set_flat_depth(ids_canvas, depth_canvas, first, n_rows, earlier_wins, flat_depth, background)
+
+        run_parts(set_depth, len(ids), drawing.n_threads)
+        view.mark("depth")
+    return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_depth(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids and depth, compared at each sample."""
+    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+        draw(memory, snapped, view, drawing, ids_canvas, depth=depth_canvas)
+        lay_background(ids_canvas, depth_canvas, drawing.sink, asked.background)
+    return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids and depth of every sample: those of the first, and of pixels that show several; or a plane a sample."""
+    (width, height), n = view.size, view.sampling.n_samples
+    positions = sample_positions(n, view.grid_bits)
+    check_fits((n, height, width), np.int32, np.float32)
+    can_split = choices.can_split(view, snapped.n_triangles) and not snapped.mesh.is_named
+    if can_split and asked.ids_out is None and asked.depth_out is None:
+        shape, n_threads = (height, width), drawing.n_threads
+        given = snapped.mesh, snapped.n_triangles, positions, drawing.sink, shape, asked.background
+        split = draw_split(memory, *given, n_threads)
+        if split is None:
+            snapped.refuse()
+        view.mark("draw")
+        return Fragments.of_split(split, snapped.n_vertices, snapped.n_triangles)
+    ids, depth = planes_of(memory, view)
+    draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
+    lay_background(ids, depth, drawing.sink, asked.background)
+    copy_planes(ids, depth, asked)
+    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
+    return Fragments.of_samples(ids, depth, meshes, snapped.n_vertices, snapped.n_triangles)
+
+
+def planes_of(memory: Memory, view: View) -> Buffers:
+    """Return ids and depth of all samples to draw into, (S, H, W)."""
+    (width, height), n = view.size, view.sampling.n_samples
+    shape = n, height, width
+    return memory.empty("sample ids", shape, np.int32), memory.empty("sample depth", shape, np.float32)
+
+
+def copy_planes(ids: NDArray[np.int32], depth: NDArray[np.float32], asked: Asked) -> None:
+    """Write planes of samples to the arrays that a caller gave, (H, W, S)."""
+    for name, out, planes in (("triangle", asked.ids_out, ids), ("depth", asked.depth_out, depth)):
+        if out is not None:
+            n, height, width = planes.shape
+            result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
+            result[...] = np.moveaxis(planes, 0, -1)
+
+
+ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
+
+
+def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked) -> Fragments | None:
+    """Draw a mesh that the plan has in clusters.
+
+    None where there are no clusters, where drawing them does not pay, or where only the mesh can tell what is wrong.
+    """
+    if view.plan is None or view.transform is None:
+        return None
+    sink = choices.fragment_sink(asked.test, has_depth=True)
+    clusters = view.plan.find_clusters(vertices) if choices.can_cluster(view, sink) else None
+    if clusters is None:
+        return None
+    clusters.n_pictures += 1
+    if not clusters.backoff.is_over():
+        return None
+    mesh = ClusteredMesh(clusters, view)
+    route = mesh.route(sink)
+    if route is choices.ClusterRoute.WHOLE:
+        return None
+    if view.sampling.n_samples > 1:
+        return draw_cluster_samples(memory, mesh, view, asked, sink, route)
+    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+        bounds = memory.empty("bounds", engine.Target.bounds_shape(*ids_canvas.shape), np.float32)
+        target = engine.Target(sink, ids_canvas, depth_canvas, None, bounds=bounds)
+        if not mesh.draw(memory, target, route):
+            return None
+        mesh.note_hidden(target)
+        lay_background(ids_canvas, depth_canvas, sink, asked.background)
+    view.mark("draw")
+    return Fragments(ids, depth, mesh.part, len(clusters.points), clusters.n_triangles)
+
+
+def draw_cluster_samples(
+    memory: Memory, mesh: ClusteredMesh, view: View, asked: Asked, sink: Sink, route: choices.ClusterRoute
+) -> Fragments | None:
+    """Draw a mesh in clusters into a plane a sample, one after the other; None as `draw_clusters` returns it."""
+    (width, height), n = view.size, view.sampling.n_samples
+    check_fits((n, height, width), np.int32, np.float32)
+    samples = [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
+    memory = MemoryOf(memory, "samples")
+    ids, depth = planes_of(memory, view)
+    bounds = memory.empty("bounds", engine.Target.bounds_shape(height, width), np.float32)
+    for plane, z, sample in zip(ids, depth, samples, strict=True):
+        target = engine.Target(sink, plane, z, None, bounds=bounds)
+        if not mesh.draw(memory, target, route, sample):
+            return None
+    mesh.note_hidden(target)
+    lay_background(ids, depth, sink, asked.background)
+    view.mark("draw")
+    copy_planes(ids, depth, asked)
+    clusters = mesh.clusters
+    parts = mesh.parts_of_samples(ids, samples)
+    return Fragments.of_samples(ids, depth, parts, len(clusters.points), clusters.n_triangles)
+
+
+@contextmanager
+def buffers_of(memory: Memory, view: View, asked: Asked) -> Iterator[tuple[Buffers, Buffers]]:
+    """Give ids and depth to return, and contiguous ones to draw into, as `canvas_of` does."""
+    shape = view.size[::-1]
+    if asked.ids_out is None and asked.depth_out is None:
+        check_fits(shape, np.int32, np.float32)
+    ids, ids_canvas = open_canvas(memory, "triangle", asked.ids_out, shape, np.int32)
+    depth, depth_canvas = open_canvas(memory, "depth", asked.depth_out, shape, np.float32)
+    yield (ids, depth), (ids_canvas, depth_canvas)
+    for result, canvas in ((ids, ids_canvas), (depth, depth_canvas)):
+        if canvas is not result:
+            result[...] = canvas

@@ -1,0 +1,198 @@
+"""The options that all verbs share, checked once per call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_size, as_subpixel_bits, as_transform, as_window
+from topleft._core.base.options import ClipDepth, Cull, Sampling, parse
+from topleft._core.base.threads import parse_threads
+from topleft._core.raster.sampling import SAMPLE_GRID_BITS
+from topleft.methods import Method, find_method
+from topleft.typing import ClipDepthOption, CullOption, MethodOption, SamplingOption
+
+if TYPE_CHECKING:
+    from topleft._core.raster.clusters import Clusters
+
+__all__ = ["Planned", "View", "ViewOptions"]
+
+TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
+EXACT_BITS = 8  # of the grid that all samples lie on: TL_GRID_BITS in csrc/exact
+MAX_EXACT_PX = 2**48
+CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
+
+
+class Planned(Protocol):
+    """What a verb asks of the plan that it is given: `topleft.Plan`."""
+
+    def fitted(self, view: View) -> View:
+        """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
+        return replace(view, plan=self)
+
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+        """Return the checked int32 triangles, or raise an error where the plan is for others."""
+
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
+        """Return vertices and triangles in clusters, if the plan is for a mesh that does not change and has these."""
+        return None
+
+    def mark(self, stage: str) -> None:  # noqa: ARG002
+        """Note that a stage has ended: nothing, unless a plan measures."""
+        return
+
+
+class WindowOptions(TypedDict, total=False):
+    """Options of a view of a mesh that no verb names itself."""
+
+    origin: tuple[int, int]
+    viewport: tuple[int, int] | None
+    subpixel_bits: int | Literal["exact"]
+    method: MethodOption
+    clip_depth: ClipDepthOption
+    near_clip: bool
+    far_clip: bool
+    plan: Any
+
+
+class ViewOptions(WindowOptions, total=False):
+    """The options that all verbs share; `docs/design/rules.md` tells what each does."""
+
+    transform: ArrayLike | None
+    sampling: SamplingOption
+    cull: CullOption
+    threads: int | None
+
+
+OPTIONS = frozenset(ViewOptions.__annotations__)
+
+
+class How(NamedTuple):
+    """How the engine draws triangles: the window's first pixel, its grid, and codes of `csrc/topleft.h`."""
+
+    x_px: int
+    y_px: int
+    grid_bits: int
+    cull: int
+    method: int
+    test: int
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Checked `ViewOptions`."""
+
+    size: tuple[int, int]
+    origin: tuple[int, int]
+    viewport: tuple[int, int]
+    transform: NDArray[Any] | None
+    subpixel_bits: int  # EXACT_BITS when vertices are not snapped
+    grid_bits: int  # of the grid that holds the snapped vertices and all samples
+    sampling: Sampling
+    method: int
+    cull: int
+    zero_to_one: bool
+    near_clip: bool
+    far_clip: bool
+    threads: int | None
+    classic: Method | None = None
+    plan: Planned | None = None
+    single_sided: tuple[NDArray[np.uint8], int] | None = None
+    """1 for each triangle of which one side is not drawn, and the `tl_cull` that names that side."""
+    is_exact: bool = False
+    """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
+
+    @property
+    def how(self) -> How:
+        """How the engine draws triangles."""
+        return How(*self.origin, self.grid_bits, self.cull, self.method, self.test)
+
+    def engine_viewport(self) -> engine.Viewport:
+        """Return how clip space maps to pixels."""
+        bits = self.subpixel_bits, self.grid_bits
+        return engine.Viewport(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
+
+    def without_backs(self, is_single: NDArray[np.uint8] | None, *, is_mirrored: bool = False) -> View:
+        """Return the view without the backs of these triangles (T,); in a mirror their winding is turned over."""
+        back = CULL_CODES[Cull.FRONT if is_mirrored else Cull.BACK]
+        if is_single is None or self.cull == back:
+            return self
+        if not self.cull and is_single.all():
+            return replace(self, cull=back)
+        return replace(self, single_sided=(is_single, back))
+
+    def mark(self, stage: str) -> None:
+        """Note for the plan that a stage has ended."""
+        if self.plan is not None:
+            self.plan.mark(stage)
+
+    @property
+    def test(self) -> int:
+        """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""
+        return TEST_CODES.get(self.sampling, 0)
+
+    @classmethod
+    def parse(
+        cls, size: object, options: ViewOptions, *, why_snapped: str | None = None, has_poses: bool = False
+    ) -> View:
+        """Check the options of a call.
+
+        `why_snapped`: why the caller draws snapped vertices alone, if so; `has_poses`: there may be several transforms.
+        """
+        if not options.keys() <= OPTIONS:
+            unknown = min(options.keys() - OPTIONS)
+            raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
+        checked_size = as_size(size)
+        given_bits = options.get("subpixel_bits", 8)
+        is_exact = isinstance(given_bits, str) and given_bits == "exact"
+        bits = EXACT_BITS if is_exact else as_subpixel_bits(given_bits)
+        sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
+        grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
+        viewport = options.get("viewport")
+        transform = options.get("transform")
+        method = find_method(options.get("method", "auto"))
+        plan = options.get("plan")
+        if not (plan is None or hasattr(plan, "fitted")):
+            raise TypeError(f"plan must be a Plan or None, got {type(plan).__name__}")
+        view = cls(
+            size=checked_size,
+            origin=as_window(options.get("origin", (0, 0)), grid_bits),
+            viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
+            transform=None if transform is None else as_transform(transform, has_poses=has_poses),
+            subpixel_bits=bits,
+            grid_bits=grid_bits,
+            sampling=sampling,
+            method=method.code or 0,
+            cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
+            zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
+            is ClipDepth.ZERO_TO_ONE,
+            near_clip=bool(options.get("near_clip", True)),
+            far_clip=bool(options.get("far_clip", True)),
+            threads=parse_threads(options.get("threads")),
+            classic=method if method.code is None else None,
+            is_exact=is_exact,
+        )
+        if is_exact:
+            check_exact(view, why_snapped)
+        return view if plan is None else plan.fitted(view)
+
+
+def check_exact(view: View, why_snapped: str | None) -> None:
+    """Raise an error where vertices that are not snapped cannot be drawn."""
+    wish = "subpixel_bits must be in 0..16"
+    if why_snapped is not None:
+        raise ValueError(f"{wish} here, got 'exact': {why_snapped}")
+    if view.sampling is Sampling.AREA:
+        raise ValueError(
+            f"{wish} for sampling 'area', got 'exact': that decides whether a sample or a square is covered, not how "
+            "much of it"
+        )
+    if view.classic:
+        raise ValueError(f"{wish} for method {view.classic.name!r}, got 'exact': it has lanes of its own")
+    (x, y), (width, height) = view.origin, view.size
+    if max(abs(x), abs(y), abs(x + width), abs(y + height)) > MAX_EXACT_PX:
+        raise ValueError(f"origin and size must lie within {MAX_EXACT_PX} pixels of 0 for 'exact', got {(x, y)}")

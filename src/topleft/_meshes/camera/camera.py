@@ -1,0 +1,517 @@
+"""Cameras: from world to clip space, as two 4x4 matrices made from words (eye, target, field of view, intrinsics).
+
+Spaces: world; eye (OpenGL: x right, y up, the view along -z); clip (OpenGL: -w <= x, y, z <= w inside).
+Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends what the view sees before that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.arrays import (
+    as_array,
+    as_real,
+    as_size,
+    as_square,
+    as_vector,
+    check_regular,
+    set_read_only,
+    shown,
+)
+from topleft._core.base.options import check_choice
+from topleft._meshes.camera.lens import Lens, lens_of_opencv
+from topleft._meshes.camera.matrices import (
+    F64,
+    THREE_QUARTER_DEG,
+    as_framed,
+    box_corners,
+    box_matrix,
+    check_planes,
+    check_positive,
+    ends_to_frame,
+    framing_matrices,
+    frustum_matrix,
+    orthographic_matrix,
+    perspective_matrix,
+    points_to_frame,
+    split_matrix,
+    view_matrix,
+)
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.normals import moved
+from topleft._meshes.model.points import Points
+from topleft._meshes.scene.adapt import MeshLike
+from topleft._meshes.scene.scene import Scene
+from topleft.typing import FitOption, UpOption
+
+__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for", "pixels_of"]
+
+DEFAULT_FOV_Y_DEG = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Where the camera stands and how it projects.
+
+    Parameters
+    ----------
+    view : (4, 4) array_like
+        Eye from world. Eye axes are those of OpenGL: x right, y up, the view along -z.
+    projection : (4, 4) array_like
+        Clip from eye, OpenGL clip space.
+    aspect : float, optional
+        Width / height of the picture that `projection` was made for. `clip_from_world` then widens or narrows the
+        field of view to that of the picture and leaves its height alone. `None`: `projection` is taken as it is, and
+        a picture of another shape is stretched.
+    lens : OpenCVLens or FisheyeLens, optional
+        Bends the rays before `projection`, which must have perspective, sees them; without one they are straight.
+
+    Raises
+    ------
+    ValueError
+        If a matrix has another shape or a number that is not finite, if `aspect` is not positive, or if there is a lens
+        and no perspective.
+
+    Examples
+    --------
+    >>> camera = Camera.look_at(eye=(0, 0, 5), target=(0, 0, 0), fov_y_deg=90)
+    >>> clip = camera.clip_from_world((200, 100)) @ [10, 0, 0, 1]
+    >>> round(float(clip[0] / clip[3]), 6)
+    1.0
+    """
+
+    view: F64
+    projection: F64
+    aspect: float | None = None
+    lens: Lens | None = None
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is float64
+
+        def __init__(
+            self, view: npt.ArrayLike, projection: npt.ArrayLike, aspect: float | None = None, lens: Lens | None = None
+        ) -> None: ...
+
+    __setstate__ = set_read_only
+
+    def __post_init__(self) -> None:
+        for name in ("view", "projection"):
+            matrix = as_square(name, getattr(self, name), 4)
+            matrix.flags.writeable = False
+            object.__setattr__(self, name, matrix)
+        if self.aspect is not None:
+            check_positive("aspect", self.aspect)
+        if not (self.lens is None or hasattr(self.lens, "bend")):
+            raise TypeError(f"lens must be an OpenCVLens, a FisheyeLens or None, got {shown(self.lens)}")
+        if self.lens is not None and not np.array_equal(self.projection[3], [0, 0, -1, 0]):
+            raise ValueError(
+                f"a lens needs a projection whose last row is [0, 0, -1, 0], got {self.projection[3].tolist()}"
+            )
+
+    def __repr__(self) -> str:
+        """One line: where it stands, where it looks, how wide."""
+        try:
+            eye = engine.product(engine.inverse(self.view[:3, :3]), -self.view[:3, 3])
+        except np.linalg.LinAlgError:
+            return "Camera(singular view)"
+        forward = -self.view[2, :3] / (engine.length(self.view[2, :3]) or 1.0)
+        words = [f"eye=({', '.join(f'{x:.4g}' for x in eye)})", f"forward=({', '.join(f'{x:.3g}' for x in forward)})"]
+        up = float(self.projection[1, 1])
+        if up and self.projection[3, :3].any():
+            words.append(f"fov_y_deg={np.degrees(2 * np.arctan(1 / abs(up))):.4g}")
+        elif up:
+            words.append(f"ortho_height={2 / abs(up):.4g}")
+        if self.lens is not None:
+            words.append(f"lens={type(self.lens).__name__}")
+        return f"Camera({', '.join(words)})"
+
+    def clip_from_world(self, size: int | tuple[int, int]) -> F64:
+        """The matrix (4, 4) float64 that `rasterize` takes as `transform=`, for a picture of this size.
+
+        Parameters
+        ----------
+        size : (width, height), pixels
+            An empty picture gets the matrix of a square one.
+
+        Raises
+        ------
+        ValueError
+            If the camera has a lens, which no matrix describes: `rasterize_mesh` and `render` draw through it, and
+            `straightened` leaves it out.
+        """
+        if self.lens is not None:
+            raise ValueError("no matrix describes a camera with a lens; rasterize_mesh draws through it")
+        return engine.product(self.clip_from_eye(size), self.view)
+
+    def clip_from_eye(self, size: int | tuple[int, int]) -> F64:
+        """The projection (4, 4) float64 for a picture of this size; with a lens it acts on what the lens has bent."""
+        width, height = as_size(size)
+        projection = self.projection.copy()
+        if self.aspect is not None and width > 0 and height > 0:
+            projection[0] = projection[0] * (self.aspect * height) / width
+        return projection
+
+    def straightened(self) -> Camera:
+        """The same camera without its lens."""
+        return self if self.lens is None else replace(self, lens=None)
+
+    def placed(self, transform: F64) -> Camera:
+        """The same camera in the object space of what stands at `transform` (4, 4), world from object."""
+        return replace(self, view=engine.product(self.view, transform))
+
+    def project(self, points: npt.ArrayLike, size: int | tuple[int, int]) -> F64:
+        """Where world points lie in a picture.
+
+        Parameters
+        ----------
+        points : (N, 3) array_like
+            World positions.
+        size : (width, height), pixels
+
+        Returns
+        -------
+        (N, 3) float64
+            x and y in pixels (the centre of the top-left pixel is (0.5, 0.5)) and window depth, 0 near and 1 far.
+            Whatever a point behind the eye gives is not in the picture.
+
+        Raises
+        ------
+        ValueError
+            If the points have another shape.
+
+        Examples
+        --------
+        >>> Camera.look_at((0, 0, 5)).project([(0, 0, 0)], (200, 100))[0, :2].tolist()
+        [100.0, 50.0]
+        """
+        world, size = as_real("points", points), as_size(size)
+        if world.ndim != 2 or world.shape[1] != 3:
+            raise ValueError(f"points must have shape (N, 3), got {world.shape}")
+        eye = moved(world, self.view)
+        return pixels_of(eye if self.lens is None else self.lens.bend(eye), self.clip_from_eye(size), size)
+
+    @classmethod
+    def from_matrix(cls, clip_from_world: npt.ArrayLike) -> Camera:
+        """The camera of one matrix, a projection times a view: what OpenGL and nvdiffrast call the mvp.
+
+        Parameters
+        ----------
+        clip_from_world : (4, 4) array_like
+            Acts on columns, into OpenGL's clip space; its scale does not matter. Whatever takes a camera takes such a
+            matrix, too.
+
+        Returns
+        -------
+        Camera
+            Whose `clip_from_world` is the matrix, up to its scale and the rounding of float64, for pictures of every
+            size: a picture of another shape is stretched. Without perspective the eye is put into the near plane.
+
+        Raises
+        ------
+        ValueError
+            If the matrix is singular, is a pose without a projection, or its near and far planes lie aslant.
+
+        Examples
+        --------
+        >>> camera = Camera.look_at((0, 0, 5), fov_y_deg=40)
+        >>> Camera.from_matrix(camera.clip_from_world((64, 64)))
+        Camera(eye=(0, 0, 5), forward=(0, 0, -1), fov_y_deg=40)
+        """
+        return cls(*split_matrix(as_square("clip_from_world", clip_from_world, 4)))
+
+    @classmethod
+    def perspective(
+        cls, view: npt.ArrayLike, *, near: float, far: float, fov_y_deg: float = DEFAULT_FOV_Y_DEG
+    ) -> Camera:
+        """A pinhole camera with a field of view of `fov_y_deg` from the bottom to the top of the picture.
+
+        Parameters
+        ----------
+        view : (4, 4) array_like
+            Eye from world; the `view` of another camera, say.
+        near, far : float
+            Distances of the planes in front of the eye, world units, 0 < near < far.
+        fov_y_deg : float
+            Degrees, between 0 and 180.
+
+        Raises
+        ------
+        ValueError
+            If the field of view or the planes are outside their range.
+        """
+        return cls(view, perspective_matrix(fov_y_deg, near, far), aspect=1.0)
+
+    @classmethod
+    def orthographic(cls, view: npt.ArrayLike, *, near: float, far: float, height: float) -> Camera:
+        """A camera without perspective that sees `height` world units from the bottom to the top of the picture.
+
+        Parameters
+        ----------
+        view : (4, 4) array_like
+            Eye from world; the `view` of another camera, say.
+        near, far : float
+            Distances of the planes in front of the eye, world units, near < far; negative ones lie behind it.
+        height : float
+            World units, positive.
+
+        Raises
+        ------
+        ValueError
+            If the height or the planes are outside their range.
+        """
+        return cls(view, orthographic_matrix(height, near, far), aspect=1.0)
+
+    @classmethod
+    def off_center(
+        cls,
+        view: npt.ArrayLike,
+        *,
+        left: float,
+        right: float,
+        bottom: float,
+        top: float,
+        near: float,
+        far: float,
+        ortho: bool = False,
+    ) -> Camera:
+        """A camera whose axis need not pass through the middle of its picture: part of a wall of screens, say.
+
+        Parameters
+        ----------
+        view : (4, 4) array_like
+            Eye from world; the `view` of another camera, say.
+        left, right, bottom, top : float
+            Sides of the picture in the plane at `near`, world units from the axis, as for glFrustum and glOrtho. A
+            picture of another shape is stretched.
+        near, far : float
+            Distances of the planes in front of the eye, world units, near < far; with perspective 0 < near.
+        ortho : bool
+            Without perspective.
+
+        Raises
+        ------
+        ValueError
+            If the sides or the planes are out of order.
+        """
+        matrix = (box_matrix if ortho else frustum_matrix)(left, right, bottom, top, near, far)
+        return cls(view, matrix)
+
+    @classmethod
+    def look_at(
+        cls,
+        eye: npt.ArrayLike,
+        target: npt.ArrayLike = (0.0, 0.0, 0.0),
+        up: npt.ArrayLike = (0.0, 1.0, 0.0),
+        *,
+        fov_y_deg: float = DEFAULT_FOV_Y_DEG,
+        ortho_height: float | None = None,
+        near: float | None = None,
+        far: float | None = None,
+    ) -> Camera:
+        """A camera at `eye` that has `target` in the middle of its picture.
+
+        Parameters
+        ----------
+        eye, target : (3,) array_like
+            World positions.
+        up : (3,) array_like
+            The world direction that points up in the picture; not parallel to the view.
+        fov_y_deg : float
+            Field of view from bottom to top, degrees; not looked at when `ortho_height` is given.
+        ortho_height : float, optional
+            Makes the camera orthographic, with that many world units from bottom to top.
+        near, far : float, optional
+            Distances of the planes; a hundredth and a hundred times the distance of the target unless given.
+
+        Raises
+        ------
+        ValueError
+            If eye and target coincide, `up` is parallel to the view, or another number is outside its range.
+        """
+        eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
+        view = view_matrix(eye, target, up)
+        distance = engine.length(target - eye)
+        near = 0.01 * distance if near is None else near
+        far = 100 * distance if far is None else far
+        if ortho_height is not None:
+            return cls.orthographic(view, near=near, far=far, height=ortho_height)
+        return cls.perspective(view, near=near, far=far, fov_y_deg=fov_y_deg)
+
+    @classmethod
+    def from_intrinsics(
+        cls,
+        intrinsics: npt.ArrayLike,
+        camera_from_world: npt.ArrayLike,
+        size: int | tuple[int, int],
+        *,
+        near: float | None = None,
+        far: float | None = None,
+        distortion: npt.ArrayLike | None = None,
+        fisheye: npt.ArrayLike | None = None,
+    ) -> Camera:
+        """The camera of a calibrated photograph, in the convention of OpenCV.
+
+        Parameters
+        ----------
+        intrinsics : (3, 3) array_like
+            `[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`, pixels.
+        camera_from_world : (4, 4) array_like
+            The pose. Camera axes are those of OpenCV: x right, y down, z forward.
+        size : (width, height), pixels
+            The picture that the intrinsics belong to. A picture rendered at another size is that one, scaled.
+        near, far : float, optional
+            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres. Unless given
+            a thousandth of the distance d of the world's origin, and a thousand times the larger of d and 1; d counts
+            as 1 for a camera at the origin.
+        distortion : (4,), (5,), (8,), (12,) or (14,) array_like, optional
+            `k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3, s4[, tau_x, tau_y]]]]`, as `cv2.calibrateCamera` returns
+            them.
+        fisheye : (4,) array_like, optional
+            `k1, k2, k3, k4` as `cv2.fisheye.calibrate` returns them. Not together with `distortion`.
+
+        Raises
+        ------
+        ValueError
+            If a matrix has another shape, is singular or has another last row, or a number is outside its range.
+
+        Notes
+        -----
+        OpenCV puts the centre of the top-left pixel at (0, 0), `topleft` at (0.5, 0.5). So the point that the matrix
+        projects to (u, v) is drawn at x_px = u + 0.5, y_px = v + 0.5: in the same pixel.
+        """
+        matrix = as_square("intrinsics", intrinsics, 3)
+        pose = as_square("camera_from_world", camera_from_world, 4)
+        width, height = as_size(size, smallest=1)
+        away = float(np.sqrt((pose[:3, 3] ** 2).sum())) or 1.0
+        near = 1e-3 * away if near is None else near
+        far = max(1e3 * max(away, 1.0), 1e3 * near) if far is None else far
+        check_planes(near, far)
+        if not np.array_equal(matrix[2], [0, 0, 1]):
+            raise ValueError(f"the last row of intrinsics must be [0, 0, 1], got {matrix[2].tolist()}")
+        if not np.array_equal(pose[3], [0, 0, 0, 1]):
+            raise ValueError(f"the last row of camera_from_world must be [0, 0, 0, 1], got {pose[3].tolist()}")
+        check_regular("intrinsics", matrix)
+        check_regular("camera_from_world", pose)
+        px_of_center = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+        ndc_of_px = np.array([[2 / width, 0, -1], [0, -2 / height, 1], [0, 0, 1]])
+        eye_of_camera = np.diag([1.0, -1.0, -1.0, 1.0])
+        projection = perspective_matrix(90, near, far)
+        ndc_of_matrix = engine.product(engine.product(ndc_of_px, px_of_center), matrix)
+        projection[:2, :3] = engine.product(ndc_of_matrix[:2], eye_of_camera[:3, :3])
+        return cls(engine.product(eye_of_camera, pose), projection, lens=lens_of_opencv(distortion, fisheye))
+
+    @classmethod
+    def framing(
+        cls,
+        subject: MeshLike | Scene | npt.ArrayLike,
+        *,
+        azimuth_deg: float = THREE_QUARTER_DEG[0],
+        elevation_deg: float = THREE_QUARTER_DEG[1],
+        fov_y_deg: float = DEFAULT_FOV_Y_DEG,
+        up: UpOption = "y",
+        ortho: bool = False,
+        aspect: float = 1.0,
+        fit: FitOption = "sphere",
+    ) -> Camera:
+        """A camera that has the whole subject just inside its frame; three-quarter view by default.
+
+        Parameters
+        ----------
+        subject : mesh, Scene, or (N, 3) array_like
+            Whatever `as_mesh` takes, or a scene, of which the vertices in use count; or points: the two corners of a
+            box, say.
+        azimuth_deg : float
+            0 looks at the front of the subject (+z with y up, -y with z up), 90 at its right (+x). Degrees.
+        elevation_deg : float
+            0 is level, 90 looks straight down. Degrees, -90 to 90.
+        fov_y_deg : float
+            Field of view from bottom to top, degrees. Sets the distance from which `ortho` is seen, too.
+        up : {"y", "z"}
+            The axis of the world that points up.
+        ortho : bool
+            Without perspective.
+        aspect : float
+            Width / height of the picture to be made.
+        fit : {"sphere", "box", "points", "silhouette"}
+            What just fits: the sphere round the subject, which keeps its size from every side; its box; or all of its
+            points, which comes nearest; each with the middle of the box in the middle of the picture. "silhouette": the
+            box round the picture of all points is in the middle and fills the frame but for a margin of 5 % at each
+            end of its longer side.
+
+        Raises
+        ------
+        ValueError
+            If there is nothing to frame or a number is outside its range.
+        """
+        framed = as_framed(subject)
+        ends = ends_to_frame(framed)
+        check_choice("fit", fit, get_args(FitOption))
+        points = None if fit == "sphere" else box_corners(ends) if fit == "box" else points_to_frame(framed)
+        angles = azimuth_deg, elevation_deg, fov_y_deg
+        fills = fit == "silhouette"
+        matrices = framing_matrices(ends, points, angles, up=up, ortho=ortho, aspect=aspect, fills=fills)
+        return cls(*matrices, aspect=1.0)
+
+
+def pixels_of(points_eye: F64, projection: F64, size: tuple[int, int]) -> F64:
+    """What `Camera.project` returns of points in eye space, as the lens has bent them."""
+    width, height = size
+    clip = engine.product(points_eye, projection[:, :3].T) + projection[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ndc = clip[:, :3] / clip[:, 3:]
+    return np.stack([(ndc[:, 0] + 1) * (width / 2), (1 - ndc[:, 1]) * (height / 2), (ndc[:, 2] + 1) / 2], axis=1)
+
+
+CameraLike: TypeAlias = Camera | npt.NDArray[Any]
+"""What takes a camera takes its matrix (4, 4), clip from world, too: see `Camera.from_matrix`."""
+
+
+def as_camera(camera: object, name: str = "camera") -> Camera:
+    """The camera, or that of a matrix (4, 4), clip from world.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    ValueError
+        As `Camera.from_matrix` does.
+    """
+    if isinstance(camera, Camera):
+        return camera
+    wish = f"{name} must be a Camera or a (4, 4) matrix, clip from world"
+    hint = ""
+    if isinstance(camera, int) or (isinstance(camera, tuple | list) and len(camera) == 2):
+        hint = "; the size comes after the camera: size=(640, 480)"
+    elif camera is not None and not isinstance(camera, str | bytes | dict):
+        try:
+            matrix = as_array(name, camera)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            matrix = np.zeros(0)
+        if matrix.shape == (4, 4) and matrix.dtype.kind in "fiu":
+            return Camera.from_matrix(matrix)
+        hint = "; Camera.from_intrinsics takes those of OpenCV" * (matrix.shape in ((3, 3), (3, 4)))
+    raise TypeError(f"{wish}, got {shown(camera)}{hint}")
+
+
+def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: tuple[int, int]) -> Camera:
+    """The camera, or the three-quarter view of the subject in a picture of this size.
+
+    Raises
+    ------
+    TypeError
+        If the camera is none.
+    ValueError
+        If there is none, and nothing to frame.
+    """
+    if camera is not None:
+        return as_camera(camera)
+    if isinstance(subject, Mesh) and not len(subject.triangles):
+        raise ValueError("there is nothing to frame: the mesh has no triangles")
+    width, height = size
+    aspect = width / height if width > 0 and height > 0 else 1.0
+    angles = *THREE_QUARTER_DEG, DEFAULT_FOV_Y_DEG
+    return Camera(*framing_matrices(subject.extreme_points(), None, angles, aspect=aspect), aspect=1.0)

@@ -1,0 +1,97 @@
+"""Cameras that a file brings: those of glTF.
+
+Input: a path. Output: `Camera`, one for each node that holds one.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_path
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.matrices import F64, box_matrix, frustum_matrix, tangent
+from topleft._meshes.io.load import GLTF_SUFFIXES, reading
+from topleft._meshes.io.references import InputFile
+from topleft.errors import MeshError
+
+if TYPE_CHECKING:
+    from topleft._meshes.io.gltf import CameraOfFile
+
+
+def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
+    r"""The cameras of a glTF or GLB file, in the order of the nodes that hold them; of other formats none.
+
+    Parameters
+    ----------
+    path : path
+        The file that `load` reads the mesh from.
+
+    Returns
+    -------
+    list of Camera
+        In the world of the mesh. A picture of another shape has the height of the view of the file, and is wider or
+        narrower. A camera without a far plane sees to infinity.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    MeshError
+        If the file is broken, or a camera of it has numbers that none can have.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import topleft as tl
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "one.obj")
+    ...     _ = path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    ...     tl.load_cameras(path)
+    []
+    """
+    source = InputFile(as_path("path", path))
+
+    def cameras() -> list[Camera]:
+        if source.path.suffix.lower() not in GLTF_SUFFIXES:
+            return []
+        from topleft._meshes.io.gltf import read_cameras  # as late as in `load`
+
+        return [_camera(own, source) for own in read_cameras(source)]
+
+    return reading(source, cameras)
+
+
+def _camera(own: CameraOfFile, source: InputFile) -> Camera:
+    numbers = own.numbers
+    if not np.isfinite(own.world_from_eye).all() or not np.isfinite(list(numbers.values())).all():
+        raise MeshError("a camera of it stands nowhere")
+    # A node may be scaled, and the eye is not: its axes keep their directions alone.
+    axes = own.world_from_eye[:3, :3]
+    lengths = np.sqrt((axes * axes).sum(axis=0))
+    if not (lengths > 0).all():
+        raise MeshError(f"cannot read {str(source.path)!r}: a camera of it stands in a space without a volume")
+    rigid = np.eye(4)
+    rigid[:3, :3] = axes / lengths
+    rigid[:3, 3] = own.world_from_eye[:3, 3]
+    view = engine.inverse(rigid.astype(np.float64))
+    return Camera(view, _projection(own), aspect=1.0)
+
+
+def _projection(own: CameraOfFile) -> F64:
+    """Clip from eye of a picture as wide as it is high."""
+    numbers = own.numbers
+    near, far = numbers["znear"], numbers.get("zfar")
+    if own.kind == "orthographic":
+        half = numbers["ymag"]
+        return box_matrix(-half, half, -half, half, near, numbers["zfar"])
+    half = tangent(math.degrees(numbers["yfov"]) / 2) * near
+    matrix = frustum_matrix(-half, half, -half, half, near, 2 * near if far is None else far)
+    if far is None:
+        matrix[2, 2:] = -1, -2 * near
+    return matrix

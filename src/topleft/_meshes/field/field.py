@@ -1,0 +1,330 @@
+"""Fields: values on an unstructured mesh, and heights of its surface, on a regular grid.
+
+Input: a mesh, values of its vertices or faces, a `Grid`. Output: an array (H, W), NaN where nothing is.
+
+Based on: Gold, C. M., T. D. Charters and J. Ramsden, "Automated Contour Mapping Using Triangular Element Data
+Structures and an Interpolant over Each Irregular Triangular Domain", SIGGRAPH 1977 (the plane through each triangle).
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.arrays import apart_from, as_array, as_checked_triangles, as_number, as_pair
+from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
+from topleft._core.base.memory import SCRATCH
+from topleft._core.base.options import Per, Sink, check_choice, parse
+from topleft._core.base.threads import count_threads, run_parts
+from topleft._core.raster.choices import drawing
+from topleft._core.raster.rasterize import canvas_of, draw
+from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.view import View
+from topleft._meshes.scene.adapt import MeshLike, as_polygons
+from topleft._meshes.scene.cells import Polygons
+from topleft.typing import PerOption, SurfaceOption, YOption
+
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+
+
+#: Pixels a triangle. With fewer it pays to compute all planes first: 200,000 triangles at 1080p.
+MAX_PIXELS_TO_LIST = 48
+
+#: They take 64 bytes each, which the thread's scratch memory keeps.
+MAX_LISTED_PLANES = 1_000_000
+
+
+def field(
+    mesh: MeshLike,
+    values: npt.ArrayLike,
+    size: int | tuple[int, int] | Grid | None = None,
+    *,
+    origin: tuple[int, int] = (0, 0),
+    window: int | tuple[int, int] | None = None,
+    nodata: float | None = None,
+    extent: ExtentLike | None = None,
+    pixel_size: float | tuple[float, float] | None = None,
+    y: YOption = "up",
+    per: PerOption = "auto",
+    subpixel_bits: int | Literal["exact"] = 8,
+    threads: int | None = None,
+    out: npt.NDArray[Any] | None = None,
+) -> npt.NDArray[Any]:
+    """Return a field of an unstructured mesh on a regular grid, one value a pixel.
+
+    Parameters
+    ----------
+    mesh : matplotlib.tri.Triangulation, meshio.Mesh, pyvista.PolyData, (points, triangles), ...
+        Whatever `as_mesh` takes; z is not looked at. Where triangles overlap, the later one is seen.
+    values : array_like of real numbers, shape (V,) per vertex or (F,) per face
+        Faces are the triangles, or the polygons that they were cut from. A NaN makes its triangles NaN.
+    size : (width, height) or Grid, optional
+        How many pixels; or the grid, which then says all.
+    origin : (column, row), pixels
+        The pixel of the grid that is row 0, column 0 of the result, which is the crop of the whole bit for bit.
+    window : (width, height), optional
+        How large the result is; from `origin` to the end of the grid unless given.
+    nodata : number, optional
+        What stands where the mesh is not, instead of NaN. With it integers of faces stay what they are.
+    extent : (x_min, x_max, y_min, y_max), optional
+        What the picture shows, data units; the box of the mesh unless given.
+    pixel_size : float or (float, float), optional
+        Width and height of a pixel, data units, instead of `size`; see `Grid.around`.
+    y : {"up", "down"}
+        "up": row 0 is at y_max, as on a map; "down": row 0 is at y_min. See `Grid`.
+    per : {"auto", "vertex", "triangle"}
+        What a value belongs to; "auto" tells by their number.
+    subpixel_bits, threads
+        As in `coverage`.
+    out : ndarray of the dtype of the result, shape (H, W), optional
+        Where the result goes. A fresh array costs its first touch.
+
+    Returns
+    -------
+    ndarray of float32, or float64 unless `values` are float32, shape (H, W)
+        Linear over each triangle, or constant; NaN, or `nodata`, outside of the mesh. Of integers of faces and with
+        `nodata` in the dtype of `values`.
+
+    Raises
+    ------
+    ValueError
+        If the number of values fits neither, or both; if a point in use is not finite; if `nodata` is no number of the
+        result's dtype; or as `Grid.around`.
+    TypeError
+        If the values are no real numbers, or the mesh is none.
+
+    Notes
+    -----
+    Each pixel belongs to the triangle that owns its centre, by the top-left rule on vertices that are rounded to
+    ``2**-subpixel_bits`` pixels: there are neither gaps nor doubles. The value is that of the exact triangle's plane at
+    the centre in float64, kept within the three values of the triangle. Points go to pixels in float64, the difference
+    to the extent first, so large coordinates (UTM, say) lose nothing: a point is off by less than 2**-51 of its
+    distance from that side, before it is rounded to the grid above.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.field(([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]]), [0.0, 4.0, 8.0], (4, 4))
+    array([[nan, nan, nan, nan],
+           [5.5, nan, nan, nan],
+           [3.5, 4.5, nan, nan],
+           [1.5, 2.5, 3.5, nan]])
+
+    The centres on the slanted side belong to the triangle on its other side, if there is one.
+    """
+    polygons = as_polygons(mesh)
+    points = _plane_points(polygons)
+    array = as_array("values", apart_from(out, "values", values))
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+    is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
+    grid = _grid_of(polygons, size, pixel_size, extent, y)
+    triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
+    points_px = grid.to_pixels(points)
+    size = _window_of(grid, origin) if window is None else window
+    view = View.parse(size, {"subpixel_bits": subpixel_bits, "threads": threads, "origin": origin})
+    dtype = dtype_of_field(array.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
+    empty = nodata_of(nodata, dtype)
+    with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
+        ids = visible(points_px, triangles, view, Sink.LABEL)
+        if is_of_faces:
+            own = array if polygons.faces is None else array[polygons.faces]
+            np.take(np.append(own.astype(dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
+        else:
+            fill_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), view, canvas)
+            if nodata is not None:
+                canvas[ids < 0] = empty
+    return result
+
+
+def height_map(
+    mesh: MeshLike,
+    spacing: float | tuple[float, float] | Grid,
+    *,
+    surface: SurfaceOption = "upper",
+    extent: ExtentLike | None = None,
+    y: YOption = "up",
+    subpixel_bits: int | Literal["exact"] = 8,
+    threads: int | None = None,
+    out: F64 | None = None,
+) -> F64:
+    """Return the heights of the upper or lower surface of a mesh on a regular grid, seen along z.
+
+    Parameters
+    ----------
+    mesh : mesh with points (V, 3)
+        Whatever `as_mesh` takes; z is the height.
+    spacing : float, (float, float) or Grid
+        Width and height of a pixel, in the units of the mesh; or the grid, which then says all.
+    surface : {"upper", "lower"}
+        Whether the largest or the smallest height counts.
+    extent : (x_min, x_max, y_min, y_max), optional
+        What the picture shows; the box of the mesh unless given.
+    y : {"up", "down"}
+        "up": row 0 is at y_max, as on a map; "down": row 0 is at y_min. See `Grid`.
+    subpixel_bits, threads
+        As in `coverage`.
+    out : ndarray of float64, shape (H, W), optional
+        Where the result goes. A fresh array costs its first touch.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W)
+        z of the surface at the pixel centres (`Grid.around(mesh, pixel_size=spacing)` tells where they are), NaN where
+        there is none.
+
+    Raises
+    ------
+    ValueError
+        If the points are flat, one in use is not finite, an option is unknown, or as `Grid.around`.
+    TypeError
+        If the mesh is none.
+
+    Notes
+    -----
+    A depth buffer in float32 only decides which triangle is seen: of surfaces closer to each other than 2**-22 of the
+    range of heights either may be taken. The height is then that of the triangle's exact plane, in float64.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.height_map(([[0, 0, 1], [2, 0, 1], [0, 2, 3]], [[0, 1, 2]]), 1.0)
+    array([[nan, nan],
+           [1.5, nan]])
+    """
+    check_choice("surface", surface, get_args(SurfaceOption))
+    polygons = as_polygons(mesh)
+    points = _plane_points(polygons)
+    if points.shape[1] != 3:
+        raise ValueError(f"a height map needs points of shape (V, 3), got {points.shape}")
+    is_grid = isinstance(spacing, Grid)
+    grid = _grid_of(polygons, spacing, None, extent, y) if is_grid else _grid_of(polygons, None, spacing, extent, y)
+    triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
+    points_px, heights = grid.to_pixels(points), points[:, 2].astype(np.float64)
+    view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
+    sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
+    with canvas_of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
+        depth = depth_of(heights, *range_of(heights, triangles))
+        ids = visible(np.column_stack([points_px, depth]), triangles, view, sink)
+        fill_planes(ids, points_px, triangles, heights, view, canvas)
+    return result
+
+
+def _window_of(grid: Grid, origin: tuple[int, int]) -> tuple[int, int]:
+    """The pixels of a grid from one of them on."""
+    (width, height), (x, y) = grid.size, as_pair("origin", origin)
+    if not (x <= width and y <= height):
+        raise ValueError(f"origin must lie in the grid, of {width} x {height} pixels, or window be given, got {origin}")
+    return width - x, height - y
+
+
+def dtype_of_field(values: np.dtype[Any], *, is_of_faces: bool, has_nodata: bool) -> type[Any]:
+    """The dtype of a field of values of a dtype."""
+    if is_of_faces and has_nodata and values.kind in "iub":
+        return values.type
+    return np.float32 if values.newbyteorder("=") == np.float32 else np.float64
+
+
+def nodata_of(nodata: object, dtype: type[Any]) -> npt.NDArray[Any]:
+    """What stands where the mesh is not, as an array of one number of the dtype."""
+    if nodata is None:
+        return np.array([np.nan], dtype)
+    number = as_number("nodata", nodata)
+    kind = np.dtype(dtype).kind
+    low, high = (0, 1) if kind == "b" else (np.iinfo(dtype).min, np.iinfo(dtype).max) if kind in "iu" else (0, 0)
+    fits = kind == "f" or (number == np.floor(number) and low <= number <= high)
+    if not fits:
+        raise ValueError(f"nodata must be one of {np.dtype(dtype)}, as the values are, got {nodata!r}")
+    return np.array([number], dtype)
+
+
+def _plane_points(polygons: Polygons) -> npt.NDArray[Any]:
+    points = as_array("points", polygons.points)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"points must have shape (V, 2) or (V, 3), got {points.shape}")
+    if points.dtype.kind not in "fiu":
+        raise TypeError(f"points must be real numbers, got dtype {points.dtype}")
+    return points
+
+
+def _grid_of(polygons: Polygons, size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption) -> Grid:
+    if isinstance(size, Grid):
+        if extent is not None or pixel_size is not None or y != "up":
+            raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")
+        return size
+    return grid_around(extent_of(polygons) if extent is None else extent, size, pixel_size, y)
+
+
+def extent_around(mesh: MeshLike, extent: ExtentLike | None) -> ExtentLike:
+    """The box round what a mesh shows, unless an extent is given."""
+    polygons = as_polygons(mesh)
+    return extent_of(polygons) if extent is None else extent
+
+
+def extent_of(polygons: Polygons) -> Extent:
+    """The box round the points that triangles use."""
+    if not len(polygons.triangles):
+        raise ValueError("a mesh without triangles has no extent")
+    points, corners = np.asarray(polygons.points), np.asarray(polygons.triangles)
+    x, y = points[:, 0][corners], points[:, 1][corners]  # by column: NumPy is slow along short rows
+    return float(x.min()), float(x.max()), float(y.min()), float(y.max())
+
+
+def is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: Per) -> bool:
+    """Whether values are of faces; of vertices otherwise."""
+    fits_vertices, fits_faces = values.shape == (n_vertices,), values.shape == (n_faces,)
+    if per is Per.AUTO and fits_vertices and fits_faces:
+        raise ValueError(
+            f"values has {n_faces} numbers, and there are as many faces as vertices: say per='triangle' or per='vertex'"
+        )
+    if fits_faces and per is not Per.VERTEX:
+        return True
+    if fits_vertices and per is not Per.TRIANGLE:
+        return False
+    wishes = {Per.VERTEX: f"({n_vertices},)", Per.TRIANGLE: f"({n_faces},)"}
+    wish = wishes.get(per, f"({n_vertices},) per vertex or ({n_faces},) per face")
+    raise ValueError(f"values must have shape {wish}, got {values.shape}")
+
+
+def range_of(heights: F64, triangles: I32) -> tuple[float, float]:
+    """The lowest and the highest height that triangles use."""
+    used: F64 = heights[triangles]
+    with np.errstate(invalid="ignore"):
+        return (float(used.min()), float(used.max())) if used.size else (0.0, 0.0)
+
+
+def depth_of(heights: F64, low: float, high: float) -> F64:
+    """The heights that count as -1 to 1, from low to high: what float32 tells apart best."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        middle, half = low / 2 + high / 2, high / 2 - low / 2
+        depth: F64 = np.divide(np.subtract(heights, middle), half or 1.0)
+    return depth
+
+
+def visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
+    """Ids (H, W) of the triangles that show, in memory that the thread's next call overwrites."""
+    snapped = snap_mesh(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
+    ids: I32 = SCRATCH.empty("labels", view.size[::-1], np.int32)
+    depth = None if sink is Sink.LABEL else SCRATCH.empty("depth of heights", ids.shape, np.float32)
+    draw(SCRATCH, snapped, view, drawing(view, snapped, sink), ids, depth=depth)
+    return ids
+
+
+def fill_planes(ids: I32, points_px: F64, triangles: I32, values: F64, view: View, canvas: npt.NDArray[Any]) -> None:
+    """Write the values of the planes that show in a canvas (H, W)."""
+    n, n_threads = len(triangles), count_threads(view.threads, len(triangles))
+    planes: F64 | None = None
+    if ids.size < MAX_PIXELS_TO_LIST * n and n < MAX_LISTED_PLANES:
+        planes = SCRATCH.empty("planes", ((1 + n) * engine.PLANE_DOUBLES,), np.float64)
+    valued = engine.Valued(points_px, triangles, np.ascontiguousarray(values), planes)
+    if planes is not None:
+        run_parts(valued.list_planes, n, n_threads)
+
+    def fill_rows(first: int, end: int) -> None:
+        valued.fill_planes(ids, canvas, first, end - first, *view.origin)
+
+    run_parts(fill_rows, ids.shape[0], n_threads)

@@ -1,0 +1,299 @@
+"""Reads by trimesh what has no reader here: 3MF, COLLADA and what else it knows.
+
+Input: a file, unchecked. Output: `Mesh` parts, placed. trimesh cuts polygons of COLLADA into fans, which cover what
+concave ones do not, and leaves out geometries of controllers and of materials that are missing: so its XML is made
+simpler before.
+
+Based on: Khronos Group, "COLLADA 1.4.1 Specification", 2008.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+from urllib.parse import unquote
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._meshes.io.notes import Notes
+from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text
+from topleft._meshes.model.from_trimesh import placed
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.normals import moved
+from topleft._meshes.model.polygons import triangulate
+from topleft.errors import MeshError, MissingPackageError
+
+Array = npt.NDArray[Any]
+
+NO_TRIANGLES = {
+    ".svg": "it holds curves in a plane",
+    ".dxf": "it is a drawing, of which only curves could be read",
+    ".binvox": "it holds voxels: make a mesh of them, by trimesh's VoxelGrid.marching_cubes say",
+}
+"""What trimesh may read that is no mesh."""
+
+FORMATS_OF_EXTRA = (".3mf", ".dae", ".zae", ".xaml", ".amf")
+BINARY_DXF = b"AutoCAD Binary DXF"
+MAX_UNPACKED_BYTES = 1 << 29
+"""Of all files of an archive."""
+
+SKINS = "skins and morph targets drawn as they were modelled"
+
+OF_NUMBERS = frozenset({"float_array", "float", "color", "matrix", "translate", "rotate", "scale", "lookat"})
+"""Elements that hold numbers which need not be whole."""
+
+
+def read_by_trimesh(source: InputFile) -> list[Mesh]:
+    """The meshes of a file, in its order.
+
+    Raises
+    ------
+    MeshError
+        If it is of an unsupported format, holds no mesh, or is an archive of too much.
+    MissingPackageError
+        If trimesh, or a package that it needs for this format, is not installed.
+    """
+    suffix = source.path.suffix.lower()
+    try:
+        import trimesh
+    except ImportError:
+        raise MissingPackageError("reading a mesh needs trimesh: pip install 'topleft[render]'") from None
+    _check_what_it_is(source, suffix)
+    try:
+        with quiet():
+            scene = _scene(trimesh, source, suffix)
+            parts = list(_parts(scene, source))
+    except NotImplementedError:
+        readable = " ".join(sorted(trimesh.available_formats() | {"obj", "ply", "stl", "gltf", "glb"}))
+        raise MeshError(
+            f"cannot read {str(source.path)!r}: format {source.path.suffix!r} is none of {readable}"
+        ) from None
+    except ImportError as error:
+        # trimesh asks for these to guess the encoding of what is not UTF-8: here, of a file that is no text.
+        if getattr(error, "name", None) in ("charset_normalizer", "chardet"):
+            raise MeshError("it is not text") from error
+        extra = "pip install 'topleft[formats]'" if suffix in FORMATS_OF_EXTRA else f"another package: {error}"
+        raise MissingPackageError(f"reading {source.path.suffix!r} needs {extra}") from error
+    if suffix == ".dae":
+        _note_missing_pictures(source)
+    return parts
+
+
+def _check_what_it_is(source: InputFile, suffix: str) -> None:
+    """Raise an error for what trimesh would fail on in words that do not say why."""
+    with source.path.open("rb") as file:
+        head = file.read(64)
+    if head.startswith(BINARY_DXF):
+        raise MeshError(f"cannot read {str(source.path)!r}: it is a binary DXF: save it as text")
+    if suffix in (".svg", ".dxf", ".binvox"):
+        raise MeshError(f"cannot draw {str(source.path)!r}: {NO_TRIANGLES[suffix]}")
+    if head.startswith(b"PK\3\4"):
+        import zipfile
+
+        try:
+            with zipfile.ZipFile(source.path) as archive:
+                rows = archive.infolist()
+                n_bytes = sum(row.file_size for row in rows)
+                models = [row for row in rows if row.filename.lower().endswith(".model")]
+                main = [row for row in models if row.filename.lower().endswith("3d/3dmodel.model")]
+                has_objects = not main or n_bytes > MAX_UNPACKED_BYTES or b"<object" in archive.read(main[0])
+        except (zipfile.BadZipFile, NotImplementedError) as error:
+            raise MeshError(f"its archive is broken ({error})") from error
+        if n_bytes > MAX_UNPACKED_BYTES:
+            raise MeshError(f"its archive holds {n_bytes} bytes, more than {MAX_UNPACKED_BYTES}")
+        if len(models) > 1 and not has_objects:
+            raise MeshError(f"cannot read {str(source.path)!r}: its objects are in further files of the archive")
+
+
+def _scene(trimesh: Any, source: InputFile, suffix: str) -> Any:
+    """What trimesh reads of a file; of COLLADA, after its polygons have been cut."""
+    if suffix not in (".dae", ".zae"):
+        return trimesh.load_scene(str(source.path), process=False)
+
+    class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
+        def get(self, name: str) -> bytes:
+            path = source.find(unquote(name), "textures")
+            if path is None:
+                raise FileNotFoundError(name)
+            return path.read_bytes()
+
+    resolver: Any = Beside(str(source.path))
+    if suffix == ".zae":
+        with source.path.open("rb") as file:
+            archive = trimesh.util.decompress(file, file_type="zip")
+        name = next((name for name in archive if name.lower().endswith(".dae")), None)
+        if name is None:
+            raise MeshError("its archive holds no .dae file")
+        content, resolver = archive[name].read(), trimesh.resolvers.ZipResolver(archive)
+    else:
+        content = source.path.read_bytes()
+    simple = io.BytesIO(simplified(content, source.notes))
+    return trimesh.load_scene(simple, file_type="dae", resolver=resolver, process=False)
+
+
+def _note_missing_pictures(source: InputFile) -> None:
+    """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out without a word."""
+    names = re.findall(rb"<init_from>\s*(?:<ref>)?\s*([^<\s][^<]*\.[A-Za-z]{3,4})\s*<", source.path.read_bytes())
+    for name in names:
+        source.find(unquote(name.decode("utf-8", errors="replace")).removeprefix("file://"), "textures")
+
+
+def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
+    """The meshes of a trimesh scene, in its order, placed."""
+    n_vertices = 0
+    for transform, name in (scene.graph[node] for node in scene.graph.nodes_geometry):
+        geometry = scene.geometry[name]
+        if len(getattr(geometry, "faces", ())):
+            n_vertices += len(geometry.vertices)
+            source.check_n_vertices(n_vertices)
+            yield placed(geometry, transform)
+        elif hasattr(geometry, "colors") and len(getattr(geometry, "vertices", ())):
+            source.notes.add("points not drawn")
+            points = moved(np.asarray(geometry.vertices), transform)
+            source.check_n_vertices(len(points))
+            colors = np.asarray(geometry.colors)
+            source.clouds.append(Cloud(points, colors if colors.shape == (len(points), 4) else None))
+        elif hasattr(geometry, "entities"):
+            source.notes.add("lines not drawn")
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep what trimesh and meshio print off the terminal; errors say what is wrong."""
+    import logging
+
+    logger = logging.getLogger("trimesh")
+    handler = logging.NullHandler()
+    logger.addHandler(handler)  # a logger without a handler prints its warnings
+    nowhere = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(nowhere), contextlib.redirect_stdout(nowhere), np.errstate(all="ignore"):
+            yield
+    finally:
+        logger.removeHandler(handler)
+
+
+def simplified(content: bytes, notes: Notes) -> bytes:
+    """The file with triangles alone.
+
+    Raises
+    ------
+    MeshError
+        If it is no XML, or its polygons name what is not there.
+    """
+    try:
+        root = ElementTree.fromstring(content)
+    except ElementTree.ParseError as error:
+        raise MeshError(f"it is no XML: {error}") from error
+    space = root.tag.partition("}")[0] + "}" if root.tag.startswith("{") else ""
+    named = {row.get("id"): row for row in root.iter() if row.get("id")}
+    for row in root.iter():
+        if row.text and "," in row.text and row.tag[len(space) :] in OF_NUMBERS:  # some programs write decimal commas
+            row.text = row.text.replace(",", ".")
+    for mesh in root.iter(f"{space}mesh"):
+        for kind in ("polylist", "polygons"):
+            for row in mesh.findall(f"{space}{kind}"):
+                _cut(row, space, named, notes)
+        if mesh.find(f"{space}lines") is not None or mesh.find(f"{space}linestrips") is not None:
+            notes.add("lines not drawn")
+    for node in list(root.iter(f"{space}node")):
+        for row in node.findall(f"{space}instance_controller"):
+            _uncontrol(node, row, space, named, notes)
+    for bound in list(root.iter(f"{space}technique_common")):
+        for row in bound.findall(f"{space}instance_material"):
+            if not _is_material(row.get("target", ""), space, named):
+                bound.remove(row)
+                notes.add("materials that are not there", row.get("target", "")[1:])
+    if root.find(f"{space}library_animations/{space}animation") is not None:
+        notes.add("animations not played: everything is at rest")
+    return ElementTree.tostring(root)
+
+
+def _is_material(target: str, space: str, named: dict[str | None, Element]) -> bool:
+    """Whether there is a material with an effect; one of another file may be there."""
+    if not target.startswith("#"):
+        return True
+    material = named.get(target[1:])
+    effect = None if material is None else material.find(f"{space}instance_effect")
+    return effect is not None and effect.get("url", "")[1:] in named
+
+
+def _cut(row: Element, space: str, named: dict[str | None, Element], notes: Notes) -> None:
+    """Make triangles of polygons, in place."""
+    inputs = row.findall(f"{space}input")
+    stride = 1 + max((int(one.get("offset", 0)) for one in inputs), default=0)
+    vertex = next((one for one in inputs if one.get("semantic") == "VERTEX"), None)
+    if vertex is None or row.find(f"{space}ph") is not None:
+        notes.add("polygons with holes not read" if vertex is not None else "polygons without vertices not read")
+        for old in row.findall(f"{space}ph"):
+            row.remove(old)
+        if vertex is None:
+            return
+    lists = [_whole(one.text) for one in row.findall(f"{space}p")]
+    corners = np.concatenate(lists) if lists else np.zeros(0, np.int64)
+    if row.tag == f"{space}polylist":
+        n_corners = _whole(row.findtext(f"{space}vcount"))
+    else:
+        n_corners = np.array([len(one) // stride for one in lists], np.int64)
+    if (n_corners < 0).any() or int(n_corners.sum()) * stride != len(corners):
+        raise MeshError(f"a list of polygons has {len(corners)} numbers for {int(n_corners.sum())} corners")
+    corners = corners.reshape(-1, stride)
+    positions = _positions(vertex, space, named)
+    triangles, _ = triangulate(positions, corners[:, int(vertex.get("offset", 0))], n_corners)
+    for old in [*row.findall(f"{space}p"), *row.findall(f"{space}vcount")]:
+        row.remove(old)
+    row.tag = f"{space}triangles"
+    row.set("count", str(len(triangles)))
+    ElementTree.SubElement(row, f"{space}p").text = " ".join(map(str, corners[triangles.ravel()].ravel().tolist()))
+
+
+def _positions(vertex: Element, space: str, named: dict[str | None, Element]) -> Array:
+    """The positions (V, 3) that an input of vertices names."""
+    vertices = named.get(vertex.get("source", "")[1:])
+    rows = [] if vertices is None else vertices.findall(f"{space}input")
+    source = next((named.get(one.get("source", "")[1:]) for one in rows if one.get("semantic") == "POSITION"), None)
+    if source is None:
+        raise MeshError("polygons name positions that are not there")
+    accessor = source.find(f"{space}technique_common/{space}accessor")
+    stride = 3 if accessor is None else int(accessor.get("stride", 1))
+    start = 0 if accessor is None else int(accessor.get("offset", 0))
+    numbers = numbers_of_text((source.findtext(f"{space}float_array") or "").encode())[start:]
+    if not 2 <= stride <= 64:
+        raise MeshError(f"positions have {stride} numbers")
+    return numbers[: len(numbers) // stride * stride].reshape(-1, stride)[:, :3]
+
+
+def _whole(text: str | None) -> npt.NDArray[np.int64]:
+    return numbers_of_text((text or "").encode(), np.int64)
+
+
+def _uncontrol(node: Element, row: Element, space: str, named: dict[str | None, Element], notes: Notes) -> None:
+    """Put the geometry of a controller where the controller is, in place."""
+    notes.add(SKINS)
+    matrix: str | None = None
+    url = row.get("url", "")
+    for _ in range(len(named)):  # a skin may move what a morph makes
+        controller = named.get(url[1:])
+        if controller is None or controller.tag != f"{space}controller":
+            break
+        kind = next((each for each in controller if each.tag in (f"{space}skin", f"{space}morph")), None)
+        if kind is None:
+            return
+        matrix = kind.findtext(f"{space}bind_shape_matrix") or matrix
+        url = kind.get("source", "")
+    row.tag = f"{space}instance_geometry"
+    row.set("url", url)
+    for old in row.findall(f"{space}skeleton"):
+        row.remove(old)
+    if matrix:
+        node.remove(row)
+        inner = ElementTree.SubElement(node, f"{space}node")
+        ElementTree.SubElement(inner, f"{space}matrix").text = matrix
+        inner.append(row)

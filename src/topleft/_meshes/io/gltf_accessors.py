@@ -1,0 +1,193 @@
+"""The arrays of a glTF file: accessors over views of buffers, dense or sparse, whole or normalized numbers.
+
+Input: the JSON and the binary chunk, both unchecked. Output: arrays (N, K); nothing outside of a buffer is read, and
+no memory is taken for more than the buffers hold.
+
+Based on: Khronos Group, "glTF 2.0 Specification", 2021, 3.6.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from typing import Any
+from urllib.parse import unquote, unquote_to_bytes
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._meshes.io.references import InputFile
+from topleft.errors import MeshError
+
+Array = npt.NDArray[Any]
+Tree = dict[str, Any]
+
+DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+N_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+def entry(tree: Tree, kind: str, index: Any) -> Tree:
+    """A row of one of the lists of the file.
+
+    Raises
+    ------
+    MeshError
+        If there is no such row, or it is no object.
+    """
+    rows = tree.get(kind, [])
+    if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
+        raise MeshError(f"{kind}[{index!r}] is no entry of a list")
+    if not 0 <= index < len(rows):
+        raise MeshError(f"{kind}[{index}] is not one of {len(rows)}")
+    if not isinstance(rows[index], dict):
+        raise MeshError(f"{kind}[{index}] is no object")
+    return rows[index]
+
+
+def whole(row: Tree, name: str, default: int | None = None) -> int:
+    """A whole number, not negative, of an object.
+
+    Raises
+    ------
+    MeshError
+        If it is none, or is not there and has no default.
+    """
+    value = row.get(name, default)
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 53:
+        raise MeshError(f"{name} must be a whole number, got {value!r}"[:120])
+    return value
+
+
+class Accessors:
+    """The arrays of a file by their index, each decoded once.
+
+    Parameters
+    ----------
+    tree : dict
+        The JSON.
+    blob : bytes, optional
+        The binary chunk of a GLB file.
+    source : InputFile
+        Where the buffers are.
+    """
+
+    def __init__(self, tree: Tree, blob: bytes | None, source: InputFile) -> None:
+        self._tree = tree
+        self._blob = blob
+        self._source = source
+        self._buffers: dict[int, npt.NDArray[np.uint8]] = {}
+        self._arrays: dict[int, Array] = {}
+
+    def array(self, index: Any) -> Array:
+        """The array (N, K) of an accessor: integers as they are, float32, and normalized integers as float32.
+
+        Raises
+        ------
+        MeshError
+            If it says what is no accessor, or lies beyond its buffer.
+        """
+        row = entry(self._tree, "accessors", index)
+        if index not in self._arrays:
+            self._arrays[index] = self._decoded(row, index)
+        return self._arrays[index]
+
+    def view(self, index: Any) -> npt.NDArray[np.uint8]:
+        """The bytes of a view of a buffer.
+
+        Raises
+        ------
+        MeshError
+            If it lies beyond its buffer.
+        """
+        row = entry(self._tree, "bufferViews", index)
+        buffer = self._buffer(row.get("buffer"))
+        start, size = whole(row, "byteOffset", 0), whole(row, "byteLength")
+        if start + size > len(buffer):
+            raise MeshError(f"bufferViews[{index}] ends at byte {start + size} of a buffer of {len(buffer)}")
+        return buffer[start : start + size]
+
+    def _decoded(self, row: Tree, index: int) -> Array:
+        n, kind, code = whole(row, "count"), row.get("type"), row.get("componentType")
+        if kind not in N_COMPONENTS or code not in DTYPES:
+            raise MeshError(f"accessors[{index}] is of {kind!r} and {code!r}, which is no type")
+        n_columns, dtype = N_COMPONENTS[kind], np.dtype(DTYPES[code])
+        sparse = row.get("sparse")
+        self._source.check_n_vertices(n // (3 if kind == "SCALAR" else 1))
+        if "bufferView" in row:
+            stride = whole(entry(self._tree, "bufferViews", row["bufferView"]), "byteStride", 0)
+            values = self._rows(row["bufferView"], whole(row, "byteOffset", 0), n, n_columns, dtype, stride)
+        else:
+            values = np.zeros((n, n_columns), dtype)
+        if sparse is not None:
+            places = sparse["indices"]
+            n_set = whole(sparse, "count")
+            at_dtype = np.dtype(DTYPES[places["componentType"]])
+            at = self._rows(places["bufferView"], whole(places, "byteOffset", 0), n_set, 1, at_dtype, 0)
+            source = sparse["values"]
+            new = self._rows(source["bufferView"], whole(source, "byteOffset", 0), n_set, n_columns, dtype, 0)
+            if n_set and int(at.max()) >= n:
+                raise MeshError(f"accessors[{index}] sets row {int(at.max())} of {n}")
+            values = values.copy()
+            values[at[:, 0].astype(np.intp)] = new
+        return normalized(values) if row.get("normalized") else values
+
+    def _rows(self, view: Any, offset: int, n: int, n_columns: int, dtype: np.dtype[Any], stride: int) -> Array:
+        """Rows of numbers of a view, `stride` bytes from one to the next (0: without gaps)."""
+        data = self.view(view)
+        size = dtype.itemsize
+        width = n_columns * size
+        stride = stride or width
+        if n and offset + stride * (n - 1) + width > len(data):
+            raise MeshError(f"an accessor of {n} rows of {width} bytes ends beyond its {len(data)} bytes")
+        if n == 0:
+            return np.zeros((0, n_columns), dtype)
+        return np.ndarray((n, n_columns), dtype, data.data, offset, (stride, size))
+
+    def _buffer(self, index: Any) -> npt.NDArray[np.uint8]:
+        row = entry(self._tree, "buffers", index)
+        if index not in self._buffers:
+            content = self._blob if "uri" not in row else uri_content(row["uri"], self._source, "buffers")
+            if content is None and "uri" not in row and any("meshopt" in name for name in row.get("extensions", {})):
+                raise MeshError(
+                    f"cannot read {str(self._source.path)!r}: its buffers are compressed by meshopt, which is not read"
+                )
+            if content is None:
+                name = str(row.get("uri", "in the file"))[:80]
+                raise MeshError(f"cannot read {str(self._source.path)!r}: its buffer {name!r} is not there")
+            if len(content) < whole(row, "byteLength"):
+                raise MeshError(f"buffers[{index}] has {len(content)} of its {row['byteLength']} bytes")
+            self._buffers[index] = np.frombuffer(content, np.uint8)
+        return self._buffers[index]
+
+
+def normalized(values: Array) -> Array:
+    """Whole numbers as float32 of -1 or 0 to 1; others as they are."""
+    if values.dtype.kind == "f":
+        return values
+    steps = np.float32(np.iinfo(values.dtype).max)
+    return np.maximum(values / steps, np.float32(-1)).astype(np.float32, copy=False)
+
+
+def uri_content(uri: Any, source: InputFile, what: str) -> bytes | None:
+    """The bytes of a URI: of a file beside the mesh, or its own.
+
+    Raises
+    ------
+    MeshError
+        If it is no text, or its own bytes are broken.
+    """
+    if not isinstance(uri, str):
+        raise MeshError(f"a uri of {what} must be text, got {uri!r}"[:120])
+    if not uri.startswith("data:"):
+        return source.read(unquote(uri), what)
+    head, comma, body = uri.partition(",")
+    if not comma:
+        raise MeshError(f"a data: URI of {what} has no data")
+    if not head.endswith(";base64"):
+        return unquote_to_bytes(body)
+    try:
+        return base64.b64decode(body if "%" not in body else unquote(body))
+    except binascii.Error as error:
+        raise MeshError(f"a data: URI of {what} is broken ({error})") from error

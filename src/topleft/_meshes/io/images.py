@@ -1,0 +1,154 @@
+"""Pictures and buffers to files, whole or not at all.
+
+Input: an array, or several by name. Output: PNG, JPEG, WebP, TIFF, .npy or .npz, by the end of the file's name.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.arrays import as_array
+from topleft._core.base.remote import Place, as_place
+from topleft._core.base.whole_file import write_whole
+from topleft._meshes.io import png
+from topleft.errors import ImageError
+
+__all__ = ["PICTURE_SUFFIXES", "SUFFIXES", "composite", "save_image"]
+
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
+BUFFER_SUFFIXES = (".npy", ".npz")
+SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES
+"""What `save_image` writes, by the end of the name."""
+
+BYTES = ("uint8 (H, W)", "uint8 (H, W, 3)", "uint8 (H, W, 4)")
+HOLDS: Mapping[str, tuple[str, ...]] = {
+    ".png": (*BYTES, "uint8 (H, W, 2)", "uint16 (H, W)"),
+    ".jpg": BYTES,
+    ".jpeg": BYTES,
+    ".webp": BYTES,
+    ".tif": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)", "float32 (H, W, K)"),
+    ".tiff": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)", "float32 (H, W, K)"),
+}
+
+PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
+    ".jpg": ("JPEG", {"quality": 92, "subsampling": 0}),
+    ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
+    ".webp": ("WEBP", {"lossless": True}),  # ids and normals must survive
+    ".tif": ("TIFF", {"compression": "tiff_adobe_deflate"}),
+    ".tiff": ("TIFF", {"compression": "tiff_adobe_deflate"}),
+}
+
+#: Pixels a side that libjpeg and WebP encode.
+MOST_SIDE = {".jpg": 65_500, ".jpeg": 65_500, ".webp": 16_383}
+
+
+def save_image(
+    path: str | os.PathLike[str],
+    image: npt.NDArray[Any] | Mapping[str, npt.NDArray[Any]],
+    *,
+    background: tuple[int, int, int] = (255, 255, 255),
+    text: Mapping[str, str] | None = None,
+) -> None:
+    """Write a picture or a raw buffer; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path or URL
+        PNG, JPEG, WebP (lossless), TIFF, .npy or .npz, by the end of the name. A file of that name is replaced. A URL
+        is whatever fsspec can write to, "s3://bucket/name.png".
+    image : (H, W), (H, W, 3) or (H, W, 4) uint8, or (H, W) bool
+        The picture; a mask becomes 0 and 255. PNG also holds (H, W, 2) uint8, grey with alpha, and (H, W) uint16; TIFF
+        also (H, W) of uint16, int32 or float32, and (H, W, K) float32, a page for each channel. For .npy any array, for
+        .npz any array or several by name. PNG holds neither ids nor floats: they are refused, for they would have to be
+        scaled, which `ViewLayers.save` does (ids plus 1, distances in millimetres); .tif and .npy hold both.
+    background : (3,) of 0 to 255
+        What shows through in JPEG, which has no alpha.
+    text : mapping of str to str, optional
+        Notes that go into a PNG, by keyword; Latin-1.
+
+    Raises
+    ------
+    ImageError
+        If the format is unknown or cannot hold the array or the text.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import topleft as tl
+    >>> mask = tl.coverage([(0, 0), (4, 0), (0, 4)], [(0, 1, 2)], (4, 4))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     tl.save_image(Path(folder, "mask.png"), mask)
+    ...     Path(folder, "mask.png").exists()
+    True
+    """
+    place = as_place("path", path)
+    suffix = place.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ImageError(f"cannot write {str(place)!r}: format {place.suffix!r} is none of {' '.join(SUFFIXES)}")
+    if text and suffix != ".png":
+        raise ImageError(f"cannot write {str(place)!r}: text goes into .png only")
+    if suffix == ".npz":
+        arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
+        write_whole(place, lambda file: np.savez_compressed(file, **arrays))
+        return
+    if isinstance(image, Mapping):
+        raise ImageError(f"cannot write {str(place)!r}: several arrays by name need .npz")
+    picture = as_array("image", image)
+    if suffix == ".npy":
+        write_whole(place, lambda file: np.save(file, picture, allow_pickle=False))
+        return
+    if picture.dtype == np.bool_:
+        picture = np.where(picture, np.uint8(255), np.uint8(0))
+    _check_holds(place, picture)
+    if suffix == ".png":
+        write_whole(place, lambda file: file.writelines(png.pieces(picture, text=text)))
+        return
+    if suffix in (".jpg", ".jpeg") and picture.shape[2:] == (4,):
+        picture = composite(picture, background)
+    from PIL import Image  # 10 ms that PNG does without
+
+    kind, options = PILLOW_OPTIONS[suffix]
+    if picture.dtype == np.float32 and picture.ndim == 3:
+        first, *others = (Image.fromarray(np.ascontiguousarray(channel)) for channel in np.moveaxis(picture, -1, 0))
+        options = {**options, "save_all": True, "append_images": others}
+    else:
+        first = Image.fromarray(picture)
+    # In memory first: Pillow's JPEG encoder does not notice a disk that is full, its TIFF one reads back what it wrote.
+    encoded = io.BytesIO()
+    first.save(encoded, format=kind, **options)
+    write_whole(place, lambda file: file.write(encoded.getbuffer()))
+
+
+def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
+    """The RGBA picture (H, W, 4) laid over one colour: (H, W, 3) uint8, mixed as the numbers stand (sRGB)."""
+    alpha = image[..., 3:].astype(np.uint32)
+    mixed = image[..., :3] * alpha + np.asarray(background, dtype=np.uint32) * (255 - alpha)
+    return ((mixed + 127) // 255).astype(np.uint8)
+
+
+def _check_holds(path: Place, image: npt.NDArray[Any]) -> None:
+    """Raise an error for what the format cannot hold."""
+    kinds = HOLDS[path.suffix.lower()]
+    channels = "".join(f", {n}" for n in image.shape[2:])
+    found = {f"{image.dtype} (H, W{channels})", f"{image.dtype} (H, W{', K' * (image.ndim - 2)})"}
+    if image.ndim < 2 or not found & set(kinds):
+        raise ImageError(
+            f"cannot write {str(path)!r}: {path.suffix} holds {', '.join(kinds)}; got {image.dtype} {image.shape}"
+            + "; .tif and .npy hold ids and floats" * (image.dtype.kind in "if")
+        )
+    most = MOST_SIDE.get(path.suffix.lower())
+    if most is not None and max(image.shape[:2]) > most:
+        raise ImageError(
+            f"cannot write {str(path)!r}: {path.suffix} holds sides of at most {most} pixels, got {image.shape[:2]}"
+        )
+    if image.size == 0:
+        raise ImageError(f"cannot write {str(path)!r}: a picture of shape {image.shape} has no pixels")

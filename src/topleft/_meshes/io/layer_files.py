@@ -1,0 +1,163 @@
+"""Layers to files: as they are where the format holds them, as scaled integers in PNG.
+
+Input: arrays by name, from `draw_layers`. Output: a file for each, or one .npz.
+
+In a PNG a layer that is no picture holds whole numbers, and its text chunks tell what they stand for:
+
+    number = topleft:offset + topleft:scale * value        value 0 where nothing is, in 16 bits
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.arrays import as_number
+from topleft._core.base.remote import Place, as_place, place_of
+from topleft._meshes.io.images import SUFFIXES, save_image
+from topleft.errors import ImageError
+
+__all__ = ["layer_paths", "save_layers"]
+
+Array = npt.NDArray[Any]
+
+RANGES = {"camera_normal": (-1.0, 1.0), "world_normal": (-1.0, 1.0), "barycentric": (0.0, 1.0)}
+"""Layers of three channels that eight bits show: what 0 and 255 stand for."""
+
+LENGTHS = ("distance", "ray_distance")
+MILLIMETRES = 1000.0
+"""Steps of a unit of length, if none are given: what datasets of depth mostly have."""
+
+LARGEST = 65535
+
+
+def layer_paths(destination: Place, names: Sequence[str]) -> dict[str, Place]:
+    """Return the file of each layer: `{layer}` in the name stands for the layer; .npz holds all of them.
+
+    Raises
+    ------
+    ImageError
+        If the format is unknown, or several layers would have one file that can hold one.
+    """
+    text = str(destination)
+    if destination.suffix.lower() not in SUFFIXES:
+        known = " ".join(SUFFIXES)
+        raise ImageError(f"cannot write {text!r}: format {destination.suffix!r} is none of {known}")
+    if destination.suffix.lower() != ".npz" and "{layer}" not in text and len(names) > 1:
+        raise ImageError(f"{len(names)} layers need {{layer}} in the name, or .npz, got {text!r}")
+    return {name: place_of(text.replace("{layer}", name)) for name in names}
+
+
+def save_layers(
+    destination: str | os.PathLike[str],
+    layers: Mapping[str, Array],
+    *,
+    scale: float | None = None,
+    matrix: npt.NDArray[np.float64] | None = None,
+    background: tuple[int, int, int] = (255, 255, 255),
+) -> tuple[Place, ...]:
+    """Write layers, each file whole or not at all; returns the files.
+
+    Parameters
+    ----------
+    destination : path or URL
+        `{layer}` in the name stands for the name of the layer. The end tells the format:
+
+        * .npz, .npy: the arrays as they are.
+        * .tif, .tiff: pictures and masks (0 and 255) of 8 bits; all else as it is, float32 or int32; of several
+          channels each is a page.
+        * .png: pictures and masks as in TIFF; normals and barycentrics of 8 bits. Numbers (H, W) of 16 bits, 0 where
+          nothing is: ids plus 1; distances in thousandths, millimetres if units are metres; depth, of which 0 to 1 is
+          1 to 65535; others from the least, 1, to the greatest, 65535.
+        * .jpg, .webp: pictures and masks.
+    layers : mapping of str to ndarray
+    scale : float, optional
+        Steps a unit for numbers in PNG that are no ids, instead of these.
+    matrix : (4, 4) float64, optional
+        Clip space from the world; goes into .npz with the layers, as `clip_from_world`.
+    background : (3,) of 0 to 255
+        What shows through in JPEG.
+
+    Raises
+    ------
+    ImageError
+        If the format is unknown, cannot hold a layer, or several layers would have one file that can hold one.
+    OSError
+        If a file cannot be written.
+    """
+    place = as_place("path", destination)
+    if scale is not None:
+        scale = as_number("scale", scale)
+        if not 0 < scale < np.inf:
+            raise ValueError(f"scale must be positive and finite, got {scale}")
+    paths = layer_paths(place, list(layers))
+    if place.suffix.lower() == ".npz" and "{layer}" not in str(place):
+        save_image(place, layers if matrix is None else {**layers, "clip_from_world": matrix})
+        return (place,)
+    # All are converted before the first is written: a layer that does not fit leaves no file.
+    stored = {name: _stored(paths[name], name, array, scale) for name, array in layers.items()}
+    for name, (array, text) in stored.items():
+        save_image(paths[name], array, background=background, text=text)
+    return tuple(paths.values())
+
+
+def _stored(path: Place, name: str, array: Array, scale: float | None) -> tuple[Array, dict[str, str] | None]:
+    """What goes into the file, and the notes that tell what it means."""
+    suffix = path.suffix.lower()
+    if suffix in (".npy", ".npz") or array.dtype == np.uint8:
+        return array, None
+    if array.dtype == np.bool_:
+        return array.view(np.uint8) * np.uint8(255), None
+    if suffix in (".tif", ".tiff"):
+        return array, None
+    if suffix == ".png" and name in RANGES:
+        low, high = RANGES[name]
+        step = (high - low) / 255
+        return np.rint((array - low) / step).clip(0, 255).astype(np.uint8), _notes(name, step, low)
+    if suffix == ".png" and array.ndim == 2 and array.size:
+        return _numbers_of_16_bits(path, name, array, scale)
+    raise ImageError(
+        f"cannot write {str(path)!r}: {path.suffix} cannot hold the layer {name!r}, {array.dtype} {array.shape}; "
+        "take .npz or .tiff"
+    )
+
+
+def _numbers_of_16_bits(
+    path: Place, name: str, array: Array, scale: float | None
+) -> tuple[npt.NDArray[np.uint16], dict[str, str]]:
+    """Numbers in equal steps; 0 where they are not finite, or ids that are -1."""
+    if array.dtype == np.int32:
+        _check_steps(path, name, 1.0, np.array([array.min(), array.max()], np.int64) + 1)
+        return (array + 1).astype(np.uint16), _notes(name, 1, -1)
+    is_there = np.isfinite(array)
+    numbers = array[is_there].astype(np.float64)
+    if scale is not None or name in LENGTHS:
+        step, offset = 1 / (MILLIMETRES if scale is None else float(scale)), 0.0
+        steps = np.rint(numbers / step)
+    else:
+        ends = (0.0, 1.0) if name == "depth" or not numbers.size else (float(numbers.min()), float(numbers.max()))
+        step = (ends[1] - ends[0]) / (LARGEST - 1)
+        offset = ends[0] - step
+        steps = 1 + np.rint((numbers - ends[0]) / step) if step else np.ones(numbers.shape)
+    _check_steps(path, name, step, steps)
+    values = np.zeros(array.shape, np.uint16)
+    values[is_there] = steps
+    return values, _notes(name, step, offset)
+
+
+def _check_steps(path: Place, name: str, step: float, steps: npt.NDArray[Any]) -> None:
+    """Raise an error for what 16 bits do not hold."""
+    low, high = steps.min(initial=0), steps.max(initial=0)
+    if not (low >= 0 and high <= LARGEST):
+        raise ImageError(
+            f"cannot write {str(path)!r}: {name} must lie in 0 to {LARGEST} steps of {step:g} for a PNG, "
+            f"got {low:g} to {high:g}; take .tiff, or another scale"
+        )
+
+
+def _notes(name: str, scale: float, offset: float) -> dict[str, str]:
+    return {"topleft:layer": name, "topleft:scale": repr(scale), "topleft:offset": repr(offset)}

@@ -1,0 +1,207 @@
+"""Reads a mesh from a file of any format.
+
+Input: a path. Output: one `Mesh`, and warnings of what it lacks.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+import numpy as np
+
+from topleft._core.base.arrays import as_path
+from topleft._meshes.io.notes import tell
+from topleft._meshes.io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
+from topleft._meshes.model.joined import joined
+from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh, as_crease
+from topleft._meshes.model.points import Points
+from topleft.errors import MeshError, MissingPackageError
+
+Made = TypeVar("Made")
+
+GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    crease: float = DEFAULT_CREASE,
+    max_vertices: int = MAX_VERTICES,
+    max_texture_pixels: int = MAX_TEXTURE_PIXELS,
+) -> Mesh | Points:
+    r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
+
+    Parameters
+    ----------
+    path : path
+        The end of its name tells the format.
+    crease : float
+        Degrees, 0 to 180: edges at which triangles bend by more are sharp, where the file has no normals; see `Mesh`.
+        180: none is, 0: all are.
+    max_vertices : int
+        A file with more, or one that says so, is refused.
+    max_texture_pixels : int
+        Pictures with more are left out.
+
+    Returns
+    -------
+    Mesh, or Points
+        `Points` of a file that holds points and no triangles. Of a mesh polygons are cut into triangles, groups and
+        objects are one mesh, in the order of the file; the nodes of a scene are placed by their transforms, skins and
+        morph targets are at rest. Normals are those of the file. A file without normals gets its vertices merged where
+        they are equal, so that shading has no seams where a format (STL) or a texture had to double them; triangles of
+        glTF without normals are flat, as its standard says. Colours are those of the vertices or the faces, if there
+        are any; `uv` those of the file. Materials are those of MTL and glTF.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    MeshError
+        If the file is broken, has no triangles, or is of an unsupported format.
+    MissingPackageError
+        If trimesh, or a package that it needs for this format, is not installed.
+
+    Warns
+    -----
+    MeshWarning
+        Once for each kind of thing that the mesh lacks: textures that are not there, say.
+
+    Notes
+    -----
+    Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened. What is read
+    of each format is told in docs/guide/files.md.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import topleft as tl
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "one.obj")
+    ...     _ = path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    ...     mesh = tl.load(path)
+    >>> mesh.triangles.tolist()
+    [[0, 1, 2]]
+    """
+    crease = as_crease(crease)
+    source = InputFile(as_path("path", path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
+    mesh = reading(source, lambda: _mesh(source, crease))
+    tell(source.notes.lines, stacklevel=2)
+    return mesh
+
+
+def _mesh(source: InputFile, crease: float) -> Mesh | Points:
+    """The mesh of the file; a reader is imported when a file needs it."""
+    match source.path.suffix.lower():
+        case suffix if suffix in GLTF_SUFFIXES:
+            from topleft._meshes.io.gltf import read_gltf
+
+            parts = read_gltf(source)
+        case ".obj":
+            from topleft._meshes.io.obj import read_obj
+
+            parts = read_obj(source)
+        case ".ply":
+            from topleft._meshes.io.ply import read_ply
+
+            parts = read_ply(source)
+        case ".stl" | ".stl_ascii":
+            from topleft._meshes.io.stl_off import read_stl
+
+            parts = read_stl(source)
+        case ".off":
+            from topleft._meshes.io.stl_off import read_off
+
+            parts = read_off(source)
+        case _:
+            from topleft._meshes.io.foreign import read_by_trimesh
+
+            parts = read_by_trimesh(source)
+    if not parts and source.clouds:
+        return _points(source)
+    if not any(len(part.triangles) for part in parts):
+        drawn = [
+            line.partition(": ")[2].removesuffix(" not drawn") for line in source.notes.lines if "not drawn" in line
+        ]
+        raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
+    return joined(parts, crease)
+
+
+def _points(source: InputFile) -> Points:
+    """The points of a file without triangles; those that are nowhere are left out."""
+    source.notes.remove("points not drawn")
+    clouds = source.clouds
+    positions = np.concatenate([cloud.positions for cloud in clouds])
+    colors = normals = None
+    if any(cloud.colors is not None for cloud in clouds):
+        white = [np.full((len(cloud.positions), 4), 255, np.uint8) for cloud in clouds]
+        own = [cloud.colors for cloud in clouds]
+        colors = np.concatenate([one if one is not None else other for one, other in zip(own, white, strict=True)])
+    if all(cloud.normals is not None for cloud in clouds):
+        normals = np.concatenate([cloud.normals for cloud in clouds if cloud.normals is not None])
+    is_somewhere = np.isfinite(positions).all(axis=1)
+    if not is_somewhere.all():
+        source.notes.add("points that are not finite left out")
+        positions = positions[is_somewhere]
+        colors, normals = (None if rows is None else rows[is_somewhere] for rows in (colors, normals))
+    if not len(positions):
+        raise MeshError(f"{str(source.path)!r} has no points that are finite")
+    return Points(positions, colors, normals)
+
+
+def reading(source: InputFile, read: Callable[[], Made]) -> Made:
+    """What a reader makes of a file; whatever goes wrong in it is told in one line.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    MeshError
+        If the reader fails.
+    MissingPackageError
+        If it needs a package that is not installed.
+    """
+    path = source.path
+    if not path.exists():
+        raise FileNotFoundError(f"there is no file {str(path)!r}")
+    if path.is_dir():
+        raise MeshError(f"{str(path)!r} is a folder, not a mesh")
+    if not path.is_file():
+        raise MeshError(f"{str(path)!r} is a pipe or a device, not a file")
+    try:
+        with _strict_parsing(), np.errstate(all="ignore"):
+            return read()
+    except FileNotFoundError as error:  # the mesh is there: some formats name more files
+        raise MeshError(f"cannot read {str(path)!r}: broken, or without a file that it names ({error})") from error
+    except MissingPackageError:
+        raise
+    except MeshError as error:
+        if repr(str(path)) in str(error):
+            raise
+        raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({error})") from error
+    except MemoryError as error:
+        raise MemoryError(f"not enough memory to read {str(path)!r} ({error})") from error
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({error})") from error
+    except Exception as error:  # a reader meets broken bytes in its own way: KeyError, struct.error, ...
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        if path.suffix.lower() in GLTF_SUFFIXES and isinstance(error, AttributeError | KeyError | TypeError):
+            reason = f"its JSON is not that of glTF: {reason}"
+        raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({reason})") from error
+
+
+@contextmanager
+def _strict_parsing() -> Iterator[None]:
+    """Make NumPy's text reader fail where it stops in a broken file (old ones only warn); keep others quiet."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        warnings.simplefilter("ignore", RuntimeWarning)
+        warnings.filterwarnings("error", message="string or file could not be read")
+        yield

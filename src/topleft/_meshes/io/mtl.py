@@ -1,0 +1,346 @@
+"""Reads material libraries of OBJ files (MTL).
+
+Input: text. Output: `Material` by name; a file says little of what it means, so what is not given is not there.
+
+Based on: Wavefront Technologies, "Advanced Visualizer Manual", appendix B1, 1995; `Pr`, `Pm`, `map_Pr`, `map_Pm` and
+`norm` as Exocortex proposed them in 2014.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.color import Color, decode_srgb
+from topleft._meshes.io.references import InputFile
+from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.texture import Texture, Wrap
+from topleft.errors import MeshError
+from topleft.typing import EncodingOption
+
+U8 = npt.NDArray[np.uint8]
+
+OPTION_LENGTHS = {
+    "-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1, "-blendv": 1, "-imfchan": 1, "-boost": 1,
+    "-texres": 1, "-cc": 1, "-type": 1, "-colorspace": 1,
+}  # fmt: skip
+"""The most words that an option of a map has."""
+
+UNREAD_MAPS = ("map_Ks", "map_Ns", "map_Ka", "disp", "decal", "refl", "map_disp", "map_refl", "map_Ps", "map_aniso")
+NEARLY_OPAQUE, NEARLY_CLEAR = 250, 5
+"""A map of opacity whose values all lie above or below is a cutout."""
+
+
+@dataclass
+class _Map:
+    """A picture and how it is laid on."""
+
+    name: str
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    is_clamped: bool = False
+    bump: float = 1.0
+    channel: str = ""
+
+    @property
+    def placement(self) -> dict[str, Any]:
+        """The options of its `Texture`."""
+        (su, sv), (du, dv) = self.scale, self.offset
+        is_moved = (su, sv, du, dv) != (1, 1, 0, 0)
+        matrix = np.array([[su, 0, du], [0, sv, dv]]) if is_moved else None
+        return {"wrap": Wrap.CLAMP if self.is_clamped else Wrap.REPEAT, "transform": matrix}
+
+
+@dataclass
+class _Entry:
+    """What a library says of a material."""
+
+    numbers: dict[str, list[float]] = field(default_factory=dict)
+    maps: dict[str, _Map] = field(default_factory=dict)
+
+
+def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[], Material]]:
+    """The materials of a library: functions, since the pictures of those that nobody uses are not read.
+
+    Parameters
+    ----------
+    text : str
+        The library.
+    folder : Path
+        Where its pictures are.
+    source : InputFile
+        The mesh file, which gets the notes.
+    """
+    entries: dict[str, _Entry] = {}
+    own = _Entry()
+    for line in text.replace("\\\n", " ").splitlines():
+        words = line.split(maxsplit=1)
+        if not words or words[0].startswith("#"):
+            continue
+        key, rest = words[0], words[1].strip() if len(words) > 1 else ""
+        if key == "newmtl":
+            own = entries[rest] = _Entry()
+        elif _lower(key) in MAPS:
+            own.maps[MAPS[_lower(key)]] = _map_of(rest)
+        elif key in UNREAD_MAPS:
+            source.notes.add(f"{key} of its materials not read")
+        elif key in ("Kd", "Ks", "Ke", "Ns", "d", "Tr", "illum", "Pr", "Pm"):
+            own.numbers[key] = _numbers(rest, key)
+    makers = _Makers(folder, source)
+    return {name: _maker(makers, entry) for name, entry in entries.items()}
+
+
+MAPS = {
+    "map_kd": "color", "map_d": "opacity", "map_tr": "transparency", "map_ke": "emission", "map_bump": "bump",
+    "bump": "bump", "norm": "normal", "map_norm": "normal", "map_kn": "normal", "map_pr": "roughness",
+    "map_pm": "metallic",
+}  # fmt: skip
+
+
+def _lower(key: str) -> str:
+    return key.lower()
+
+
+def _numbers(rest: str, key: str) -> list[float]:
+    words = rest.split()
+    if words and words[0] in ("spectral", "xyz"):
+        return []
+    words = [word for word in words if word != "-halo"]
+    values = []
+    for word in words[: 3 if key in ("Kd", "Ks", "Ke") else 1]:
+        try:
+            value = float(word)
+        except ValueError:
+            break
+        if not math.isfinite(value):
+            raise MeshError(f"{key} of its material library is {word!r}")
+        values.append(value)
+    return values
+
+
+def _map_of(rest: str) -> _Map:
+    """A picture with its options, which stand before its name."""
+    own, words = _Map(""), rest.split(" ")
+    i = 0
+    while i < len(words):
+        option = words[i]
+        if not option:
+            i += 1
+        elif option in OPTION_LENGTHS:
+            j = i + 1
+            values: list[str] = []
+            while j < len(words) and len(values) < OPTION_LENGTHS[option] and (not values or _is_number(words[j])):
+                if words[j]:
+                    values.append(words[j])
+                j += 1
+            _set_option(own, option, values)
+            i = j
+        else:
+            break
+    own.name = " ".join(words[i:]).strip().strip('"')
+    return own
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return math.isfinite(float(word)) if word else True
+    except ValueError:
+        return False
+
+
+def _set_option(own: _Map, option: str, values: list[str]) -> None:
+    numbers = [float(value) for value in values if value and _is_number(value)]
+    match option:
+        case "-s" if numbers:
+            own.scale = numbers[0], numbers[1] if len(numbers) > 1 else 1.0
+        case "-o" if numbers:
+            own.offset = numbers[0], numbers[1] if len(numbers) > 1 else 0.0
+        case "-clamp":
+            own.is_clamped = values == ["on"]
+        case "-bm" if numbers:
+            own.bump = numbers[0]
+        case "-imfchan" if values:
+            own.channel = values[0]
+
+
+def _maker(makers: _Makers, entry: _Entry) -> Callable[[], Material]:
+    return lambda: makers.material(entry)
+
+
+class _Makers:
+    """Materials with the pictures that they share."""
+
+    def __init__(self, folder: Path, source: InputFile) -> None:
+        self._folder = folder
+        self._source = source
+        self._textures: dict[tuple[Any, ...], Texture] = {}
+
+    def material(self, entry: _Entry) -> Material:
+        """The material of an entry."""
+        numbers, maps = entry.numbers, entry.maps
+        own = self._colors(numbers, maps) | self._highlights(numbers) | self._opacity(numbers, maps)
+        own |= self._emission(numbers, maps) | self._relief(maps)
+        if {"roughness", "metallic"} & maps.keys() or {"Pr", "Pm"} & numbers.keys():
+            own |= self._metallic_rough(numbers, maps)
+        return Material(**own)
+
+    def _colors(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
+        """Colour, or its map, beside which programs write any Kd."""
+        if "color" in maps:
+            picture = self._picture(maps["color"])
+            if picture is not None:
+                return {"texture": self._texture(maps["color"], picture, "srgb")}
+        return {"color": _rgb(numbers["Kd"]) if numbers.get("Kd") else None}
+
+    def _highlights(self, numbers: dict[str, list[float]]) -> dict[str, Any]:
+        """Highlights where the file has both their strength and their exponent, and its model of light has them."""
+        strength, exponent = numbers.get("Ks"), numbers.get("Ns")
+        illumination = numbers.get("illum") or [2.0]
+        if not strength or not exponent or exponent[0] <= 0 or illumination[0] < 2:
+            return {"specular": 0.0, "shininess": 0.0}
+        return {"specular": _share(float(np.mean(strength))), "shininess": exponent[0]}
+
+    def _opacity(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
+        """Opacity: of `d`, else 1 - `Tr`; times the map of it, which becomes the alpha of the texture."""
+        opacity = 1.0
+        if numbers.get("d"):
+            opacity = _share(numbers["d"][0])
+        elif numbers.get("Tr") and numbers["Tr"][0] < 1:  # MeshLab writes 1 for opaque
+            opacity = 1 - _share(numbers["Tr"][0])
+        if opacity == 0:
+            self._source.notes.add("materials that are wholly transparent")
+        own: dict[str, Any] = {"opacity": opacity}
+        if opacity < 1:
+            own["alpha_mode"] = AlphaMode.BLEND
+        kind = next((kind for kind in ("opacity", "transparency") if kind in maps), None)
+        picture = None if kind is None else self._picture(maps[kind])
+        if kind is None or picture is None:
+            return own
+        alpha = _scalar_of(picture, maps[kind].channel, "a" if (picture[..., 3] < 255).any() else "l")
+        if kind == "transparency":
+            alpha = 255 - alpha
+        laid = maps.get("color", maps[kind])
+        color = self._picture(maps["color"]) if "color" in maps else None
+        if color is None:
+            base, laid = np.full((*alpha.shape, 4), 255, np.uint8), maps[kind]
+        else:
+            base, alpha = _same_size(color, alpha)
+        base = np.dstack([base[..., :3], alpha])
+        own["texture"] = Texture(base, **laid.placement)
+        if own.get("alpha_mode") is None:
+            between = (alpha > NEARLY_CLEAR) & (alpha < NEARLY_OPAQUE)
+            own["alpha_mode"] = AlphaMode.BLEND if between.mean() > 0.05 else AlphaMode.MASK
+        return own
+
+    def _emission(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
+        light = _light(numbers.get("Ke", []))
+        picture = self._picture(maps["emission"]) if "emission" in maps else None
+        if picture is None:
+            return {"emission": light}
+        texture = self._texture(maps["emission"], picture, "srgb")
+        return {"emission": light if any(light) else (1.0, 1.0, 1.0), "emission_texture": texture}
+
+    def _relief(self, maps: dict[str, _Map]) -> dict[str, Any]:
+        """The normal map: `norm`, or `bump`, which is a map of heights if it is grey."""
+        laid = maps.get("normal", maps.get("bump"))
+        picture = None if laid is None else self._picture(laid)
+        if laid is None or picture is None:
+            return {}
+        is_grey = bool((np.ptp(picture[..., :3], axis=-1) <= 2).all())
+        if is_grey and "normal" not in maps:
+            normals = normals_of_heights(_scalar_of(picture, laid.channel, "l"), laid.bump)
+            return {"normal_texture": Texture(normals, encoding="linear", **laid.placement)}
+        texture = self._texture(laid, picture, "linear")
+        return {"normal_texture": texture, "normal_scale": max(laid.bump, 0.0)}
+
+    def _metallic_rough(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
+        """A metallic-rough surface; its two maps become green and blue of one."""
+        own: dict[str, Any] = {
+            "roughness": _share((numbers.get("Pr") or [1.0])[0]),
+            "metallic": _share((numbers.get("Pm") or [1.0 if "metallic" in maps else 0.0])[0]),
+        }
+        pictures = {kind: self._picture(maps[kind]) for kind in ("roughness", "metallic") if kind in maps}
+        values = {kind: _scalar_of(picture, "", "l") for kind, picture in pictures.items() if picture is not None}
+        if values:
+            first = next(iter(values))
+            packed = np.full((*values[first].shape, 3), 255, np.uint8)
+            for kind, channel in (("roughness", 1), ("metallic", 2)):
+                if kind in values:
+                    packed, alpha = _same_size(packed, values[kind])
+                    packed = packed.copy()
+                    packed[..., channel] = alpha
+                    if kind not in numbers and not numbers.get({"roughness": "Pr", "metallic": "Pm"}[kind]):
+                        own[kind] = 1.0
+            own["metallic_roughness_texture"] = Texture(packed, encoding="linear", **maps[first].placement)
+        return own
+
+    def _picture(self, laid: _Map) -> U8 | None:
+        return self._source.picture(laid.name, self._folder) if laid.name else None
+
+    def _texture(self, laid: _Map, picture: U8, encoding: EncodingOption) -> Texture:
+        """The texture; materials that use the same share it. The alpha of a picture is not opacity: map_d is."""
+        key = (laid.name, laid.scale, laid.offset, laid.is_clamped, encoding)
+        if key not in self._textures:
+            self._textures[key] = Texture(picture[..., :3], encoding=encoding, **laid.placement)
+        return self._textures[key]
+
+
+def _scalar_of(picture: U8, channel: str, default: str) -> U8:
+    """One number a pixel: red, green, blue, the "matte" alpha, or luminance."""
+    match channel or default:
+        case "r" | "g" | "b" as one:
+            return picture[..., "rgb".index(one)]
+        case "m" | "a":
+            return picture[..., 3]
+        case _:
+            return np.rint((picture[..., :3] * [0.2126, 0.7152, 0.0722]).sum(axis=-1)).astype(np.uint8)
+
+
+def _same_size(color: U8, alpha: U8) -> tuple[U8, U8]:
+    """Both in the larger of their two sizes."""
+    if color.shape[:2] == alpha.shape:
+        return color, alpha
+    from PIL import Image
+
+    if color.shape[0] * color.shape[1] >= alpha.size:
+        size = color.shape[1], color.shape[0]
+        return color, np.asarray(Image.fromarray(alpha).resize(size, Image.Resampling.BILINEAR))
+    size = alpha.shape[1], alpha.shape[0]
+    return np.asarray(Image.fromarray(np.ascontiguousarray(color)).resize(size, Image.Resampling.BILINEAR)), alpha
+
+
+def normals_of_heights(heights: U8, scale: float) -> U8:
+    """A normal map (H, W, 3) of a map of heights (H, W), 0 to 255 for 0 to `scale` texels times two."""
+    values = heights.astype(np.float64) * (scale / 255)
+    slope_u = np.roll(values, -1, axis=1) - np.roll(values, 1, axis=1)
+    slope_v = np.roll(values, 1, axis=0) - np.roll(values, -1, axis=0)
+    normals = np.dstack([-slope_u, -slope_v, np.ones_like(values)])
+    normals /= np.sqrt((normals * normals).sum(axis=2, keepdims=True))
+    return np.rint(127.5 * (normals + 1)).astype(np.uint8)
+
+
+def _rgb(values: list[float]) -> Color:
+    red, green, blue = (round(255 * _share(value)) for value in _three(values))
+    return red, green, blue
+
+
+def _light(values: list[float]) -> tuple[float, float, float]:
+    if not values:
+        return 0.0, 0.0, 0.0
+    red, green, blue = (float(value) for value in decode_srgb(np.maximum(np.array(_three(values)), 0)))
+    return red, green, blue
+
+
+def _three(values: list[float]) -> list[float]:
+    """Red, green and blue: one number stands for all."""
+    return values if len(values) == 3 else [values[0]] * 3
+
+
+def _share(value: float) -> float:
+    return min(max(value, 0.0), 1.0)

@@ -1,0 +1,223 @@
+"""Reads STL, binary and text, and OFF: triangles and polygons, and little else.
+
+Normals of STL are not read: the corners of its triangles say the same. The first word of OFF names what its vertices
+have: colours, normals, texture coordinates.
+
+Input: a file, unchecked. Output: a `Mesh`, or none where nothing has faces; no memory is taken for more than it holds.
+
+Based on: 3D Systems, "StereoLithography Interface Specification", 1988; The Geometry Center, "OFF", Geomview manual,
+1996; files of Princeton, libigl and MeshLab.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text, whole_numbers
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.polygons import triangulate
+from topleft.errors import MeshError
+
+Array = npt.NDArray[Any]
+I64 = npt.NDArray[np.int64]
+
+N_HEADER_BYTES, N_TRIANGLE_BYTES = 84, 50
+HEAD = re.compile(rb"\s*((?:ST)?C?N?(4?)(n?)OFF)?(?=[\s\d]|$)", re.IGNORECASE)
+
+
+def read_stl(source: InputFile) -> list[Mesh]:
+    """The triangles of an STL file, in one mesh; none if it has none.
+
+    Raises
+    ------
+    MeshError
+        If the file is broken.
+    """
+    content = source.path.read_bytes()
+    n = int.from_bytes(content[80:84], "little") if len(content) >= N_HEADER_BYTES else 0
+    n_bytes = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
+    # Binary files may begin with "solid", too.
+    if content.lstrip()[:5].lower() == b"solid" and len(content) != n_bytes:
+        corners = _corners_of_text(content)
+    elif len(content) < N_HEADER_BYTES or n_bytes > len(content):
+        n_there = max(0, len(content) - N_HEADER_BYTES) // N_TRIANGLE_BYTES
+        raise MeshError(f"it has {n_there} of {n} triangles")
+    else:
+        rows = np.frombuffer(content, np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")]), n, N_HEADER_BYTES)
+        corners = rows["corners"].reshape(-1, 3)
+    source.check_n_vertices(len(corners))
+    return [Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))] if len(corners) else []
+
+
+def mapped_corners(path: Path) -> np.ndarray[tuple[int, int], np.dtype[np.float32]] | None:
+    """The nine numbers of each triangle (T, 9) of a binary file, mapped; None of a text.
+
+    Raises
+    ------
+    MeshError
+        If the file is broken.
+    """
+    n_file = path.stat().st_size
+    with open(path, "rb") as file:
+        header = file.read(N_HEADER_BYTES)
+    n = int.from_bytes(header[80:84], "little") if len(header) == N_HEADER_BYTES else 0
+    n_bytes = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
+    if header.lstrip()[:5].lower() == b"solid" and n_file != n_bytes:
+        return None
+    if len(header) < N_HEADER_BYTES or n_bytes > n_file:
+        raise MeshError(f"it has {max(0, n_file - N_HEADER_BYTES) // N_TRIANGLE_BYTES} of {n} triangles")
+    if not n:
+        raise MeshError("it has no triangles")
+    rows = np.memmap(path, np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")]), "r", N_HEADER_BYTES, (n,))
+    return rows["corners"]
+
+
+def _corners_of_text(content: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """The numbers after each "vertex"."""
+    content = content.lower().replace(b"\r", b"\n")
+    lines = re.sub(rb"(?m)^[ \t]*(?:outer|end|facet|solid)[^\n]*$", b"", content)
+    numbers = numbers_of_text(lines.replace(b"vertex", b" "))
+    if len(numbers) % 9:
+        raise MeshError(f"it has {len(numbers)} numbers, which are not 9 a triangle")
+    return numbers.reshape(-1, 3)
+
+
+def read_off(source: InputFile) -> list[Mesh]:
+    """The faces of an OFF file, in one mesh; none, and a cloud of its points, if it has none.
+
+    Raises
+    ------
+    MeshError
+        If the file is broken.
+    """
+    content = re.sub(rb"#[^\r\n]*", b"", source.path.read_bytes()).replace(b"\r", b"\n")
+    head = HEAD.match(content)
+    if head is None:
+        raise MeshError("it does not begin with OFF")
+    word = (head[1] or b"").upper()
+    if head[2] or head[3]:
+        raise MeshError("its points have more than three dimensions")
+    rest = content[head.end() :]
+    if word and rest.split(None, 1)[:1] == [b"BINARY"]:
+        raise MeshError(f"cannot read {str(source.path)!r}: it is a binary OFF: save it as text")
+    counts = re.match(rb"\s*(\d{1,15})\s+(\d{1,15})(?:[ \t]+\d{1,15})?", rest)
+    if counts is None:
+        raise MeshError("it does not say how many vertices and faces it has")
+    n_vertices, n_faces = int(counts[1]), int(counts[2])
+    source.check_n_vertices(n_vertices)
+    body = rest[counts.end() :].lstrip()
+    try:
+        values = numbers_of_text(body)
+    except MeshError:
+        raise MeshError("a number of it is none") from None
+    lines: list[bytes] = []
+    width = len(body.split(b"\n", 1)[0].split())
+    faces = _faces_of_one_size(values[n_vertices * width :], n_faces)
+    if faces is None:
+        lines = [line for line in body.split(b"\n") if line.strip()]
+    if faces is None and len(lines) == n_vertices + n_faces:
+        faces = _faces_of_lines(lines[n_vertices:])
+    if faces is None:  # rows that go over several lines, or some that are left over: corners, and no colours
+        width = 3 + 3 * (b"N" in word) + 4 * (b"C" in word) + 2 * word.startswith(b"ST")
+        if n_vertices * width > len(values):
+            raise MeshError(f"it ends within its {n_vertices} vertices")
+        faces = _faces_of_numbers(values[n_vertices * width :].tolist(), n_faces)
+    numbers = values[: n_vertices * width]
+    if len(numbers) != n_vertices * width or (n_vertices and width < 3):
+        raise MeshError(f"it ends within its {n_vertices} vertices")
+    return _meshes(source, word, numbers.reshape(n_vertices, max(width, 3)), *faces)
+
+
+Faces = tuple[I64, I64, Array | None]
+"""The corners of all faces, how many each has, and colours (F, 3 or 4) if all have some."""
+
+
+def _faces_of_one_size(values: Array, n_faces: int) -> Faces | None:
+    """Faces with as many corners each, and as many numbers of a colour; None if they have not."""
+    if not n_faces or len(values) % n_faces or not len(values):
+        return (np.zeros(0, np.int64), np.zeros(0, np.int64), None) if not n_faces and not len(values) else None
+    rows = values.reshape(n_faces, -1)
+    n_colors = rows.shape[1] - 1 - rows[0, 0]
+    if n_colors not in (0, 3, 4) or not (rows[:, 0] == rows[0, 0]).all():
+        return None
+    k = int(rows[0, 0])
+    return whole_numbers(rows[:, 1 : k + 1].ravel()), np.full(n_faces, k), rows[:, k + 1 :] if n_colors else None
+
+
+def _faces_of_lines(lines: list[bytes]) -> Faces:
+    """Faces of which each has a line of its own."""
+    rows = [line.split() for line in lines]
+    counts = whole_numbers(numbers_of_text(b" ".join(row[0] for row in rows)))
+    if not all(0 <= n < len(row) for n, row in zip(counts.tolist(), rows, strict=True)):
+        raise MeshError("a face has fewer corners than it says")
+    corners = [word for n, row in zip(counts.tolist(), rows, strict=True) for word in row[1 : n + 1]]
+    colors = [row[n + 1 :] for n, row in zip(counts.tolist(), rows, strict=True)]
+    table: Array | None = None
+    if colors and len(colors[0]) in (3, 4) and all(len(color) == len(colors[0]) for color in colors):
+        table = numbers_of_text(b" ".join(word for color in colors for word in color)).reshape(len(colors), -1)
+    return whole_numbers(numbers_of_text(b" ".join(corners))), counts, table
+
+
+def _faces_of_numbers(values: list[float], n_faces: int) -> Faces:
+    """Faces one after the other."""
+    if n_faces > len(values):
+        raise MeshError(f"it ends within its {n_faces} faces")
+    corners: list[float] = []
+    counts: list[int] = []
+    at = 0
+    for _ in range(n_faces):
+        if at >= len(values) or not 0 <= values[at] <= len(values) - at - 1:
+            raise MeshError(f"it ends within its {n_faces} faces")
+        counts.append(int(values[at]))
+        corners += values[at + 1 : at + 1 + counts[-1]]
+        at += counts[-1] + 1
+    return whole_numbers(np.array(corners, np.float64)), np.array(counts, np.int64), None
+
+
+def _bytes(values: Array) -> npt.NDArray[np.uint8]:
+    """SRGB bytes of colours of whole numbers of 0 to 255, or of 0 to 1."""
+    is_whole = bool((values == np.rint(values)).all() and values.max(initial=0) > 1)
+    return np.rint((np.nan_to_num(values) * (1 if is_whole else 255)).clip(0, 255)).astype(np.uint8)
+
+
+def _meshes(
+    source: InputFile, word: bytes, rows: Array, corners: I64, n_corners: I64, of_faces: Array | None
+) -> list[Mesh]:  # fmt: skip
+    """The mesh of the rows of vertices and of the faces."""
+    positions, at = rows[:, :3], 3
+    normals = colors = uv = None
+    if b"N" in word and rows.shape[1] >= at + 3:
+        normals, at = rows[:, at : at + 3], at + 3
+    n_uv = 2 if word.startswith(b"ST") and rows.shape[1] >= at + 2 else 0
+    n_colors = min(rows.shape[1] - at - n_uv, 4)
+    if n_colors >= 3:
+        colors = _bytes(rows[:, at : at + n_colors])
+    if n_uv:
+        uv = rows[:, -2:]
+    if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < len(positions):
+        bad = int(corners.min()) if int(corners.min()) < 0 else int(corners.max())
+        raise MeshError(f"a face names vertex {bad} of {len(positions)}")
+    triangles, faces = triangulate(positions, corners, n_corners)
+    if not len(triangles):
+        if not len(corners) and len(positions):
+            source.clouds.append(Cloud(positions, _opaque(colors), normals))
+        return []
+    names = corners[triangles].astype(np.int32)
+    if of_faces is None or colors is not None:
+        return [Mesh(positions, names, normals, colors, uv)]
+    at_corner = names.ravel()
+    own = (None if each is None else each[at_corner] for each in (normals, uv))
+    own_normals, own_uv = own
+    rows_of = np.arange(len(at_corner), dtype=np.int32).reshape(-1, 3)
+    return [Mesh(positions[at_corner], rows_of, own_normals, np.repeat(_bytes(of_faces)[faces], 3, axis=0), own_uv)]
+
+
+def _opaque(colors: Array | None) -> Array | None:
+    if colors is None or colors.shape[1] == 4:
+        return colors
+    return np.column_stack([colors, np.full(len(colors), 255, np.uint8)])

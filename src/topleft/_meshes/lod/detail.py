@@ -1,0 +1,282 @@
+"""Detail: the coarsest level of a mesh that a view cannot tell from it, within a tolerance in pixels.
+
+In: a mesh or scene, a camera, a size, a tolerance. Out: `Detail`: the level, its bound in pixels, and why no other.
+
+Let p be a point of one surface that shows in the picture, at clip = (x, y, z, w), q one of the other, and d = q - p.
+With u = x / w, rows l of the linear part of the matrix and a viewport W wide, exactly
+
+    px(q) - px(p) = W/2 (l_x - u l_w) . d / w(q),      and so for y with v and H.
+
+So no p moves by more than bound * s / w_min: s the largest singular value of the matrix of both rows, which is convex
+in (u, v) and so largest in a corner of what the mesh can show in, w_min the least w on both surfaces. Stretched
+pixels, shear, the edge of the frame and instances that are scaled are in the matrix.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_number, as_size, shown
+from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
+from topleft._meshes.lod.levels import Level, Levels
+from topleft._meshes.lod.simplify import levels_of
+from topleft._meshes.model.material import Material
+from topleft._meshes.model.mesh import Mesh, has_holes
+from topleft._meshes.scene.adapt import MeshLike, as_mesh
+from topleft._meshes.scene.scene import Scene, meshes_of
+from topleft.typing import CullOption
+
+__all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
+
+F64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Detail:
+    """Which level of a mesh a view needs. Made by `choose_detail`.
+
+    Attributes
+    ----------
+    level : int
+        0: the mesh itself.
+    mesh : Mesh
+        What is drawn: the `.triangle` of its visibility buffer are rows of its triangles.
+    bound : float
+        How far its surface may lie from the mesh, object units.
+    bound_px : float
+        How far a point that shows may lie from where it belongs, pixels.
+    tolerance : float
+        What was asked for, pixels.
+    n_triangles : int
+        Triangles of the mesh itself.
+    why : str
+    rejected : tuple of str
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(3))
+    >>> detail = tl.choose_detail(ball, tl.Camera.framing(ball), (64, 64), tolerance=0.0)
+    >>> detail.level, detail.mesh is ball
+    (0, True)
+    """
+
+    level: int
+    mesh: Mesh
+    bound: float
+    bound_px: float
+    tolerance: float
+    n_triangles: int
+    why: str
+    rejected: tuple[str, ...] = ()
+
+
+def choose_detail(
+    mesh: MeshLike,
+    camera: CameraLike,
+    size: int | tuple[int, int],
+    *,
+    tolerance: float,
+    cull: CullOption = "none",
+    material: Material | None = None,
+    transform: npt.ArrayLike | None = None,
+    viewport: tuple[int, int] | None = None,
+    origin: tuple[int, int] = (0, 0),
+) -> Detail:
+    """The coarsest level of a mesh whose points lie within a tolerance of where they belong in a picture.
+
+    Parameters
+    ----------
+    mesh : Mesh, or whatever `as_mesh` takes
+        Its levels are made when they are needed first, and kept with it; see `simplify`.
+    camera : Camera
+    size : (width, height), pixels
+    tolerance : float
+        Pixels, at least 0. 0: always the mesh itself.
+    cull, material, viewport, origin
+        As for `render` and `rasterize`.
+    transform : (4, 4) array_like, optional
+        World from object, of an instance.
+
+    Returns
+    -------
+    Detail
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is negative or not finite.
+    MissingPackageError
+        If levels are to be made and fast-simplification is not installed.
+
+    Notes
+    -----
+    Each point of the mesh that shows lies within `bound_px` of a point of the level in the picture, and the other way
+    round; the snap to sub-pixels moves either by 1/512 pixel at most along each axis. The order in which surfaces hide
+    each other, and their light, may differ by more.
+
+    It is the mesh itself where no bound holds: with a lens; where the mesh may reach the near or the far plane or the
+    eye; where a side is culled, since turns of triangles are not bounded; where materials cut holes.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> tl.choose_detail(cube, tl.Camera.framing(cube), (64, 48), tolerance=0).level
+    0
+    """
+    mesh, camera, size = as_mesh(mesh), as_camera(camera), as_size(size)
+    viewport = None if viewport is None else as_size(viewport, "viewport", smallest=1)
+    tolerance = check_tolerance(tolerance)
+    n = len(mesh.triangles)
+
+    def whole(why: str, others: tuple[str, ...] = ()) -> Detail:
+        return Detail(0, mesh, 0.0, 0.0, tolerance, n, why, others)
+
+    if reason := why_whole(mesh, camera, tolerance, cull, material):
+        return whole(reason)
+    levels = levels_of(mesh)
+    if len(levels) == 1:
+        return whole("it has no coarser level")
+    sight = sight_of(camera, size, viewport, origin)
+    place = None if transform is None else np.asarray(transform, np.float64)
+
+    def rejected(i: int) -> str:
+        scale = sight.scale_of(place, levels[0], levels[i])
+        off = "reach the near or the far plane, or the eye"
+        if scale is not None:
+            off = f"be off by {levels[i].bound * scale:.3g} px"
+        return f"level {i}, {len(levels[i].mesh.triangles):,} triangles: may {off}"
+
+    matrix = sight.clip_from_world if place is None else engine.product(sight.clip_from_world, place)
+    (i,), (scale,) = (found.tolist() for found in sight.coarsest(matrix[None], levels, tolerance))
+    if i == 0:
+        return whole(f"no coarser level is sure to be within {tolerance:g} px", (rejected(1),))
+    bound_px = levels[i].bound * scale
+    why = f"no point that shows is off by more than {bound_px:.3g} px, and {tolerance:g} px are allowed"
+    others = [rejected(i + 1)] if i + 1 < len(levels) else []
+    others.append(f"the mesh itself, {n:,} triangles: finer than the picture has to be")
+    return Detail(i, levels[i].mesh, levels[i].bound, bound_px, tolerance, n, why, tuple(others))
+
+
+class Sight(NamedTuple):
+    """What a view says of how far points may be off."""
+
+    clip_from_world: F64
+    viewport: tuple[int, int]
+    window: F64  # as `window_of` gives it
+
+    def scale_of(self, place: F64 | None, *levels: Level) -> float | None:
+        """How many pixels a unit is at most on some levels; None where nothing is known of that."""
+        matrix = self.clip_from_world if place is None else engine.product(self.clip_from_world, place)
+        return engine.pixels_per_unit(matrix, self.viewport, self.window, np.stack([level.extent for level in levels]))
+
+    def coarsest(self, matrices: F64, levels: Levels, tolerance: float) -> tuple[NDArray[np.int64], F64]:
+        """The last level that is sure to be within a tolerance under each matrix, 0 for none, and its scale."""
+        found: NDArray[np.int64] = np.empty(len(matrices), np.int64)
+        scales: F64 = np.empty(len(matrices))
+        given = matrices, self.viewport, self.window, levels.extents, levels.bounds, tolerance
+        engine.coarsest_levels(*given, found, scales)
+        return found, scales
+
+
+def sight_of(camera: Camera, size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> Sight:
+    """What a view says of how far points may be off."""
+    return Sight(camera.clip_from_world(viewport or size), viewport or size, window_of(size, viewport, origin))
+
+
+def check_tolerance(tolerance: float) -> float:
+    """The tolerance, if it is one."""
+    if not 0 <= as_number("tolerance", tolerance) < math.inf:
+        raise ValueError(f"tolerance must be at least 0 pixels, got {tolerance!r}")
+    return float(tolerance)
+
+
+def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str, material: Material | None) -> str | None:
+    """Why nothing but the mesh itself will do, as far as that is known without its levels."""
+    if tolerance == 0:
+        return "tolerance=0: the picture of the mesh itself, to the bit"
+    if not len(mesh.triangles):
+        return "it has no triangles"
+    if camera.lens is not None:
+        return "a lens bends the picture by what no bound is known of"
+    if str(cull) != "none":
+        return f"cull={str(cull)!r}: which way a triangle is turned has no bound"
+    if any(has_holes(one, mesh) for one in (mesh.materials if material is None else (material,))):
+        return "a material cuts holes, and they have no bound"
+    return None
+
+
+def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> F64:
+    """Where in normalised device coordinates pixels are looked at: lower and upper x, and y, (4,).
+
+    All of the viewport, so that a window of a picture has the level of the whole; more where the window has more.
+    """
+    ends = []
+    for first, n, whole in zip(origin, size, viewport or size, strict=True):
+        low, high = min(0, first), max(whole, first + n)
+        ends.append((2 * (low - 1) / max(whole, 1) - 1, 2 * (high + 1) / max(whole, 1) - 1))
+    return np.array([*ends[0], -ends[1][1], -ends[1][0]])
+
+
+def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level) -> float | None:
+    """How far a point that shows may be off, pixels; None where nothing is known of that.
+
+    Parameters
+    ----------
+    matrix : (4, 4) float64
+        Clip from object.
+    viewport : (width, height), pixels
+    window : (4,) float64
+        What `window_of` gives.
+    original, level : Level
+    """
+    scale = engine.pixels_per_unit(matrix, viewport, window, np.stack([original.extent, level.extent]))
+    return None if scale is None else level.bound * scale
+
+
+def detailed(
+    mesh: Mesh | Scene, camera: Camera, size: tuple[int, int], tolerance: float, **options: Any
+) -> Mesh | Scene:
+    """The mesh or scene as it is drawn within a tolerance; options as for `choose_detail`."""
+    if not isinstance(options.get("material"), Material | None):
+        raise TypeError(f"material must be a Material, got {shown(options['material'])}")
+    if check_tolerance(tolerance) == 0:
+        return mesh
+    if isinstance(mesh, Mesh):
+        return level_of(mesh, camera, size, tolerance, **options)
+    sight = sight_of(camera, size, options.get("viewport"), options.get("origin", (0, 0)))
+    matrices = mesh.clip_from_objects(sight.clip_from_world)
+    meshes = meshes_of(mesh)
+    for one, at in mesh.meshes.values():
+        if not why_whole(one, camera, tolerance, options.get("cull", "none"), options.get("material")):
+            levels = levels_of(one)
+            for i, level in zip(at.tolist(), sight.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
+                meshes[i] = levels[level].mesh if level else one
+    return mesh.with_meshes(meshes)
+
+
+def level_of(
+    mesh: Mesh,
+    camera: Camera,
+    size: tuple[int, int],
+    tolerance: float,
+    *,
+    cull: str = "none",
+    material: Material | None = None,
+    viewport: tuple[int, int] | None = None,
+    origin: tuple[int, int] = (0, 0),
+) -> Mesh:
+    """The mesh of `choose_detail`, of checked arguments, without its words."""
+    if why_whole(mesh, camera, tolerance, cull, material):
+        return mesh
+    levels, sight = levels_of(mesh), sight_of(camera, size, viewport, origin)
+    level = int(sight.coarsest(sight.clip_from_world[None], levels, tolerance)[0][0])
+    return levels[level].mesh if level else mesh

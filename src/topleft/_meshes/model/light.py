@@ -1,0 +1,162 @@
+"""Lights: directions and points that light comes from, and the depth cue; values, checked once.
+
+Based on: Lambert, J. H., "Photometria", 1760; Mitchell, J., G. McTaggart and C. Green, "Shading in Valve's Source
+Engine", SIGGRAPH 2006 courses (the half-Lambert fall-off of the headlight, there with the power 2).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_number, as_vector
+from topleft._core.base.color import Color, ColorLike, as_color
+from topleft._core.base.options import parse
+from topleft.typing import LightKindOption, SpaceOption
+
+F64 = npt.NDArray[np.float64]
+
+TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / engine.length([-0.35, 0.45, 1.0])
+"""Direction of the headlight in eye space: from over the viewer's left shoulder, so that up and left read as lit."""
+
+AMBIENT = 0.03
+"""Share of the light, in linear light, that reaches a surface from all sides.
+
+The headlight adds the rest: it falls off as ((1 + n . l) / 2)**3 and so reaches 0 smoothly, at the far side of a
+sphere. Lambert's max(0, n . l) ends in a line, which on coarse meshes reads as a seam.
+"""
+
+
+class LightKind(StrEnum):
+    """Where light comes from."""
+
+    DIRECTIONAL = "directional"
+    POINT = "point"
+
+
+class LightSpace(StrEnum):
+    """What a light is fixed to."""
+
+    WORLD = "world"
+    EYE = "eye"
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light that shines from a direction or from a point; without shadows.
+
+    Parameters
+    ----------
+    at : (3,) of float
+        The direction *to* the light, of any length, or the point where it is. World space, or that of the eye (x right,
+        y up, the view along -z).
+    kind : {"directional", "point"}
+        What `at` means.
+    color : (3,) of 0 to 255
+        sRGB.
+    intensity : float
+        Not negative. A white surface that faces a white light of intensity 1 is white.
+    falloff : float
+        Not negative. At distance d from a point the light is divided by `1 + falloff * d**2`; 0: it is the same
+        everywhere.
+    space : {"world", "eye"}
+        "eye": the light moves with the camera.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite or outside its range, or the direction has no length.
+
+    Examples
+    --------
+    >>> Light((0, 1, 0)).kind
+    <LightKind.DIRECTIONAL: 'directional'>
+    """
+
+    at: tuple[float, float, float]
+    kind: str = "directional"
+    color: Color = (255, 255, 255)
+    intensity: float = 1.0
+    falloff: float = 0.0
+    space: str = "world"
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            at: npt.ArrayLike,
+            kind: LightKindOption = "directional",
+            color: ColorLike = (255, 255, 255),
+            intensity: float = 1.0,
+            falloff: float = 0.0,
+            space: SpaceOption = "world",
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
+        keep(self, "kind", parse(LightKind, "kind", self.kind))
+        keep(self, "space", parse(LightSpace, "space", self.space))
+        keep(self, "color", as_color("color", self.color, 3))
+        keep(self, "at", tuple(as_vector("at", self.at).tolist()))
+        if self.kind == LightKind.DIRECTIONAL and not any(self.at):
+            raise ValueError(f"at must be a direction, got {self.at}")
+        for name in ("intensity", "falloff"):
+            keep(self, name, as_not_negative(name, getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class Fog:
+    """The depth cue: with the distance along the view, a colour takes the place of what is seen.
+
+    Parameters
+    ----------
+    near, far : float
+        Where it begins, and where nothing else is left; world units in front of the eye, near < far.
+    color : (3,) of 0 to 255
+        sRGB.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> fog = tl.Fog(2.0, 6.0, color=(200, 210, 220))
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> tl.render(ball, tl.Camera.framing(ball), (32, 32), fog=fog).shape
+    (32, 32, 4)
+    """
+
+    near: float
+    far: float
+    color: Color = (255, 255, 255)
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(self, near: float, far: float, color: ColorLike = (255, 255, 255)) -> None: ...
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "color", as_color("color", self.color, 3))
+        if not -math.inf < as_number("near", self.near) < as_number("far", self.far) < math.inf:
+            raise ValueError(f"near and far must be finite and near < far, got {self.near} and {self.far}")
+
+
+def as_not_negative(name: str, value: float) -> float:
+    """The number as a float.
+
+    Raises
+    ------
+    ValueError
+        If it is negative or not finite.
+    """
+    if not 0 <= as_number(name, value) < math.inf:
+        raise ValueError(f"{name} must be finite and not negative, got {value!r}")
+    return float(value)

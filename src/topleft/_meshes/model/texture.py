@@ -1,0 +1,321 @@
+"""Textures: pictures of linear light and their halves, made once from an sRGB picture.
+
+Input: uint8 pixels. Output: what the kernels read.
+
+Based on: Williams, L., "Pyramidal Parametrics", SIGGRAPH 1983.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_array, set_read_only
+from topleft._core.base.color import LIGHT_OF_SRGB
+from topleft._core.base.options import parse
+from topleft._core.base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
+from topleft.typing import EncodingOption, FilterOption, WrapOption
+
+U8 = npt.NDArray[np.uint8]
+U16 = npt.NDArray[np.uint16]
+F64 = npt.NDArray[np.float64]
+
+MAX_TEXTURE_SIZE = 1 << 15
+"""Of a side: 16 levels."""
+
+
+class Filter(StrEnum):
+    """What a texture is at a point between its texels, and where they are smaller than a pixel."""
+
+    NEAREST = "nearest"
+    BILINEAR = "bilinear"
+    TRILINEAR = "trilinear"
+
+
+class Encoding(StrEnum):
+    """What the values of a picture stand for."""
+
+    SRGB = "srgb"
+    LINEAR = "linear"
+
+
+LIGHT_OF_BYTE = {Encoding.SRGB: LIGHT_OF_SRGB.astype(np.float64), Encoding.LINEAR: np.arange(256) / 255}
+BLOCK_TEXELS = 1 << 17
+"""Texels that are halved together: 4 MB of float64, which stay in a cache."""
+
+
+class Wrap(StrEnum):
+    """What lies beyond a texture."""
+
+    REPEAT = "repeat"
+    CLAMP = "clamp"
+    MIRROR = "mirror"
+
+
+FILTER_CODES = {Filter.NEAREST: 0, Filter.BILINEAR: 1, Filter.TRILINEAR: 2}  # tl_filter in csrc/shading.h
+WRAP_CODES = {Wrap.REPEAT: 0, Wrap.CLAMP: 1, Wrap.MIRROR: 2}  # tl_wrap in csrc/shading.h
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """A picture to be laid on a mesh by its `uv`.
+
+    Parameters
+    ----------
+    image : (H, W), (H, W, 3) or (H, W, 4) array_like of uint8
+        sRGB, and opacity; row 0 is the top, where v = 1. Copied.
+    filter : {"trilinear", "bilinear", "nearest"}
+        "trilinear": between the texels and between the two halvings next to the size of the pixel's footprint.
+        "bilinear": between the four texels next to the point. "nearest": the texel that the point lies in.
+    wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
+        What lies beyond 0 and 1.
+    encoding : {"srgb", "linear"}
+        "srgb": red, green and blue are colours. "linear": they are numbers, 0 to 255 for 0 to 1, as in normal maps.
+    uv_set : {0, 1}
+        Laid on by `uv` or by `uv1` of the mesh.
+    transform : (2, 3) array_like of float, optional
+        Takes (u, v, 1) of the mesh to where the texture is looked up.
+
+    Raises
+    ------
+    TypeError
+        If the pixels are no uint8.
+    ValueError
+        If the picture has another shape, no pixels, or a side of more than 32768, or an option is unknown.
+
+    Notes
+    -----
+    Texels are kept as linear light in 65535ths, so filters and halvings take the mean of light. A halving is the mean
+    over the area of its texels, also where a side is odd.
+
+    Examples
+    --------
+    >>> Texture([[0, 255]]).filter
+    <Filter.TRILINEAR: 'trilinear'>
+    """
+
+    image: U8
+    filter: str = "trilinear"
+    wrap: str | tuple[str, str] = "repeat"
+    encoding: str = "srgb"
+    uv_set: int = 0
+    transform: F64 | None = None
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            image: npt.ArrayLike,
+            filter: FilterOption = "trilinear",  # noqa: A002
+            wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+            encoding: EncodingOption = "srgb",
+            uv_set: int = 0,
+            transform: npt.ArrayLike | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
+        keep(self, "image", as_image("image", self.image))
+        keep(self, "filter", parse(Filter, "filter", self.filter))
+        both = (self.wrap, self.wrap) if isinstance(self.wrap, str) else self.wrap
+        if not isinstance(both, tuple | list) or len(both) != 2:
+            raise ValueError(f"wrap must be one word, or two for u and v, got {self.wrap!r}")
+        keep(self, "wrap", tuple(parse(Wrap, "wrap", one) for one in both))
+        keep(self, "encoding", parse(Encoding, "encoding", self.encoding))
+        if self.uv_set not in (0, 1):
+            raise ValueError(f"uv_set must be 0 or 1, got {self.uv_set!r}")
+        if self.transform is not None:
+            matrix = as_array("transform", self.transform).astype(np.float64)
+            if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
+                raise ValueError(f"transform must be (2, 3) finite numbers, got shape {matrix.shape}")
+            matrix.flags.writeable = False
+            keep(self, "transform", matrix)
+
+    def __repr__(self) -> str:
+        """One line: its size and how it is looked up."""
+        height, width = self.image.shape[:2]
+        wraps = list(dict.fromkeys(map(str, self.wrap)))
+        return f"Texture({width}x{height}, filter={str(self.filter)!r}, wrap={'/'.join(wraps)!r})"
+
+    @cached_property
+    def compiled(self) -> engine.Mipmap:
+        """What the kernels read; made when it is first needed."""
+        height, width = self.image.shape[:2]
+        rows = level_rows(width, height, has_halves=self.filter is Filter.TRILINEAR)
+        texels = texels_of(self.image, rows, light=LIGHT_OF_BYTE[Encoding(self.encoding)])
+        wrap_u, wrap_v = (WRAP_CODES[Wrap(one)] for one in self.wrap)
+        filter_code = FILTER_CODES[Filter(self.filter)]
+        table = np.array(rows, dtype=np.int32)
+        if self.transform is None:
+            return engine.Mipmap(texels, table, filter_code, wrap_u, wrap_v, self.uv_set)
+        (a, b, _), (c, d, _) = rows_of_transform = self.transform.tolist()
+        hand = -1.0 if a * d < b * c else 1.0
+        return engine.Mipmap(
+            texels, table, filter_code, wrap_u, wrap_v, self.uv_set, rows_of_transform, (d * hand, -c * hand), hand
+        )
+
+    def value_levels(self) -> ValueLevels:
+        """Light and opacity as float32, and their halvings; made when they are first needed, and kept unless large."""
+        found: ValueLevels | None = self.__dict__.get("_value_levels")
+        if found is None:
+            wrap_u, wrap_v = map(str, self.wrap)
+            found = levels_of(as_light(self.image, str(self.encoding)), str(self.filter), (wrap_u, wrap_v))
+            if found.texels.nbytes <= MOST_KEPT_BYTES:
+                self.__dict__["_value_levels"] = found
+        return found
+
+    @cached_property
+    def has_alpha(self) -> bool:
+        """Whether some of it is not opaque."""
+        return int(self.image[..., 3].min()) < 255
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: the texels are made there."""
+        return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+    __setstate__ = set_read_only
+
+
+def as_image(name: str, pixels: npt.ArrayLike) -> U8:
+    """The picture as its own read-only (H, W, 4) uint8.
+
+    Raises
+    ------
+    TypeError
+        If the pixels are no uint8.
+    ValueError
+        If it has another shape, no pixels, or a side of more than 32768.
+    """
+    array = as_array(name, pixels)
+    if array.dtype != np.uint8:
+        if array.dtype.kind not in "iu" or (array.size and not (0 <= array.min() and array.max() <= 255)):
+            raise TypeError(f"{name} must be uint8, got {array.dtype}")
+        array = array.astype(np.uint8)
+    if array.ndim not in (2, 3) or array.shape[2:] not in ((), (3,), (4,)):
+        raise ValueError(f"{name} must have shape (H, W), (H, W, 3) or (H, W, 4), got {array.shape}")
+    if not 0 < min(array.shape[:2]) <= max(array.shape[:2]) <= MAX_TEXTURE_SIZE:
+        raise ValueError(f"{name} must have 1 to {MAX_TEXTURE_SIZE} pixels a side, got shape {array.shape}")
+    rgba = np.full((*array.shape[:2], 4), 255, np.uint8)
+    rgba[..., : array.shape[2] if array.ndim == 3 else 3] = array if array.ndim == 3 else array[..., None]
+    rgba.flags.writeable = False
+    return rgba
+
+
+def level_rows(width: int, height: int, *, has_halves: bool) -> list[tuple[int, int, int]]:
+    """A row (offset in texels, width, height) of each level; behind each row of texels stands its first one again."""
+    rows = [(0, width, height)]
+    while has_halves and max(width, height) > 1:
+        offset, width, height = rows[-1]
+        offset, width, height = offset + height * (width + 1), max(1, width // 2), max(1, height // 2)
+        rows.append((offset, width, height))
+    return rows
+
+
+def texels_of(image: U8, rows: list[tuple[int, int, int]], *, light: F64) -> U16:
+    """The texels (N, 4) of all levels in 65535ths, row 0 at v = 0; `light` is that of each value of a byte.
+
+    A few rows at a time go through all levels, so that nothing but the texels themselves is large.
+    """
+    offset, width, height = rows[-1]
+    texels = np.zeros((offset + height * (width + 1) + 1, 4), np.uint16)  # pairs may be read one texel past the end
+    level = None
+    for row in reversed(rows):
+        level = LevelWriter(texels, row, level)
+    first, (_, width, height) = level, rows[0]
+    n = max(1, BLOCK_TEXELS // width)
+    for begin in range(0, height, n):
+        block = image[::-1][begin : begin + n]
+        own = np.empty(block.shape)
+        own[..., :3] = light[block[..., :3]]
+        own[..., 3] = block[..., 3] / 255
+        if first is not None:
+            first.take(own)
+    return texels
+
+
+class LevelWriter:
+    """Writes the rows of a level as they come, and hands their halvings on to the next one."""
+
+    def __init__(self, texels: U16, row: tuple[int, int, int], half: LevelWriter | None) -> None:
+        offset, width, height = row
+        self.texels = texels[offset : offset + height * (width + 1)].reshape(height, width + 1, 4)
+        self.n_taken = 0
+        self.half = half
+        self.rows = RowPairs() if height % 2 == 0 else RowAreas(height) if height > 1 else None
+
+    def take(self, block: F64) -> None:
+        """Take the next rows (n, width, 4)."""
+        own = self.texels[self.n_taken : self.n_taken + len(block)]
+        np.rint(65535 * block, out=own[:, :-1], casting="unsafe")
+        own[:, -1] = own[:, 0]
+        self.n_taken += len(block)
+        if self.half is not None:
+            lower = block if self.rows is None else self.rows.halve(block)
+            if len(lower):
+                self.half.take(halved_along(lower, 1))
+
+
+class RowPairs:
+    """Means of two rows each, of rows that come in blocks."""
+
+    def __init__(self) -> None:
+        self.rest: F64 | None = None
+
+    def halve(self, block: F64) -> F64:
+        """The rows that are complete with this block."""
+        if self.rest is not None:
+            block = np.concatenate([self.rest, block])
+        n = len(block) // 2 * 2
+        self.rest = block[n:].copy() if n < len(block) else None
+        return halved_along(block[:n], 0)
+
+
+class RowAreas:
+    """Means over equal parts of an odd number of rows, of rows that come in blocks."""
+
+    def __init__(self, n: int) -> None:
+        self.n, self.m = n, n // 2
+        self.border = np.arange(self.m + 1) * n / self.m
+        self.below = np.minimum(self.border.astype(int), n - 1)
+        self.n_taken = 0
+        self.sum: F64 | None = None  # of the rows before, and the area up to the last border
+        self.area: F64 | None = None
+
+    def halve(self, block: F64) -> F64:
+        """The rows that are complete with this block."""
+        before = np.zeros_like(block[:1]) if self.sum is None else self.sum
+        sums = np.cumsum(np.concatenate([before, block]), axis=0)
+        first, end = np.searchsorted(self.below, [self.n_taken, self.n_taken + len(block)])
+        at = self.below[first:end] - self.n_taken
+        share = (self.border - self.below)[first:end, None, None]
+        area = sums[at] + share * block[at]
+        if self.area is not None:
+            area = np.concatenate([self.area, area])
+        self.n_taken, self.sum, self.area = self.n_taken + len(block), sums[-1:], area[-1:]
+        return np.diff(area, axis=0) * (self.m / self.n)
+
+
+def halved_along(level: F64, axis: int) -> F64:
+    """One axis of the next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
+    n = level.shape[axis]
+    if n % 2 == 0:
+        even, odd = (level[::2], level[1::2]) if axis == 0 else (level[:, ::2], level[:, 1::2])
+        return (even + odd) / 2
+    return mean_over_area(level, n // 2, axis) if n > 1 else level
+
+
+def mean_over_area(level: F64, m: int, axis: int) -> F64:
+    """The m means of equal parts of an axis."""
+    n = level.shape[axis]
+    sums = np.cumsum(np.insert(level, 0, 0, axis=axis), axis=axis)  # the area up to each border
+    border = np.arange(m + 1) * n / m
+    below = np.minimum(border.astype(int), n - 1)
+    share = np.expand_dims(border - below, tuple(k for k in range(level.ndim) if k != axis))
+    area = sums.take(below, axis) + share * level.take(below, axis)
+    return np.diff(area, axis=axis) * (m / n)

@@ -1,0 +1,190 @@
+"""Draws pictures with materials that what is behind shows through: `alpha_mode="blend"`, and colours with alpha.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: the visibility buffer of what is opaque; the rest, laid over its picture.
+
+What is opaque is drawn as ever. The other triangles are peeled, layers that it hides are left out, the rest is shaded,
+each with its own opacity, and laid over it front to back, in linear light: their order in the mesh does not matter.
+With several samples a pixel each sample is composited by itself, and the light is averaged.
+
+Based on: Everitt, C., "Interactive Order-Independent Transparency", 2001; Porter, T. and T. Duff, "Compositing Digital
+Images", SIGGRAPH 1984.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
+from topleft._core.base.memory import SCRATCH
+from topleft._core.raster.peel import peel_meshes
+from topleft._core.raster.rasterize import refuse_many
+from topleft._core.raster.snap import Snapped
+from topleft._core.raster.view import View
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
+from topleft._meshes.picture.fragments import SceneFragments, parts_of
+from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place
+from topleft._meshes.picture.scene_shade import shade_by, shade_part
+from topleft._meshes.picture.shade import Shading, ShadingOptions
+from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
+
+__all__ = ["Glass", "blended_masks", "glass_of"]
+
+F32 = npt.NDArray[np.float32]
+U8 = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
+
+BLENDING = (Shading.SMOOTH, Shading.FLAT, Shading.UNLIT)
+"""What else a picture tells, it tells of the surface that is nearest, as if it were opaque."""
+
+LAYERS, MOST_LAYERS = 4, 16
+"""Layers of a pixel: as many as most need; and all that are looked at, where some pixel has more."""
+
+CLEAR = (0, 0, 0, 0)
+
+COLORED = Material(alpha_mode="blend")
+"""Of a mesh with nothing but colours, which means their alpha."""
+
+
+def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
+    """The triangles (T,) that something shows through, by the materials of the mesh or this one; None if none does."""
+    given = mesh.materials if material is None else (material,)
+    materials = given or (COLORED,)
+    are_blended = [one.alpha_mode is AlphaMode.BLEND and has_opacity(one, mesh) for one in materials]
+    if not any(are_blended):
+        return None
+    rows = mesh.material_of_triangle if given is mesh.materials else None
+    found = np.full(len(mesh.triangles), are_blended[0]) if rows is None else np.array(are_blended)[rows]
+    if all(has_opaque_rest(one, mesh) for one, is_it in zip(materials, are_blended, strict=True) if is_it):
+        found &= (mesh.colors[:, 3] < 255)[mesh.triangles].any(axis=1)  # type: ignore[index]
+    return found if found.any() else None
+
+
+def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
+    """Whether the colours of the vertices alone make something show through."""
+    texture = material.texture if is_laid(material.texture, mesh) else None
+    return material.opacity == 1 and not (texture is not None and texture.has_alpha)
+
+
+def blended_masks(subject: Mesh | Scene, options: ShadingOptions) -> list[Mask | None] | None:
+    """The blended triangles of each instance; None where there are none, or a picture does not tell them apart."""
+    if options.mode not in BLENDING:
+        return None
+    masks = [blended_triangles(mesh, options.material) for mesh in meshes_of(subject)]
+    return None if all(mask is None for mask in masks) else masks
+
+
+def glass_of(
+    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], options: ShadingOptions, view_options: dict[str, Any]
+) -> Glass | None:
+    """What a picture of the subject composites; None where all of it is opaque."""
+    masks = blended_masks(subject, options)
+    if masks is None:
+        return None
+    scene = scene_of(subject)
+    scene.check_counted("a scene that something shows through")
+    placed, view = place(scene, camera, size, view_options, material=options.material)
+    refuse_many(view, "rasterize")
+    if placed.bent is not None:  # the parts that a lens makes of the triangles
+        masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
+    return Glass(placed, view, masks, camera, options)
+
+
+class Glass:
+    """A scene some of whose triangles are blended: what is opaque is drawn first, then these are laid over it."""
+
+    def __init__(
+        self, placed: PlacedScene, view: View, masks: Sequence[Mask | None], camera: Camera, options: ShadingOptions
+    ) -> None:
+        self.whole, self.view, self.masks, self.camera = placed, view, masks, camera
+        self.under = options
+        self.options = replace(options, background=CLEAR, shows_opacity=True)
+
+    @property
+    def scene(self) -> Scene:
+        """What ids count the triangles of."""
+        return self.whole.whole
+
+    def draw_opaque(self) -> SceneFragments:
+        """The visibility buffer of what is opaque."""
+        return draw_nearest(self.whole.of(collapsed(self.whole.scene, self.masks)), self.view)
+
+    @cached_property
+    def blended(self) -> PlacedScene:
+        """The blended triangles alone."""
+        inverse = [None if mask is None else ~mask for mask in self.masks]
+        return self.whole.of(collapsed(self.whole.scene, inverse, keeps_others=False))
+
+    @cached_property
+    def snapped(self) -> list[Snapped]:
+        """The same, ready to be peeled."""
+        return [self.blended.snap(i) for i, mask in enumerate(self.masks) if mask is not None]
+
+    def lay_over(self, picture: U8, frags: SceneFragments) -> None:
+        """Lay what is visible of the blended triangles over the picture of what is opaque."""
+        if 0 in self.view.size:
+            return
+        positions = frags.positions
+        layers = [self.peel(frags, k) for k in range(len(positions))]
+        is_seen = np.logical_or.reduce([ids[0] >= 0 for ids, _ in layers])
+        at = np.nonzero(is_seen)
+        numbers = np.empty(is_seen.shape, np.int32)
+        numbers[at] = np.arange(len(at[0]), dtype=np.int32)
+        light, alpha = np.zeros((len(at[0]), 3), np.float32), np.zeros(len(at[0]), np.float32)
+        for k, planes in enumerate(layers):
+            under = picture
+            if len(positions) > 1:
+                under = shade_by(frags.sample(k).only(*at), self.scene, self.camera, self.under)
+            self.composite(*planes, positions[k], under[at], numbers, light, alpha)
+        color = light / np.maximum(alpha, np.float32(1e-20))[:, None]
+        steps = np.rint(np.minimum(color, 1) * LINEAR_ONE).astype(np.int64)
+        picture[at[0], at[1], :3] = srgb_tables()[1][steps]
+        picture[at[0], at[1], 3] = np.rint(alpha * np.float32(255 / len(positions))).astype(np.uint8)
+
+    def peel(self, frags: SceneFragments, k: int) -> tuple[npt.NDArray[np.int32], F32]:
+        """The layers of a sample that nothing opaque hides, planes (K, H, W) of ids and depths."""
+        there, nearest = (planes[k] for planes in frags.drawn_planes)
+        for n in (LAYERS, MOST_LAYERS):
+            ids, depth = peel_meshes(SCRATCH, self.snapped, self.view, n, is_farthest=False, at_fx=frags.positions[k])
+            for own_ids, own_depth in zip(ids, depth, strict=True):
+                if not (own_ids >= 0).any():
+                    break
+                own_ids[(own_depth > nearest) | ((own_depth == nearest) & (own_ids > there) & (there >= 0))] = -1
+            if not (ids[-1] >= 0).any():
+                break
+        return ids, depth
+
+    def composite(
+        self,
+        ids: npt.NDArray[np.int32],
+        depth: F32,
+        at_sample: tuple[int, int],
+        under: U8,
+        numbers: npt.NDArray[np.int32],
+        light: F32,
+        alpha: F32,
+    ) -> None:
+        """Add what a sample sees to light times opacity (P, 3), and to opacity (P,); `numbers` (H, W) names the pixels.
+
+        `under` (P, 4): the colours of what is opaque.
+        """
+        through = np.ones(len(under), np.float32)
+        for k in range(len(ids)):
+            if not (ids[k] >= 0).any():
+                break
+            layer = SceneFragments(ids[k : k + 1], depth[k : k + 1], self.blended, [at_sample])
+            for part in parts_of(layer, self.scene):
+                own, pixels = shade_part(part, self.camera, self.options)[part.seen], numbers[part.box][part.seen]
+                share = through[pixels] * (own[:, 3] / np.float32(255))
+                light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
+                through[pixels] -= share
+        share = through * (under[:, 3] / np.float32(255))
+        light += share[:, None] * LIGHT_OF_SRGB[under[:, :3]]
+        alpha += 1 - through + share

@@ -1,0 +1,275 @@
+"""Draws clouds of points: their visibility buffer, their picture and their layers.
+
+Input: `Points`, a camera. Output: `PointFragments`, a picture (H, W, 4) uint8, or arrays by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
+from topleft._core.base.memory import FRESH, empty
+from topleft._core.base.options import PointShape
+from topleft._core.raster.classic import refuse_classic
+from topleft._core.raster.points import PointFragments, draw_points
+from topleft._core.raster.rasterize import refuse_many
+from topleft._core.raster.view import View, ViewOptions
+from topleft._meshes.camera.camera import Camera, pixels_of
+from topleft._meshes.camera.lens import Lens
+from topleft._meshes.model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
+from topleft._meshes.model.normals import moved, turn_of_normals, unit_or_zero
+from topleft._meshes.model.points import Points, PointUnit
+from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_numbers, shade_samples
+
+__all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+U8 = npt.NDArray[np.uint8]
+
+NOWHERE_PX = 1e12
+"""Where points stand that a lens does not see: no window shows it."""
+
+
+def draw_cloud(
+    cloud: Points, camera: Camera, size: tuple[int, int], *, depth_test: str | None = "less", **options: Any
+) -> PointFragments:
+    """The visibility buffer of a cloud; options as those of `points`.
+
+    Raises
+    ------
+    ValueError
+        If an option has no meaning for points.
+    """
+    if depth_test != "less":
+        raise ValueError(f"points are drawn with depth_test 'less', got {depth_test!r}")
+    if options.get("cull", "none") != "none":
+        raise ValueError("points have no side to cull")
+    frame = options.get("viewport") or size
+    positions: npt.NDArray[Any] = cloud.positions
+    sizes: float | F64 = cloud.size
+    if camera.lens is None:
+        options["transform"] = camera.clip_from_world(frame)
+    if camera.lens is not None or cloud.unit != PointUnit.PX:
+        eye = moved(positions, camera.view)
+        bent = eye if camera.lens is None else camera.lens.bend(eye)
+        projection = camera.clip_from_eye(frame)
+        if cloud.unit != PointUnit.PX:
+            unit_of_eye = abs(engine.determinant(camera.view[:3, :3])) ** (1 / 3)
+            scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
+            sizes = np.asarray(cloud.size) * scale / w_of(bent, projection)
+        if camera.lens is not None:
+            positions = through_lens(eye, bent, camera.lens, projection, frame)
+    view = View.parse(size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
+    refuse_many(view, "a cloud")
+    refuse_classic(view, "points")
+    return draw_points(FRESH, positions, sizes, PointShape(cloud.shape), view)
+
+
+def draw_share(cloud: Points, camera: Camera, size: tuple[int, int], **options: Any) -> npt.NDArray[Any]:
+    """Where points are, (H, W): bool, or of several samples a pixel the share, float32; options as for `draw_cloud`."""
+    frags = draw_cloud(cloud, camera, size, **options)
+    is_seen = frags.samples_triangle >= 0
+    return frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
+
+
+def through_lens(eye: F64, bent: F64, lens: Lens, projection: F64, frame: tuple[int, int]) -> F64:
+    """Where points in eye space lie in the picture of a lens, which bends them: pixels and depth (N, 3)."""
+    with np.errstate(all="ignore"):
+        places = pixels_of(bent, projection, frame)
+        _, angle = engine.off_axis(eye * [1, 1, -1])
+    is_seen = np.isfinite(places).all(axis=1) & (places[:, 2] >= 0) & (places[:, 2] <= 1)
+    places[~(is_seen & (angle < lens.max_angle))] = NOWHERE_PX, NOWHERE_PX, 0
+    return places
+
+
+def w_of(bent: F64, projection: F64) -> F64:
+    """What divides the sizes (N,) of points of the world in a picture; 1 for what it cannot show."""
+    x, y, z = bent.T
+    a, b, c, d = projection[3].tolist()
+    w = ((a * x + b * y) + c * z) + d
+    return np.where(w > 0, w, 1)
+
+
+def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture (H, W, 4) of a cloud: its colours, lit where it has normals.
+
+    Raises
+    ------
+    ValueError
+        If an option has no meaning for points.
+    """
+    if options.mode is Shading.MATCAP or options.material is not None or options.environment is not None:
+        raise ValueError("points have colours of their own: they take neither a material, a matcap nor an environment")
+    if options.mode is Shading.NORMALS and cloud.normals is None:
+        raise ValueError("shading 'normals' needs points that have normals")
+    if options.mode in (Shading.IDS, Shading.DEPTH):
+        return shade_numbers(frags, camera, options)
+
+    def shade_one(sample: Any) -> U8:
+        picture = empty((*sample.id.shape, 4), np.uint8)
+        picture[...] = options.background
+        seen = sample.mask
+        picture[seen, :3] = colors_of(sample.id[seen], sample.depth[seen], cloud, camera, options)
+        picture[seen, 3] = 255
+        return picture
+
+    return shade_samples(frags, shade_one, options.background)
+
+
+def colors_of(ids: npt.NDArray[np.int32], depth: F32, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:
+    """Colours (P, 3) of pixels that show these points: each point is lit once."""
+    decode, encode = srgb_tables()
+    is_seen = np.zeros(len(cloud), np.bool_)
+    is_seen[ids] = True
+    rows = np.flatnonzero(is_seen)
+    row_of = np.cumsum(is_seen) - 1
+    if options.mode is Shading.NORMALS:
+        return np.rint(127.5 * in_eye_space(cloud, camera, rows)[1] + 127.5).astype(np.uint8)[row_of[ids]]
+    plain = np.array(options.color or DEFAULT_COLOR, np.uint8)
+    own = np.broadcast_to(plain, (len(rows), 3)) if cloud.colors is None else cloud.colors[rows, :3]
+    light = decode[own] / LINEAR_ONE
+    if cloud.normals is not None and options.mode is not Shading.UNLIT:
+        light *= light_at(cloud, camera, rows, options)
+    if options.fog is None:
+        return encode[steps_of(light)][row_of[ids]]
+    way = (eye_distance(depth, camera) - options.fog.near) / (options.fog.far - options.fog.near)
+    share = way.clip(0, 1)[:, None]
+    behind = np.array(light_of(options.fog.color)[:3])
+    return encode[steps_of(light[row_of[ids]] * (1 - share) + behind * share)]
+
+
+def steps_of(light: F64) -> npt.NDArray[np.intp]:
+    """Light in whole steps: rows of the table of sRGB values."""
+    return np.rint(LINEAR_ONE * light.clip(0, 1)).astype(np.intp)
+
+
+def in_eye_space(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp]) -> tuple[F64, F64]:
+    """Positions (P, 3) of some points in eye space, and unit normals on the side that is seen; 0: none."""
+    given = cast(npt.NDArray[Any], cloud.normals)[rows]
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn_of_normals(camera.view).T
+    eye, normals = moved(cloud.positions[rows], camera.view), unit_or_zero(moved(unit_or_zero(given), matrix))
+    to_eye = -eye if camera.projection[3, :3].any() else np.broadcast_to(np.array([0.0, 0.0, 1.0]), normals.shape)
+    normals[engine.row_products(normals, to_eye) < 0] *= -1
+    return eye, normals
+
+
+def light_at(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp], options: ShadingOptions) -> F64:
+    """How much of red, green and blue (P, 3) some points send back: as a mesh does, without highlights."""
+    eye, normals = in_eye_space(cloud, camera, rows)
+    total = np.full((len(rows), 3), options.ambient)
+    if options.lights is None:
+        half = (1 + engine.row_products(normals, TO_HEADLIGHT)) / 2
+        total += (max(0.0, 1 - options.ambient) * half * half * half)[:, None]
+    for light in options.lights or ():
+        total += lambert(light, eye, normals, camera.view)[:, None] * np.array(light_of(light.color)[:3])
+    total[~normals.any(axis=1)] = 1.0
+    return total
+
+
+def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
+    """The cosine of one light at some points (P, 3) in eye space, times its intensity: (P,)."""
+    is_point = light.kind == LightKind.POINT
+    at = np.array([light.at])
+    if light.space == LightSpace.WORLD:
+        matrix = view if is_point else np.vstack([np.c_[view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
+        at = moved(at, matrix)
+    way = at - eye if is_point else at
+    cosine = light.intensity * np.maximum(engine.row_products(normals, unit_or_zero(way)), 0)
+    if not is_point:
+        return cosine
+    unit_of_eye = abs(engine.determinant(view[:3, :3])) ** (1 / 3)
+    return cosine / (1 + light.falloff * engine.row_products(way, way) / unit_of_eye**2)
+
+
+@dataclass(frozen=True, eq=False)
+class CloudBuffer:
+    """A cloud and who looks at it; as `GBuffer` is of meshes."""
+
+    subject: Points
+    camera: Camera
+    size: tuple[int, int]
+    options: dict[str, Any] = field(default_factory=dict)
+    look: dict[str, Any] = field(default_factory=dict)
+    camera_to: Camera | None = None
+    transforms_to: F64 | None = None
+
+    @cached_property
+    def frags(self) -> PointFragments:
+        """The visibility buffer, at the centres of the pixels."""
+        return draw_cloud(self.subject, self.camera, self.size, **self.options)
+
+    def spread(self, values: npt.NDArray[np.floating[Any]], background: float) -> F32:
+        """Values of the points, (N,) or (N, K), at the pixels."""
+        return self.frags.interpolate(values, background=background)
+
+    @property
+    def eye(self) -> F64:
+        """The points in eye space, (N, 3)."""
+        return moved(self.subject.positions, self.camera.view)
+
+
+def silhouette(buffer: CloudBuffer) -> npt.NDArray[Any]:
+    """Where points are, (H, W): bool, or the share of samples, float32."""
+    sampling = buffer.look.get("sampling", "center")
+    if sampling == "center":
+        return buffer.frags.mask
+    return draw_share(buffer.subject, buffer.camera, buffer.size, sampling=sampling, **buffer.options)
+
+
+def alpha(buffer: CloudBuffer) -> U8:
+    """How much of the pixel is covered, (H, W) uint8, 255 for all of it."""
+    return np.rint(silhouette(buffer).astype(np.float32) * np.float32(255)).astype(np.uint8)
+
+
+def distance(buffer: CloudBuffer) -> F32:
+    """Distance of the point along the view, (H, W) float32."""
+    return buffer.spread(-buffer.eye[:, 2], np.inf)
+
+
+def ray_distance(buffer: CloudBuffer) -> F32:
+    """Distance of the point from the eye, (H, W) float32."""
+    if not buffer.camera.projection[3, :3].any():
+        return distance(buffer)
+    return buffer.spread(np.sqrt(engine.row_products(buffer.eye, buffer.eye)), np.inf)
+
+
+def camera_normal(buffer: CloudBuffer) -> F32:
+    """The normal of the point in eye space, on the side that is seen, (H, W, 3) float32."""
+    if buffer.subject.normals is None:
+        raise ValueError("normals need points that have them")
+    return buffer.spread(in_eye_space(buffer.subject, buffer.camera, np.arange(len(buffer.subject)))[1], 0.0)
+
+
+def world_normal(buffer: CloudBuffer) -> F32:
+    """The same in the world."""
+    if buffer.subject.normals is None:
+        raise ValueError("normals need points that have them")
+    back = np.eye(4)
+    back[:3, :3] = buffer.camera.view[:3, :3].T  # the transpose, where positions take the inverse
+    _, own = in_eye_space(buffer.subject, buffer.camera, np.arange(len(buffer.subject)))
+    return buffer.spread(unit_or_zero(moved(own, back)), 0.0)
+
+
+CLOUD_LAYERS: Mapping[str, Callable[[CloudBuffer], npt.NDArray[Any]]] = MappingProxyType({
+    "alpha": alpha,
+    "silhouette": silhouette,
+    "depth": lambda buffer: buffer.frags.depth,
+    "distance": distance,
+    "ray_distance": ray_distance,
+    "triangle": lambda buffer: buffer.frags.point,
+    "instance": lambda buffer: buffer.frags.instance,
+    "world_position": lambda buffer: buffer.spread(buffer.subject.positions, np.nan),
+    "world_normal": world_normal,
+    "camera_normal": camera_normal,
+})  # fmt: skip
+"""The layers that points have beside colours and flow, as `LAYERS` of `layers.py`."""

@@ -1,0 +1,99 @@
+"""Draws the edges of triangles over a picture, those that its visibility buffer does not hide.
+
+Input: a picture (H, W, 4) uint8, `Fragments`, the `Mesh` or `Scene` and the `Camera` they were made with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.verbs import wireframe
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.shade import ShadingOptions
+from topleft._meshes.picture.through_lens import seen_through
+from topleft._meshes.scene.scene import Instance, Scene, scene_of
+from topleft.typing import CullOption
+
+__all__ = ["EDGE_COLOR", "depth_behind", "draw_all_edges"]
+
+EDGE_COLOR = (24, 28, 40)
+TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
+
+
+def draw_all_edges(
+    picture: npt.NDArray[np.uint8],
+    frags: Fragments,
+    subject: Mesh | Scene,
+    camera: Camera,
+    options: ShadingOptions,
+    *,
+    cull: CullOption,
+) -> None:
+    """Draw the edges of every instance that the visibility buffer does not hide."""
+    behind = depth_behind(frags.depth)
+    for instance in scene_of(subject):
+        own_camera, own_cull = camera.placed(instance.transform), cull_of(cull, instance)
+        back = cull_of("back", instance)
+        vertices, triangles = instance.mesh.vertices, instance.mesh.triangles
+        is_single = instance.mesh.single_sided(options.material)
+        kinds = [(triangles, own_cull)]
+        if is_single is not None and own_cull != back:
+            kinds = [(triangles[is_single == 0], own_cull)]
+            if own_cull == "none":  # of the others the edges of what shows its front
+                kinds.append((triangles[is_single == 1], back))
+        for some, side in kinds:
+            draw_edges(picture, behind, vertices, some, own_camera, cull=side, threads=options.threads)
+
+
+def cull_of(cull: CullOption, instance: Instance) -> CullOption:
+    """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
+    return TURNED.get(cull, cull) if instance.is_mirrored else cull
+
+
+def draw_edges(
+    picture: npt.NDArray[np.uint8],
+    depth: npt.NDArray[np.float32],
+    vertices: npt.NDArray[Any],
+    triangles: npt.NDArray[Any],
+    camera: Camera,
+    *,
+    cull: CullOption,
+    threads: int | None,
+) -> None:
+    """Draw the edges of triangles over the picture (H, W, 4), those that are not behind a depth (H, W)."""
+    height, width = depth.shape
+    size = width, height
+    vertices, triangles, transform, bent = seen_through(vertices, triangles, camera, size)
+    if bent is not None:
+        triangles, cull = bent.outline(transform, cull), "none"
+    lines = wireframe(
+        vertices, triangles, size, transform=transform, depth=depth, antialias=True, cull=cull,
+        threads=threads,
+    )  # fmt: skip
+    on = lines > 0
+    share = lines[on][:, None]
+    under = picture[on].astype(np.float32)
+    alpha = share + (1 - share) * (under[:, 3:] / 255)  # "over", T. Porter, T. Duff, Compositing Digital Images, 1984
+    rgb = share * np.array(EDGE_COLOR, np.float32) + (1 - share) * (under[:, 3:] / 255) * under[:, :3]
+    picture[on] = np.rint(np.hstack([rgb / alpha, 255 * alpha])).astype(np.uint8)
+
+
+def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """The depth that edges may have and still show: farther by what the surface falls away within a pixel.
+
+    The slope along each axis is the smaller of those to the two neighbours: the other one may jump to another surface.
+    """
+    behind = depth.copy()
+    for axis in range(2):
+        with np.errstate(invalid="ignore"):
+            step = np.abs(np.diff(depth, axis=axis, prepend=np.inf, append=np.inf))
+        before, after = np.delete(step, -1, axis), np.delete(step, 0, axis)
+        slope = np.fmin(before, after)  # NaN: nothing on either side
+        behind += np.where(np.isfinite(slope), slope, 0)
+    return behind

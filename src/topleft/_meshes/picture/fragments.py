@@ -1,0 +1,418 @@
+"""Holds what each instance shows in a visibility buffer: of a mesh or a scene, with or without a lens.
+
+Input: ids that count the triangles of all instances, and what they were drawn from. Output: `SceneFragments`,
+`BentFragments`, and their parts: rectangles of pixels with the fragments and the mesh as they were drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_aligned, as_array, set_aligned, shown
+from topleft._core.base.memory import empty
+from topleft._core.raster.fragments import Fragments, Viewer, as_sample, view_of
+from topleft._core.raster.peel import DepthLayers
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.bend import BentMesh
+from topleft._meshes.scene.scene import Instance, Scene, counted_ranges, meshes_of
+
+if TYPE_CHECKING:
+    from topleft._meshes.picture.instances import PlacedScene
+
+__all__ = [
+    "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "join",
+    "parts_of",
+]  # fmt: skip
+
+Ids = NDArray[np.int32] | NDArray[np.int64]
+"""What counts the triangles of all instances: int64 where int32 does not."""
+
+WHOLE = slice(None), slice(None)
+"""The box of a part that is all of the picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What one instance shows: its index, the rectangle of pixels round that, and the fragments there."""
+
+    i: int
+    box: tuple[slice, slice]
+    frags: Fragments
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """Where in the rectangle the instance shows."""
+        return self.frags.mask
+
+
+@dataclass(frozen=True, eq=False)
+class VisiblePart(Part):
+    """A part, and the instance that shows there; without one the mesh stands where its vertices are."""
+
+    mesh: Mesh
+    instance: Instance | None = None
+
+    @cached_property
+    def drawn(self) -> tuple[Fragments, Mesh]:
+        """The fragments and the mesh as they were drawn, for the kernels: through a lens those of its parts."""
+        frags, mesh = self.frags, self.mesh
+        return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
+
+    @property
+    def place(self) -> npt.NDArray[np.float64]:
+        """World from object, (4, 4)."""
+        return np.eye(4) if self.instance is None else self.instance.transform
+
+    def camera(self, camera: Camera) -> Camera:
+        """The camera as it stands in the object space of the instance, without its lens."""
+        return camera.straightened() if self.instance is None else camera.straightened().placed(self.instance.transform)
+
+
+PartT = TypeVar("PartT", bound=Part)
+
+
+def parts_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[VisiblePart]:
+    """What each instance shows that shows anything, of the mesh or scene that was drawn; a mesh shows one part."""
+    if isinstance(subject, Mesh):
+        return [VisiblePart(0, WHOLE, frags, subject)]
+    found = cast(SceneFragments, frags).parts
+    return [VisiblePart(part.i, part.box, part.frags, subject[part.i].mesh, subject[part.i]) for part in found]
+
+
+def join(
+    parts: Sequence[PartT], shape: tuple[int, ...], background: Any, make: Callable[[PartT], NDArray[Any]],
+    dtype: npt.DTypeLike = np.float32,
+) -> NDArray[Any]:  # fmt: skip
+    """A picture made part by part; what is made of a part that is all of it is returned, not copied."""
+    if len(parts) == 1 and parts[0].box == WHOLE:
+        return make(parts[0])
+    picture = empty(shape, dtype)
+    picture[...] = background
+    for part in parts:
+        to, made = picture[part.box], make(part)
+        if to.ndim > 2 and to.shape[2:] == (4,) and to.dtype == made.dtype == np.uint8 and made.flags.c_contiguous:
+            to, made = to.view(np.uint32), made.view(np.uint32)  # a pixel at once
+        np.copyto(to, made, where=part.seen.reshape(part.seen.shape + (1,) * (to.ndim - 2)))
+    return picture
+
+
+class InstanceIds:
+    """What ids of triangles of all instances tell, of a buffer or of layers."""
+
+    id: Any  # Ids
+    placed: Any
+
+    @cached_property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the instance that shows, int32, -1 where there is none."""
+        return instance_of_ids(self.id, self.placed.whole_first_ids)
+
+    @cached_property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle in its mesh, int32, -1 where there is none."""
+        return local_ids(self.id, self.instance, self.placed.whole_first_ids)
+
+
+class SceneFragments(InstanceIds, Fragments):
+    """What `rasterize_mesh` returns of a `Scene`.
+
+    An instance is snapped again when an attribute of it is asked for.
+
+    Attributes
+    ----------
+    instance : ndarray of int32, shape (H, W)
+        Index of the instance that shows in the pixel, -1 where there is none.
+    triangle : ndarray of int32, shape (H, W)
+        Index of its triangle in the mesh of that instance, -1 where there is none.
+    id : ndarray of int32, shape (H, W)
+        The triangles of all instances counted in their order: the number that decides ties. int64 where there are more
+        than 2**31 - 1 of them.
+    depth, mask
+        As in `Fragments`. `interpolate` takes a sequence of arrays, one of each instance, all with as many channels.
+    samples_instance, samples_triangle, samples_id, samples_depth : ndarray, shape (H, W, S)
+        The same for each sample, with several a pixel.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> scene = tl.Scene([tl.Instance(cube)])
+    >>> frags = tl.rasterize_mesh(scene, tl.Camera.framing(scene), (16, 16))
+    >>> int(frags.instance[8, 8]), int(frags.instance[0, 0])
+    (0, -1)
+    """
+
+    _planes: Any  # Ids, and depth
+
+    def __init__(
+        self, ids: Ids, depth: NDArray[np.float32], placed: PlacedScene, positions: Sequence[tuple[int, int]]
+    ) -> None:
+        """Take planes (S, H, W) of what was drawn, and where their samples lie."""
+        self.drawn_planes = ids, depth
+        self.placed = placed
+        self.positions = positions
+        self._planes = placed.whole_ids(ids), depth
+        self.id, self._depth = self._planes[0][0], depth[0]
+        self.samples_id = np.moveaxis(self._planes[0], 0, -1)
+
+    def __repr__(self) -> str:
+        height, width = self.id.shape
+        return f"SceneFragments({width}x{height}, {len(self.whole)} instances, {self.whole.n_triangles} triangles)"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: the parts refer to memory of this one, and are made there."""
+        return {name: value for name, value in vars(self).items() if name != "parts"}
+
+    __setstate__ = set_aligned
+
+    @property
+    def whole(self) -> Scene:
+        """The scene that ids count the triangles of."""
+        return self.placed.whole
+
+    @cached_property
+    def _found(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Which instance shows (H, W), and the boxes of pixels round each (N, 4): left, top, right, bottom."""
+        ids: Ids = np.ascontiguousarray(as_aligned(self.id))
+        boxes = np.tile(np.array([*ids.shape[::-1], 0, 0], np.int32), (len(self.placed.whole_first_ids) - 1, 1))
+        return find_instances(ids, self.placed.whole_first_ids, boxes), boxes
+
+    @cached_property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the instance that shows, int32, -1 where there is none."""
+        return self._found[0]
+
+    @cached_property
+    def samples_instance(self) -> NDArray[np.int32]:
+        """Index of the instance that each sample sees, int32 (H, W, S)."""
+        return instance_of_ids(self.samples_id, self.placed.whole_first_ids)
+
+    @cached_property
+    def samples_triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
+        return local_ids(self.samples_id, self.samples_instance, self.placed.whole_first_ids)
+
+    def _at_sample(self, i: int) -> SceneFragments:
+        """Return ids, depth and attributes at one sample of each pixel."""
+        i = as_sample(i, len(self.positions))
+        ids, depth = self.drawn_planes
+        return SceneFragments(ids[i : i + 1], depth[i : i + 1], self.placed, self.positions[i : i + 1])
+
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> SceneFragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        ids = np.full((1, *self.id.shape), -1, self.id.dtype)
+        ids[0, rows, cols] = self.drawn_planes[0][0, rows, cols]
+        return SceneFragments(ids, self.depth[None], self.placed, self.positions[:1])
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """What each instance shows that shows anything, in their order."""
+        return tuple(self._make_parts())
+
+    def _make_parts(self) -> Iterator[Part]:
+        _, boxes = self._found
+        for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
+            left, top, right, bottom = boxes[i].tolist()
+            box = slice(top, bottom), slice(left, right)
+            first, end = self.placed.first_ids[i : i + 2].tolist()
+            own = local_part(self.drawn_planes[0][0][box], first, end)
+            scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(left, top)
+            mesh = self.placed.scene[i].mesh
+            frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
+            frags.corners = self.placed.corners(i)
+            bent = self.placed.bent
+            yield Part(i, box, frags if bent is None else BentFragments(frags, bent[i], self.whole[i].mesh))
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the three vertices of the triangle that shows in each pixel; see `Fragments`."""
+        return join(self.parts, (*self.id.shape, 3), 0.0, lambda part: part.frags.barycentric())
+
+    def distance(self, camera: Viewer) -> NDArray[np.float32]:
+        """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
+        view = view_of(camera)
+        rows = [engine.product(view[2], instance.transform) for instance in self.whole]
+        meshes = meshes_of(self.whole)
+        values = [-(engine.product(mesh.vertices, row[:3]) + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
+        return self.interpolate(values, background=np.inf)
+
+    def _checked(self, values: Any) -> list[NDArray[Any]]:
+        n = len(self.whole)
+        if not isinstance(values, Iterable):
+            raise TypeError(f"values must be one array for each of {n} instances, got {shown(values)}")
+        arrays = [as_array("values", array) for array in values]
+        if len(arrays) != n:
+            raise ValueError(f"values must be one array for each of {n} instances, got {len(arrays)}")
+        shapes = {() if array.ndim < 2 else array.shape[-1:] for array in arrays}
+        if len(shapes) > 1:
+            raise ValueError(f"values must have as many channels for each instance, got {sorted(shapes)}")
+        return arrays
+
+    def _interpolated(self, arrays: list[NDArray[Any]], background: float) -> NDArray[np.float32]:  # type: ignore[override]
+        """The attribute, part by part."""
+        shape = *self.id.shape, *arrays[0].shape[1:][-1:]
+        return join(
+            self.parts, shape, background, lambda part: part.frags.interpolate(arrays[part.i], background=background)
+        )
+
+    def _derivatives(self, arrays: list[NDArray[Any]]) -> NDArray[np.float32]:  # type: ignore[override]
+        """The derivatives, part by part."""
+        shape = *self.id.shape, *arrays[0].shape[1:][-1:], 2
+        return join(self.parts, shape, 0.0, lambda part: part.frags.interpolate(arrays[part.i], derivatives=True)[1])
+
+
+class SceneDepthLayers(InstanceIds, DepthLayers):
+    """The nearest layers of every pixel of a `Scene`.
+
+    Attributes
+    ----------
+    instance, triangle, id : ndarray of int32, shape (H, W, K)
+        As in `SceneFragments`, of each layer; -1 where there are fewer.
+    depth : ndarray of float32, shape (H, W, K)
+        As in `DepthLayers`.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> scene = tl.Scene([tl.Instance(cube)])
+    >>> layers = tl.visible_layers(scene, tl.Camera.framing(scene), (16, 16), layers=2)
+    >>> layers.instance[8, 8].tolist()
+    [0, 0]
+    """
+
+    def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], placed: PlacedScene) -> None:
+        """Take planes (K, H, W)."""
+        self.planes = ids, depth
+        self.placed = placed
+
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of all instances together."""
+        return int(self.placed.whole_first_ids[-1])
+
+    @property
+    def n_vertices(self) -> None:
+        """None: vertices are those of several meshes."""
+        return
+
+    @property
+    def id(self) -> NDArray[np.int32]:  # none assigns it
+        """The triangles of all instances counted in their order, int32 (H, W, K)."""
+        return np.moveaxis(self.planes[0], 0, -1)
+
+    def layer(self, k: int) -> SceneFragments:
+        """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
+        k = range(len(self))[k]
+        ids, depth = self.planes
+        return SceneFragments(ids[k : k + 1], depth[k : k + 1], self.placed, [(0, 0)])
+
+
+def instance_of_ids(ids: Ids, first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Return the instance that each id belongs to, -1 for -1."""
+    if len(first_ids) == 2:
+        return ids >> 31
+    flat: Any = np.ascontiguousarray(ids).reshape(1, -1)
+    return find_instances(flat, first_ids, None).reshape(ids.shape)
+
+
+def find_instances(ids: Ids, first_ids: NDArray[np.int64], boxes: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Return the same of contiguous ids (H, W), and widen the boxes of those that show."""
+    found = empty(ids.shape, np.int32)
+    if ids.dtype == np.int32:
+        engine.find_instances(cast("NDArray[np.int32]", ids), first_ids, found, boxes)
+        return found
+    found[...] = -1
+    for first, end in counted_ranges(first_ids):
+        own, part = local_part(ids, *first_ids[[first, end]].tolist()), empty(ids.shape, np.int32)
+        own_ids = first_ids[first : end + 1] - first_ids[first]
+        engine.find_instances(own, own_ids, part, None if boxes is None else boxes[first:end])
+        np.add(part, np.int32(first), out=found, where=own >= 0)
+    return found
+
+
+def local_part(ids: Ids, first: int, end: int) -> NDArray[np.int32]:
+    """Return ids less the first of those in [first, end), which int32 counts; -1 for others."""
+    own: NDArray[Any] = ids - ids.dtype.type(first)
+    own[own.view(np.dtype(f"u{own.itemsize}")) >= end - first] = -1
+    return own.astype(np.int32, copy=False)
+
+
+def local_ids(ids: Ids, instance: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Return the index of each triangle in its mesh, -1 for -1."""
+    first: NDArray[Any] = np.append(first_ids[:-1], 0).astype(ids.dtype)
+    return (ids - first[instance]).astype(np.int32, copy=False)  # instance -1 takes the last of them, 0
+
+
+class BentFragments(Fragments):
+    """The visibility buffer of a mesh whose triangles were drawn in parts, in terms of the whole ones.
+
+    Made by `rasterize_mesh` for cameras with a lens. `triangle` holds triangles of the mesh, and attributes are those
+    of its vertices.
+    """
+
+    def __init__(self, drawn: Fragments, bent: BentMesh, mesh: Mesh) -> None:
+        super().__init__(
+            bent.whole_ids(drawn.triangle), drawn.depth, drawn._snapped, len(mesh.vertices), len(mesh.triangles)
+        )
+        self.drawn, self.bent = drawn, bent
+        self._mesh = mesh
+
+    def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
+        """Return the fragments of each of several samples, and their planes (S, H, W), of whole triangles."""
+        if self._planes is None:
+            samples, planes = self.drawn._sampled()
+            self._samples = tuple(BentFragments(sample, self.bent, self._mesh) for sample in samples)
+            self._planes = planes and (self.bent.whole_ids(planes[0]), planes[1])
+        return self._samples, self._planes
+
+    def again(self) -> BentFragments:
+        """Return the same made anew from the parts, whose buffers have changed."""
+        return BentFragments(self.drawn, self.bent, self._mesh)
+
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        return BentFragments(self.drawn.only(rows, cols), self.bent, self._mesh)
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the three vertices of the triangle that shows in each pixel."""
+        if not len(self.bent.triangles):
+            return np.zeros((*self.triangle.shape, 3), np.float32)
+        if self.bent.parts is None:
+            return self.drawn.barycentric()
+        return self._interpolated(np.broadcast_to(np.eye(3, dtype=np.float32), (len(self._mesh.triangles), 3, 3)), 0.0)
+
+    def distance(self, camera: Viewer) -> NDArray[np.float32]:
+        """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
+        view = view_of(camera)
+        return self.interpolate(-(engine.product(self._mesh.vertices, view[2, :3]) + view[2, 3]), background=np.inf)
+
+    def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
+        """The attribute of checked values, by way of the parts."""
+        if not len(self.bent.triangles):
+            channels = array.shape[-1:] if array.ndim > 1 else ()
+            return np.full((*self.triangle.shape, *channels), background, np.float32)
+        own = array if self.bent.parts is None else self._corners_of_parts(array)
+        out = self.drawn.interpolate(own, background=background)
+        return out if array.ndim > 1 else out.reshape(self.triangle.shape)
+
+    def _derivatives(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The derivatives of checked values, by way of the parts."""
+        if not len(self.bent.triangles):
+            channels = array.shape[-1:] if array.ndim > 1 else ()
+            return np.zeros((*self.triangle.shape, *channels, 2), np.float32)
+        _, slopes = self.drawn.interpolate(self._corners_of_parts(array), derivatives=True)
+        return slopes if array.ndim > 1 else slopes[..., 0, :]
+
+    def _corners_of_parts(self, array: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Checked values at the corners of the parts, (T, 3, K)."""
+        corners = array if array.ndim == 3 else array.reshape(len(array), -1)[self._mesh.triangles]
+        return self.bent.at_corners(corners)

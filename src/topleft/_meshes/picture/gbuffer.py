@@ -1,0 +1,163 @@
+"""Evaluates where in space each visible pixel of a mesh or scene lies, when a layer asks for it.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: `GBuffer`, from which `layers` are taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.memory import empty
+from topleft._core.base.threads import run_parts, threads_for
+from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.verbs import Rasterizer
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.normals import moved
+from topleft._meshes.picture.fragments import VisiblePart, join, parts_of
+from topleft._meshes.picture.holes import cuts_of, without_holes
+from topleft._meshes.picture.render import rasterize_subject
+from topleft._meshes.scene.scene import Scene
+
+__all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
+
+F64 = npt.NDArray[np.float64]
+
+
+class PointKind(IntEnum):
+    """What is told of a point: tl_point_kind in csrc/topleft.h."""
+
+    ROWS = 0
+    LENGTH = 1
+    FLOW = 2
+
+
+N_NUMBERS = {PointKind.LENGTH: 1, PointKind.FLOW: 2}
+
+
+def evaluate(
+    part: VisiblePart,
+    what: PointKind,
+    rows: F64,
+    background: float,
+    *,
+    size: tuple[int, int] = (0, 0),
+    threads: int | None = None,
+    dtype: type[np.floating[Any]] = np.float32,
+) -> npt.NDArray[Any]:
+    """What pixels/points.c tells of the points of the pixels, from numbers that are rows (N, 4) times (x, y, z, 1).
+
+    Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the snap,
+    relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.
+    """
+    frags, mesh = part.drawn
+    ids = np.require(frags.triangle, np.int32, ["C", "A"])
+    n = N_NUMBERS.get(what, len(rows))
+    out: npt.NDArray[Any] = empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
+    half_size = size[0] / 2, size[1] / 2
+    points = engine.PixelPoints(
+        mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64
+    )
+    scene = frags._snapped.with_inverse_w(ids.size, empty)
+    n_threads = threads_for(threads, len(mesh.triangles))
+    run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
+    return out
+
+
+def points_of(part: VisiblePart) -> F64:
+    """Where the pixels that are seen lie on the mesh, in its own space: (P, 3) float64."""
+    points: F64 = evaluate(part, PointKind.ROWS, np.eye(4)[:3], np.nan, dtype=np.float64)[part.seen]
+    return points
+
+
+@dataclass(frozen=True, eq=False)
+class GBuffer:
+    """A mesh or scene and who looks at it.
+
+    Parameters
+    ----------
+    subject : Mesh or Scene
+    camera : Camera
+    size : (width, height), pixels
+    options : dict
+        `cull`, `subpixel_bits` and `threads`, as `rasterize_mesh` takes them.
+    look : dict
+        Further options of `render`, for colours.
+    camera_to : Camera, optional
+        Who looks when the flow ends.
+    transforms_to : (N, 4, 4) float64, optional
+        Where the instances are then.
+    rasterizer : Rasterizer, optional
+        What layers hold may lie in its memory, which the next picture overwrites.
+    """
+
+    subject: Mesh | Scene
+    camera: Camera
+    size: tuple[int, int]
+    options: dict[str, Any] = field(default_factory=dict)
+    look: dict[str, Any] = field(default_factory=dict)
+    camera_to: Camera | None = None
+    transforms_to: F64 | None = None
+    rasterizer: Rasterizer | None = None
+
+    @cached_property
+    def frags(self) -> Fragments:
+        """The visibility buffer, at the centres of the pixels, without what materials cut out."""
+        return self._cut(rasterize_subject(*self._view, self.rasterizer, self.look.get("material"), **self.options))
+
+    def sampled(self, sampling: str) -> Fragments:
+        """Return the same with several samples a pixel."""
+        material = self.look.get("material")
+        return self._cut(rasterize_subject(*self._view, material=material, sampling=sampling, **self.options))
+
+    @cached_property
+    def has_holes(self) -> bool:
+        """Whether materials cut something out."""
+        return any(cuts_of(self.subject, self.look.get("material")))
+
+    @property
+    def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:
+        return self.subject, self.camera, self.size
+
+    def _cut(self, frags: Fragments) -> Fragments:
+        return without_holes(frags, self.subject, self.camera, self.look.get("material"))
+
+    @cached_property
+    def parts(self) -> Sequence[VisiblePart]:
+        """The visible pixels of each instance that shows any."""
+        return parts_of(self.frags, self.subject)
+
+    def join(
+        self, channels: tuple[int, ...], background: float, make: Callable[[VisiblePart], npt.NDArray[Any]]
+    ) -> npt.NDArray[np.float32]:
+        """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each part."""
+        return join(self.parts, (*self.frags.depth.shape, *channels), background, make)
+
+    def evaluate(
+        self, part: VisiblePart, what: PointKind, rows: F64, background: float, *, size: tuple[int, int] = (0, 0)
+    ) -> npt.NDArray[Any]:
+        """What `evaluate` does, with the threads of this buffer."""
+        return evaluate(part, what, rows, background, size=size, threads=self.options.get("threads"))
+
+
+def project(points: F64, camera: Camera, transform: F64, size: tuple[int, int]) -> F64:
+    """Where points (P, 3) of an object lie in a picture, pixels (P, 2) float64; NaN for what the camera cannot see."""
+    projection = camera.clip_from_eye(size)
+    if camera.lens is None:
+        is_seen = np.ones(len(points), np.bool_)
+        x, y, w = moved(points, engine.product(engine.product(projection, camera.view), transform)[[0, 1, 3]]).T
+    else:
+        eye = moved(points, engine.product(camera.view, transform)[:3])
+        is_seen = engine.off_axis(eye * [1, 1, -1])[1] < camera.lens.max_angle
+        x, y, w = moved(camera.lens.bend(eye), projection[[0, 1, 3]]).T
+    w[~(is_seen & (w > 0))] = np.nan
+    width, height = size
+    return np.stack([(x / w + 1) * (width / 2), (1 - y / w) * (height / 2)], -1)

@@ -1,0 +1,539 @@
+"""Draws the instances of a scene into one buffer, whole or in clusters, from front to back.
+
+In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragments`, or a mask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import INT32_MAX, set_aligned
+from topleft._core.base.memory import FRESH, SCRATCH, KeptMemory, Memory, check_fits, empty
+from topleft._core.base.options import DepthTest, Sampling, Sink, parse
+from topleft._core.base.threads import count_threads, run_parts
+from topleft._core.raster import choices
+from topleft._core.raster.classic import refuse_classic
+from topleft._core.raster.cluster_draw import ClusteredMesh, Survey, draw_clustered, equal_bands
+from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.fragments import GivenCorners
+from topleft._core.raster.peel import check_peel, peel_meshes
+from topleft._core.raster.rasterize import canvas_of, refuse_many
+from topleft._core.raster.sampling import sample_positions, sum_areas
+from topleft._core.raster.snap import Snapped, snap_mesh
+from topleft._core.raster.view import View, ViewOptions
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.material import Material
+from topleft._meshes.picture.fragments import Ids, SceneDepthLayers, SceneFragments
+from topleft._meshes.picture.through_lens import DrawnScene, scene_through
+from topleft._meshes.scene.scene import Scene
+from topleft.typing import DepthTestOption
+
+__all__ = ["PlacedScene", "draw_nearest", "draw_scene", "draw_scene_coverage", "peel_scene", "place"]
+
+#: Snapped vertices that are held at a time: 16 bytes each.
+VERTICES_AT_ONCE = 1 << 20
+
+#: `tl_kernels.draw` begins a mask anew after 2**31 pixels, which one that is drawn in several calls must not meet.
+MOST_PIXELS_OF_PART = 1 << 30
+
+#: cull codes of a view (tl_cull) for an instance that mirrors.
+MIRRORED = {0: 0, 1: 2, 2: 1}
+
+#: Instances that tell what a picture shows of all, and clusters of each: less than a tenth of a millisecond.
+SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
+
+#: Instances that are drawn before it is looked which others they hide.
+FIRST_ROUND = 16
+
+#: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
+CELLS = 128
+
+#: Which end of a box each of its corners has, axis by axis.
+CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.bool_)
+
+
+class PlacedScene:
+    """A scene as a camera sees it: its instances are snapped when they are asked for.
+
+    Attributes
+    ----------
+    scene, whole : Scene
+        What is drawn, and what ids count the triangles of: the same but for a lens.
+    first_ids, whole_first_ids : (N + 1,) int64
+        Where the ids of each instance begin in these, and their end.
+    bent : sequence of BentMesh, optional
+        The parts that a lens makes of each instance.
+    """
+
+    def __init__(
+        self,
+        drawn: DrawnScene,
+        view: View,
+        *,
+        with_depth: bool,
+        may_cluster: bool = True,
+        material: Material | None = None,
+        first_id: int = 0,
+    ) -> None:
+        self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
+        self.first_ids, self.whole_first_ids = drawn.scene.first_ids, drawn.whole.first_ids
+        self._view, self._first_id = view, first_id
+        self._material = material  # instead of those of the meshes
+        self._with_depth = with_depth
+        self._may_cluster = may_cluster
+        self._last: tuple[int, View] | None = None  # the instance that was last asked for: often thrice in turn
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: views of instances are made there."""
+        return vars(self) | {"_last": None}
+
+    __setstate__ = set_aligned
+
+    def of(self, scene: Scene) -> PlacedScene:
+        """Return another scene to draw, made for this picture alone, seen in the same way."""
+        drawn = self._drawn._replace(scene=scene)
+        return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False, material=self._material)
+
+    def whole_ids(self, ids: Ids) -> Ids:
+        """Return ids in terms of the whole scene: as they are, but for a lens."""
+        if self.bent is None or all(one.parts is None for one in self.bent):
+            return ids
+        firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
+        wholes = np.concatenate([*(one.source + first for one, first in firsts), [-1]]).astype(np.int32)
+        return wholes[ids]  # part -1, none, is the last
+
+    def snap(self, i: int) -> Snapped:
+        """Return an instance, snapped; in shared buffers it draws its own range of ids."""
+        mesh = self.scene[i].mesh
+        view, with_depth = self._view_of(i), self._with_depth
+        snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
+        return replace(snapped, mesh=snapped.mesh.numbered_from(self._number(i)))
+
+    def corners(self, i: int) -> GivenCorners:
+        """Return what an instance is drawn from."""
+        mesh, view = self.scene[i].mesh, self._view_of(i)
+        return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport)
+
+    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> engine.SnappedMesh:
+        """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
+        if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
+            return ClusteredMesh(*self.clustered(i)).part(triangles)
+        return self.snap(i).mesh
+
+    def _view_of(self, i: int) -> View:
+        last = self._last
+        if last is None or last[0] != i:
+            self._last = last = i, self._make_view(i)
+        return last[1]
+
+    def _make_view(self, i: int) -> View:
+        instance, view = self.scene[i], self._view
+        cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
+        own = replace(view, transform=self._clip_from_objects[i], cull=cull)
+        is_single = self.whole[i].mesh.single_sided(self._material)
+        if is_single is None:
+            return own
+        is_single = is_single if self.bent is None else is_single[self.bent[i].source]
+        return own.without_backs(is_single, is_mirrored=instance.is_mirrored)
+
+    def _can_cluster(self, sink: Sink) -> bool:
+        """Whether clusters may be drawn, which do not know that some triangles are single-sided and others are not."""
+        return self._may_cluster and choices.can_cluster(self._view, sink) and not self._has_sides
+
+    @cached_property
+    def _has_sides(self) -> bool:
+        masks = (mesh.single_sided(self._material) for mesh, _ in self.whole.meshes.values())
+        return any(mask is not None and not mask.all() for mask in masks)
+
+    def clustered(self, i: int) -> tuple[Clusters, View, int]:
+        """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
+        return self.scene[i].mesh.clusters, self._view_of(i), self._number(i)
+
+    def _number(self, i: int) -> int:
+        """What triangle 0 of an instance is called in a buffer of ids, if there is one, and int32 counts them."""
+        has_ids = self._with_depth and self.scene.n_triangles <= INT32_MAX
+        return int(self.first_ids[i]) + self._first_id if has_ids else 0
+
+    def groups(self) -> Iterator[tuple[int, PlacedScene]]:
+        """Yield parts of the scene whose triangles int32 counts from 1 on, each with where its own ids begin."""
+        for first, group in self.scene.groups:
+            placed = PlacedScene(
+                self._drawn._replace(scene=group, whole=group), self._view, with_depth=self._with_depth,
+                may_cluster=self._may_cluster, material=self._material, first_id=1,
+            )  # fmt: skip
+            yield int(self.first_ids[first]), placed
+
+    def shown(
+        self,
+        some: NDArray[np.intp],
+        target: engine.Target,
+        at: tuple[int, int],
+        rows: tuple[int, int] | None = None,
+        *,
+        is_drawn: bool,
+    ) -> NDArray[np.intp]:
+        """Return those of some instances whose boxes may show a sample in some rows, or in all; before what `is_drawn`.
+
+        At least the first one otherwise, which clears the target if nothing shows.
+        """
+        may_show: NDArray[np.uint8] = np.ones(len(some), np.uint8)
+        for dtype in (np.float32, np.float64):
+            own = np.flatnonzero(self._is_float32[some] == (dtype == np.float32))
+            if not len(own):
+                continue
+            chosen = some[own]
+            seen, mesh = ClusteredMesh(*self.clustered(int(chosen[0]))).seen(target.sink, at, rows)
+            shown: NDArray[np.uint8] = np.empty(len(own), np.uint8)
+            matrices = self._clip_from_objects[chosen].astype(dtype).astype(np.float64)  # as the vertex stage has them
+            engine.find_shown(mesh, seen, self.scene.boxes[chosen], matrices, target, is_drawn, shown)
+            may_show[own] = shown
+        return some[:1] if not is_drawn and not may_show.any() else some[may_show != 0]
+
+    def split_rows(self, some: NDArray[np.intp], height: int, n: int) -> list[int]:
+        """Return the first rows of n bands with about as many of some instances each, and `height`.
+
+        Instances of about one distance often lie in one band of equal bands. Small ones are left to one thread.
+        """
+        view = self._view
+        if n == 1 or height * view.size[0] > MOST_PIXELS_OF_PART:
+            return equal_bands(height, n)
+        boxes, matrices = self.scene.boxes[some], self._clip_from_objects[some][:, [1, 3]]
+        low, high = boxes[:, None, :3], boxes[:, None, 3:]
+        y, w = (0.5 * (matrices[:, :, :3] * (low + high)).sum(axis=2) + matrices[:, :, 3]).T
+        w = np.where(w > 0, w, np.inf)
+        reach = 0.5 * (np.abs(matrices[:, 0, :3]) * (high - low)[:, 0]).sum(axis=1)
+        n_rows = float(np.mean(reach / w)) * view.viewport[1]
+        if not choices.pays_to_share_instances(self.scene.n_triangles // len(self.scene), n_rows):
+            return [0, height]
+        rows = (1 - y / w) * (0.5 * view.viewport[1]) - view.origin[1]
+        wished = np.quantile(rows, np.arange(1, n) / n).clip(0, height)
+        tops = [0]
+        for k, top in enumerate(wished.tolist(), 1):
+            tops.append(min(max(int(top), tops[-1] + 1), height - n + k))
+        return [*tops, height]
+
+    @cached_property
+    def _clip_from_objects(self) -> NDArray[np.float64]:
+        return self.scene.clip_from_objects(self._clip_from_world)
+
+    @cached_property
+    def _is_float32(self) -> NDArray[np.bool_]:
+        is_float32 = np.empty(len(self.scene), np.bool_)
+        for mesh, at in self.scene.meshes.values():
+            is_float32[at] = mesh.clusters.points.dtype == np.float32
+        return is_float32
+
+    def chunks(self) -> Iterator[list[Snapped]]:
+        """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
+        chunk: list[Snapped] = []
+        n_vertices = 0
+        for i in range(len(self.scene)):
+            chunk.append(self.snap(i))
+            n_vertices += chunk[-1].n_vertices
+            if n_vertices >= VERTICES_AT_ONCE:
+                yield chunk
+                chunk, n_vertices = [], 0
+        if chunk:
+            yield chunk
+
+    def draw(
+        self, targets: list[engine.Target], positions: Sequence[tuple[int, int]], height: int, *, is_first: bool = True
+    ) -> None:
+        """Draw what each sample sees into targets of that many rows; (0, 0) is the pixel's centre.
+
+        `is_first`: clear them before; otherwise what is there stays unless something lies before it.
+        """
+        n_parts = count_threads(self._view.threads, self.scene.n_triangles)
+        n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
+        seen = self._clip_from_world, self._view
+        is_group = self._first_id > 0  # of a scene so large that clusters pay for it
+        if self._can_cluster(Sink(targets[0].sink)) and (is_group or pays_in_clusters(self, *seen)):
+            order = front_to_back(self.scene, self._clip_from_world)
+            if is_first and Sink(targets[0].sink) in (Sink.NEAREST, Sink.FARTHEST):
+                shape = engine.Target.bounds_shape(height, self._view.size[0])
+                for target in targets:
+                    target.keep_bounds(FRESH.empty("bounds", shape, np.float32))
+            if draw_placed(self, order, targets, positions, height, n_parts, is_first=is_first):
+                return
+        n_left = len(self.scene)
+        for chunk in self.chunks():
+            n_left -= len(chunk)
+            for target, at in zip(targets, positions, strict=True):
+                scenes = [snapped.mesh.seen_from(*at) for snapped in chunk]
+                run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
+            is_first = False
+
+
+def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
+    """Tell whether a scene whose meshes may be drawn in clusters is, and note that they are drawn."""
+    scene = placed.scene
+    n = scene.n_triangles
+    wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
+    if not all(wanted) or not scene.backoff.is_over():
+        return False
+    survey = survey_instances(placed)
+    pays = choices.pays_to_draw_instances(view, n // len(scene), survey, lambda: count_layers(scene, clip_from_world))
+    scene.backoff.note(pays=pays)
+    return pays
+
+
+def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the instances by the distance of the middle of their boxes: by w, or by z where all w are equal."""
+    boxes = np.empty((len(scene), 6))
+    for mesh, at in scene.meshes.values():
+        boxes[at] = mesh.vertex_box
+    middles = 0.5 * (boxes[:, :3] + boxes[:, 3:])
+    middles = (scene.transforms[:, :3, :3] * middles[:, None]).sum(axis=2) + scene.transforms[:, :3, 3]
+    row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
+    return np.argsort(engine.product(middles, row[:3]), kind="stable")
+
+
+def survey_instances(placed: PlacedScene) -> Survey:
+    """Return what becomes of the clusters of a scene, by some of its instances."""
+    some = range(0, len(placed.scene), -(-len(placed.scene) // SURVEYED_INSTANCES))
+    weights = [placed.scene[i].mesh.triangles.shape[0] for i in some]
+    surveys = [ClusteredMesh(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
+    return Survey(*np.average(surveys, axis=0, weights=weights).tolist())
+
+
+def count_layers(scene: Scene, clip_from_world: NDArray[np.float64]) -> float:
+    """Return how many boxes of instances lie one behind the other, on the mean over the picture where there are any."""
+    lows, highs = scene.boxes[:, :3], scene.boxes[:, 3:]
+    corners = np.where(CORNERS, highs[:, None], lows[:, None])
+    matrices = scene.clip_from_objects(clip_from_world)
+    clip = (matrices[:, None, :, :3] * corners[:, :, None]).sum(axis=3) + matrices[:, None, :, 3]
+    clip = clip[(clip[..., 3] > 0).all(axis=1)]  # a box about the eye has no outline
+    cells = np.rint((clip[..., :2] / clip[..., 3:] + 1) * (0.5 * CELLS)).clip(0, CELLS).astype(np.intp)
+    (left, top), (right, bottom) = cells.min(axis=1).T, cells.max(axis=1).T
+    steps = np.zeros((CELLS + 1, CELLS + 1), np.intp)
+    for row, column, step in ((top, left, 1), (top, right, -1), (bottom, left, -1), (bottom, right, 1)):
+        np.add.at(steps, (row, column), step)
+    n_of_cell = steps.cumsum(axis=0).cumsum(axis=1)
+    return float(n_of_cell.sum() / max(1, np.count_nonzero(n_of_cell)))
+
+
+def draw_placed(
+    placed: PlacedScene,
+    order: NDArray[np.intp],
+    targets: Sequence[engine.Target],
+    positions: Sequence[tuple[int, int]],
+    height: int,
+    n_threads: int,
+    *,
+    is_first: bool,
+) -> bool:
+    """Draw what each sample sees into targets, as `PlacedScene.draw` does; returns as `draw_clustered` does."""
+    memories = [KeptMemory() for _ in range(n_threads)]
+    return all(
+        draw_rounds(placed, order, target, height, at, memories, is_first=is_first)
+        for target, at in zip(targets, positions, strict=True)
+    )
+
+
+def draw_rounds(
+    placed: PlacedScene,
+    order: NDArray[np.intp],
+    target: engine.Target,
+    height: int,
+    at: tuple[int, int],
+    memories: Sequence[Memory],
+    *,
+    is_first: bool,
+) -> bool:
+    """Draw what a sample sees into a target, as `draw_placed` does.
+
+    In rounds, each of about as many instances as those before it together: of the others those are left out that lie
+    outside, between samples, or behind what has been drawn.
+    """
+    keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
+    order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
+    first, n = 0, FIRST_ROUND if keeps_order else len(order)
+    while first < len(order):
+        end = min(first + n, len(order))
+        ends = {"is_first": is_first and first == 0, "is_last": end == len(order)}
+        if not draw_round(placed, order[first:end], target, height, at, memories, **ends):
+            return False
+        if end < len(order):
+            order = np.append(order[:end], placed.shown(order[end:], target, at, is_drawn=True))
+        first = n = end
+    return True
+
+
+def draw_round(
+    placed: PlacedScene,
+    some: NDArray[np.intp],
+    target: engine.Target,
+    height: int,
+    at: tuple[int, int],
+    memories: Sequence[Memory],
+    **ends: bool,
+) -> bool:
+    """Draw what a sample sees of some instances, each thread those in its rows; returns as `draw_clustered` does."""
+    tops = placed.split_rows(some, height, min(height, len(memories)))
+
+    def own(first: int, end: int) -> list[int]:
+        shown = some if len(tops) == 2 else placed.shown(some, target, at, (first, end), is_drawn=False)
+        return shown.tolist()
+
+    return draw_clustered(memories, tops, own, lambda i: ClusteredMesh(*placed.clustered(i)), target, at, **ends)
+
+
+def rows_of(
+    scenes: list[engine.SnappedMesh], target: engine.Target, *, is_first: bool, is_last: bool
+) -> Callable[[int, int], None]:
+    """Return what draws rows [first, end) of several scenes into one target, which the first of all clears."""
+
+    def draw_rows(first: int, end: int) -> None:
+        for i, scene in enumerate(scenes):
+            scene.draw(target, first, end - first, is_first and i == 0, is_last and i == len(scenes) - 1)
+
+    return draw_rows
+
+
+def place(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    options: dict[str, Any],
+    *,
+    with_depth: bool = True,
+    material: Material | None = None,
+) -> tuple[PlacedScene, View]:
+    """Return the scene as the camera sees it, and the checked options of a verb; `material`: whose backs are culled."""
+    view = View.parse(size, cast(ViewOptions, options))
+    refuse_classic(view, "depth" if with_depth else "a scene")
+    drawn = scene_through(scene, camera, view.viewport, near_clip=view.near_clip)
+    return PlacedScene(drawn, view, with_depth=with_depth, material=material), view
+
+
+def draw_scene(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    *,
+    depth_test: DepthTestOption | None = "less",
+    background_depth: float | None = None,
+    material: Material | None = None,
+    **options: Any,
+) -> SceneFragments:
+    """Return the visibility buffer of a scene; options as those of `rasterize`, without `out` and `transform`."""
+    placed, view = place(scene, camera, size, options, material=material)
+    refuse_many(view, "rasterize")
+    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    frags = draw_nearest(placed, view, test)
+    if background_depth is not None:
+        ids, depth = frags.drawn_planes
+        depth[ids < 0] = background_depth
+    return frags
+
+
+def draw_nearest(placed: PlacedScene, view: View, test: DepthTest | None = DepthTest.LESS) -> SceneFragments:
+    """Return the visibility buffer of what `place` returned."""
+    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    (width, height), n = view.size, view.sampling.n_samples
+    positions: list[tuple[int, int]] = list(map(tuple, sample_positions(n, view.grid_bits).tolist()))
+    check_fits((n, height, width), np.int32, np.float32)
+    ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
+    depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
+    targets = [engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True) if width and height]
+    if placed.scene.n_triangles > INT32_MAX:
+        return SceneFragments(draw_groups(placed, targets, positions, ids), depth, placed, positions)
+    if targets:
+        placed.draw(targets, positions, height)
+    return SceneFragments(ids, depth, placed, positions)
+
+
+def draw_groups(
+    placed: PlacedScene, targets: list[engine.Target], positions: Sequence[tuple[int, int]], ids: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """Draw a scene with more triangles than int32 counts; returns ids in int64, -1 where there is nothing.
+
+    One group after the other into the planes `ids` of the targets, where 0 stands for what earlier groups have drawn:
+    it is less than all other ids, so that ties are decided as in one picture.
+    """
+    counted: NDArray[np.int64] = np.full(ids.shape, -1, np.int64)
+    if targets:
+        for k, (first, group) in enumerate(placed.groups()):
+            group.draw(targets, positions, ids.shape[1], is_first=k == 0)
+            is_new = ids > 0
+            np.add(ids, first - 1, out=counted, where=is_new, dtype=np.int64)
+            ids[is_new] = 0
+    return counted
+
+
+def peel_scene(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    *,
+    layers: int = 4,
+    depth_test: DepthTestOption = "less",
+    material: Material | None = None,
+    **options: Any,
+) -> SceneDepthLayers:
+    """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
+    scene.check_counted("a scene that is peeled")
+    placed, view = place(scene, camera, size, options, material=material)
+    n, is_farthest = check_peel(view, layers, depth_test)
+    snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
+    return SceneDepthLayers(*peel_meshes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
+
+
+def draw_scene_coverage(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    out: object,
+    *,
+    material: Material | None = None,
+    **options: Any,
+) -> NDArray[Any]:
+    """Return the mask of a scene, as `coverage` gives that of a mesh; options as there."""
+    placed, view = place(scene, camera, size, options, with_depth=False, material=material)
+    width, height = view.size
+    n = view.sampling.n_samples
+    is_share = n > 1 or view.sampling is Sampling.AREA
+    with canvas_of(FRESH, "coverage", out, (height, width), np.float32 if is_share else np.bool_) as (result, canvas):
+        if not (width and height):
+            pass
+        elif view.sampling is Sampling.AREA:
+            add_areas(placed, view, canvas)
+        elif n > 1 and view.is_exact:
+            add_masks(placed, view, canvas)
+        else:
+            samples = sample_positions(n, view.grid_bits) if n > 1 else None
+            shape = engine.Target.covered_shape(height, width, n)
+            sink = Sink.SAMPLES if n > 1 else Sink.MASK
+            target = engine.Target(sink, canvas, None, SCRATCH.empty("covered", shape, np.uint64), samples)
+            placed.draw([target], [(0, 0)], height)
+    return result
+
+
+def add_masks(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
+    """Write the share of samples that the instances cover, from a mask of each sample."""
+    n, (width, height) = view.sampling.n_samples, view.size
+    mask: NDArray[np.bool_] = SCRATCH.empty("sample mask", (height, width), np.bool_)
+    covered = SCRATCH.empty("covered", engine.Target.covered_shape(height, width, 1), np.uint64)
+    canvas[...] = 0
+    for x, y in sample_positions(n, view.grid_bits).tolist():
+        placed.draw([engine.Target(Sink.MASK, mask, None, covered)], [(x, y)], height)
+        np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
+
+
+def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
+    """Write the sum of the areas that the instances cover, at most 1."""
+    canvas[...] = 0
+    own = empty(canvas.shape, np.float32)
+    for chunk in placed.chunks():
+        for snapped in chunk:
+            n_threads = count_threads(view.threads, snapped.n_triangles)
+            sum_areas(SCRATCH, snapped.mesh, snapped.n_triangles, own, n_threads, is_clamped=True)
+            canvas += own
+    np.minimum(canvas, 1, out=canvas)

@@ -1,0 +1,332 @@
+"""Prepares what the shading kernels read: materials, lights and a camera as numbers, a mesh as rows of float32.
+
+Input: a mesh, its materials, lights, a camera and the size of the whole picture. Output: `ShadingInputs`, which fills
+`engine.ShadingTable`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
+from topleft._core.base.memory import empty
+from topleft._core.base.threads import run_parts, threads_of_rows
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT, Environment
+from topleft._meshes.model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
+from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.mesh import Mesh, is_laid
+from topleft._meshes.model.normals import (
+    box_of_triangles,
+    face_normal_rows,
+    moved,
+    turn_of_normals,
+    turned_faces,
+    unit_rows,
+)
+from topleft._meshes.model.texture import Texture
+
+__all__ = ["CameraRays", "ShadingInputs", "ShadingMesh"]
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+
+LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
+WRAPPED_LIGHT = 2
+
+
+@dataclass(frozen=True, eq=False)
+class CameraRays:
+    """What `tl_shading` in csrc/shading.h tells of the camera, in a shading space whose origin is at `center`.
+
+    Attributes
+    ----------
+    eye : (3,) float64
+        Where the camera is; without perspective the unit vector to it.
+    ray : (4, 3) float64
+        The ray of pixel position (0, 0), what it gains per column and per row, and, without perspective, along the
+        depth.
+    eye_from, origin : (3, 3) and (3,) float64
+        Eye space from shading space: `eye_from @ p + origin` but for a scale.
+    scale : float
+        How many units of eye space one of the shading space is.
+    distance_start, distance_scale : float
+        The distance along the view: `start + scale * w`, or `start + scale * depth` without perspective.
+    """
+
+    has_perspective: bool
+    eye: F64
+    ray: F64
+    eye_from: F64
+    origin: F64
+    scale: float
+    distance_start: float
+    distance_scale: float
+
+
+def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space: bool) -> CameraRays:
+    """How the camera sees shading space: the world, or its own eye space, moved so that `center` is the origin."""
+    view = np.eye(4) if in_eye_space else camera.view
+    has_perspective, rows, scale = engine.camera_rays(camera.clip_from_eye(size), view, center, *size)
+    if has_perspective:
+        start, way = 0.0, 1.0 / -float(camera.projection[3, 2])
+    else:
+        (a, b), (c, d) = camera.projection[2:, 2:]
+        near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
+        start, way = near, far - near
+    return CameraRays(has_perspective, rows[0], rows[1:5], rows[5:8], rows[8], scale, start, way)
+
+
+class ShadingMesh:
+    """What shading needs of a mesh.
+
+    Attributes
+    ----------
+    positions : (V, 3) float
+        As in the mesh, or in eye space.
+    center : (3,) float64
+        The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
+        float32 is fine enough.
+    normals : (N, 4) float32
+        Unit normals of the vertices, then of creased corners, 0 where there is none, and 1.
+    colors : (V, 4) float32, optional
+        sRGB of the vertices, 0 to 255, and opacity, 0 to 1.
+    """
+
+    def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
+        """`view`: (4, 4), takes the mesh to eye space first."""
+        corners = None if mesh.is_faceted else mesh.corner_normals()
+        if mesh.is_faceted:  # nobody reads normals of vertices where every face has its own
+            self.normals = np.ones((len(mesh.vertices), 4), np.float32)
+        else:
+            normals = mesh.vertex_normals() if corners is None else corners.rows
+            self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
+        self._triangles = mesh.triangles
+        self.normal_of_corner = None if corners is None else corners.of_corner
+        self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
+        low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
+        self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
+        self.colors = None if mesh.colors is None else color_rows(mesh.colors)
+
+    @cached_property
+    def face_normals(self) -> F32:
+        """(T, 4): unit normals of the triangles, on the side from which they run counter-clockwise, and 1."""
+        return face_normal_rows(self.positions, self._triangles)
+
+    @cached_property
+    def is_turned(self) -> npt.NDArray[np.uint8] | None:
+        """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
+        turned = turned_faces(self.positions, self._triangles, self.normals, self.normal_of_corner)
+        return turned if turned.view(np.bool_).any() else None
+
+
+def color_rows(colors: npt.NDArray[np.uint8]) -> F32:
+    """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
+    rows = np.empty((len(colors), 4), np.float32)
+    n_threads = threads_of_rows(len(colors))
+    run_parts(lambda first, end: engine.color_rows(colors, first, end, rows), len(colors), n_threads)
+    return rows
+
+
+_shading_meshes: WeakKeyDictionary[Mesh, ShadingMesh] = WeakKeyDictionary()
+
+
+def shading_mesh_of(mesh: Mesh) -> ShadingMesh:
+    """The shading_mesh of a mesh in its own space, made once."""
+    shading_mesh = _shading_meshes.get(mesh)
+    if shading_mesh is None:
+        shading_mesh = _shading_meshes[mesh] = ShadingMesh(mesh)
+    return shading_mesh
+
+
+def is_full(material: Material) -> bool:
+    """Whether a surface has more than a colour, a texture and a highlight."""
+    texture = material.texture
+    return (
+        material.is_metallic_rough
+        or any(material.emission)
+        or material.occlusion_texture is not None
+        or material.normal_texture is not None
+        or (texture is not None and (texture.uv_set == 1 or texture.transform is not None))
+    )
+
+
+def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
+    """What `tl_material` has of a full material."""
+    metallic, roughness = (1.0 if value is None else value for value in (material.metallic, material.roughness))
+    maps = (
+        material.metallic_roughness_texture if material.is_metallic_rough else None,
+        material.occlusion_texture,
+        material.normal_texture,
+        material.emission_texture if any(material.emission) else None,
+    )
+    compiled_maps = [one.compiled if one is not None and is_laid(one, mesh) else None for one in maps]
+    numbers = material.is_metallic_rough, metallic, roughness, material.occlusion_strength, material.normal_scale
+    return (*numbers, material.emission, *compiled_maps)
+
+
+def is_similarity(view: F64) -> bool:
+    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
+    (a, b, c), (d, e, f), (g, h, i) = view[:3, :3].tolist()
+    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
+    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
+    scale = sum(squares) / 3
+    error = max(map(abs, (*products, *(square - scale for square in squares))))
+    return error <= 1e-9 * scale and engine.determinant(view[:3, :3]) > 0
+
+
+class ShadingInputs:
+    """The numbers of one picture, as the kernels read them."""
+
+    def __init__(
+        self,
+        scene: engine.SnappedMesh,
+        mesh: Mesh,
+        camera: Camera,
+        size: tuple[int, int],
+        material_of: npt.NDArray[np.int32] | None,
+        *,
+        is_flat: bool,
+    ) -> None:
+        is_flat = is_flat or mesh.is_faceted
+        in_eye_space = not is_similarity(camera.view)
+        self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
+        viewport = size if scene.viewport is None else scene.viewport.size
+        self.rays = rays_of(camera, viewport, self.mesh.center, in_eye_space=in_eye_space)
+        self.view = camera.view
+        self.back_side = -1.0 if engine.determinant(camera.view[:3, :3]) > 0 else 1.0
+        self.is_in_eye_space = in_eye_space
+        normals, finds_inverse_w = self.mesh.normals, False
+        if scene.viewport is not None and self.rays.has_perspective:
+            finds_inverse_w = scene.finds_inverse_w(size[0] * size[1])
+            if not finds_inverse_w:
+                own = normals[: len(mesh.vertices)]
+                normals = empty(own.shape, np.float32)
+                engine.set_inverse_w(scene, own, normals)
+        self.shading = engine.ShadingTable(
+            normals,
+            finds_inverse_w,
+            self.mesh.normal_of_corner,
+            self.mesh.normals,
+            self.mesh.face_normals if is_flat else None,
+            self.mesh.positions,
+            None if is_flat else self.mesh.is_turned,
+            mesh.uv,
+            mesh.uv1,
+            self.mesh.colors,
+            mesh.has_alpha,
+            -self.back_side,
+            material_of,
+            LIGHT_OF_SRGB,
+        )
+
+    def set_materials(
+        self, mesh: Mesh, materials: Sequence[Material], *, is_unlit: bool, all_full: bool = False
+    ) -> None:
+        """Take the materials; a row that several triangles name may be one for all.
+
+        `all_full`: for an environment that lights them all, or their opacity; others are full where they need it.
+        """
+        rows = []
+        for one in materials:
+            texture = one.texture if is_laid(one.texture, mesh) else None
+            has_colors = texture is not None or mesh.colors is not None
+            color = (*light_of(one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR))[:3], one.opacity)
+            back = light_of(one.back_color or (0, 0, 0))[:3]
+            side = 0.0 if one.back_color is None else self.back_side
+            shininess = one.shininess if one.specular > 0 else 0.0
+            cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
+            full = full_part(one, mesh) if all_full or is_full(one) else None
+            compiled = None if texture is None else texture.compiled
+            row = color, back, side, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, compiled, full
+            rows.append(row)
+        self.shading.set_materials(rows)
+
+    def set_opacity(self) -> None:
+        """Have the opacity of the surface in the alpha of the picture; all materials are full."""
+        self.shading.set_wants_opacity()
+
+    def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64 | None = None) -> None:
+        """Take the lights, in shading space.
+
+        `world_from_mesh`: (4, 4) for a mesh that stands in the world by a matrix, whose camera is the one in its space.
+        """
+        if lights is None:
+            at = engine.product(self.rays.eye_from.T, TO_HEADLIGHT)
+            rows: list[tuple[Any, ...]] = [(WRAPPED_LIGHT, at, (max(0.0, 1 - ambient),) * 3, 0.0)]
+        else:
+            placed = lights if world_from_mesh is None else self._lights_by(lights, world_from_mesh)
+            rows = [self._light(light) for light in placed]
+        self.shading.set_lights(rows, (ambient,) * 3)
+
+    def set_environment(self, environment: Environment | None, world_from_mesh: F64 | None = None) -> None:
+        """Take the environment, or what metallic surfaces mirror without one.
+
+        `world_from_mesh`: as for `set_lights`.
+        """
+        own = DEFAULT_ENVIRONMENT if environment is None else environment
+        rows = self.rays.eye_from
+        if own.space is LightSpace.WORLD:
+            rows = engine.product(engine.inverse(self.view[:3, :3]), rows)
+            rows = rows if world_from_mesh is None else engine.product(world_from_mesh[:3, :3], rows)
+        rows = engine.product(own.axes, rows / engine.cube_root(abs(engine.determinant(rows))))
+        texels, table = own.levels or (None, None)
+        diffuse = 0.0 if environment is None else 1.0
+        self.shading.set_surroundings(engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
+
+    def _lights_by(self, lights: Sequence[Light], world_from_mesh: F64) -> list[Light]:
+        """The lights as they stand in the space of a mesh, as bright as they are in the world."""
+        mesh_from_world = engine.inverse(world_from_mesh)
+        # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
+        scale = 1.0 if self.is_in_eye_space else engine.cube_root(abs(engine.determinant(world_from_mesh[:3, :3])))
+        placed = []
+        for light in lights:
+            at = np.array([*light.at, light.kind == LightKind.POINT])
+            at = at if light.space == LightSpace.EYE else engine.product(mesh_from_world, at)
+            placed.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * (scale * scale))))
+        return placed
+
+    def _light(self, light: Light) -> tuple[Any, ...]:
+        rays, at = self.rays, np.array(light.at)
+        in_eye_space = light.space is LightSpace.EYE
+        if light.kind is LightKind.DIRECTIONAL:
+            if in_eye_space or self.is_in_eye_space:
+                at = at if in_eye_space else engine.product(self.view[:3, :3], at)
+                at = engine.product(rays.eye_from.T, at)
+            at = at / engine.length(at)
+        elif in_eye_space:
+            at = engine.product(rays.eye_from.T, at - rays.origin) / rays.scale
+        else:
+            in_space = engine.product(self.view[:3, :3], at) + self.view[:3, 3] if self.is_in_eye_space else at
+            at = in_space - self.mesh.center
+        rgb = light_of(light.color)[:3]
+        return LIGHT_CODES[LightKind(light.kind)], at, tuple(light.intensity * c for c in rgb), light.falloff
+
+    def set_view(self, show: int, matcap: Texture | None, background: Color) -> None:
+        """Take what the picture tells, and its background."""
+        rays = self.rays
+        compiled = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").compiled
+        eyes = rays.eye_from.tolist(), rays.has_perspective, rays.eye.tolist(), rays.ray.tolist()
+        self.shading.set_view(show, compiled, *eyes, light_of(background), background)
+
+    def set_turn(self, show: int, turn: F64) -> None:
+        """Take what is told, in a space that the matrix (3, 3) takes eye space to."""
+        rays = self.rays
+        rows = engine.product(turn, rays.eye_from).tolist()
+        eyes = rows, rays.has_perspective, rays.eye.tolist(), rays.ray.tolist()
+        self.shading.set_view(show, None, *eyes, (0, 0, 0, 0), (0, 0, 0, 0))
+
+    def set_fog(self, fog: Fog | None) -> None:
+        """Take the depth cue, if there is one."""
+        if fog is not None:
+            rays = self.rays
+            scale = 1 / (fog.far - fog.near)
+            self.shading.set_fog(light_of(fog.color), fog.near, scale, rays.distance_start, rays.distance_scale)

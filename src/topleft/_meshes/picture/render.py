@@ -1,0 +1,237 @@
+"""Renders: a mesh or scene and a camera to a picture, in one call.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of
+`rasterize_mesh`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Unpack, cast
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import NDArray
+
+from topleft._core.base.arrays import as_size, shown
+from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
+from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.verbs import Rasterizer, rasterize
+from topleft._core.raster.view import WindowOptions
+from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
+from topleft._meshes.lod.detail import detailed
+from topleft._meshes.model.material import Material
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.points import Points
+from topleft._meshes.picture.blended import glass_of
+from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
+from topleft._meshes.picture.edges import draw_all_edges
+from topleft._meshes.picture.fragments import BentFragments, SceneFragments
+from topleft._meshes.picture.holes import without_holes
+from topleft._meshes.picture.instances import draw_scene
+from topleft._meshes.picture.scene_shade import shade_by
+from topleft._meshes.picture.shade import LookOptions, ShadingOptions
+from topleft._meshes.picture.through_lens import StaticPlan, seen_through
+from topleft._meshes.scene.adapt import MeshLike
+from topleft._meshes.scene.scene import Scene, as_subject
+from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
+
+DEFAULT_SIZE = (640, 480)
+
+
+class RasterizeOptions(WindowOptions, total=False):
+    """The options of `rasterize` that `rasterize_mesh` passes on."""
+
+    sampling: SamplingOption
+    depth_test: DepthTestOption | None
+    background_depth: float | None
+    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None
+
+
+def render(
+    mesh: MeshLike | Scene | Points,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
+    *,
+    shading: ShadingOption = "smooth",
+    color: ColorLike = DEFAULT_COLOR,
+    background: ColorLike = WHITE,
+    cull: CullOption = "none",
+    edges: bool = False,
+    sampling: SamplesOption = "center",
+    subpixel_bits: int | Literal["exact"] = 8,
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
+    **look: Unpack[LookOptions],
+) -> npt.NDArray[np.uint8]:
+    """A picture of the mesh or scene.
+
+    Parameters
+    ----------
+    mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
+        What to draw: a path, or a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+        Points have no edges, sides to cull, materials and levels; they are lit where they have normals.
+    camera : Camera or (4, 4) array, optional
+        Unless given, the three-quarter view of `Camera.framing`, with y up. A matrix is clip from world, see
+        `Camera.from_matrix`.
+    size : (width, height), or one number for a square; pixels
+        640 x 480 unless given.
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
+        What the colours tell; `topleft.shade` describes each. The first three composite what shows through, materials
+        with `alpha_mode="blend"` and colours with alpha, in linear light; the others show it as if it were opaque.
+    color : str, (3,) integers of 0 to 255 or (3,) floats of 0 to 1
+        sRGB colour of a mesh without colours: "red", "#f00", (255, 0, 0) and (1.0, 0.0, 0.0) are the same.
+    background : str, (3,) or (4,) integers of 0 to 255 or floats of 0 to 1
+        sRGB, and alpha if it is not opaque; white unless given, "transparent" is `(0, 0, 0, 0)`.
+    cull : {"none", "back", "front"}
+        Triangles to leave out, by the side that is seen; besides the backs of materials that are not double-sided.
+    edges : bool
+        Whether the edges that show are drawn over it, as smooth dark lines.
+    sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
+        Samples of a pixel. With several outlines are smooth: a triangle is shaded once in a pixel, where the first of
+        its samples lies, and the light of the samples is averaged.
+    subpixel_bits : int, 0 to 16, or "exact"
+        As for `coverage`: which grid vertices snap to. "exact": they stay where they are.
+    tolerance : float
+        How far outlines may lie from where they belong, pixels: the mesh is drawn at the coarsest level of detail that
+        a bound on its distance allows in this view, see `choose_detail`. 0: the mesh itself. Levels are made at the
+        first use, which takes a while, and kept with the mesh; `simplify` and `Levels.load` do that beforehand.
+    threads : int, optional
+        How many threads draw; never changes a bit.
+    rasterizer : Rasterizer, optional
+        Of this size: what is needed on the way lies in the memory that it keeps.
+    **look
+        `lights`, `ambient`, `material`, `matcap`, `fog` and `environment` of `topleft.shade`.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        sRGB with alpha: 255 where the mesh is, the background elsewhere, their mean where samples see both.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, or an option is unknown.
+    MissingPackageError
+        If levels of detail are to be made and fast-simplification is not installed.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
+    255
+    """
+    for option in look.keys() - LookOptions.__annotations__:
+        raise TypeError(f"render() got an unexpected keyword argument {option!r}")
+    size = as_size(size)
+    subject = as_subject(mesh)
+    camera = camera_for(subject, camera, size)
+    options = ShadingOptions.parse(shading, color, background, threads=threads, **look)
+    view: dict[str, Any] = {"cull": cull, "sampling": sampling, "subpixel_bits": subpixel_bits, "threads": threads}
+    if isinstance(subject, Points):
+        if edges:
+            raise ValueError("points have no edges")
+        cloud = draw_cloud(subject, camera, size, **view)
+        return shade_cloud(cloud, subject, camera, options)
+    subject = detailed(subject, camera, size, tolerance, cull=cull, material=options.material)
+    glass = glass_of(subject, camera, size, options, view)
+    if glass is None:
+        frags = rasterize_subject(subject, camera, size, rasterizer, options.material, **view)
+    else:
+        subject, frags = glass.scene, glass.draw_opaque()
+    frags = without_holes(frags, subject, camera, options.material, threads=threads)
+    picture = shade_by(frags, subject, camera, options)
+    if glass is not None:
+        glass.lay_over(picture, cast(SceneFragments, frags))
+    if edges:
+        draw_all_edges(picture, frags, subject, camera, options, cull=cull)
+    return picture
+
+
+def rasterize_mesh(
+    mesh: MeshLike | Scene | Points,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
+    *,
+    cull: CullOption = "none",
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
+    **view: Unpack[RasterizeOptions],
+) -> Fragments:
+    """The visibility buffer of the mesh or scene: ids and depth per pixel, and attributes interpolated on demand.
+
+    Parameters
+    ----------
+    mesh, camera, size, cull, threads
+        As for `render`.
+    tolerance : float
+        As for `render`; but for 0 ids are those of the level's triangles, ``choose_detail(...).mesh``.
+    rasterizer : Rasterizer, optional
+        Of this size: the result lies in its memory, until the next call. Scenes are drawn in memory of their own.
+    **view
+        Other options of `rasterize`, `origin=` for a window of a larger picture, say.
+
+    Returns
+    -------
+    Fragments
+        `.triangle` (H, W) int32, -1 where there is nothing; `.depth` (H, W) float32, window depth in [0, 1], +inf where
+        there is nothing. Of a scene `SceneFragments`: also `.instance` (H, W) int32, and `.triangle` counts the
+        triangles of its mesh. Of `Points` `PointFragments`: `.point` is the same as `.triangle`.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> camera = tl.Camera.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0))
+    >>> frags = tl.rasterize_mesh(cube, camera, (9, 9))
+    >>> round(float(frags.distance(camera)[4, 4]), 3)
+    4.0
+    """
+    size = as_size(size)
+    if view.get("viewport") is not None:
+        view["viewport"] = as_size(view["viewport"], "viewport", smallest=1)
+    subject = as_subject(mesh)
+    camera = camera_for(subject, camera, size)
+    if isinstance(subject, Points):
+        return draw_cloud(subject, camera, size, cull=cull, threads=threads, **view)
+    window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
+    subject = detailed(subject, camera, size, tolerance, cull=cull, **window)
+    return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)
+
+
+def rasterize_subject(
+    subject: Mesh | Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    rasterizer: Rasterizer | None = None,
+    material: Material | None = None,
+    **view: Any,
+) -> Fragments:
+    """The visibility buffer of what `detailed` returned; options as for `rasterize_mesh`.
+
+    `material`: whose backs are culled, instead of those that the meshes have.
+    """
+    if isinstance(subject, Scene):
+        return draw_scene(subject, camera, size, material=material, **view)
+    frame, near_clip = view.get("viewport") or size, view.get("near_clip", True)
+    drawn = seen_through(subject.vertices, subject.triangles, camera, frame, near_clip=near_clip)
+    view["transform"] = drawn.transform
+    if not isinstance(rasterizer, Rasterizer | None):
+        raise TypeError(f"rasterizer must be a Rasterizer or None, got {shown(rasterizer)}")
+    if rasterizer is not None and rasterizer.size != tuple(size):
+        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
+    if drawn.bent is None:
+        view.setdefault("plan", StaticPlan(subject))
+    view["plan"] = drawn.sided(view.get("plan"), subject.single_sided(material))
+    if rasterizer is None:
+        frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
+    else:
+        frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
+    return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)

@@ -1,0 +1,175 @@
+"""Shades a visibility buffer, of a scene each instance by itself, in the rectangle that it shows in.
+
+Input: `Fragments`, the `Mesh` or `Scene` and the `Camera` they were made with. Output: a picture (H, W, 4) uint8, sRGB
+with alpha.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
+from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.points import PointFragments
+from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
+from topleft._meshes.model.environment import Environment
+from topleft._meshes.model.light import Fog, Light
+from topleft._meshes.model.material import Material
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.points import Points
+from topleft._meshes.model.texture import Texture
+from topleft._meshes.picture.cloud import shade_cloud
+from topleft._meshes.picture.fragments import SceneFragments, VisiblePart, join, parts_of
+from topleft._meshes.picture.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
+from topleft._meshes.scene.scene import Scene, meshes_of
+from topleft.typing import ShadingOption
+
+__all__ = ["shade", "shade_by", "shade_part"]
+
+U8 = npt.NDArray[np.uint8]
+
+
+def shade(
+    frags: Fragments,
+    mesh: Mesh | Scene | Points,
+    camera: CameraLike,
+    *,
+    shading: ShadingOption = "smooth",
+    color: ColorLike = DEFAULT_COLOR,
+    background: ColorLike = WHITE,
+    depth_range: tuple[float, float] | None = None,
+    lights: Light | Sequence[Light] | None = None,
+    ambient: float | None = None,
+    material: Material | None = None,
+    matcap: Texture | None = None,
+    fog: Fog | None = None,
+    environment: Environment | None = None,
+    threads: int | None = None,
+) -> U8:
+    """The picture (H, W, 4) uint8 of a visibility buffer: sRGB, alpha 255 where a triangle shows.
+
+    Parameters
+    ----------
+    frags : Fragments
+        What `rasterize` or `rasterize_mesh` returned for the mesh or scene. With several samples a pixel a triangle is
+        shaded once in a pixel, at the first of the samples that see it, and the picture is the mean of the light of the
+        samples.
+    mesh : Mesh, Scene or Points
+        Its materials, and its colours, are used if it has any. Each instance of a scene is shaded by itself.
+    camera : Camera
+        The camera of `frags`.
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
+        "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
+        light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour
+        that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range
+        of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
+        faces the viewer is light blue.
+    color, background : str, integers of 0 to 255 or floats of 0 to 1
+        sRGB of a mesh without colours and materials, and with alpha where nothing shows; as for `render`.
+    depth_range : (float, float), optional
+        Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
+        those of the picture.
+    lights : Light or sequence of Light, optional
+        Lambert's cosine for each of them, or GGX on metallic-rough materials. Unless given: one headlight over the
+        viewer's left shoulder, whose light wraps round the mesh; none in an environment.
+    ambient : float, optional
+        Light from all sides, not negative, 0.03 unless given, 0 in an environment.
+    material : Material, optional
+        For all triangles, instead of those of the mesh.
+    matcap : Texture, optional
+        A picture of a lit sphere, for "matcap". It is clamped, so the rim holds where normals turn away.
+    fog : Fog, optional
+        The depth cue.
+    environment : Environment, optional
+        Light from all around. Unless given, metallic-rough materials mirror a bright side, that of the headlight, and
+        a dark one, and nothing else is lit by it.
+    threads : int, optional
+        How many threads shade; never changes a bit.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has other numbers of vertices or triangles than what was drawn, `shading` is unknown, a colour is
+        none, a number is outside its range, or "matcap" has no matcap.
+    TypeError
+        If `frags`, the mesh, a light, material, texture or environment is none.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> camera = tl.Camera.framing(ball)
+    >>> frags = tl.rasterize_mesh(ball, camera, (32, 32))
+    >>> tl.shade(frags, ball, camera, shading="normals").shape
+    (32, 32, 4)
+    """
+    camera = as_camera(camera)
+    if not isinstance(mesh, Points):
+        check_drawn(frags, mesh)
+    options = ShadingOptions.parse(
+        shading, color, background, depth_range, lights, ambient, material, matcap, fog, environment, threads
+    )
+    if isinstance(mesh, Points):
+        if not (isinstance(frags, PointFragments) and frags._n_vertices == len(mesh)):
+            raise ValueError(f"frags must be those of the {len(mesh)} points, got {frags!r}")
+        return shade_cloud(frags, mesh, camera, options)
+    return shade_by(frags, mesh, camera, options)
+
+
+def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture of a visibility buffer by checked options."""
+    if options.mode in (Shading.IDS, Shading.DEPTH):
+        return shade_numbers(frags, camera, options)
+
+    def shade_own(part: VisiblePart) -> U8:
+        return shade_part(part, camera, options)
+
+    def shade_one(sample: Fragments) -> U8:
+        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_own, np.uint8)
+
+    def color_at(sample: Fragments, at: Places) -> U8:
+        left = sample.only(*at)
+        colors, instance = np.empty((len(at[0]), 4), np.uint8), left.instance[at]
+        for part in parts_of(left, mesh):
+            own = instance == part.i
+            rows, columns = (places[own] - side.start for places, side in zip(at, part.box, strict=True))
+            colors[own] = shade_own(part)[rows, columns]
+        return colors
+
+    # The kernel resolves the samples of one mesh; those of several are resolved here.
+    return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background, color_at)
+
+
+def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture of the rectangle of a part."""
+    place = None if part.instance is None else part.instance.transform
+    return shade_mesh(*part.drawn, part.camera(camera), options, place)
+
+
+def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
+    """Raise an error unless the mesh or scene can be the one that was drawn: kernels index its arrays by fragments."""
+    if not isinstance(frags, Fragments):
+        raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
+    whole = frags.whole if isinstance(frags, SceneFragments) else None
+    kind = Mesh if whole is None else Scene
+    if not isinstance(mesh, kind):
+        raise TypeError(f"mesh must be a {kind.__name__}, got {type(mesh).__name__}")
+    given = counts_of(mesh)
+    drawn = [(frags._n_vertices, frags._n_triangles)] if whole is None else counts_of(whole)
+    if len(drawn) != len(given):
+        raise ValueError(f"mesh must be the scene that was drawn, of {len(drawn)} instances, got one of {len(given)}")
+    for k, (old, new) in enumerate(zip(drawn, given, strict=True)):
+        if old != new:
+            name = "mesh" if whole is None else f"mesh[{k}]"
+            raise ValueError(
+                f"{name} must be the one that was drawn, with {old[0]} vertices and {old[1]} triangles, "
+                f"got {new[0]} and {new[1]}"
+            )
+
+
+def counts_of(subject: Mesh | Scene) -> list[tuple[int, int]]:
+    """Vertices and triangles of the mesh of each instance."""
+    return [(len(mesh.vertices), len(mesh.triangles)) for mesh in meshes_of(subject)]

@@ -1,0 +1,109 @@
+"""Draws silhouettes: where a mesh or scene is, seen by a camera, as a mask.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: a mask (H, W), bool or float32.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+import numpy.typing as npt
+
+from topleft._core.base.arrays import as_out, as_size
+from topleft._core.raster.verbs import coverage
+from topleft._core.raster.view import WindowOptions
+from topleft._meshes.camera.camera import CameraLike, camera_for
+from topleft._meshes.lod.detail import detailed
+from topleft._meshes.model.points import Points
+from topleft._meshes.picture.cloud import draw_share
+from topleft._meshes.picture.instances import draw_scene_coverage
+from topleft._meshes.picture.render import DEFAULT_SIZE
+from topleft._meshes.picture.through_lens import seen_through
+from topleft._meshes.scene.adapt import MeshLike
+from topleft._meshes.scene.scene import Scene, as_subject
+from topleft.typing import CullOption, SamplingOption
+
+__all__ = ["silhouette"]
+
+
+def silhouette(
+    mesh: MeshLike | Scene | Points,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
+    *,
+    sampling: SamplingOption = "center",
+    cull: CullOption = "none",
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    out: npt.NDArray[Any] | None = None,
+    **view: Unpack[WindowOptions],
+) -> npt.NDArray[Any]:
+    """Return the mask of the mesh or scene: where it is seen, or how much of each pixel it covers.
+
+    Parameters
+    ----------
+    mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
+        What to look at.
+    camera : Camera, optional
+        Unless given, the three-quarter view of `Camera.framing`, with y up.
+    size : (width, height), pixels
+        640 x 480 unless given.
+    sampling : str
+        As `coverage` takes it: "center" gives bool, "area" float32.
+    cull : {"none", "back", "front"}
+        Triangles to leave out, by the side that is seen.
+    tolerance : float
+        As for `render`: how far the outline may lie from where it belongs, pixels.
+    threads : int, optional
+        How many threads draw; never changes a bit.
+    out : ndarray of bool (float32 for "area"), shape (H, W), optional
+        Where the result goes.
+    **view
+        Other options of `coverage`, `origin=` for a window of a larger picture, say.
+
+    Returns
+    -------
+    ndarray of bool or float32, shape (H, W)
+        False or 0 where the mesh is not.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, or an option is unknown.
+
+    Notes
+    -----
+    What is covered by samples is the union of the triangles. By area it is the sum of their areas, at most 1: the union
+    where triangles do not overlap within a pixel. They do not along the outline of a closed mesh with ``cull="back"``
+    that each line of sight enters once; where one part of it hides another, a pixel of the inner outline is full.
+    Without culling the far side counts as well, and a pixel on the outline gets up to twice its share. Areas of the
+    instances of a scene are added up as float32, which is exact while the sum is below 1.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> int(tl.silhouette(mesh, size=(8, 6)).sum())
+    17
+    >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
+    16.2
+    """
+    size, subject = as_size(size), as_subject(mesh)
+    camera = camera_for(subject, camera, size)
+    if isinstance(subject, Points):
+        found = draw_share(subject, camera, size, sampling=sampling, cull=cull, threads=threads, **view)
+        if out is None:
+            return found
+        result = as_out("out", out, found.shape, found.dtype.type)
+        result[...] = found
+        return result
+    window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
+    subject = detailed(subject, camera, size, tolerance, cull=cull, **window)
+    options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
+    if isinstance(subject, Scene):
+        return draw_scene_coverage(subject, camera, size, out, **options)
+    frame, near_clip = view.get("viewport") or size, view.get("near_clip", True)
+    drawn = seen_through(subject.vertices, subject.triangles, camera, frame, near_clip=near_clip)
+    options |= {"transform": drawn.transform, "plan": drawn.sided(view.get("plan"), subject.single_sided())}
+    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
+    return mask

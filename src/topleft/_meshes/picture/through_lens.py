@@ -1,0 +1,108 @@
+"""Finds what to draw of a mesh or scene: itself, or the parts that a lens makes of it.
+
+Input: `Mesh` or `Scene`, a camera with or without lens. Output: `DrawnMesh` or `DrawnScene`, what the verbs draw.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._core.raster import choices
+from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.view import Planned, View
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.bend import BentMesh, bend
+from topleft._meshes.scene.scene import Instance, Scene
+
+__all__ = ["DrawnMesh", "DrawnScene", "StaticPlan", "scene_through", "seen_through"]
+
+Array = npt.NDArray[Any]
+
+MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+
+
+class DrawnMesh(NamedTuple):
+    """What the verbs draw of a mesh."""
+
+    vertices: Array
+    triangles: Array
+    transform: npt.NDArray[np.float64]
+    bent: BentMesh | None
+
+    def sided(self, plan: Planned | None, is_single: npt.NDArray[np.uint8] | None) -> Planned | SidedPlan | None:
+        """The plan, without the backs of the triangles of the mesh that are single-sided."""
+        if is_single is None:
+            return plan
+        return SidedPlan(plan, is_single if self.bent is None else is_single[self.bent.source])
+
+
+class SidedPlan:
+    """A plan for triangles some of which show no back."""
+
+    def __init__(self, plan: Planned | None, is_single: npt.NDArray[np.uint8]) -> None:
+        self._plan, self._is_single = plan, is_single
+
+    def fitted(self, view: View) -> View:
+        """Return the view with the plan, and without these backs."""
+        own = view if self._plan is None else self._plan.fitted(view)
+        return own.without_backs(self._is_single)
+
+
+def seen_through(
+    vertices: Array, triangles: Array, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True
+) -> DrawnMesh:
+    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
+    if camera.lens is None:
+        return DrawnMesh(vertices, triangles, camera.clip_from_world(frame), None)
+    bent = bend(vertices, triangles, camera, camera.lens, frame, near_clip=near_clip)
+    return DrawnMesh(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
+
+
+class StaticPlan(Planned):
+    """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
+        """Return the triangles of the mesh, which has checked them."""
+        return self._mesh.triangles
+
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
+        """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
+        mesh = self._mesh
+        return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
+
+
+class DrawnScene(NamedTuple):
+    """What is drawn of a scene, and the scene itself, which ids count the triangles of."""
+
+    scene: Scene
+    whole: Scene
+    clip_from_world: npt.NDArray[np.float64]
+    bent: tuple[BentMesh, ...] | None
+
+
+def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnScene:
+    """The scene as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it.
+
+    What is bent stands in eye space, mirrored instances mirrored twice: so they stay mirrored, for `cull`.
+    """
+    if camera.lens is None:
+        return DrawnScene(scene, scene, camera.clip_from_world(frame), None)
+    scene.check_counted("a scene behind a lens")
+    many, instances = [], []
+    for instance in scene:
+        mesh = instance.mesh
+        own = camera.placed(instance.transform)
+        bent = bend(mesh.vertices, mesh.triangles, own, camera.lens, frame, near_clip=near_clip)
+        place = MIRROR if instance.is_mirrored else np.eye(4)
+        points = bent.points_eye * np.diag(MIRROR)[:3] if instance.is_mirrored else bent.points_eye
+        many.append(bent)
+        instances.append(Instance(Mesh(points, bent.triangles), place))
+    return DrawnScene(Scene(instances), scene, camera.clip_from_eye(frame), tuple(many))

@@ -1,0 +1,191 @@
+"""Draws transparent pictures: shades every layer of a mesh or scene, then composites them.
+
+Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, Unpack
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.arrays import as_count, as_size
+from topleft._core.base.color import WHITE, ColorLike, as_color
+from topleft._core.raster.composite import composite
+from topleft._core.raster.peel import DepthLayers, peel
+from topleft._core.raster.view import WindowOptions
+from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
+from topleft._meshes.lod.detail import detailed
+from topleft._meshes.picture.fragments import SceneDepthLayers
+from topleft._meshes.picture.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
+from topleft._meshes.picture.instances import peel_scene
+from topleft._meshes.picture.render import DEFAULT_SIZE
+from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.shade import LookOptions
+from topleft._meshes.picture.through_lens import seen_through
+from topleft._meshes.scene.adapt import MeshLike
+from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
+from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
+
+__all__ = ["render_transparent", "visible_layers"]
+
+CLEAR = (0, 0, 0, 0)
+
+
+class GlassOptions(LookOptions, total=False):
+    """The options of `shade` that `render_transparent` passes on."""
+
+    color: ColorLike
+    depth_range: tuple[float, float] | None
+
+
+class PeelOptions(WindowOptions, total=False):
+    """The options of `peel` that `visible_layers` passes on."""
+
+    layers: int
+    depth_test: DepthTestOption
+    sampling: SamplesOption
+    cull: CullOption
+    threads: int | None
+
+
+def render_transparent(
+    mesh: MeshLike | Scene,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
+    *,
+    opacity: float = 0.5,
+    layers: int = 8,
+    shading: ShadingOption = "smooth",
+    background: ColorLike = WHITE,
+    cull: CullOption = "none",
+    subpixel_bits: int | Literal["exact"] = 8,
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    **look: Unpack[GlassOptions],
+) -> npt.NDArray[np.uint8]:
+    """A picture of the mesh or scene as if it were of coloured glass.
+
+    Parameters
+    ----------
+    mesh, camera, size, shading, background, cull, subpixel_bits, tolerance, threads, **look
+        As for `render`, one sample a pixel, and as for `shade`.
+    opacity : float, 0 to 1
+        How much each layer hides of what lies behind it.
+    layers : int, 1 to 16
+        How many are looked at; what lies behind them is not seen.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        sRGB with alpha. The values are composited as they are, front to back; see `composite`.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
+
+    Notes
+    -----
+    What `alpha_cutoff` leaves out of a texture is no glass: the layers behind it are one fewer.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> tl.render_transparent(mesh, size=(64, 48), opacity=0.5, background=(0, 0, 0, 0))[24, 32].tolist()[3]
+    192
+    """
+    size, layers, material = as_size(size), as_count("layers", layers), look.get("material")
+    subject = as_meshes(mesh)
+    camera = camera_for(subject, camera, size)
+    subject = detailed(subject, camera, size, tolerance, cull=cull, material=material)
+    ground = as_color("background", background, 4)
+    view: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
+    cuts = cuts_of(subject, material)
+    if any(cuts):
+        subject = scene_of(subject)  # which is the same picture
+        found: DepthLayers = solid_layers(subject, camera, size, cuts, layers=layers, **view)
+    else:
+        found = visible_layers(subject, camera, size, layers=layers, **view)
+    pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
+    for k in range(layers):
+        frags = found.layer(k)
+        if not frags.mask.any():
+            break
+        own = shade(frags, subject, camera, shading=shading, background=CLEAR, **look)
+        pictures[:, :, k] = own[..., :3]
+    picture: npt.NDArray[np.uint8] = composite(found, pictures, opacity=opacity, background=ground, threads=threads)
+    return picture
+
+
+def solid_layers(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    cuts: Sequence[Cut | None],
+    *,
+    threads: int | None,
+    **options: Any,
+) -> SceneDepthLayers:
+    """The nearest layers of a scene without what is cut out of its meshes."""
+    check_straight(camera)
+    holed = holed_instances(scene, cuts, camera)
+    found = peel_scene(solid_scene(scene, holed), camera, size, threads=threads, **options)
+    if 0 in size:
+        return found
+    whole = SceneDepthLayers(*found.planes, found.placed.of(scene))
+    draw_holed(whole.placed, holed, *whole.planes, is_peeled=True, threads=threads)
+    return whole
+
+
+def check_straight(camera: Camera) -> None:
+    """Raise an error if the camera has a lens."""
+    if camera.lens is not None:
+        raise ValueError("layers are not peeled through a lens, but camera has one: take its straightened()")
+
+
+def visible_layers(
+    mesh: MeshLike | Scene,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
+    **options: Unpack[PeelOptions],
+) -> DepthLayers:
+    """The nearest layers of every pixel of a mesh or scene, whatever its materials cut out; options as for `peel`.
+
+    Parameters
+    ----------
+    mesh, camera, size
+        As for `render`.
+    **options
+        Those of `peel`: `layers`, `cull`, `threads`, `origin`, ...
+
+    Returns
+    -------
+    DepthLayers
+        Of a scene `SceneDepthLayers`, which tells instances apart.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> layers = tl.visible_layers(cube, tl.Camera.framing(cube), (16, 16), layers=3)
+    >>> int(layers.count[8, 8])  # the front and the back
+    2
+    """
+    size = as_size(size)
+    subject = as_meshes(mesh)
+    camera = camera_for(subject, camera, size)
+    check_straight(camera)
+    if isinstance(subject, Scene):
+        return peel_scene(subject, camera, size, **options)
+    drawn = seen_through(subject.vertices, subject.triangles, camera, options.get("viewport") or size)
+    options["plan"] = drawn.sided(options.get("plan"), subject.single_sided())
+    return peel(subject.vertices, subject.triangles, size, transform=drawn.transform, **options)

@@ -1,0 +1,358 @@
+"""Finds what decides how triangles are drawn: transform, clip and snap as in the draw, then a census in its place.
+
+In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` turns into sentences; the bytes that a call needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import as_array
+from topleft._core.base.memory import FRESH, empty
+from topleft._core.base.options import DepthTest, Sampling, Sink
+from topleft._core.raster import choices
+from topleft._core.raster.choices import ClusterRoute, Drawing, Route
+from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
+from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.sampling import area_cells, sample_positions, split_bytes
+from topleft._core.raster.snap import Snapped, snap_mesh
+from topleft._core.raster.view import View
+from topleft._meshes.model.mesh import Mesh
+
+__all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
+
+#: The names of `tl_class` in ``csrc/topleft.h``.
+CLASSES = (
+    "degenerate", "culled", "outside", "between", "tiny", "small", "middle", "rows", "long",
+    "edge 64", "span 64", "edge 128", "span 128",
+)  # fmt: skip
+
+
+MOST_SHOWS = "most of the mesh shows, and drawing that cluster by cluster takes longer"
+
+#: Of closed meshes: 89 triangles a meshlet.
+TRIANGLE_BYTES_OF_MESHLETS = 19.2
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterFacts:
+    """How the clusters of a mesh fare in a view.
+
+    Attributes
+    ----------
+    clusters : Clusters or None
+        What is drawn from; None when the mesh is drawn whole.
+    why_not : str
+        Why it is.
+    n_outside, n_turned, n_hidden, n_drawn : int
+        Clusters outside of the picture, turned away, hidden, and drawn.
+    meshlet_bytes : int
+        What meshlets take of memory, about, where pictures come to be drawn from them; else 0.
+    """
+
+    clusters: Clusters | None
+    why_not: str = ""
+    n_outside: int = 0
+    n_turned: int = 0
+    n_hidden: int = 0
+    n_drawn: int = 0
+    meshlet_bytes: int = 0
+
+
+class Decided(NamedTuple):
+    """How samples of triangles whose vertices are not snapped were decided: `tl_exact_counts` in ``csrc/exact.h``."""
+
+    n_triangles: int
+    n_on_grid: int
+    n_asked: int
+    n_turns: int
+    n_expansions: int
+    n_integers: int
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What decides how a scene is drawn."""
+
+    verb: str
+    outputs: tuple[str, ...]
+    view: View
+    test: DepthTest | None
+    route: Route | None  # of `rasterize`
+    drawing: Drawing
+    vertex_dtype: str  # as given
+    point_dtype: str  # as worked on
+    is_vertex_copy: bool
+    index_dtype: str
+    n_vertices: int
+    n_components: int
+    n_triangles: int
+    is_clip_space: bool
+    is_affine: bool
+    are_whole: bool  # vertices in pixels are whole numbers
+    n_wide: int  # vertices beyond 2**30 sub-pixels
+    n_clipped: int  # vertices outside of a clip plane
+    n_cut: int  # triangles that a plane cuts and that are drawn as pieces
+    n_pieces: int
+    common_depth: float | None  # of all vertices, whatever is made of it
+    is_direct: bool  # uint8 colours of triangles are stored without labels in between
+    is_few: bool  # large triangles, whose picture is written row by row
+    work_ms: float  # of one thread, as guessed before the draw
+    census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
+    decided: Decided | None = None  # with vertices that are not snapped
+    clusters: ClusterFacts | None = None  # of a mesh
+
+    def count(self, *names: str) -> int:
+        """Return how many triangles or pieces are of some classes."""
+        return sum(self.census[CLASSES.index(name)][0] for name in names)
+
+    @property
+    def n_beyond(self) -> int:
+        """Triangles of which the clip planes leave nothing."""
+        return self.n_triangles - self.n_cut + self.n_pieces - sum(row[0] for row in self.census)
+
+    @property
+    def draws_planes(self) -> bool:
+        """Whether each sample is a picture of its own."""
+        return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
+
+    @property
+    def draws_bands(self) -> bool:
+        """Whether each sample is a picture of its own, drawn band after band of rows."""
+        return self.draws_planes and not self.in_clusters
+
+    @property
+    def is_split(self) -> bool:
+        """Whether the samples of pixels that show one triangle are kept once."""
+        can_split = self.verb == "rasterize" and choices.can_split(self.view, self.n_triangles)
+        return can_split and not self.in_clusters
+
+    @property
+    def in_clusters(self) -> bool:
+        """Whether a mesh is drawn cluster by cluster, each sample a picture of its own."""
+        return self.clusters is not None and self.clusters.clusters is not None
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether each thread takes a share of the triangles."""
+        if self.view.sampling is Sampling.AREA or self.draws_planes or self.is_direct:
+            return False
+        return self.drawing.is_shared
+
+    @property
+    def in_bands(self) -> bool:
+        """Whether triangles are sorted into bands of rows, and band after band is drawn."""
+        return self.drawing.in_bands and not (self.is_direct or self.is_few or 0 in self.view.size)
+
+    @property
+    def n_drawn(self) -> int:
+        """Triangles and pieces that may cover a sample."""
+        return self.count(*CLASSES[4:])
+
+    @property
+    def covered(self) -> float:
+        """Return about how many samples are covered, each as often as it is."""
+        return sum(row[2] for row in self.census)
+
+
+def find_facts(
+    vertices: ArrayLike, triangles: ArrayLike, view: View, verb: str, outputs: tuple[str, ...], test: DepthTest | None
+) -> tuple[Facts, NDArray[np.int32]]:
+    """Return what a scene is, and its triangles as a copy that nobody changes.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As the verb would.
+    """
+    decided = count_decided(vertices, triangles, view) if view.is_exact else None
+    asked, view = view, replace(view, is_exact=False)  # the census is that of the snapped triangles
+    snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
+    snapped.given.check_indices()
+    given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
+    (points, source, indices_drawn, *_), pieces = snapped.given, snapped.pieces
+    xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
+    is_special = xy[:, 0] == np.iinfo(np.int32).min
+    route, drawing = None, choices.drawing(view, snapped, find_sink(verb, view))
+    if verb == "rasterize":
+        route, drawing = choices.route(view, snapped, test, wants_depth=False)
+    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=source.is_clip_space)
+    samples = sample_positions(view.sampling.n_samples, view.grid_bits) if drawing.sink is Sink.SAMPLES else None
+    census = [(0, 0.0, 0.0)] * len(CLASSES)
+    if 0 not in view.size and snapped.n_triangles:
+        _, census = snapped.mesh.count_classes(drawing.sink, *view.size, samples)
+    in_pixels = not source.is_clip_space and len(points) > 0
+    facts = Facts(
+        verb=verb,
+        outputs=outputs,
+        view=asked,
+        test=test,
+        route=route,
+        drawing=drawing,
+        vertex_dtype=str(given.dtype),
+        point_dtype=str(points.dtype),
+        is_vertex_copy=not np.shares_memory(given, points),
+        index_dtype=str(indices.dtype),
+        n_vertices=len(points),
+        n_components=points.shape[1],
+        n_triangles=snapped.n_triangles,
+        is_clip_space=source.is_clip_space,
+        is_affine=source.is_affine,
+        are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
+        n_wide=int((is_special & (xy[:, 1] == 1)).sum()),
+        n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
+        n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]
+        n_pieces=len(pieces) if pieces else 0,
+        common_depth=common,
+        is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
+        is_few=writes_rows(snapped, view, verb, drawing),
+        work_ms=choices.work_ns(view, snapped, drawing.sink) / 1e6,
+        census=tuple(census),
+        decided=decided,
+    )
+    checked = np.array(indices_drawn, np.int32)
+    checked.flags.writeable = False
+    return facts, checked
+
+
+def writes_rows(snapped: Snapped, view: View, verb: str, drawing: Drawing) -> bool:
+    """Tell whether a picture is written row by row; colours are taken for RGBA, one a triangle."""
+    if verb == "fill":
+        return choices.fills_few(snapped, view, np.zeros((snapped.n_triangles, 4), np.uint8), is_flat=True)
+    is_one = view.sampling.n_samples == 1 or drawing.sink is Sink.SAMPLES
+    return is_one and choices.draws_few(snapped, view, drawing.sink, drawing.n_threads)
+
+
+def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Decided:
+    """Draw a scene without a snap, and return how its samples were decided; of several samples the first."""
+    exact = snap_mesh(FRESH, vertices, triangles, view, with_depth=False, out=None)
+    mesh = exact.mesh
+    if view.sampling.n_samples > 1:
+        x, y = sample_positions(view.sampling.n_samples, view.grid_bits)[0].tolist()
+        mesh = mesh.seen_from(x, y)
+    width, height = view.size
+    if width and height:
+        covered = empty(engine.Target.covered_shape(height, width, 1), np.uint64)
+        target = engine.Target(Sink.MASK, empty((height, width), np.bool_), None, covered)
+        if mesh.draw(target, 0, height) >= 0:
+            exact.refuse()
+    return Decided(*mesh.exact.counts)  # type: ignore[union-attr]
+
+
+def find_sink(verb: str, view: View) -> Sink:
+    """Return what a verb other than `rasterize` does with a covered sample."""
+    if verb == "fill":
+        return Sink.LABEL
+    if verb == "overdraw" or view.sampling is Sampling.AREA:
+        return Sink.COUNT
+    return Sink.SAMPLES if view.sampling.n_samples > 1 else Sink.MASK
+
+
+def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None) -> ClusterFacts:
+    """Return what `rasterize_mesh` does from the second picture of a mesh on; clusters are made for it if need be."""
+    n_triangles = len(mesh.triangles)
+    if verb != "rasterize":
+        return ClusterFacts(None, f"{verb} draws arrays, which may change")
+    sink = choices.fragment_sink(test, has_depth=True)
+    if view.is_exact:
+        return ClusterFacts(None, "vertices that are not snapped are drawn from beginning to end")
+    if view.grid_bits != view.subpixel_bits:
+        return ClusterFacts(None, "samples lie on a finer grid than the vertices")
+    if not choices.can_cluster(view, sink):
+        return ClusterFacts(None, "the order of the triangles matters, or the window lies too far off")
+    if not choices.pays_to_cluster(n_triangles, 1):
+        return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
+    clusters = mesh.clusters
+    seen = ClusteredMesh(clusters, view)
+    few = seen.survey(SURVEYED_OF_SAMPLES if view.sampling.n_samples > 1 else SURVEYED)
+    n, beyond = len(clusters), seen.find_beyond
+    pays = choices.pays_to_draw_from(ClusterRoute.CLUSTERS, view, n_triangles, few, 0.0, beyond)
+    can_grow = choices.can_draw_meshlets(view, sink, is_float32=clusters.is_float32)
+    can_grow = can_grow and choices.pays_to_grow(choices.MIN_PICTURES_TO_GROW, n_triangles, n)
+    if not (pays or can_grow):
+        return ClusterFacts(None, MOST_SHOWS)
+    found = seen.survey(n)
+    n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
+    n_hidden = n - n_outside - n_turned - n_drawn
+    hidden = n_hidden / max(1, n_hidden + n_drawn)
+    drawn_from = ClusterRoute.MESHLETS, view, n_triangles, found, hidden, beyond
+    is_grown = can_grow and choices.pays_to_draw_from(*drawn_from)
+    meshlet_bytes = bytes_of_meshlets(clusters) if is_grown else 0
+    if not pays:
+        return ClusterFacts(None, MOST_SHOWS, meshlet_bytes=meshlet_bytes)
+    return ClusterFacts(clusters, "", n_outside, n_turned, n_hidden, n_drawn, meshlet_bytes)
+
+
+def bytes_of_meshlets(clusters: Clusters) -> int:
+    """Return what the meshlets of a mesh take of memory: exactly once they are grown, about before."""
+    if clusters.has_meshlets:
+        return clusters.meshlets.n_bytes
+    return round(TRIANGLE_BYTES_OF_MESHLETS * clusters.n_triangles)
+
+
+def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
+    """Return the bytes of scratch, which is kept from call to call, and of results, by name.
+
+    What only the data can tell comes on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the pieces
+    of cut triangles, about 100 bytes each; triangles in several bands of rows.
+    """
+    view, n = facts.view, facts.n_triangles
+    width, height = view.size
+    n_pixels, n_samples = width * height, view.sampling.n_samples
+    is_empty = n_pixels == 0
+    scratch = {"records": 0 if is_empty or not n else engine.VERTEX_BYTES * facts.n_vertices}
+    if view.is_exact:  # float64 pixels stay where they are
+        taken = 24 if facts.is_clip_space else 8 * facts.n_components if facts.point_dtype != "float64" else 0
+        scratch = {"points": 0 if is_empty or not n else taken * facts.n_vertices}
+    if facts.index_dtype not in ("int32", "uint32"):
+        scratch["triangles"] = 12 * n
+    results = result_bytes(facts)
+    if facts.drawing.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
+        scratch["covered"] = 8 * height * engine.Target.covered_shape(height, width, n_samples)[1]
+    if view.sampling is Sampling.AREA:
+        strips = facts.drawing.n_threads * engine.blend_cells(width)
+        of_sums = area_cells(n, height, width, facts.drawing.n_threads) if n_pixels else 0
+        scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
+    elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_few):
+        scratch["labels"] = 4 * n_pixels
+    elif facts.is_split:
+        scratch |= split_bytes(n, (height, width), n_samples, facts.drawing.n_threads)[0]
+    elif facts.draws_bands and not is_empty and n and choices.can_share(view) and not facts.is_few:
+        scratch["bins"] = 12 * (n + 16)
+        scratch["bands"] = 4 * (n + 1)
+    found = facts.clusters
+    if facts.in_clusters or (facts.route is Route.DEPTH and facts.drawing.is_bounded):
+        rows, segments = engine.Target.bounds_shape(height, width)
+        scratch["bounds"] = 4 * rows * segments
+    if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
+        scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
+        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
+    elif facts.in_bands:
+        scratch |= {"bins": 12 * (n + 16), "bands": 4 * (n + 1)}
+    elif facts.is_shared:
+        scratch["others"] = 4 * (n + 16 * facts.drawing.n_threads)
+    if found is not None and found.meshlet_bytes:
+        scratch["meshlets"] = found.meshlet_bytes
+    return scratch, results
+
+
+def result_bytes(facts: Facts) -> dict[str, int]:
+    """Return the bytes of what the verb returns; colours have four bytes a pixel."""
+    width, height = facts.view.size
+    n_pixels, n_samples = width * height, facts.view.sampling.n_samples
+    many = facts.view.sampling is Sampling.AREA or n_samples > 1
+    if facts.is_split:
+        return split_bytes(facts.n_triangles, (height, width), n_samples, facts.drawing.n_threads)[1]
+    if facts.verb == "rasterize":
+        return {"triangle": 4 * n_pixels * n_samples, "depth": 4 * n_pixels * n_samples}
+    if facts.verb == "fill":
+        planes = {"sample labels": 4 * n_pixels * n_samples} if n_samples > 1 else {}
+        return {"color": 4 * n_pixels, **planes}
+    if facts.verb == "overdraw":
+        return {"overdraw": 4 * n_pixels * n_samples}
+    return {"coverage": (4 if many else 1) * n_pixels}

@@ -1,0 +1,406 @@
+"""What happens to a scene, stage by stage: what was chosen, why, what was left out, and what it should take.
+
+In: `Facts` and `Costs`. Out: `Stage`s, in the order of the pipeline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from topleft._core import engine
+from topleft._core.base.options import Sampling, Sink
+from topleft._core.base.threads import available_threads
+from topleft._core.raster import choices
+from topleft._core.raster.choices import MIN_THREAD_NS, Route
+from topleft._meshes.lod.detail import Detail
+from topleft._meshes.plan.costs import Costs, features, sink_group
+from topleft._meshes.plan.facts import ClusterFacts, Decided, Facts, memory_of
+from topleft.methods import METHODS
+
+__all__ = ["Stage", "find_stages"]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One step of the pipeline.
+
+    Attributes
+    ----------
+    name, choice, why : str
+        What is done, and why that is enough.
+    rejected : tuple of str
+        What else could have been done, and why it was not.
+    estimated_ms : float or None
+        None: part of another stage, which is named in `timed_in`.
+    timed_in : str
+        The stage that the time is measured with; its own name where it has one.
+    """
+
+    name: str
+    choice: str
+    why: str
+    rejected: tuple[str, ...] = ()
+    estimated_ms: float | None = None
+    timed_in: str = ""
+
+
+SINKS = {
+    Sink.MASK: "a bit a pixel, made bytes at the end",
+    Sink.COUNT: "a counter a pixel",
+    Sink.LABEL: "the id of one triangle a pixel",
+    Sink.PAINT: "ids and depth; the later triangle wins",
+    Sink.NEAREST: "ids and depth; the nearer triangle wins",
+    Sink.FARTHEST: "ids and depth; the farther triangle wins",
+    Sink.SAMPLES: "a bit a sample, counted at the end",
+}
+
+#: What it takes to find out whether a cluster shows, and what one that does not would take of the time of one that
+#: does: of balls of 10**6 and 10**7 triangles.
+CLUSTER_TEST_NS = 160
+LEFT_OUT_SHARE = 0.6
+
+#: What drawing takes of vertices that are not snapped, beside the snapped draw: of the scenes in docs/design/exact.md.
+EXACT_TIMES = 1.1
+
+
+def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
+    """Return the stages of a call."""
+    stages = [plan_input(facts, costs), *plan_vertices(facts, costs), plan_arithmetic(facts), plan_cull(facts)]
+    stages += [plan_method(facts, costs), *plan_sink(facts, costs)]
+    stages += [plan_threads(facts, costs), plan_memory(facts, costs)]
+    n_samples = facts.view.sampling.n_samples
+    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters, n_samples))
+
+
+def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int) -> list[Stage]:
+    """Return the stages of a mesh that is drawn again, with one that tells what its clusters save, for each sample."""
+    if found.clusters is None:
+        stages[1:1] = [Stage("clusters", "none", found.why_not, timed_in="method"), *plan_meshlets(found)]
+        return stages
+    n, n_triangles = len(found.clusters), found.clusters.n_triangles
+    names = {"outside of the picture": found.n_outside, "turned away": found.n_turned, "hidden": found.n_hidden}
+    parts = [f"{count:,} {text}" for text, count in names.items() if count]
+    why = "the mesh does not change, so its triangles were sorted once; " + (", ".join(parts) or "none is left out")
+    rejected = (
+        f"the mesh from beginning to end: all of {plural(n_triangles, 'triangle')} would be set up",
+        "the order of the triangles as given: near ones that come late hide nothing",
+    )
+    choice = f"{found.n_drawn:,} of {n:,} drawn, front to back, at most {engine.CLUSTER} triangles each"
+    row = Stage("clusters", choice, why, rejected, timed_in="method")
+    vertex_stages = ("transform", "clip", "snap")
+    share = found.n_drawn / max(1.0, found.n_drawn + LEFT_OUT_SHARE * (n - found.n_drawn))
+    total = CLUSTER_TEST_NS * n_samples * n / 1e6
+    scaled = []
+    for stage in stages:
+        if stage.name == "input":
+            scaled.append(replace(stage, choice="a copy of the mesh, sorted and checked once", rejected=()))
+        elif stage.name in vertex_stages:
+            total += n_samples * (stage.estimated_ms or 0.0) * share
+            scaled.append(replace(stage, estimated_ms=None, timed_in="method"))
+        elif stage.name == "method":
+            total += (stage.estimated_ms or 0.0) * share
+            scaled.append(replace(stage, estimated_ms=total))
+        else:
+            scaled.append(stage)
+    scaled[1:1] = [row, *plan_meshlets(found)]
+    return scaled
+
+
+def plan_meshlets(found: ClusterFacts) -> list[Stage]:
+    """Return the stage of a mesh that is drawn from meshlets once it has been drawn often, if it is."""
+    if not found.meshlet_bytes:
+        return []
+    choice = f"from picture {choices.MIN_PICTURES_TO_GROW} on, at most {engine.MESHLET_TRIANGLES} triangles each"
+    why = "what is drawn so often is worth growing, once; estimates are of the pictures before"
+    rejected = ("from the first picture on: growing takes as long as a hundred of them save",)
+    return [Stage("meshlets", choice, why, rejected, timed_in="method")]
+
+
+def plural(n: int, thing: str) -> str:
+    """Return a number with what it counts."""
+    return f"{n:,} {thing}" if n == 1 else f"{n:,} {thing}s"
+
+
+def vertices(n: int) -> str:
+    """Return a number of vertices."""
+    return "1 vertex" if n == 1 else f"{n:,} vertices"
+
+
+def megabytes(n: int) -> str:
+    """Return a number of bytes as people read it."""
+    return f"{n:,} bytes" if n < 10_000 else f"{n / 1e3:,.0f} kB" if n < 10_000_000 else f"{n / 1e6:,.0f} MB"
+
+
+def plan_detail(found: Detail) -> Stage:
+    """Tell which level of a mesh is drawn."""
+    count, n = len(found.mesh.triangles), found.n_triangles
+    choice = f"the mesh itself, {plural(n, 'triangle')}"
+    if found.level:
+        choice = f"level {found.level}: {plural(count, 'triangle')} of {n:,}, within {found.bound_px:.3g} px"
+    return Stage("detail", choice, found.why, found.rejected)
+
+
+def plan_input(facts: Facts, costs: Costs) -> Stage:
+    """Tell what becomes of the caller's arrays."""
+    reads = "read as they are" if not facts.is_vertex_copy else f"copied to contiguous {facts.point_dtype}"
+    converts = facts.index_dtype not in ("int32", "uint32")
+    indices = "made int32, checked on the way" if converts else "read as they are, checked while drawing"
+    n = facts.n_triangles
+    threads = choices.threads_to_convert(facts.view.threads, n)
+    why = f"{vertices(facts.n_vertices)} of {facts.vertex_dtype}, {plural(n, 'triangle')} of {facts.index_dtype}"
+    rejected = ["a check of all indices beforehand: the pass that draws reads them anyway"]
+    if converts:
+        rejected = ["int64 in the kernels: twice the memory to read in each pass; pass int32, or a plan, to save this"]
+    ms = costs.call[facts.verb] / 1e6 + (costs.other["index"] * n / threads / 1e6 if converts else 0.0)
+    if facts.is_vertex_copy:
+        ms += costs.other["touch"] * 8 * facts.n_vertices * facts.n_components / 1e6
+    return Stage("input", f"vertices {reads}; indices {indices}", why, tuple(rejected), ms, "input")
+
+
+def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
+    """Tell about transform, clip and snap: one pass over the vertices, and one over cut triangles."""
+    view = facts.view
+    kind = "snap"
+    if facts.is_clip_space:
+        kind = "project" if view.transform is None else "affine" if facts.is_affine else "transform"
+    threads = choices.threads_to_snap(view.threads, facts.n_vertices, facts.n_triangles)
+    ms = costs.vertex[f"{kind} {facts.point_dtype}"] * facts.n_vertices / threads / 1e6
+    if kind == "snap":
+        yield Stage("transform", "none", "vertices are in pixels", timed_in="snap")
+        why = "pixels have no near or far plane, and sides never cut: all sums are exact"
+        yield Stage("clip", "none", why, timed_in="snap")
+    else:
+        yield plan_transform(facts)
+        yield plan_clip(facts, costs)
+    if view.is_exact:
+        is_taken = kind == "snap" and facts.point_dtype == "float64"
+        why = f"{vertices(facts.n_vertices)} stay where they are: no pixel is wrong against the numbers of the array"
+        choice = "none, float64 where it lies" if is_taken else f"none, float64, {plural(threads, 'thread')}"
+        grid = ("a grid: vertices would move by up to 1/512 px at 8 sub-pixel bits",)
+        yield Stage("snap", choice, why, grid, 0.0 if is_taken else ms, "vertices")
+        return
+    bits = view.subpixel_bits
+    why = f"{vertices(facts.n_vertices)}, each moved by at most 1/{2 << bits} px; all that follows is integers"
+    rejected = ["float32 coordinates: edges that two triangles share would leave gaps"]
+    if facts.are_whole and bits:
+        rejected.append("0 sub-pixel bits: all vertices are whole pixels: the same picture, but no faster")
+    choice = f"{plural(bits, 'sub-pixel bit')}, {plural(threads, 'thread')}"
+    yield Stage("snap", choice, why, tuple(rejected), ms, "vertices")
+
+
+def plan_transform(facts: Facts) -> Stage:
+    """Tell about the matrix and the divide."""
+    precision = facts.point_dtype
+    if facts.view.transform is None:
+        return Stage("transform", f"divide by w in {precision}", "vertices are in clip space", timed_in="snap")
+    if facts.is_affine:
+        rejected = (f"a divide by w for each of {vertices(facts.n_vertices)}: by 1 it changes no bit",)
+        choice = f"matrix in {precision}, no divide"
+        return Stage("transform", choice, "its last row is 0 0 0 1, so every w is 1", rejected, timed_in="snap")
+    other = "float64: the vertices are float32"
+    if precision == "float64":
+        other = "float32: would round away bits that the vertices have"
+    choice, why = f"matrix and divide by w in {precision}", "perspective: the last row of the matrix is not 0 0 0 1"
+    return Stage("transform", choice, why, (other,), timed_in="snap")
+
+
+def plan_clip(facts: Facts, costs: Costs) -> Stage:
+    """Tell how many triangles are cut."""
+    view = facts.view
+    planes = [name for name, is_on in (("near", view.near_clip), ("far", view.far_clip)) if is_on]
+    names = " and ".join(planes) + (" plane" if len(planes) == 1 else " planes") if planes else "the eye's plane"
+    sides = ("the four sides of the picture: sums are exact as far as 2**60 sub-pixels, so nothing is cut there",)
+    if not facts.n_clipped:
+        return Stage("clip", "none", f"no vertex lies outside of {names}", sides, 0.0, "clip")
+    return Stage(
+        "clip",
+        f"{plural(facts.n_cut, 'triangle')} cut into {plural(facts.n_pieces, 'piece')}",
+        f"{vertices(facts.n_clipped)} outside of {names}, and {plural(facts.n_beyond, 'triangle')} with them",
+        sides,
+        costs.other["clip"] * (facts.n_cut + facts.n_beyond) / 1e6,
+        "clip",
+    )
+
+
+def plan_arithmetic(facts: Facts) -> Stage:
+    """Tell how many bits the edge functions need."""
+    if facts.decided is not None:
+        return plan_decisions(facts.decided)
+    narrow, long = facts.count("tiny", "small", "middle", "rows"), facts.count("long", "edge 64", "span 64")
+    wide = facts.count("edge 128", "span 128")
+    parts = [f"{name}: {n:,}" for name, n in (("32-bit lanes", narrow), ("64-bit", long), ("128-bit", wide)) if n]
+    why = "an extent of up to 62 px fits 32 bits, vertices below 2**30 sub-pixels 64, all others 128"
+    rejected: tuple[str, ...] = ()
+    if narrow and not wide:
+        rejected = ("128 bits for all: the fullest model, and no bit of the picture would differ",)
+    return Stage("arithmetic", ", ".join(parts) or "none", why, rejected, timed_in="method")
+
+
+def plan_decisions(found: Decided) -> Stage:
+    """Tell how the samples of vertices that are not snapped were decided."""
+    parts = [f"{plural(found.n_asked, 'sample or row end')} in doubt"]
+    if found.n_on_grid:
+        parts.append(f"{plural(found.n_on_grid, 'triangle')} on 2**-8 px, without rounding")
+    if found.n_turns:
+        parts.append(f"the turn of {plural(found.n_turns, 'triangle')}")
+    why = (
+        f"float32 and float64 lanes decide what lies beyond their error; of the rest {found.n_expansions:,} signs took "
+        f"sums of several float64, {found.n_integers:,} integers of 2,176 bits"
+    )
+    rejected = ("the exact sign for every sample: 10 to 1,000 times as long for the same picture",)
+    return Stage("arithmetic", ", ".join(parts), why, rejected, timed_in="method")
+
+
+def plan_cull(facts: Facts) -> Stage:
+    """Tell which triangles draw nothing."""
+    names = {"degenerate": "without area", "culled": "turned away", "outside": "outside of the picture",
+             "between": "between the samples"}  # fmt: skip
+    parts = [f"{facts.count(name):,} {text}" for name, text in names.items() if facts.count(name)]
+    if facts.n_beyond:
+        parts.append(f"{facts.n_beyond:,} outside of a clip plane")
+    if facts.view.is_exact:
+        parts = [f"{part}, on 2**-8 px" if part.endswith("without area") else part for part in parts]
+    n_hidden = facts.count(*names) + facts.n_beyond
+    n_all = facts.n_triangles - facts.n_cut + facts.n_pieces
+    why = f"{n_hidden:,} of {n_all:,} cannot cover a sample: " + ", ".join(parts)
+    side = {0: "no side asked for", 1: "back faces", 2: "front faces"}[facts.view.cull]
+    rejected = ("sides that are turned away: not asked for with cull=",) if not facts.view.cull else ()
+    return Stage("cull", side, why if parts else "every triangle may cover a sample", rejected, timed_in="method")
+
+
+METHOD_NAMES = {
+    "tiny": "{:,} by four tests in place (boxes up to 2x2)",
+    "small": "{:,} by sixteen tests (up to 4x4)",
+    "middle": "{:,} a row of many at a time (up to 16x16)",
+    "rows": "{:,} many rows at a time (up to 62x62)",
+    "long": "{:,} by themselves, row ends in float64",
+    "edge 64": "{:,} by themselves, sample by sample",
+    "span 64": "{:,} by themselves, row by row",
+    "edge 128": "{:,} by themselves, sample by sample in 128 bits",
+    "span 128": "{:,} by themselves, row by row in 128 bits",
+}
+
+
+def plan_method(facts: Facts, costs: Costs) -> Stage:
+    """Tell how triangles of each size find their samples."""
+    view = facts.view
+    n_pixels = view.size[0] * view.size[1]
+    group = sink_group(facts.drawing.sink, view.sampling)
+    times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
+    counts = features(facts.census, n_pixels)
+    times *= EXACT_TIMES if facts.decided is not None else 1.0
+    ms = times * costs.draw_ms(group, counts, facts.drawing.n_threads, is_shared=facts.is_shared) if n_pixels else 0.0
+    if view.sampling is Sampling.AREA:
+        why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"
+        choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
+        return Stage("method", choice, why, ("16 samples a pixel: not exact, and slower",), ms, "draw")
+    parts = [text.format(facts.count(name)) for name, text in METHOD_NAMES.items() if facts.count(name)]
+    ms += costs.other["beyond"] * facts.n_beyond / 1e6  # each thread looks at all of them
+    layers = facts.covered / max(1, n_pixels)
+    covered = f"about {facts.covered:,.0f} samples are covered, {layers:.2g} times the {n_pixels:,} pixels"
+    rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
+    if view.method != METHODS["auto"].code:
+        rejected = ("method='auto': another one was asked for; the picture is the same",)
+    if facts.is_few and facts.n_drawn:
+        parts = [f"{plural(facts.n_drawn, 'triangle')} at once, row by row: every pixel is written once"]
+        rejected = ("one after the other: what they cover would be cleared first, and written again",)
+    elif facts.is_direct and facts.n_drawn:
+        parts = [f"{plural(facts.n_drawn, 'triangle')} one after the other, in painter's order"]
+        rejected = ("vectors and queues of triangles: they change the order, and colours have no ids to tell it",)
+    return Stage("method", "; ".join(parts) or "nothing to draw", covered, rejected, ms, "draw")
+
+
+def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
+    """Tell about depth, sampling and attributes."""
+    view, n_pixels = facts.view, facts.view.size[0] * facts.view.size[1]
+    yield plan_depth(facts, costs)
+    n = view.sampling.n_samples
+    names = {Sampling.CENTER: "the pixel's centre", Sampling.AREA: "exact area", Sampling.OUTER: "squares that are met",
+             Sampling.INNER: "squares that are held"}  # fmt: skip
+    rejected = () if n == 1 else ("a full draw for each sample: setup, culling and boxes are shared",)
+    choice, why = names.get(view.sampling, f"{n} samples a pixel"), f"sampling={str(view.sampling)!r} was asked for"
+    if n > 1 and facts.in_clusters:
+        choice = f"{choice}, a picture of each"
+        rejected = ("all samples of a band of rows before the next: the whole mesh would be snapped and sorted first",)
+    yield Stage("sampling", choice, why, rejected, timed_in="method")
+    if facts.is_direct or (facts.is_few and facts.verb == "fill"):
+        why = "triangles are few for the picture: their colours go straight to it"
+        rejected = ("labels and colours from them: two passes over the picture, which pay for small triangles",)
+        yield Stage("shade", "none", why, rejected, timed_in="method")
+    elif facts.verb == "fill":
+        ms = costs.other["paint"] * n_pixels * n / 1e6
+        why = f"at most {n_pixels:,} of about {facts.covered:,.0f} samples show"
+        rejected = ("colours while drawing: hidden samples would be coloured too",)
+        yield Stage("shade", "colours from ids, once a pixel", why, rejected, ms, "shade")
+    elif facts.verb == "rasterize":
+        wanted = [name for name in facts.outputs if name not in ("triangle", "depth", "mask")]
+        choice = f"{', '.join(wanted)} from ids, when asked for" if wanted else "none"
+        why = "attributes are of pixels that show, so they come after" if wanted else "no attribute was asked for"
+        yield Stage("shade", choice, why, ("attributes while drawing: hidden samples would have them too",))
+
+
+def plan_depth(facts: Facts, costs: Costs) -> Stage:
+    """Tell whether samples compare depths."""
+    what = SINKS[facts.drawing.sink] if facts.view.sampling is not Sampling.AREA else "a sum of areas a pixel"
+    if facts.is_direct:
+        what = "the colour of the later triangle a pixel"
+    if facts.verb != "rasterize":
+        return Stage("depth", "none", f"{facts.verb} needs {what}", timed_in="method")
+    if facts.route is Route.LABELS:
+        why = "vertices have no depth: the later triangle wins, and depth 0 is written when it is asked for"
+        return Stage("depth", "no test, ids alone", why, timed_in="method")
+    if facts.route is Route.FLAT:
+        n_pixels = facts.view.size[0] * facts.view.size[1]
+        earlier = choices.earlier_wins(facts.test, has_depth=facts.n_components > 2)
+        order = "the earlier triangle wins" if earlier else "the later triangle wins"
+        why = f"every vertex lies at depth {facts.common_depth:g}: {order}; one pass over {n_pixels:,} pixels writes it"
+        compared = f"a comparison for each of about {facts.covered:,.0f} samples"
+        rejected = (f"{compared}: planes through equal depths are equal to the bit",)
+        ms = costs.other["flat"] * n_pixels / facts.drawing.n_threads / 1e6
+        return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
+    rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
+    why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
+    if facts.common_depth is not None:
+        why = f"every vertex lies at depth {facts.common_depth:g}, but little of the picture is covered"
+        rejected = ("ids alone, and a pass over all pixels for depth: longer than the comparisons",)
+    if facts.drawing.is_bounded:
+        what += "; large triangles leave out what lies behind"
+        why += "; rows of triangles are long, so a bound of depth is kept for each 64 columns of a row"
+    return Stage("depth", what, why, rejected, timed_in="method")
+
+
+def plan_threads(facts: Facts, costs: Costs) -> Stage:
+    """Tell how many threads draw, and what each takes."""
+    view, n = facts.view, facts.n_triangles
+    n_threads, usable = facts.drawing.n_threads, available_threads()
+    wake = f"waking a thread takes {costs.other['wake'] / 1e3:.0f} us"
+    if view.threads is not None:
+        why = f"threads={view.threads} was asked for"
+    else:
+        is_enough = "at least" if n_threads == usable else "less than"
+        each = f"{MIN_THREAD_NS / 1e6:g} ms for each of {usable}"
+        why = f"about {facts.work_ms:.2g} ms of work are {is_enough} {each}; {wake}"
+    if facts.in_bands:
+        sorted_ = f"the {n:,} triangles are sorted into bands of rows, which are cleared and drawn in the cache"
+        rejected = ("triangles as they come: what that saves is less than what pixels outside of the cache cost",)
+        who = "1, the caller's own" if n_threads == 1 else f"{n_threads}, each its bands of rows"
+        return Stage("threads", f"{who}; one band after the other", f"{why}; {sorted_}", rejected)
+    if n_threads == 1:
+        return Stage("threads", "1, the caller's own", why, (f"more: {wake}",))
+    if facts.is_shared:
+        rejected = (f"bands alone: each of {n_threads} threads would set up all {n:,} triangles",)
+        return Stage("threads", f"{n_threads}, each a share of the triangles and its own rows", why, rejected)
+    rejected = ("shares of the triangles: threads would have to meet twice",)
+    return Stage("threads", f"{n_threads} bands of {-(-view.size[1] // max(1, n_threads)):,} rows", why, rejected)
+
+
+def plan_memory(facts: Facts, costs: Costs) -> Stage:
+    """Tell what is allocated."""
+    scratch, results = memory_of(facts)
+    kept, made = sum(scratch.values()), sum(results.values())
+    parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)
+    touch = f"{costs.other['touch'] * (kept + made) / 1e6:.2g} ms more for its first touch"
+    rejected = (f"fresh memory for each frame: {touch}; a Rasterizer keeps it",)
+    choice = f"{megabytes(kept)} of scratch, {megabytes(made)} of results, {megabytes(kept + made)} at most"
+    return Stage("memory", choice, parts, rejected)

@@ -1,0 +1,199 @@
+"""Makes triangles of faces and cells as other libraries keep them: faces of any number of corners, skins of solids.
+
+Input: what meshio, pyvista and matplotlib have as meshes, or arrays; whose kind `adapt.py` tells. Output: `Polygons`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core.base.arrays import as_array
+from topleft._meshes.model.polygons import triangulate
+
+__all__ = ["Polygons", "of_arrays", "of_cells", "of_grid", "of_padded", "of_pair", "of_triangulation"]
+
+CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
+"""Corners of the surface cells of meshio, which come first in a row; `None`: all of the row. Of curved cells the points
+on their edges and inside are left out: they are drawn straight, from corner to corner."""
+
+SIDES_OF_SOLID = {
+    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    "voxel": ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (1, 3, 7, 5), (3, 2, 6, 7), (2, 0, 4, 6)),
+}
+"""Corners of the sides of solid cells, counter-clockwise seen from outside."""
+
+SOLID_OF_CELL = {
+    "tetra": "tetra", "tetra10": "tetra", "hexahedron": "hexahedron", "hexahedron20": "hexahedron",
+    "hexahedron24": "hexahedron", "hexahedron27": "hexahedron", "wedge": "wedge", "wedge15": "wedge",
+    "wedge18": "wedge", "pyramid": "pyramid", "pyramid13": "pyramid", "pyramid14": "pyramid", "voxel": "voxel",
+}  # fmt: skip
+
+CELL_OF_VTK = {
+    5: "triangle", 7: "polygon", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid",
+    22: "triangle6", 23: "quad8", 24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13", 28: "quad9",
+    29: "hexahedron27", 34: "triangle7",
+}  # fmt: skip
+"""The cells of VTK, by their numbers."""
+
+
+class Polygons(NamedTuple):
+    """Points, and triangles that know which face they were cut from."""
+
+    points: npt.NDArray[Any]
+    """(V, 2) or (V, 3)."""
+
+    triangles: npt.NDArray[Any]
+    """(T, 3) integers."""
+
+    faces: npt.NDArray[np.int64] | None
+    """(T,) the face, of any number of corners, that each triangle is a part of; `None`: faces are the triangles."""
+
+    n_faces: int
+
+
+def of_triangulation(subject: Any) -> Polygons:
+    """Triangles of matplotlib's Triangulation that are not masked."""
+    points = np.column_stack([as_array("x", subject.x), as_array("y", subject.y)])
+    triangles, mask = as_array("triangles", subject.triangles), getattr(subject, "mask", None)
+    if mask is None:
+        return Polygons(points, triangles, None, len(triangles))
+    kept = np.flatnonzero(~np.asarray(mask))
+    return Polygons(points, triangles[kept], kept, len(triangles))
+
+
+def of_arrays(subject: Any) -> Polygons:
+    """Triangles of what has `vertices` and `faces` or `triangles`."""
+    faces = getattr(subject, "faces", None)
+    return _plain(subject.vertices, subject.triangles if faces is None else faces)
+
+
+def of_pair(subject: Any) -> Polygons:
+    """Triangles of (vertices, triangles)."""
+    return _plain(*subject)
+
+
+def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Polygons:
+    points = as_array("vertices", vertices)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"points must have shape (V, 2) or (V, 3), got {points.shape}")
+    if isinstance(triangles, list | tuple) and len({np.size(face) for face in triangles}) > 1:
+        n_corners = np.array([np.size(face) for face in triangles])
+        corners = np.concatenate([np.asarray(face).ravel() for face in triangles])
+        if corners.dtype.kind not in "iu":
+            raise TypeError(f"triangles must be integers, got {corners.dtype}")
+        return _of_faces(points, corners, n_corners)
+    corners = as_array("triangles", triangles)
+    if corners.ndim == 2 and corners.shape[1] > 3 and corners.dtype.kind in "iu":
+        return _of_blocks(points, [corners])
+    return Polygons(points, corners, None, corners.shape[0] if corners.ndim else 0)
+
+
+def of_cells(subject: Any) -> Polygons:
+    """Triangles of the cells of a mesh of meshio."""
+    return _of_cells(as_array("points", subject.points), subject.cells)
+
+
+def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Polygons:
+    """Triangles of the surface cells of meshio, block after block; where there are none, of the skin of solid ones."""
+    blocks = list(blocks)
+    surfaces = [block for block in blocks if block.type in CORNERS_OF_CELL]
+    if surfaces:
+        return _of_blocks(
+            points, [as_array("cells", block.data)[:, : CORNERS_OF_CELL[block.type]] for block in surfaces]
+        )
+    solids = [
+        (SOLID_OF_CELL[block.type], as_array("cells", block.data)) for block in blocks if block.type in SOLID_OF_CELL
+    ]
+    if not solids:
+        kinds = ", ".join(block.type for block in blocks) or "none"
+        raise ValueError(f"mesh has no triangles: its cells are {kinds}")
+    return _skin(points, solids)
+
+
+def of_grid(subject: Any) -> Polygons:
+    """Triangles of the cells of pyvista's UnstructuredGrid: one array, before each cell its number of points."""
+    points, padded = as_array("points", subject.points), as_array("cells", subject.cells).ravel().astype(np.int64)
+    kinds = as_array("celltypes", subject.celltypes).ravel()
+    starts, sizes = _rows_of_padded(padded)
+    if len(starts) != len(kinds):
+        raise ValueError(f"mesh has {len(starts)} cells and {len(kinds)} types of cells")
+    blocks = []
+    for kind in np.unique(kinds).tolist():
+        for size in np.unique(sizes[kinds == kind]).tolist():
+            rows = padded[starts[(kinds == kind) & (sizes == size)][:, None] + np.arange(size)]
+            blocks.append(_Block(CELL_OF_VTK.get(kind, f"VTK's {kind}"), rows))
+    return _of_cells(points, blocks)
+
+
+class _Block(NamedTuple):
+    type: str
+    data: npt.NDArray[np.int64]
+
+
+def _skin(points: npt.NDArray[Any], solids: list[tuple[str, npt.NDArray[Any]]]) -> Polygons:
+    """Triangles of the sides of solid cells that no second cell has."""
+    sides: dict[int, list[npt.NDArray[np.int64]]] = {3: [], 4: []}
+    for kind, cells in solids:
+        sides_of_cell = SIDES_OF_SOLID[kind]
+        middle = points[cells[:, : 1 + max(max(side) for side in sides_of_cell)]].mean(axis=1)
+        for side in sides_of_cell:
+            rows = cells[:, side].astype(np.int64)
+            first, *_, last = corners = np.moveaxis(points[rows], 1, 0)
+            # Programs do not agree which way round a wedge goes.
+            is_inwards = (np.cross(corners[1] - first, last - first) * (corners.mean(axis=0) - middle)).sum(axis=1) < 0
+            rows[is_inwards] = rows[is_inwards][:, ::-1]
+            sides[len(side)].append(rows)
+    blocks = []
+    for rows in (np.concatenate(own) for own in sides.values() if own):
+        _, first, n_cells = np.unique(np.sort(rows, axis=1), axis=0, return_index=True, return_counts=True)
+        blocks.append(rows[np.sort(first[n_cells == 1])])
+    return _of_blocks(points, blocks)
+
+
+def of_padded(subject: Any) -> Polygons:
+    """Triangles of the faces of pyvista: one array, before each face its number of corners."""
+    points, padded = as_array("points", subject.points), as_array("faces", subject.faces)
+    if padded.ndim == 2:
+        return _plain(points, padded)
+    if getattr(subject, "n_strips", 0):
+        raise ValueError("mesh has strips of triangles: take its triangulate()")
+    if padded.size % 4 == 0 and (padded[::4] == 3).all():
+        triangles = padded.reshape(-1, 4)[:, 1:]
+        return Polygons(points, triangles, None, len(triangles))
+    starts, sizes = _rows_of_padded(padded)
+    within = np.arange(int(sizes.sum())) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    return _of_faces(points, padded[np.repeat(starts, sizes) + within], sizes)
+
+
+def _rows_of_padded(padded: npt.NDArray[Any]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Where the rows of one array begin, before each of which stands its length, and these."""
+    starts, sizes, at, numbers = [], [], 0, padded.tolist()
+    while at < len(numbers):
+        size = numbers[at]
+        if size < 0 or at + 1 + size > len(numbers):
+            raise ValueError(f"faces[{at}] = {size} must be a number of corners that follow")
+        starts.append(at + 1)
+        sizes.append(size)
+        at += 1 + size
+    return np.array(starts, np.int64), np.array(sizes, np.int64)
+
+
+def _of_blocks(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Polygons:
+    """Faces (N, K) as K - 2 triangles each."""
+    if all(block.shape[1] == 3 for block in blocks):
+        triangles = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        return Polygons(points, triangles, None, len(triangles))
+    n_corners = np.concatenate([np.full(len(block), block.shape[1]) for block in blocks])
+    return _of_faces(points, np.concatenate([block.ravel() for block in blocks]), n_corners)
+
+
+def _of_faces(points: npt.NDArray[Any], corners: npt.NDArray[Any], n_corners: npt.NDArray[Any]) -> Polygons:
+    rows, faces = triangulate(points, corners, n_corners)
+    return Polygons(points, corners[rows], faces, len(n_corners))

@@ -1,0 +1,356 @@
+"""Scenes: meshes that stand in one world, each placed by a matrix, as often as wanted.
+
+Input: meshes and matrices; or whatever a caller gives to be drawn, a path, say. Output: a `Scene`, or the `Mesh`,
+`Scene` or `Points` that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
+from topleft._core.raster.clusters import Backoff
+from topleft._meshes.io.load import load
+from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
+from topleft._meshes.model.normals import moved
+from topleft._meshes.model.points import Points
+from topleft._meshes.scene.adapt import MeshLike, as_mesh, is_mesh_like
+
+__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "collapsed", "counted_ranges", "meshes_of", "scene_of"]
+
+F64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A mesh and where it stands; the arrays are those of the mesh, never copied.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    transform : (4, 4) array_like
+        World from object, with last row [0, 0, 0, 1] and not singular. One that mirrors turns the winding over, and
+        what `cull` leaves out with it, so that the outside stays outside.
+    name : str, optional
+
+    Raises
+    ------
+    ValueError
+        If the matrix has another shape or last row, is singular, or holds a number that is not finite.
+    TypeError
+        If `mesh` is none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> aside = np.eye(4)
+    >>> aside[0, 3] = 3.0
+    >>> scene = tl.Scene([tl.Instance(cube), tl.Instance(cube, aside, name="right")])
+    >>> scene.n_triangles
+    24
+    """
+
+    mesh: Mesh
+    transform: F64 = field(default_factory=lambda: np.eye(4))
+    name: str | None = None
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(self, mesh: Mesh, transform: npt.ArrayLike = ..., name: str | None = None) -> None: ...
+
+    __setstate__ = set_read_only
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.mesh, Mesh):
+            raise TypeError(f"mesh must be a Mesh, got {shown(self.mesh)}: topleft.as_mesh makes one of others")
+        if not isinstance(self.name, str | None):
+            raise TypeError(f"name must be a str or None, got {shown(self.name)}")
+        matrix = as_square("transform", self.transform, 4)
+        if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+            raise ValueError(f"the last row of transform must be [0, 0, 0, 1], got {matrix[3].tolist()}")
+        check_regular("transform", matrix)
+        matrix.flags.writeable = False
+        object.__setattr__(self, "transform", matrix)
+
+    def __repr__(self) -> str:
+        """One line: the mesh and where its origin stands."""
+        place = ", ".join(f"{x:.4g}" for x in self.transform[:3, 3])
+        name = "" if self.name is None else f", name={self.name!r}"
+        return f"Instance({self.mesh!r}, at=({place}){name})"
+
+    def with_mesh(self, mesh: Mesh) -> Instance:
+        """Return another mesh in the same place, which has been checked."""
+        instance = object.__new__(Instance)
+        vars(instance).update(vars(self), mesh=mesh)
+        return instance
+
+    @cached_property
+    def is_mirrored(self) -> bool:
+        """Whether the matrix turns the winding of triangles over."""
+        return engine.determinant(self.transform[:3, :3]) < 0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene:
+    """Meshes in one world.
+
+    Parameters
+    ----------
+    instances : iterable of Instance, mesh, (mesh, transform) or (mesh, transform, name)
+        At least one. A mesh is whatever `as_mesh` takes: a `Mesh`, a path, a mesh of trimesh, (vertices, triangles).
+        By itself it stands where its vertices are. What is to be shared by several instances is made a `Mesh` first.
+
+    Raises
+    ------
+    ValueError
+        If there is no instance.
+    TypeError
+        If an instance is something else.
+
+    Examples
+    --------
+    >>> import numpy as np, topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> aside = np.eye(4)
+    >>> aside[0, 3] = 3
+    >>> scene = tl.Scene([cube, (cube, aside, "right")])
+    >>> scene
+    Scene(2 instances of 1 mesh, 24 triangles)
+    >>> scene[1].name, scene.bounds.tolist()
+    ('right', [[-1.0, -1.0, -1.0], [4.0, 1.0, 1.0]])
+    """
+
+    instances: tuple[Instance, ...]
+
+    def __init__(self, instances: Iterable[Instance | MeshLike | tuple[object, ...]]) -> None:
+        if isinstance(instances, Mesh | str | np.ndarray) or not isinstance(instances, Iterable):
+            raise TypeError(f"instances must be a sequence of meshes, got {shown(instances)}: Scene([mesh])")
+        object.__setattr__(self, "instances", tuple(map(as_instance, instances)))
+        if not self.instances:
+            raise ValueError("a scene needs at least one instance, got none")
+
+    def __getstate__(self) -> dict[str, object]:
+        """What another process needs: the rest is found out there."""
+        return {"instances": self.instances}
+
+    def _repr_html_(self) -> str:
+        """A table of the instances, the first hundred of them."""
+        rows = [
+            (i, one.name or "", len(one.mesh.vertices), len(one.mesh.triangles), one.transform[:3, 3].round(4).tolist())
+            for i, one in enumerate(self.instances[:100])
+        ]
+        head = "".join(f"<th>{escape(name)}</th>" for name in ("", "name", "vertices", "triangles", "at"))
+        body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>"
+
+    def __len__(self) -> int:
+        return len(self.instances)
+
+    def __iter__(self) -> Iterator[Instance]:
+        return iter(self.instances)
+
+    def __getitem__(self, i: int) -> Instance:
+        return self.instances[i]
+
+    def __repr__(self) -> str:
+        n, n_meshes = len(self), len({id(instance.mesh) for instance in self})
+        many, kinds = "s" * (n > 1), "es" * (n_meshes > 1)
+        return f"Scene({n} instance{many} of {n_meshes} mesh{kinds}, {self.n_triangles} triangles)"
+
+    @cached_property
+    def backoff(self) -> Backoff:
+        """How long to go on drawing the meshes whole."""
+        return Backoff()
+
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of all instances together."""
+        return int(self.first_ids[-1])
+
+    @cached_property
+    def first_ids(self) -> npt.NDArray[np.int64]:
+        """Where the triangles of each instance begin when all are counted, and the number of all: (N + 1,) int64."""
+        first_ids = np.cumsum([0, *(len(instance.mesh.triangles) for instance in self.instances)], dtype=np.int64)
+        first_ids.flags.writeable = False
+        return first_ids
+
+    @cached_property
+    def transforms(self) -> F64:
+        """World from object of each instance, (N, 4, 4)."""
+        transforms = np.stack([instance.transform for instance in self.instances])
+        transforms.flags.writeable = False
+        return transforms
+
+    def clip_from_objects(self, clip_from_world: F64) -> F64:
+        """Clip from object of each instance, (N, 4, 4): the product of each, to the bit."""
+        columns = np.ascontiguousarray(self.transforms.transpose(1, 0, 2)).reshape(4, -1)
+        products = engine.product(clip_from_world, columns).reshape(4, -1, 4)
+        return np.ascontiguousarray(products.transpose(1, 0, 2))
+
+    @cached_property
+    def meshes(self) -> dict[int, tuple[Mesh, npt.NDArray[np.intp]]]:
+        """The different meshes, by their `id`, and which instances are of each, ascending."""
+        found: dict[int, list[int]] = {}
+        for i, instance in enumerate(self.instances):
+            found.setdefault(id(instance.mesh), []).append(i)
+        return {key: (self.instances[at[0]].mesh, np.array(at, np.intp)) for key, at in found.items()}
+
+    @cached_property
+    def boxes(self) -> F64:
+        """The `vertex_box` of the mesh of each instance, (N, 6); NaN where a vertex is not finite."""
+        boxes = np.empty((len(self), 6))
+        for mesh, at in self.meshes.values():
+            boxes[at] = mesh.vertex_box if mesh.is_finite else np.nan
+        return boxes
+
+    @cached_property
+    def groups(self) -> tuple[tuple[int, Scene], ...]:
+        """The scene in parts whose triangles int32 can count from 1 on, each with the index of its first instance."""
+        groups = []
+        for first, end in counted_ranges(self.first_ids):
+            part = object.__new__(Scene)
+            vars(part).update(instances=self.instances[first:end], transforms=self.transforms[first:end])
+            groups.append((first, part))
+        return tuple(groups)
+
+    def check_counted(self, what: str) -> None:
+        """Check that int32 counts all triangles.
+
+        Raises
+        ------
+        ValueError
+            If it does not.
+        """
+        if self.n_triangles > INT32_MAX:
+            raise ValueError(f"{what} must have at most {INT32_MAX} triangles, got {self.n_triangles}")
+
+    def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
+        """Return the scene with other meshes, which stand where these do."""
+        scene = object.__new__(Scene)
+        instances = tuple(one.with_mesh(mesh) for one, mesh in zip(self.instances, meshes, strict=True))
+        vars(scene).update(instances=instances, transforms=self.transforms)
+        return scene
+
+    @property
+    def bounds(self) -> F64:
+        """Lower and upper corner (2, 3) float64 of the box round all triangles, in the world.
+
+        Raises
+        ------
+        ValueError
+            If there are no triangles.
+        """
+        points = self.extreme_points()
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    def extreme_points(self) -> F64:
+        """Corners of triangles in the world, (N, 3) float64, which have the box and the bounding sphere of all.
+
+        Raises
+        ------
+        ValueError
+            If there are no triangles.
+        """
+        used = [world_corners(instance) for instance in self.instances if len(instance.mesh.triangles)]
+        if not used:
+            raise ValueError("a scene without triangles has no bounds")
+        return extreme_points(*used)
+
+
+def counted_ranges(first_ids: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+    """Yield the ranges of instances whose triangles int32 can count from 1 on, by where the ids of each begin."""
+    first = 0
+    while first < len(first_ids) - 1:
+        end = int(np.searchsorted(first_ids, first_ids[first] + INT32_MAX, side="right")) - 1
+        yield first, end
+        first = end
+
+
+def as_instance(value: object) -> Instance:
+    """Return an instance of what a scene is made from."""
+    if isinstance(value, Instance):
+        return value
+    if isinstance(value, Scene):
+        raise TypeError("instances must be meshes, got a Scene: Scene([*scene, mesh]) joins them")
+    if isinstance(value, tuple) and 2 <= len(value) <= 3 and not is_pair(value):
+        mesh, *place = value
+        if is_subject(mesh):
+            return Instance(as_mesh(mesh), *place)
+    elif is_subject(value):
+        return Instance(as_mesh(value))
+    raise TypeError(
+        "instances must be Instance, a mesh, (mesh, transform) or (mesh, transform, name), a mesh being a Mesh, a "
+        f"path, a mesh of another library or (vertices, triangles), got {shown(value)}"
+    )
+
+
+def is_subject(value: object) -> bool:
+    """Whether `as_mesh` is to be asked what it makes of it."""
+    return isinstance(value, Mesh) or is_mesh_like(value) or is_pair(value) or hasattr(value, "vertices")
+
+
+def is_pair(value: object) -> bool:
+    """Whether it is (vertices, triangles), and not (mesh, transform)."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        return False
+    try:
+        first, second = (np.shape(part) for part in value)
+    except ValueError:  # polygons of several numbers of corners
+        return not is_mesh_like(value[0])
+    return len(first) == 2 and first[1] in (2, 3) and len(second) == 2
+
+
+def world_corners(instance: Instance) -> F64:
+    """The vertices that triangles of an instance use, in the world: (N, 3) float64."""
+    return moved(used_vertices(instance.mesh), instance.transform)
+
+
+def as_subject(given: MeshLike | Scene | Points) -> Mesh | Scene | Points:
+    """What is drawn of what is given; of a path what `load` reads, of other things what `as_mesh` makes of them."""
+    if isinstance(given, Mesh | Scene | Points):
+        return given
+    return load(given) if isinstance(given, str | os.PathLike) else as_mesh(given)
+
+
+def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
+    """The same for what needs triangles: points are refused."""
+    return given if isinstance(given, Scene) else as_mesh(given)
+
+
+def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
+    """The mesh of each instance."""
+    return [subject] if isinstance(subject, Mesh) else [instance.mesh for instance in subject]
+
+
+def scene_of(subject: Mesh | Scene) -> Scene:
+    """The scene, or that of a mesh alone."""
+    return subject if isinstance(subject, Scene) else Scene([subject])
+
+
+def collapsed(scene: Scene, masks: Sequence[npt.NDArray[np.bool_] | None], *, keeps_others: bool = True) -> Scene:
+    """The scene with these triangles collapsed to points, so ids stay; other instances whole, or all of them."""
+    made: dict[int, Mesh] = {}
+    instances = []
+    for instance, mask in zip(scene, masks, strict=True):
+        mesh = instance.mesh
+        if mask is None and keeps_others:
+            instances.append(instance)
+            continue
+        if id(mesh) not in made:
+            if mask is None:
+                made[id(mesh)] = Mesh(mesh.vertices[mesh.triangles[:1, 0]], np.zeros_like(mesh.triangles))
+            else:
+                made[id(mesh)] = Mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
+        instances.append(Instance(made[id(mesh)], instance.transform))
+    return Scene(instances)
