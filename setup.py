@@ -1,7 +1,8 @@
 """Build `topleft._core.engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and
 the classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's default instruction set.
 
-Everything that is not about compiling stands in `pyproject.toml`. setuptools gives all sources of an extension the same
+Everything that is not about compiling stands in `pyproject.toml`. What the engine declares of csrc, and its types for
+type checkers, are made by `packaging/bindings.py`. setuptools gives all sources of an extension the same
 flags, so `BuildTopleft` compiles each unit by itself and links the objects.
 
 Environment:
@@ -32,6 +33,9 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, PlatformError
 
 ROOT = Path(__file__).resolve().parent
+sys.path.insert(0, str(ROOT / "packaging"))
+import bindings  # noqa: E402
+
 ENGINE = "topleft._core.engine.kernels"
 CLASSICS = "topleft.methods.classics.classic_kernels"
 
@@ -288,18 +292,20 @@ class BuildTopleft(build_ext):
 
         source = ROOT / ext.sources[0]
         target = self.temp / (source.stem + ".c")
+        contract = bindings.contract()
 
         def make() -> None:
+            self.temp.joinpath("contract.pxi").write_text(contract, encoding="utf-8")
             with tempfile.TemporaryDirectory(dir=self.temp) as folder:
                 made = Path(folder, target.name)
-                options = CompilationOptions(output_file=str(made), language_level=3)
+                options = CompilationOptions(output_file=str(made), language_level=3, include_path=[str(self.temp)])
                 if compile_single(str(source), options, ext.name).num_errors:
                     raise CompileError(f"Cython found errors in {source.relative_to(ROOT)}")
                 os.replace(made, target)
 
         included = files_in(str(source.parent.relative_to(ROOT)), ".pxd", ".pxi")
         with self.cython_lock:
-            make_once(target, digest(Cython.__version__, ext.name, source, *included), make)
+            make_once(target, digest(Cython.__version__, ext.name, contract, source, *included), make)
         return target
 
     def compile_unit(self, source: Path | Extension, flags: list[str], macros: list[tuple[str, str]]) -> Path:
@@ -348,6 +354,7 @@ def readme(url: str | None) -> str:
 
 
 url = os.environ.get("TOPLEFT_URL")
+bindings.write_stub()  # before any command: a wheel holds it, and type checkers read it in a checkout
 setup(
     long_description=readme(url),
     long_description_content_type="text/markdown",

@@ -43,9 +43,10 @@ def main(folder: Path) -> None:
         sys.exit(f"{wheel.name} must hold the license and these, compiled: {', '.join(sorted(units))}; got {found}")
     check(wheel.name, in_wheel, modules, in_wheel - modules - extensions - metadata)
 
-    top = {"LICENSE", "MANIFEST.in", "README.md", "pyproject.toml", "setup.py"}
-    built = {n for n in in_sdist if n.endswith((".so", ".o", ".pyc")) or n == "src/topleft/_core/engine/kernels.c"}
-    check(sdist.name, in_sdist, top | files_below("csrc", "src", "tests"), built)
+    top = {"LICENSE", "MANIFEST.in", "README.md", "packaging/bindings.py", "pyproject.toml", "setup.py"}
+    made = {"src/topleft/_core/engine/kernels.c", "src/topleft/_core/engine/kernels.pyi"}
+    built = {name for name in in_sdist if name.endswith((".so", ".o", ".pyc"))} | made
+    check(sdist.name, in_sdist, top | files_below("csrc", "src", "tests") - made, built)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,5 @@ peers/     who draws it: topleft and others, one file each
 harness/   what measures: processes, turns, records
 report/    tables, charts and pages, and the protocol of a study
 run/ accuracy/ atlas/ choices/ static/ pictures/ levels/ small/   the studies
-cli.py     their commands
 records/   what was measured, as the pages show it
 """

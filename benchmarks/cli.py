@@ -27,27 +27,20 @@ from benchmarks.scenes.cases import CASES
 from benchmarks.small.batch import STUDY as BATCH
 from benchmarks.small.cluster import STUDY as CLUSTER
 from benchmarks.small.explorer import STUDY as EXPLORER
-from benchmarks.small.field import STUDY as FIELD
-from benchmarks.small.fresh import STUDY as FRESH
 from benchmarks.small.gate import STUDY as GATE
 from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.instances import STUDY as INSTANCES
-from benchmarks.small.large import STUDY as LARGE
-from benchmarks.small.layers import STUDY as LAYERS
 from benchmarks.small.memset import STUDY as MEMSET
-from benchmarks.small.no_snap import STUDY as NO_SNAP
-from benchmarks.small.samples import STUDY as SAMPLES
+from benchmarks.small.pairs import STUDIES as PAIRS
 from benchmarks.small.samplings import STUDY as SAMPLINGS
 from benchmarks.small.tiles import STUDY as TILES
-from benchmarks.small.tolerance import STUDY as TOLERANCE
 from benchmarks.static.study import STUDY as STATIC
 
 STUDIES = {
     study.kind: study
     for study in (
-        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        GROWTH, POLYGONS, REAL_FILES, FRESH, LARGE, GATE, TILES, EXPLORER, CLUSTER, NO_SNAP, TOLERANCE, SAMPLES,
-        INSTANCES,
+        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, MEMSET, GROWTH, POLYGONS,
+        REAL_FILES, GATE, TILES, EXPLORER, CLUSTER, INSTANCES, *PAIRS,
     )
 }  # fmt: skip
 

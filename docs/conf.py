@@ -7,7 +7,13 @@ sys.path.insert(0, str(Path(__file__).parent / "site"))
 
 project = "topleft"
 author = "the topleft authors"
-extensions = ["myst_parser", "gallery", "links"]
+extensions = ["myst_parser", "gallery", "links", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+autodoc_typehints = "none"  # docstrings have shapes, dtypes and units
+autodoc_member_order = "bysource"
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+suppress_warnings = ["ref.python"]  # `mesh` in the type of a parameter is no link
 html_theme = "furo"
 html_show_copyright = False
 html_title = "topleft"

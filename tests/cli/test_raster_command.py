@@ -132,6 +132,17 @@ def test_interrupted_command_resumes(tmp_path, pair, capsys):
     assert "exists: resume=True" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["a.zarr", "a.tif", "a.dzi"])
+def test_command_replaces_what_is_there_when_told_to(tmp_path, pair, capsys, name):
+    arguments = [pair, "-o", str(tmp_path / name), "--size", "64x48"]
+    assert main(["raster", *arguments]) == 0
+    assert main(["raster", *arguments, "--labels"]) == 2
+    assert main(["raster", *arguments, "--labels", "--overwrite"]) == 0
+    assert "int32, 1 windows drawn" in capsys.readouterr().out
+    assert main(["raster", *arguments, "--overwrite", "--resume"]) == 2
+    assert "give one of them" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

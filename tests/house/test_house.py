@@ -25,6 +25,7 @@ from topleft._core.engine import kernels
 ROOT = Path(__file__).parents[2]
 SRC = ROOT / "src" / "topleft"
 PUBLIC = [name for name in tl.__all__ if callable(getattr(tl, name))]
+ROOMS = sorted(path.parent for path in SRC.rglob("__init__.py") if path.parent != SRC)
 PYTHON = sorted(path for folder in ("src", "tests", "benchmarks", "examples") for path in (ROOT / folder).rglob("*.py"))
 CYTHON = sorted([*SRC.rglob("*.pyx"), *SRC.rglob("*.pxi")])
 C = sorted([*(ROOT / "csrc").rglob("*.c"), *(ROOT / "csrc").rglob("*.h")])
@@ -152,6 +153,28 @@ def test_private_names_stay_in_their_file():
     found |= {(path, *pair) for path in PYTHON if ROOT / "tests" not in path.parents for pair in used_by(path)}
     lost = sorted(f"{short(path)}: {module}.{name}" for path, module, name in found if re.match("_[^_]", name))
     assert not lost, "\n".join(lost)
+
+
+# Rooms
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=short)
+def test_room_says_what_it_is_and_lists_no_files(room):
+    lines = (ast.get_docstring(parsed(room / "__init__.py")) or "").splitlines()
+    assert lines
+    assert [line for line in lines if re.match(r"\w+\.(py|pyx|pxi) +\S", line)] == []
+
+
+def test_head_of_a_file_says_what_it_is():
+    lost = [path for path in PYTHON if not ast.get_docstring(parsed(path))]
+    begins = re.compile(r'(?:# cython:[^\n]*\n)*(?:# |/\* |""")\w')
+    lost += [path for path in [*CYTHON, *C] if not begins.match(path.read_text(encoding="utf-8"))]
+    assert not lost, "\n".join(map(short, lost))
+
+
+def test_exports_are_listed_in_public_files_alone():
+    listed = [path for path in PYTHON if "__all__" in names_of(path)]
+    assert [short(path) for path in listed if re.search("/_[^_]", short(path))] == []
 
 
 # Numbers

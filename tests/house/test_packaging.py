@@ -143,6 +143,19 @@ def test_stub_declares_what_the_compiled_module_has(unit):
             assert own <= there <= own.union(*map(public_names, bases))
 
 
+@pytest.mark.parametrize("text", ["typedef union { int a; } tl_other;", "typedef long tl_number;", "extern int tl_n;"])
+def test_bindings_of_a_header_that_they_cannot_read_is_an_error(text, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "packaging")
+    bindings = import_module("bindings")
+    monkeypatch.setattr(bindings, "CSRC", tmp_path)
+    header = tmp_path / "dispatch.h"
+    header.write_text("typedef struct { const int *a, *b; } tl_pair; /* two */\n")
+    assert "ctypedef struct tl_pair:\n        const int *a\n        const int *b\n" in bindings.contract()
+    header.write_text(text)
+    with pytest.raises(ValueError, match="headers must hold what packaging"):
+        bindings.contract()
+
+
 def test_classics_use_no_engine_and_are_loaded_when_asked_for():
     code = f"import topleft, sys; print('topleft.{UNITS[1]}' in sys.modules)"
     assert run_python(code).stdout.split() == ["False"]

@@ -153,3 +153,23 @@ def test_points_have_no_corners():
         tl.points([[0, 0]], (4, 3)).barycentric()
     with pytest.raises(ValueError, match=r"values must have shape \(1, K\) or \(1,\), got \(2,\)"):
         tl.points([[0, 0]], (4, 3)).interpolate([1, 2])
+
+
+IDS, DEPTH = np.zeros((1, 8, 10), np.int32), np.zeros((1, 8, 10), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ((IDS, DEPTH[:, :4], 5), ValueError, r"one shape \(S, H, W\), got \(1, 8, 10\) and \(1, 4, 10\)"),
+        ((IDS[0], DEPTH[0], 5), ValueError, r"one shape \(S, H, W\), got \(8, 10\)"),
+        ((IDS[:0], DEPTH[:0], 5), ValueError, r"one shape \(S, H, W\), got \(0, 8, 10\)"),
+        ((IDS.astype(np.int64), DEPTH, 5), TypeError, "must be int32 and float32, got int64 and float32"),
+        ((IDS, DEPTH.astype(float), 5), TypeError, "must be int32 and float32, got int32 and float64"),
+        ((IDS, DEPTH, 1.5), TypeError, "n_points must be an integer"),
+        ((IDS, DEPTH, -1), ValueError, "n_points must be at least 0, got -1"),
+    ],
+)
+def test_planes_that_do_not_fit_are_told(given, error, message):
+    with pytest.raises(error, match=message):
+        tl.PointFragments(*given)

@@ -16,6 +16,7 @@ from benchmarks.peers import PEERS, load_peer, why_not
 from benchmarks.report.tables import number
 from benchmarks.run import scene_tables, smooth_tables, tables
 from benchmarks.scenes.cases import CASES, TASKS, Scene, orbit_camera
+from benchmarks.small import pairs
 
 import topleft as tl
 
@@ -165,14 +166,20 @@ def test_yardstick_without_a_figure_tells():
         Yardstick.parse("program", DEFAULT_PATTERN, Path(), []).read("hello", CASES["blob-10k"])
 
 
-def test_fields_that_are_timed_are_whole():
-    from benchmarks.small import field
+def test_fields_that_are_timed_are_whole(monkeypatch):
+    monkeypatch.setattr(pairs, "OTHER_FIELDS", {})
+    (_, field), (_, heights) = pairs.field_beside_others()
+    for draw, size in ((field["topleft field"], pairs.HD), (heights["topleft height_map"], (400, 400))):
+        found = draw()
+        assert found.shape == size[::-1]
+        assert np.isfinite(found).all()
 
-    points, triangles, values = field.mesh()
-    found = field.topleft_field(points, triangles, values)()
-    assert found.shape == field.SIZE[::-1]
-    assert np.isfinite(found).all()
-    assert len(triangles) > 200_000
-    heights = field.height_map()()
-    assert heights.shape == (400, 400)
-    assert np.isfinite(heights).all()
+
+@pytest.mark.parametrize("kind", pairs.PAIRS)
+def test_pairs_draw_the_same_work_and_are_printed(kind):
+    scene, calls = next(iter(pairs.PAIRS[kind].scenes()))
+    assert len(calls) > 1
+    rows = [{"scene": scene, "call": name, "ms": [1.0 + k, 2.0]} for k, name in enumerate(calls)]
+    head, _, first, *others = pairs.lines({"rows": rows})
+    assert head.split()[-2:] == ["ratio", "|"]
+    assert (first.split()[-2], len(others)) == ("1.00", len(calls) - 1)

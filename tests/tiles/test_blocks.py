@@ -61,6 +61,15 @@ def test_npy_pairs_are_mapped(tmp_path, small_blocks):
     assert np.array_equal(again.corners(slice(7, 11)), POINTS[TRIANGLES[7:11]])
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_blocks_that_reach_a_few_windows_are_the_whole(small_blocks, axis):
+    """Triangles that are sorted by place: most blocks have none in most rows of windows."""
+    corners = np.random.default_rng(2).uniform(0, 1000, (500, 1, 2)) + RNG.uniform(-9, 9, (500, 3, 2))
+    corners = corners[np.argsort(corners[:, 0, axis])].reshape(-1, 2)
+    triangles = np.arange(1500).reshape(500, 3)
+    assert np.array_equal(tl.tiles((corners, triangles), 1000, window=64)[:], tl.rasterize(corners, triangles, 1000).id)
+
+
 @pytest.mark.parametrize("options", [{}, {"order": ">"}, {"kind": "double"}, {"count": "int"}, {"extra": True}])
 def test_binary_ply_is_mapped(tmp_path, options):
     path = tmp_path / "mesh.ply"

@@ -35,6 +35,16 @@ def test_dask_array_is_the_raster(kind):
     assert np.array_equal(array.compute(scheduler="threads"), raster[:], equal_nan=raster.dtype.kind == "f")
 
 
+@pytest.mark.parametrize("size", [(0, 5), (5, 0)])
+@pytest.mark.parametrize("kind", ["labels", "coverage", "fill"])
+def test_dask_array_without_pixels_has_its_dtype(kind, size):
+    pytest.importorskip("dask.array", reason="the dask extra is not installed")
+    raster = tl.tiles((POINTS, TRIANGLES), size, kind=kind, **KINDS[kind])
+    array = raster.to_dask()
+    assert (array.shape, array.dtype) == (raster.shape, raster.dtype)
+    assert array.compute().shape == raster.shape
+
+
 def test_slices_of_a_dask_array_draw_what_they_need(monkeypatch):
     pytest.importorskip("dask.array", reason="the dask extra is not installed")
     raster = raster_of("labels")

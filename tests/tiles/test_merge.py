@@ -74,6 +74,25 @@ def test_samples_are_merged_one_by_one():
     assert np.array_equal(depth, whole.samples_depth)
 
 
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_scenes_are_merged_with_their_instances(sampling):
+    """Ids of a scene are those of all triangles; shares of its instances make the whole."""
+    cube = tl.Mesh(*tl.scenes.cube())
+    moved = [np.eye(4) for _ in range(4)]
+    for i in range(4):
+        moved[i][:3, 3] = i, 0.3 * i, -0.5 * i
+    scene = tl.Scene([tl.Instance(cube, place) for place in moved])
+    camera = tl.Camera.framing(scene)
+    whole = tl.rasterize_mesh(scene, camera, (67, 41), sampling=sampling)
+    parts = [tl.Scene(scene.instances[i : i + 2]) for i in (0, 2)]
+    shares = [tl.rasterize_mesh(part, camera, (67, 41), sampling=sampling) for part in parts]
+    ids, depth = tl.merge(shares, triangles=[0, 2 * len(cube.triangles)])
+    wished = (whole.samples_id, whole.samples_depth) if sampling == "msaa4" else (whole.id, whole.depth)
+    assert len(np.unique(whole.instance)) == 5
+    assert np.array_equal(ids, wished[0])
+    assert np.array_equal(depth, wished[1])
+
+
 @ON_EACH_ISA
 def test_merge_is_the_same_on_each_instruction_set(isa):
     rng = np.random.default_rng(1)
@@ -91,9 +110,20 @@ def test_merge_is_the_same_on_each_instruction_set(isa):
 IDS, DEPTH = np.zeros((2, 3), np.int32), np.zeros((2, 3), np.float32)
 
 
+def altered(ids=IDS, depth=DEPTH):
+    """A visibility buffer whose arrays somebody has replaced."""
+    frags = tl.points([(1, 1, 0.5)], (3, 2))
+    frags.id, frags._depth, frags._planes = ids, depth, (ids[None], depth[None])
+    return frags
+
+
 @pytest.mark.parametrize(
     ("buffers", "options", "error", "message"),
     [
+        ([altered(depth=DEPTH[:1])], {}, ValueError, r"one shape, got \(2, 3\) and \(1, 3\)"),
+        ([altered(ids=IDS[:0])], {}, ValueError, r"one shape, got \(0, 3\) and \(2, 3\)"),
+        ([altered(ids=IDS.astype(np.int64))], {}, TypeError, "got int64 and float32 as buffer 0"),
+        ([altered(depth=DEPTH.astype(np.float64))], {}, TypeError, "got int32 and float64 as buffer 0"),
         ([], {}, ValueError, "buffers must be at least one, got none"),
         ([5], {}, TypeError, r"buffers must be Fragments or pairs \(ids, depth\), got 5 as buffer 0"),
         ([(IDS, IDS)], {}, TypeError, "buffers must be int32 and float32, got int32 and int32 as buffer 0"),

@@ -307,3 +307,9 @@ def test_error_of_a_later_block_comes_in_its_turn(monkeypatch):
     first = int(np.argmax(np.isnan(points[TRIANGLES]).any(axis=(1, 2))))
     with pytest.raises(ValueError, match=f"in triangle {first}, block {first // 16 + 1} of 4"):
         next(iter(tl.tiles((points, TRIANGLES), GRID, window=16, threads=4)))
+
+
+def test_windows_without_number_are_told():
+    raster = tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), 2**31 - 1, window=1)
+    with pytest.raises(MemoryError, match=r"no memory for 2 arrays of [\d,]+ bytes together"):
+        raster[:1, :1]

@@ -1,5 +1,6 @@
 """Rasters in files: Zarr, GeoTIFF, Deep Zoom; what was killed goes on and ends up the same."""
 
+import contextlib
 import io
 import itertools
 import json
@@ -21,6 +22,7 @@ from topleft._apps.tiles.geotiff import differences, sums
 from topleft._apps.tiles.levels import halved
 
 SRC = str(Path(tl.__file__).parents[1])
+CHILD = {**os.environ, "PYTHONPATH": SRC}
 RNG = np.random.default_rng(6)
 POINTS = RNG.uniform([500000, 5000000, 0], [500300, 5000200, 9], (200, 3))
 POINTS[:, 0] -= np.where(POINTS[:, 0] > 500150, 0, 20)
@@ -124,6 +126,12 @@ def test_zarr_goes_to_what_fsspec_reaches():
     assert raster.to_zarr("memory://bucket/a.zarr", compression="none", resume=True).n_kept == 19
 
 
+def test_url_that_cannot_be_written_to_is_told():
+    pytest.importorskip("fsspec", reason="the tiles extra is not installed")
+    with pytest.raises(ValueError, match=r"cannot write to data://x\.zarr/zarr\.json: Read only filesystem"):
+        raster_of("labels").to_zarr("data://x.zarr")
+
+
 # GeoTIFF
 
 
@@ -191,6 +199,23 @@ def test_geotiff_in_pixels_and_with_y_down(tmp_path):
     with tifffile.TiffFile(tmp_path / "b.tif") as file:
         assert file.pages[0].tags[34264].value[5] == 1.0
         assert equal(file.asarray(), down[:])
+
+
+@pytest.mark.parametrize("limit", [1 << 32, 1000])
+@pytest.mark.parametrize("compression", ["deflate", "none"])
+@pytest.mark.parametrize("kind", ["labels", "coverage", "shares", "colors", "alpha"])
+def test_geotiff_is_read_by_pillow(tmp_path, kind, compression, limit, monkeypatch):
+    """All levels, with blank tiles, plain and big."""
+    monkeypatch.setattr("topleft._apps.tiles.geotiff.LIMIT_CLASSIC", limit)
+    raster = raster_of(kind)
+    raster.to_geotiff(tmp_path / "a.tif", tile=32, compression=compression)
+    level = raster[:].view(np.uint8) if raster.dtype == bool else raster[:]
+    with Image.open(tmp_path / "a.tif") as found:
+        assert found.n_frames == 5
+        for i in range(5):
+            found.seek(i)
+            assert equal(np.asarray(found), level)
+            level = halved(level, raster.painter.nodata, is_mean=raster.has_means)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int32, np.float32, np.float64, np.uint16, np.int64])
@@ -277,7 +302,7 @@ def test_what_does_not_fit_the_disk_is_told_before_a_byte_is_written(tmp_path, n
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["a.zarr", "a.dzi"])
+@pytest.mark.parametrize("name", WRITERS)
 def test_what_is_there_is_not_written_over(tmp_path, name):
     WRITERS[name](raster_of("labels"), tmp_path / name)
     with pytest.raises(FileExistsError, match="exists: resume=True goes on with it"):
@@ -324,6 +349,237 @@ def test_interrupted_run_goes_on(tmp_path, name):
         assert files_of(folder) == files_of(tmp_path / "whole")
 
 
+@pytest.mark.parametrize("name", WRITERS)
+def test_second_writer_is_refused(tmp_path, name):
+    """Whether it goes on or begins; what the first one writes is whole, and the lock goes with it."""
+    told = []
+
+    def write_again(step):
+        for options in ({}, {"resume": True}):
+            with pytest.raises(BlockingIOError, match=f"{name} is being written by another call") as info:
+                WRITERS[name](raster_of("labels"), tmp_path / "a" / name, **options)
+            told.append(info.value)
+
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    WRITERS[name](raster_of("labels"), tmp_path / "a" / name, progress=write_again)
+    WRITERS[name](raster_of("labels"), tmp_path / "b" / name)
+    assert len(told) > 2
+    assert files_of(tmp_path / "a") == files_of(tmp_path / "b")
+
+
+HELD = """
+import sys
+sys.path[:0] = sys.argv[2:]
+from test_writers import raster_of
+def wait(step):
+    print("writes", flush=True)
+    sys.stdin.read()
+raster_of("labels").to_geotiff(sys.argv[1], tile=16, progress=wait)
+"""
+
+
+def test_lock_holds_between_processes_and_ends_with_a_killed_one(tmp_path):
+    folders = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "support")]
+    command = [sys.executable, "-c", HELD, str(tmp_path / "a.tif"), *folders]
+    with subprocess.Popen(command, env=CHILD, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "writes\n"
+        with pytest.raises(BlockingIOError, match=r"a\.tif is being written by another call"):
+            raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16)
+        other.kill()
+    raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, resume=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.tif"]
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_part_that_has_gone_is_told(tmp_path, name):
+    """A blank part would be a lie."""
+    place = {"a.zarr": "a.zarr/0/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
+
+    def clean(step):
+        if step.n_done == step.n_blocks:
+            (tmp_path / place).unlink()
+
+    with pytest.raises(FileNotFoundError, match=r"(1.2|4_8|8_4\.png) has gone while the raster was written: resume"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=clean)
+    assert not (tmp_path / name).is_file()
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 1
+
+
+@pytest.mark.parametrize("options", [{}, {"resume": True}, {"overwrite": True}])
+@pytest.mark.parametrize(
+    ("name", "strange"),
+    [
+        ("a.tif", "a.tif.parts/thesis.txt"),
+        ("a.tif", "a.tif.parts/0/0_0"),
+        ("a.tif", "a.tif"),
+        ("a.tif", "a.tif/thesis.txt"),
+        ("a.zarr", "a.zarr/thesis.txt"),
+        ("a.zarr", "a.zarr/zarr.json"),
+        ("a.zarr", "a.zarr"),
+        ("a.dzi", "a_files/0/0_0.png"),
+        ("a.dzi", "a_files"),
+        ("a.dzi", "a.dzi"),
+    ],
+)
+def test_what_is_of_somebody_else_is_left_alone(tmp_path, name, strange, options):
+    path = tmp_path / strange
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("[" * 100_000 if strange.endswith("json") else "my only copy")
+    there = path.read_bytes()
+    with pytest.raises(FileExistsError, match=r"was not written by topleft: move it, or write elsewhere"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, **options)
+    assert [entry for entry in tmp_path.rglob("*") if entry.is_file()] == [path]
+    assert path.read_bytes() == there
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_file_of_somebody_else_within_a_raster_stays(tmp_path, name):
+    """To go on is no harm; to replace it all would remove it."""
+    folder = {"a.zarr": "a.zarr", "a.tif": "a.tif.parts", "a.dzi": "a_files"}[name]
+    thesis = tmp_path / folder / "0" / ".thesis.00000000.part"
+
+    def put(step):
+        thesis.parent.mkdir(exist_ok=True)
+        thesis.write_text("my only copy")
+        if step.n_done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=put)
+    there = files_of(tmp_path)
+    with pytest.raises(FileExistsError, match=r"0.\.thesis\.00000000\.part was not written by topleft"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, overwrite=True)
+    assert files_of(tmp_path) == there
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_kept >= 2
+    assert thesis.read_text() == "my only copy"
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_file_of_somebody_else_that_comes_meanwhile_stays(tmp_path, name):
+    """The raster is not finished then, and nothing is lost: it goes on when the file has been moved."""
+    if name == "a.zarr":
+        return
+
+    def put(step):
+        (tmp_path / name).write_text("my only copy")
+
+    with pytest.raises(FileExistsError, match="was not written by topleft"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=put)
+    assert (tmp_path / name).read_text() == "my only copy"
+    (tmp_path / name).unlink()
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 0
+
+
+@pytest.mark.parametrize("is_whole", [True, False])
+@pytest.mark.parametrize("name", WRITERS)
+def test_raster_is_replaced_when_that_is_asked_for(tmp_path, name, is_whole):
+    """One that is finished or not, of another mesh, another kind and other levels; nothing of it stays."""
+    old, new = raster_of("field", 128), raster_of("labels", mesh=CORNER)
+
+    def stop(step):
+        if not is_whole:
+            raise KeyboardInterrupt
+
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    with contextlib.suppress(KeyboardInterrupt):
+        WRITERS[name](old, tmp_path / "a" / name, progress=stop)
+    (tmp_path / "a" / name).parent.joinpath("beside.txt").write_text("stays")
+    with pytest.raises(FileExistsError, match="exists: resume=True goes on with it"):
+        WRITERS[name](new, tmp_path / "a" / name)
+    with pytest.raises(ValueError, match="give one of them"):
+        WRITERS[name](new, tmp_path / "a" / name, overwrite=True, resume=True)
+    WRITERS[name](new, tmp_path / "a" / name, overwrite=True)
+    WRITERS[name](new, tmp_path / "b" / name)
+    assert files_of(tmp_path / "a") == {**files_of(tmp_path / "b"), "beside.txt": b"stays"}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_finished_raster_is_kept_when_it_goes_on(tmp_path, name):
+    first = WRITERS[name](raster_of("labels"), tmp_path / name)
+    there = files_of(tmp_path)
+    again = WRITERS[name](raster_of("labels"), tmp_path / name, resume=True)
+    assert (again.n_drawn, again.n_kept, again.n_blank) == (0, first.n_drawn, first.n_blank)
+    assert files_of(tmp_path) == there
+
+
+def test_geotiff_of_another_nodata_or_crs_is_another_one(tmp_path):
+    raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16)
+    with pytest.raises(ValueError, match=r"a\.tif is not of this raster"):
+        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, nodata=7, resume=True)
+
+
+def test_empty_file_and_folder_are_written_over(tmp_path):
+    """As those that tempfile makes."""
+    (tmp_path / "a.tif").touch()
+    (tmp_path / "a.zarr").mkdir()
+    for name in ("a.tif", "a.zarr"):
+        assert WRITERS[name](raster_of("labels"), tmp_path / name).n_drawn == 19
+
+
+def test_urls_are_replaced_and_what_is_not_ours_stays():
+    fsspec = pytest.importorskip("fsspec", reason="the tiles extra is not installed")
+    store = fsspec.filesystem("memory")
+    store.pipe_file("/bucket/b.zarr/zarr.json", b"{}")
+    with pytest.raises(FileExistsError, match=r"memory://bucket/b\.zarr was not written by topleft"):
+        raster_of("labels").to_zarr("memory://bucket/b.zarr", overwrite=True)
+    raster_of("field").to_zarr("memory://bucket/c.zarr", levels=3)
+    store.pipe_file("/bucket/c.zarr/thesis.txt", b"my only copy")
+    with pytest.raises(FileExistsError, match=r"memory://bucket/c\.zarr/thesis\.txt was not written by topleft"):
+        raster_of("labels").to_zarr("memory://bucket/c.zarr", overwrite=True)
+    store.rm_file("/bucket/c.zarr/thesis.txt")
+    raster_of("labels").to_zarr("memory://bucket/c.zarr", overwrite=True)
+    raster_of("labels").to_zarr("memory://bucket/d.zarr")
+    names = [store.find(f"/bucket/{folder}.zarr") for folder in "cd"]
+    assert [name.replace("/c.zarr", "/d.zarr") for name in names[0]] == names[1]
+
+
+DAMAGES = {
+    "cut": lambda content: content[: len(content) // 2],
+    "empty": lambda content: b"",
+    "noise": lambda content: RNG.integers(0, 256, len(content), np.uint8).tobytes(),
+    "flip": lambda content: content[: (n := len(content) // 2)] + bytes([content[n] ^ 1]) + content[n + 1 :],
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("name", WRITERS)
+def test_damaged_tile_is_written_again(tmp_path, name, damage):
+    """At any level, whether another one is made of it or not."""
+    for folder in ("whole", "cut"):
+        (tmp_path / folder).mkdir()
+    WRITERS[name](raster_of("labels"), tmp_path / "whole" / name)
+    where = {"a.zarr": "a.zarr/{}/c", "a.tif": "a.tif.parts/{}", "a.dzi": "a_files/{}"}[name]
+
+    def stop(step):
+        if step.n_done > 20:  # the 19 windows, and two of the next level
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, progress=stop)
+    for level in (9, 8) if name == "a.dzi" else (0, 1):
+        tiles = [path for path in (tmp_path / "cut" / where.format(level)).rglob("*") if path.is_file()]
+        tile = max(tiles, key=lambda path: path.stat().st_size)
+        tile.write_bytes(DAMAGES[damage](tile.read_bytes()))
+    written = WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, resume=True)
+    assert (written.n_drawn, written.n_kept) == (1, 18)
+    assert files_of(tmp_path / "cut") == files_of(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_tile_that_is_damaged_meanwhile_is_told(tmp_path, name):
+    place = {"a.zarr": "a.zarr/0/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
+
+    def harm(step):
+        if step.n_done == 19:
+            (tmp_path / place).write_bytes(b"x")
+
+    with pytest.raises(OSError, match=r"(1.2|4_8|8_4\.png) is damaged \(.*\): resume=True writes it again"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=harm)
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 1
+
+
 KILLED = """
 import os, sys, time
 import numpy as np, topleft as tl
@@ -346,11 +602,9 @@ else:
 
 @pytest.mark.parametrize("kind", ["zarr", "tif"])
 def test_killed_run_goes_on_and_draws_no_whole_window_twice(tmp_path, kind):
-    env = {**os.environ, "PYTHONPATH": SRC}
-
     def run(path):
         command = [sys.executable, "-c", KILLED, kind, str(path)]
-        return subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True)
+        return subprocess.Popen(command, env=CHILD, stdout=subprocess.PIPE, text=True)
 
     def whole_windows(path):
         folder = path / "0/c" if kind == "zarr" else path.with_name(path.name + ".parts") / "0"
@@ -440,9 +694,8 @@ def test_absent_package_is_told_with_what_to_install(tmp_path, package, call):
         "raster = tl.tiles(([[0, 0], [9, 0], [0, 9]], [[0, 1, 2]]), tl.Grid((64, 64), (0, 9, 0, 9)))\n"
         f"try:\n    raster.{call}\nexcept tl.MissingPackageError as error: print(error)"
     )
-    env = {**os.environ, "PYTHONPATH": SRC}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=env, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=CHILD, check=True
     )
     assert "pip install" in done.stdout
 

@@ -20,15 +20,13 @@ import numpy.typing as npt
 
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._apps.batch.workers import Workers, signals_put_off, workers_of
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_number, shown
 from topleft._core.base.options import parse
 from topleft._core.base.whole_file import is_whole
 from topleft.errors import MeshWarning, MissingPackageError
 from topleft.typing import OnErrorOption, OrderOption
 
-__all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
-
-Array = npt.NDArray[Any]
 Progress = Callable[["Result"], object]
 
 

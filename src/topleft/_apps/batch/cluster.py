@@ -27,8 +27,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.plan.plan import plan
 from topleft.errors import MissingPackageError, TopleftError
 
-__all__ = ["ClusterWorkers"]
-
 MESH_KEY = "topleft-mesh"
 """How the keys of tasks begin that hold a mesh."""
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-import numpy.typing as npt
-
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_size, shown
 from topleft._core.base.remote import Place, as_place, place_of
 from topleft._core.raster.verbs import Rasterizer
@@ -33,9 +32,6 @@ from topleft._meshes.scene.adapt import MeshLike, as_mesh
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import LayerOption
 
-__all__ = ["Job", "JobRunner", "MeshFile", "Outcome", "as_job"]
-
-Array = npt.NDArray[Any]
 CameraMaker = Callable[[Any, tuple[int, int]], Camera]
 
 

@@ -24,8 +24,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.scene.scene import Scene
 from topleft.errors import MissingPackageError
 
-__all__ = ["Workers", "signals_put_off", "workers_of"]
-
 Jobs = Sequence[tuple[int, Job]]
 
 MOST_OF_A_THREAD, SMALL_PX = 4, 1 << 20

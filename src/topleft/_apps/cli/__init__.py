@@ -2,18 +2,6 @@
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
 --strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
-
-animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
-arguments.py  defines what `topleft render` takes
-doctor.py     runs `topleft doctor`
-explain.py    runs `topleft explain` and `topleft calibrate`
-explore.py    runs `topleft explore`
-job_file.py   reads jobs from TOML or JSON
-mask.py       runs `topleft mask`
-raster.py     runs `topleft raster`
-render.py     runs `topleft render`: from arguments to files
-sheet.py      puts many pictures, reduced, on one
-targets.py    finds which picture goes to which file, before anything is drawn
 """
 
 from __future__ import annotations
@@ -27,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
-from topleft._apps.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
+from topleft._apps.cli.arguments import REFUSED, Parser, add_render_arguments
 from topleft._apps.cli.doctor import add_doctor_command
 from topleft._apps.cli.explain import add_plan_commands
 from topleft._apps.cli.explore import add_explore_command
@@ -37,8 +25,6 @@ from topleft._apps.cli.render import FAILED, complain, complain_of_lacks, one_li
 from topleft._core.engine.isa import build_info
 from topleft._meshes.io.notes import listening
 from topleft.errors import TopleftError
-
-__all__ = ["FAILED", "REFUSED", "UsageError", "main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

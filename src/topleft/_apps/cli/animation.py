@@ -20,8 +20,6 @@ from topleft.errors import ImageError, MissingPackageError
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
-__all__ = ["ANIMATION_SUFFIXES", "check_animation", "save_animation"]
-
 VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov", ".webm")
 ANIMATION_SUFFIXES = (".gif", ".webp", ".apng", *VIDEO_SUFFIXES)
 """What `save_animation` writes, by the end of the name."""

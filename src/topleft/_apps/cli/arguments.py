@@ -21,11 +21,6 @@ from topleft._meshes.picture.shade import Shading
 from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
 
-__all__ = [
-    "REFUSED", "SUBPIXEL_BITS_HELP", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments", "meant",
-    "positive", "size", "subpixel_bits", "tolerance",
-]  # fmt: skip
-
 REFUSED = 2
 """Exit status: nothing could be done."""
 

@@ -15,8 +15,6 @@ from topleft._core.base.threads import available_threads
 from topleft._core.engine.isa import build_info
 from topleft._meshes.plan.costs import cache_file, load_costs
 
-__all__ = ["add_doctor_command", "run_doctor"]
-
 #: Extras for those who change the library; their packages are not listed.
 OWN_EXTRAS = frozenset({"all", "bench", "dev", "docs", "test"})
 

@@ -23,8 +23,6 @@ from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.plan.costs import save_costs
 from topleft._meshes.plan.plan import plan
 
-__all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
-
 
 def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""

@@ -8,8 +8,6 @@ from typing import Any
 
 from topleft._apps.cli.arguments import Parser, UsageError, size
 
-__all__ = ["add_explore_command", "run_explore"]
-
 EXPLORE_HELP = """\
 WHAT is a mesh file, an .npz file with arrays `vertices`, `triangles` and maybe `size`, the name of a scene
 (two-triangles, far-1e8-gap, torus-knot), or a link that was copied from the page. Without it the page begins with two

@@ -16,8 +16,6 @@ from typing import Any, NoReturn
 
 from topleft._apps.cli.arguments import UsageError, add_picture_arguments, meant
 
-__all__ = ["read_jobs"]
-
 
 class JobParser(argparse.ArgumentParser):
     """A parser that raises its complaints."""

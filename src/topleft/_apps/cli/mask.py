@@ -17,8 +17,6 @@ from topleft._core.polygons.polygons import Rule, polygons
 from topleft._meshes.io.images import SUFFIXES, save_image
 from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
 
-__all__ = ["add_mask_command", "run_mask"]
-
 DEFAULT_SIDE = 1024
 
 MASK_HELP = """\

@@ -21,15 +21,14 @@ from topleft._core.base.threads import available_threads
 if TYPE_CHECKING:
     from topleft._apps.tiles.levels import Written
 
-__all__ = ["add_raster_command", "run_raster"]
-
 RASTER_HELP = """\
 MESH is a mesh file, or two .npy files with a comma between them: vertices.npy,triangles.npy. Binary STL, binary PLY of
 triangles and .npy are mapped and need not fit memory. x and y are the plane, z is the height.
 
 OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder, or a URL that fsspec reaches) or .dzi (Deep Zoom). Heights
-of the upper surface are written unless --labels, --values or --kind asks for something else. --resume goes on with what
-an interrupted run has left of the same raster, and draws no window again that is whole.
+of the upper surface are written unless --labels, --values or --kind asks for something else. What is there is left
+alone: --resume goes on with what an interrupted run has left of the same raster, and draws no window again that is
+whole; --overwrite replaces what topleft has written.
 
 examples:
   topleft raster terrain.ply -o heights.tif --pixel-size 1 --crs EPSG:25832
@@ -78,7 +77,12 @@ def run_raster(options: argparse.Namespace) -> int:
 def write(raster: Tiles, path: Place, options: argparse.Namespace, client: Any) -> Written:
     """Write the raster in the format that the name asks for."""
     progress = True if not options.quiet and sys.stderr.isatty() else None
-    how: dict[str, Any] = {"resume": options.resume, "progress": progress, "executor": client}
+    how: dict[str, Any] = {
+        "resume": options.resume,
+        "overwrite": options.overwrite,
+        "progress": progress,
+        "executor": client,
+    }
     suffix = path.suffix.lower()
     if suffix == ".zarr":
         return raster.to_zarr(options.out, levels=options.levels or 1, compression=compression(options, "gzip"), **how)
@@ -172,6 +176,7 @@ def add_raster_command(commands: Any) -> None:
     raster.add_argument("--uncompressed", action="store_true", help="store pixels as they are")
     raster.add_argument("--window", type=positive, default=WINDOW, metavar="N", help=f"side of a window ({WINDOW})")
     raster.add_argument("--resume", action="store_true", help="go on with what an interrupted run has left")
+    raster.add_argument("--overwrite", action="store_true", help="replace what is there, if topleft wrote it")
     raster.add_argument("--folder", metavar="DIR", help="where temporary files go")
     raster.add_argument("--threads", type=positive, metavar="N", help="how many at most")
     raster.add_argument(

@@ -30,8 +30,6 @@ from topleft._core.base.remote import is_url
 from topleft._meshes.io.images import PICTURE_SUFFIXES, save_image
 from topleft.errors import MeshWarning, MissingPackageError, TopleftError
 
-__all__ = ["FAILED", "client_of", "complain", "complain_of_lacks", "one_line", "run_render"]
-
 FAILED = 1
 """Exit status: a part of the work failed."""
 

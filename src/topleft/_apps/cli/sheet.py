@@ -12,8 +12,6 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["make_sheet"]
-
 LONGEST_SIDE = 256
 GAP = 8
 CAPTION_HEIGHT = 16

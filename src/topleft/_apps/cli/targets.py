@@ -35,8 +35,6 @@ from topleft._meshes.picture.shade import Shading
 from topleft.errors import ImageError, MeshError, MissingPackageError
 from topleft.scenes import SHAPES, shape
 
-__all__ = ["MeshJobs", "MeshSource", "Orbit", "check_targets", "check_words", "plan_jobs"]
-
 SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth", "normals": "camera_normal"}
 """Shadings that are a layer made visible: .npy holds the layer."""
 

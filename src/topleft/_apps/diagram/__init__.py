@@ -1,4 +1,1 @@
-"""Diagrams: pictures of what a rasterizer decides.
-
-pixel_grid.py  draws magnified pixels with the triangles on them, as SVG or PNG
-"""
+"""Diagrams: pictures of what a rasterizer decides."""

@@ -21,8 +21,6 @@ from topleft._core.raster.sampling import sample_positions
 from topleft.errors import ImageError
 from topleft.typing import SamplingOption
 
-__all__ = ["pixel_grid"]
-
 SMOOTH = 4
 """A PNG is drawn so many times as large, and reduced."""
 

@@ -16,8 +16,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.scene.adapt import as_mesh
 from topleft.errors import MeshError
 
-__all__ = ["MAX_SIDE_PX", "MAX_TRIANGLES", "SCENES", "content_of", "content_of_name", "scene"]
-
 MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000
 """Of what is drawn magnified."""
 

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from topleft.methods import reference
 from topleft.methods.reference import Piece, edge_function, is_top_left
 
-__all__ = ["Run", "draw_exact", "runs"]
-
 SUB = 16
 """Samples lie on sixteenths of a pixel."""
 

@@ -15,8 +15,6 @@ from topleft._apps.explore.session import Reply, Request, Session
 from topleft._apps.explore.state import PixelState, parse_state
 from topleft.methods import CLASSICS
 
-__all__ = ["HANDLERS", "code", "test_case"]
-
 MAX_FILE_SIDE_PX = 2048
 MAX_CELL_PX = 32
 SIGNS = ".0123456789abcdefghijklmnopqrstuvwxyz"

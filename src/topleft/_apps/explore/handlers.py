@@ -14,8 +14,6 @@ from topleft._apps.explore.content import SCENES, scene
 from topleft._apps.explore.session import Handler, Reply, Request, Session
 from topleft.errors import TopleftError
 
-__all__ = ["HANDLERS", "answer"]
-
 
 def hello(session: Session, _: Request) -> Reply:
     """What the page starts with."""

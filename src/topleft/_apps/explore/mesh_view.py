@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from topleft._apps.explore.session import Reply, Request, Session
+from topleft._core.base.array_types import U8
 from topleft._core.base.arrays import as_number
 from topleft._core.base.color import Color, as_color
 from topleft._core.raster.verbs import Rasterizer
@@ -37,10 +38,6 @@ from topleft._meshes.picture.view_layers import render_layers
 from topleft._meshes.plan.plan import plan
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
-
-__all__ = ["HANDLERS", "LAYERS", "MeshView", "draw", "load_bytes"]
-
-U8 = NDArray[np.uint8]
 
 MAX_SIDE_PX, MAX_PIXELS = 8192, 2**23
 """Of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from topleft._apps.explore.session import Reply, Request
 
-__all__ = ["pack", "read_header", "split", "unpack"]
-
 MAX_HEADER_BYTES = 4 << 20
 """Of a question: a thousand triangles and their vertices need a tenth of it."""
 

@@ -13,8 +13,6 @@ from topleft._apps.explore.messages import split
 from topleft._apps.explore.session import Content, Session
 from topleft.errors import MissingPackageError
 
-__all__ = ["markup", "widget_of"]
-
 
 def widget_of(content: Content) -> Any:
     """Return the widget that shows a content.

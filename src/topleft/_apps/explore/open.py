@@ -18,8 +18,6 @@ from topleft._apps.explore.session import Content
 if TYPE_CHECKING:
     from topleft._apps.explore.server import Server
 
-__all__ = ["Explorer", "explore", "open_page"]
-
 
 class Explorer:
     """An open explorer: where its page is, and what has been moved there.

@@ -19,8 +19,6 @@ from topleft._meshes.plan.plan import plan
 from topleft.methods import CLASSICS, METHODS
 from topleft.methods.reference import area, sampling
 
-__all__ = ["EXACT", "HANDLERS", "MethodPicture", "css", "draw", "methods", "triangle_colors"]
-
 EXACT = "exact"
 """The name of the exact picture where others are those of methods."""
 

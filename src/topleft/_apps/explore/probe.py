@@ -17,8 +17,6 @@ from topleft._core.raster.verbs import overdraw
 from topleft.methods import CLASSICS, reference
 from topleft.methods.reference import Fragment, edge_function, is_top_left, sampling
 
-__all__ = ["HANDLERS", "Edge", "Verdict", "verdicts"]
-
 MAX_ROWS = 6
 """Triangles that are told of: those that have the sample, then those that nearly have."""
 

@@ -20,18 +20,6 @@ from topleft.methods import CLASSICS, find_method
 from topleft.methods.reference.integers import ExactPicture, WidePoints, draw_points, signed_area, snapped_points
 from topleft.scene_families import FAMILIES, Axis, PixelScene
 
-__all__ = [
-    "HANDLERS",
-    "PRODUCTION",
-    "Entry",
-    "Exact",
-    "FaultyPixels",
-    "draw_counts",
-    "draw_labels",
-    "entries",
-    "find_faults",
-]
-
 NO_SNAP = "exact"
 
 PRODUCTION: dict[str, tuple[str, int | str]] = {

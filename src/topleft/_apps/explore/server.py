@@ -38,8 +38,6 @@ except ImportError as error:
         f"the explorer needs {error.name or 'starlette'}: pip install 'topleft[explore]'"
     ) from error
 
-__all__ = ["LOOPBACK", "MAX_MESSAGE_BYTES", "Server"]
-
 LOOPBACK = "127.0.0.1"
 
 MAX_MESSAGE_BYTES = 256 << 20

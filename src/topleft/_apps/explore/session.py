@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from topleft._meshes.model.mesh import Mesh
 
-__all__ = ["Content", "Handler", "Reply", "Request", "Session"]
-
 Request = dict[str, Any]
 """What a page asks: "do" names it; "parts" are the arrays that came along, as bytes."""
 

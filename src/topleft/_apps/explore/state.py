@@ -15,8 +15,6 @@ from topleft._core.base.options import check_choice
 from topleft.methods import CLASSICS, find_method
 from topleft.typing import CullOption, DepthTestOption, SamplingOption
 
-__all__ = ["Look", "PixelState", "Turn", "parse_state"]
-
 Turn = Literal["as given", "clockwise", "counter-clockwise"]
 Look = Literal["owners", "overdraw", "wireframe"]
 

@@ -19,8 +19,6 @@ from topleft._core.base.arrays import as_size
 from topleft._core.raster.verbs import overdraw
 from topleft.methods import CLASSICS, METHODS, find_method
 
-__all__ = ["HANDLERS", "TRACED", "Trace", "TraceStep", "trace"]
-
 #: The methods that have a pure twin with steps.
 TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
 

@@ -14,8 +14,6 @@ from typing import TypeVar
 
 from topleft._core.base.memory import KeptMemory
 
-__all__ = ["in_order", "kept_memory"]
-
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 

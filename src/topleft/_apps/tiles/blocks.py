@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import I32, Array
 from topleft._core.base.arrays import INT32_MAX, as_aligned, as_array, shown
 from topleft._core.base.memory import FRESH, Memory
 from topleft._meshes.io.load import load
@@ -30,9 +30,6 @@ from topleft._meshes.io.ply import mapped_elements
 from topleft._meshes.io.stl_off import mapped_corners
 from topleft._meshes.scene.adapt import as_polygons
 from topleft.errors import MeshError
-
-Array = npt.NDArray[Any]
-I32 = npt.NDArray[np.int32]
 
 BLOCK = 1 << 17
 """Triangles that are read at a time: 3 MB of corners."""

@@ -14,8 +14,6 @@ from typing import Any
 from topleft._core.base.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
 from topleft.errors import TopleftError
 
-__all__ = ["write_on_cluster"]
-
 Block = tuple[int, int, int]
 
 
@@ -23,7 +21,7 @@ Block = tuple[int, int, int]
 class WriteJob:
     """A window to be drawn and written elsewhere."""
 
-    layout: Any
+    store: Any
     draw: Callable[[], Any]
     row: int
     column: int
@@ -32,7 +30,7 @@ class WriteJob:
     def __call__(self) -> None:
         """Draw and write it."""
         pixels = self.draw()
-        self.layout.write(0, self.row, self.column, pixels if self.prepare is None else self.prepare(pixels))
+        self.store.write(0, self.row, self.column, pixels if self.prepare is None else self.prepare(pixels))
 
 
 def run_write(job: WriteJob) -> None:

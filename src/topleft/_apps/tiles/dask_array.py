@@ -16,16 +16,12 @@ import numpy.typing as npt
 from topleft._apps.tiles.ahead import kept_memory
 from topleft._apps.tiles.blocks import Triangles
 from topleft._apps.tiles.drawing import Painter, Payload, without_values
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_aligned
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
-
-__all__ = ["dask_array_of", "data_array_of"]
-
-
-Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)

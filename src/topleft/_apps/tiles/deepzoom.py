@@ -10,15 +10,15 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from topleft._apps.tiles.folders import DiskFolder, check_space
-from topleft._apps.tiles.levels import Progress, Written, check_executor, halved, level_size, n_levels_to, write_levels
+from topleft._apps.tiles.folders import MANIFEST, DiskFolder, fingerprints_at, only_writer, write_own
+from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, halved, write_levels
+from topleft._apps.tiles.store import TileStore, begin, n_levels_to
+from topleft._core.base.array_types import U8, Array
 from topleft._core.base.arrays import as_count, check_progress, shown
 from topleft._core.base.color import id_colors
 from topleft._core.base.remote import as_place
@@ -27,66 +27,28 @@ from topleft._meshes.io.png import encode
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
 
-__all__ = ["write_deepzoom"]
 
-Array = npt.NDArray[Any]
-U8 = npt.NDArray[np.uint8]
+class DeepZoomStore(TileStore):
+    """Tiles of PNG. Deep Zoom counts levels from one pixel on."""
 
-FINGERPRINT = "topleft.txt"
-
-
-@dataclass(frozen=True)
-class DeepZoomLayout:
-    """Blocks of pixels as tiles of PNG. Deep Zoom counts levels from one pixel on."""
-
-    folder: DiskFolder
-    size: tuple[int, int]
-    window: tuple[int, int]
-    tile: int
-    channels: tuple[int, ...]
-    n_levels: int
+    is_filled = False
 
     def name(self, level: int, row: int, column: int) -> str:
         """The name of a tile, by its row and column among tiles."""
         return f"{self.n_levels - 1 - level}/{column}_{row}.png"
 
-    def tiles_of(self, level: int, row: int, column: int) -> list[tuple[int, int]]:
-        """The tiles of a block that lie in the level."""
-        (w, h), (width, height), t = self.window, level_size(self.size, level), self.tile
-        k_rows, k_columns = -(-h // t), -(-w // t)
-        rows = range(row * k_rows, min((row + 1) * k_rows, -(-height // t)))
-        columns = range(column * k_columns, min((column + 1) * k_columns, -(-width // t)))
-        return [(r, c) for r in rows for c in columns]
+    def encoded(self, pixels: Array) -> bytes:
+        """Return a tile as it is stored."""
+        return encode(pixels)
 
-    def seen_from_elsewhere(self) -> DeepZoomLayout:
-        """The same layout for processes that run in other folders."""
-        return replace(self, folder=self.folder.absolute())
-
-    def is_there(self, level: int, row: int, column: int) -> bool:
-        """Whether all tiles of a block are there."""
-        return all(self.folder.has(self.name(level, r, c)) for r, c in self.tiles_of(level, row, column))
-
-    def write(self, level: int, row: int, column: int, pixels: Array) -> None:
-        """Write the tiles of a block."""
-        (w, h), t = self.window, self.tile
-        for r, c in self.tiles_of(level, row, column):
-            y, x = r * t - row * h, c * t - column * w
-            self.folder.put(self.name(level, r, c), encode(pixels[y : y + t, x : x + t]))
-
-    def read(self, level: int, row: int, column: int, shape: tuple[int, ...]) -> Array:
-        """Return the pixels of a block that is there."""
+    def decoded(self, content: bytes) -> Array:
+        """Return the pixels of a tile."""
         from PIL import Image
 
-        (w, h), t = self.window, self.tile
-        pixels = np.empty(shape, np.uint8)
-        for r, c in self.tiles_of(level, row, column):
-            content = self.folder.get(self.name(level, r, c))
-            if content is None:
-                raise OSError(f"tile {self.name(level, r, c)} has gone while the raster was written")
-            y, x = r * t - row * h, c * t - column * w
-            with Image.open(io.BytesIO(content)) as image:
-                pixels[y : y + t, x : x + t] = np.asarray(image)
-        return pixels
+        with Image.open(io.BytesIO(content)) as image:
+            image.verify()  # the sums of its chunks, which reading does not look at
+        with Image.open(io.BytesIO(content)) as image:
+            return np.asarray(image)
 
 
 def write_deepzoom(
@@ -95,6 +57,7 @@ def write_deepzoom(
     tile: int,
     colors: Callable[[Array], U8] | None,
     resume: bool,
+    overwrite: bool,
     progress: Progress | bool | None,
     executor: Any,
 ) -> Written:
@@ -119,65 +82,47 @@ def write_deepzoom(
     ground = checked(paint(raster.painter.blank((1, 1))), (1, 1))
     n_levels = n_levels_to(raster.size, 1)
     folder = DiskFolder(file.with_name(f"{file.stem}_files"))
-    layout = DeepZoomLayout(folder, raster.size, window, side, ground.shape[2:], n_levels)
-    begin(raster, layout, f"{raster.fingerprint} deepzoom 2 {side} {ground.tolist()}", file, resume)
-    written = write_levels(
-        raster,
-        layout,
-        dtype=np.uint8,
-        blank=ground[0, 0],
-        halve=halved_colors,
-        prepare=lambda pixels: checked(paint(pixels), pixels.shape[:2]),
-        progress=progress,
-        executor=executor,
+    store = DeepZoomStore(
+        folder, raster.size, window, (side, side), ground.shape[2:], np.dtype(np.uint8), ground[0, 0], n_levels
     )
-    fill_blanks(layout, ground)
-    width, height = raster.size
-    description = (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        '<Image xmlns="http://schemas.microsoft.com/deepzoom/2008" '
-        f'Format="png" Overlap="0" TileSize="{side}"><Size Width="{width}" Height="{height}"/></Image>\n'
-    )
-    DiskFolder(file.parent).put(file.name, description.encode())
+    fingerprint = f"{raster.fingerprint} deepzoom 2 {side} {ground.tolist()}"
+
+    def prepare(pixels: Array) -> U8:
+        return checked(paint(pixels), pixels.shape[:2])
+
+    with only_writer(file):
+        there = fingerprints_at(folder, file)
+        if not begin(
+            raster, store, there, fingerprint, resume=resume, overwrite=overwrite, prepare=prepare
+        ):  # fmt: skip
+            file.unlink(missing_ok=True)
+            folder.put(MANIFEST, fingerprint.encode())
+        written = write_levels(
+            raster, store, halve=halved_colors, prepare=prepare, progress=progress, executor=executor
+        )
+        fill_blanks(raster, store, ground)
+        width, height = raster.size
+        description = (
+            f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- topleft: {fingerprint}; -->\n'
+            '<Image xmlns="http://schemas.microsoft.com/deepzoom/2008" '
+            f'Format="png" Overlap="0" TileSize="{side}"><Size Width="{width}" Height="{height}"/></Image>\n'
+        )
+        write_own(file, lambda out: out.write(description.encode()))
     return written
 
 
-def begin(raster: Tiles, layout: DeepZoomLayout, fingerprint: str, file: Path, resume: bool) -> None:
-    """Make the folder, or take the one that an earlier run of the same raster has left."""
-    folder = layout.folder
-    found = folder.get(FINGERPRINT)
-    if found is not None and resume:
-        if found.decode(errors="replace") != fingerprint:
-            raise ValueError(
-                f"{folder.path} is not of this raster: the mesh, an option or the size of windows differs; "
-                "write elsewhere"
-            )
-        folder.sweep()
-        return
-    if folder.exists() or file.exists():
-        what = file if file.exists() else folder.path
-        raise FileExistsError(f"{what} exists: resume=True goes on with it, if it is of this raster; else remove it")
-    w, h = raster.window_size
-    n = int((raster.index.counts > 0).sum()) * w * h * int(np.prod(layout.channels, dtype=int))
-    check_space(file.absolute().parent, n // 4, f"a raster of {raster.shape}")  # rendered pictures shrink to less
-    folder.put(FINGERPRINT, fingerprint.encode())
-
-
-def fill_blanks(layout: DeepZoomLayout, ground: U8) -> None:
+def fill_blanks(raster: Tiles, store: DeepZoomStore, ground: U8) -> None:
     """Write the tiles that no triangle touches: viewers ask for all."""
-    contents: dict[tuple[int, int], bytes] = {}
-    t = layout.tile
-    for level in range(layout.n_levels):
-        width, height = level_size(layout.size, level)
-        for r in range(-(-height // t)):
-            for c in range(-(-width // t)):
-                name = layout.name(level, r, c)
-                if layout.folder.has(name):
-                    continue
-                size = min(t, height - r * t), min(t, width - c * t)
-                if size not in contents:
-                    contents[size] = encode(np.broadcast_to(ground[0, 0], (*size, *ground.shape[2:])))
-                layout.folder.put(name, contents[size])
+    contents: dict[tuple[int, ...], bytes] = {}
+    for level, blocks in enumerate(blocks_with_pixels(raster, store.n_levels)):
+        for block in np.argwhere(~blocks).tolist():
+            blank = np.broadcast_to(ground[0, 0], store.shape_of(level, *block))
+            for r, c in store.tiles_of(level, *block):
+                tile, name = blank[store.place_of(r, c, *block)], store.name(level, r, c)
+                if tile.shape not in contents:
+                    contents[tile.shape] = store.encoded(tile)
+                if not store.folder.has(name):
+                    store.folder.put(name, contents[tile.shape])
 
 
 def painting(raster: Tiles) -> Callable[[Array], U8]:

@@ -16,10 +16,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._apps.tiles.ahead import kept_memory
 from topleft._apps.tiles.blocks import Triangles
+from topleft._core.base.array_types import F64, I32, Array
 from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
@@ -29,11 +29,6 @@ from topleft._core.raster.verbs import coverage, fill, overdraw
 from topleft._core.raster.view import View
 from topleft._meshes.field.field import depth_of, dtype_of_field, fill_planes, is_per_face, nodata_of, visible
 
-__all__ = ["KINDS", "Painter", "Payload", "painter_of"]
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 Size = tuple[int, int]
 
 VIEW_OPTIONS = ("cull", "subpixel_bits")

@@ -1,43 +1,106 @@
-"""Chunks in a folder or behind a URL: each is whole or not there.
+"""Chunks in a folder or behind a URL: each is whole or not there, and one process at a time writes a folder.
 
-Input: names with slashes, bytes. On disk a chunk is written under another name and renamed.
+Input: names with slashes, bytes. On disk a chunk is written under another name and renamed, and files that no raster
+has are never removed.
 """
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import shutil
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import IO, Any, Self
 
 from topleft._core.base.arrays import shown
-from topleft._core.base.remote import RemotePath, as_place
-from topleft._core.base.whole_file import write_whole
+from topleft._core.base.remote import Place, RemotePath, as_place
+from topleft._core.base.whole_file import is_whole, write_whole
 
-__all__ = ["DiskFolder", "Folder", "check_space", "folder_of"]
+MANIFEST = "topleft.txt"
+"""The chunk that tells whose a folder is."""
+
+OWN_NAME = re.compile(rf"{re.escape(MANIFEST)}|\d+/\d+_\d+(\.png)?|(\d+/)?(zarr\.json|c/\d+/\d+(/0)*)")
+"""The names of chunks: of parts of a TIFF, of Deep Zoom, of Zarr."""
+
+PART = re.compile(r"\.(.+)\.[0-9a-f]{8}\.part")
+"""The name of a chunk that is being written: `write_whole`."""
+
+MARK = re.compile(rb"topleft: ([^;]*);")
+"""What stands in a file of ours."""
+
+MARK_BYTES = 4096
+"""How far from its beginning at most."""
+
+NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
+"""What a file system without locks answers."""
 
 
-class Folder(Protocol):
+class Folder(ABC):
     """Where chunks are kept."""
 
+    @abstractmethod
     def put(self, name: str, content: bytes) -> None:
         """Write a chunk."""
 
+    @abstractmethod
     def get(self, name: str) -> bytes | None:
         """Read a chunk; None where there is none."""
 
+    @abstractmethod
     def has(self, name: str) -> bool:
         """Whether a chunk is there."""
 
+    @abstractmethod
+    def place(self, name: str) -> str:
+        """Where a chunk is, for messages."""
+
+    @abstractmethod
     def exists(self) -> bool:
         """Whether anything is there."""
 
-    def absolute(self) -> Folder:
+    @abstractmethod
+    def absolute(self) -> Self:
         """The same folder for processes that run in other ones."""
 
+    @abstractmethod
+    def names(self) -> list[str]:
+        """The names of all files."""
 
-class DiskFolder:
+    @abstractmethod
+    def delete(self, name: str) -> None:
+        """Remove a file, if it is there."""
+
+    def check_own(self) -> None:
+        """Raise an error for a file that is no chunk of a raster.
+
+        Raises
+        ------
+        FileExistsError
+            If there is one.
+        """
+        for name in self.names():
+            if not is_own(name):
+                raise FileExistsError(f"{self.place(name)} was not written by topleft: move it, or write elsewhere")
+
+    def remove(self) -> None:
+        """Remove the chunks; what tells whose they are goes last."""
+        for name in sorted(filter(is_own, self.names()), key=lambda name: "/" not in name):
+            self.delete(name)
+
+
+def is_own(name: str) -> bool:
+    """Whether a file has the name of a chunk, or of one that is being written."""
+    folder, slash, last = name.rpartition("/")
+    return OWN_NAME.fullmatch(folder + slash + PART.sub(r"\1", last)) is not None
+
+
+class DiskFolder(Folder):
     """A folder on a disk."""
 
     def __init__(self, path: Path) -> None:
@@ -54,12 +117,16 @@ class DiskFolder:
         """Read a chunk; None where there is none."""
         try:
             return (self.path / name).read_bytes()
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
 
     def has(self, name: str) -> bool:
         """Whether a chunk is there."""
         return (self.path / name).is_file()
+
+    def place(self, name: str) -> str:
+        """Where a chunk is, for messages."""
+        return str(self.path / name)
 
     def exists(self) -> bool:
         """Whether anything is there but what a killed process had not renamed yet."""
@@ -71,13 +138,33 @@ class DiskFolder:
         """The same folder for processes that run in other ones."""
         return DiskFolder(self.path.absolute())
 
+    def names(self) -> list[str]:
+        """The names of all files, and of links to folders."""
+        found = []
+        for folder, folders, files in os.walk(self.path):
+            links = [name for name in folders if os.path.islink(os.path.join(folder, name))]
+            found += [Path(folder, name).relative_to(self.path).as_posix() for name in [*files, *links]]
+        return found
+
+    def delete(self, name: str) -> None:
+        """Remove a file, if it is there."""
+        (self.path / name).unlink(missing_ok=True)
+
+    def remove(self) -> None:
+        """Remove the chunks, and the folders that are empty then."""
+        super().remove()
+        for folder, _, _ in os.walk(self.path, topdown=False):
+            with suppress(OSError):  # something is in it
+                os.rmdir(folder)
+
     def sweep(self) -> None:
         """Remove what a killed process had not renamed yet."""
-        for left in self.path.rglob(".*.part"):
-            left.unlink(missing_ok=True)
+        for name in self.names():
+            if PART.fullmatch(name.rpartition("/")[2]) and is_own(name):
+                self.delete(name)
 
 
-class RemoteFolder:
+class RemoteFolder(Folder):
     """What fsspec reaches."""
 
     def __init__(self, path: RemotePath) -> None:
@@ -99,6 +186,10 @@ class RemoteFolder:
         """Whether a chunk is there."""
         return (self._path / name).exists()
 
+    def place(self, name: str) -> str:
+        """Where a chunk is, for messages."""
+        return str(self._path / name)
+
     def exists(self) -> bool:
         """Whether anything is there."""
         return self._path.exists()
@@ -106,6 +197,14 @@ class RemoteFolder:
     def absolute(self) -> RemoteFolder:
         """The same folder for processes that run in other ones."""
         return self
+
+    def names(self) -> list[str]:
+        """The names of all files."""
+        return self._path.names_below()
+
+    def delete(self, name: str) -> None:
+        """Remove a file, if it is there."""
+        (self._path / name).unlink()
 
 
 def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> DiskFolder | RemoteFolder:
@@ -116,6 +215,101 @@ def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = Non
     if isinstance(place, RemotePath):
         return RemoteFolder(replace(place, storage=tuple((storage or {}).items())))
     return DiskFolder(place)
+
+
+@contextmanager
+def only_writer(path: Place) -> Iterator[None]:
+    """Hold the lock of what is written: a file beside it, locked by the system as long as this process lives.
+
+    URLs have none: who writes the same raster there writes the same bytes.
+
+    Raises
+    ------
+    BlockingIOError
+        If another call writes it, here or in another process.
+    """
+    if isinstance(path, RemotePath):
+        yield
+        return
+    path = path.absolute()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    name = path.with_name(f".{path.name}.lock")
+    file = _locked(name, path)
+    try:
+        yield
+    finally:
+        if sys.platform == "win32":  # where an open file cannot be removed
+            os.close(file)
+        with suppress(OSError):
+            os.unlink(name)
+        if sys.platform != "win32":
+            os.close(file)
+
+
+def _locked(name: Path, path: Path) -> int:
+    while True:
+        try:
+            file = os.open(name, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise type(error)(error.errno, f"cannot write: {error.strerror}", str(path)) from error
+        try:
+            if not _take(file):
+                raise BlockingIOError(f"{path} is being written by another call: wait for it, or write elsewhere")
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(file), os.stat(name)):
+                    return file  # and not one that its owner has removed meanwhile
+        except BaseException:
+            os.close(file)
+            raise
+        os.close(file)
+
+
+def _take(file: int) -> bool:
+    """Lock an open file, and tell whether that went; where the file system has no locks it goes."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno in NO_LOCKS
+    return True
+
+
+def fingerprints_at(folder: DiskFolder, file: Path) -> list[tuple[object, str | None]]:
+    """What is there of a folder and a file, and the fingerprint of its raster; None where it is not ours."""
+    found: list[tuple[object, str | None]] = []
+    if folder.exists():
+        manifest = folder.get(MANIFEST)
+        found.append((folder.path, None if manifest is None else manifest.decode(errors="replace")))
+    if file.is_dir() or is_whole(file):
+        found.append((file, _mark_of(file)))
+    return found
+
+
+def write_own(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file, unless one of somebody else has come there meanwhile.
+
+    Raises
+    ------
+    FileExistsError
+        If so.
+    """
+    if is_whole(path) and _mark_of(path) is None:
+        raise FileExistsError(f"{path} was not written by topleft: move it, or write elsewhere")
+    write_whole(path, write)
+
+
+def _mark_of(path: Path) -> str | None:
+    if path.is_dir():
+        return None
+    with open(path, "rb") as file:
+        found = MARK.search(file.read(MARK_BYTES))
+    return None if found is None else found[1].decode(errors="replace")
 
 
 def check_space(folder: Path, n_bytes: int, what: str) -> None:

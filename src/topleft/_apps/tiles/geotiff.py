@@ -1,8 +1,8 @@
 """Writes cloud-optimised GeoTIFF: tiles, compressed, with overviews, all directories before the pixels.
 
 Input: a raster. Output: one file. The tiles of each window are compressed where it is drawn and wait in a folder beside
-the file, a file a window; a second pass makes the overviews of them, and a third puts all together: the directories
-first, then the tiles, those of the smallest overview first and the full resolution last.
+the file; a second pass makes the overviews of them, and a third puts all together: the directories first, then the
+tiles, those of the smallest overview first and the full resolution last.
 
 It is written here and not by tifffile or rasterio: tifffile puts a directory behind the pixels that it describes, so
 its files are not cloud-optimised, and GDAL's COG driver copies a raster that is written already, which takes the disk
@@ -14,121 +14,53 @@ Standard, 1.0, 2023; Adobe Photoshop TIFF Technical Note 3, 2005 (the predictor 
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
 import struct
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._apps.tiles.folders import DiskFolder, check_space
-from topleft._apps.tiles.levels import Progress, Written, check_executor, halved, level_size, n_levels_to, write_levels
+from topleft._apps.tiles.folders import MANIFEST, DiskFolder, fingerprints_at, only_writer, write_own
+from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, halved, write_levels
+from topleft._apps.tiles.store import TileStore, begin, level_size, n_levels_to
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_number, check_progress, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.options import check_choice
 from topleft._core.base.remote import as_place
-from topleft._core.base.whole_file import write_whole
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
 
-__all__ = ["write_geotiff"]
-
-Array = npt.NDArray[Any]
 
 COMPRESSIONS = ("deflate", "none")
 LIMIT_CLASSIC = 1 << 32  # bytes that offsets of a plain TIFF reach
-COPY_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
-class TiffLayout:
-    """Blocks of pixels as files of compressed tiles, one a block: their lengths, then their bytes."""
+class TiffStore(TileStore):
+    """Tiles of a TIFF, each a file until all are there."""
 
-    folder: DiskFolder
-    size: tuple[int, int]
-    window: tuple[int, int]
-    tile: int
-    channels: tuple[int, ...]
-    dtype: np.dtype[Any]  # as stored
-    empty: Any
-    n_levels: int
     compression: str
 
-    @staticmethod
-    def name(level: int, row: int, column: int) -> str:
-        """The name of the file of a block."""
+    def name(self, level: int, row: int, column: int) -> str:
+        """The name of a tile, by its row and column among tiles."""
         return f"{level}/{row}_{column}"
 
-    def n_tiles(self, level: int) -> tuple[int, int]:
-        """Columns and rows of tiles of a level."""
-        width, height = level_size(self.size, level)
-        return -(-width // self.tile), -(-height // self.tile)
-
-    def tiles_of(self, level: int, row: int, column: int) -> tuple[range, range]:
-        """Rows and columns of the tiles of a block that lie in the level."""
-        (w, h), (columns, rows) = self.window, self.n_tiles(level)
-        k_rows, k_columns = -(-h // self.tile), -(-w // self.tile)
-        return (
-            range(row * k_rows, min((row + 1) * k_rows, rows)),
-            range(column * k_columns, min((column + 1) * k_columns, columns)),
-        )
-
-    def seen_from_elsewhere(self) -> TiffLayout:
-        """The same layout for processes that run in other folders."""
-        return replace(self, folder=self.folder.absolute())
-
-    def is_there(self, level: int, row: int, column: int) -> bool:
-        """Whether a block is there."""
-        return self.folder.has(self.name(level, row, column))
-
-    def write(self, level: int, row: int, column: int, pixels: Array) -> None:
-        """Write a block."""
-        rows, columns = self.tiles_of(level, row, column)
-        parts = []
-        for r in range(len(rows)):
-            for c in range(len(columns)):
-                part = pixels[r * self.tile : (r + 1) * self.tile, c * self.tile : (c + 1) * self.tile]
-                parts.append(self.encoded(part))
-        lengths = np.array([len(part) for part in parts], "<u4").tobytes()
-        self.folder.put(self.name(level, row, column), b"".join([lengths, *parts]))
-
-    def read(self, level: int, row: int, column: int, shape: tuple[int, ...]) -> Array:
-        """Return the pixels of a block that is there."""
-        content = self.folder.get(self.name(level, row, column))
-        if content is None:
-            raise OSError(f"{self.folder.path / self.name(level, row, column)} has gone while the raster was written")
-        rows, columns = self.tiles_of(level, row, column)
-        n = len(rows) * len(columns)
-        lengths = np.frombuffer(content, "<u4", n)
-        ends = 4 * n + np.cumsum(lengths, dtype=np.int64)
-        pixels = np.empty(shape, self.dtype)
-        for i, (end, length) in enumerate(zip(ends.tolist(), lengths.tolist(), strict=True)):
-            y, x = (i // len(columns)) * self.tile, (i % len(columns)) * self.tile
-            own = pixels[y : y + self.tile, x : x + self.tile]
-            own[...] = self.decoded(content[end - length : end])[: own.shape[0], : own.shape[1]]
-        return pixels
-
     def encoded(self, pixels: Array) -> bytes:
-        """Return the bytes of a tile, filled up with what stands where nothing is."""
-        shape = (self.tile, self.tile, *self.channels)
-        whole = np.empty(shape, self.dtype)
-        if pixels.shape != shape:
-            whole[...] = self.empty
-        whole[: pixels.shape[0], : pixels.shape[1]] = pixels
+        """Return a tile as it is stored."""
         if self.compression == "none":
-            return whole.astype(self.dtype.newbyteorder("<"), copy=False).tobytes()
-        return zlib.compress(differences(whole), 1)
+            return pixels.astype(self.dtype.newbyteorder("<"), copy=False).tobytes()
+        return zlib.compress(differences(pixels), 1)
 
     def decoded(self, content: bytes) -> Array:
         """Return the pixels of a tile."""
-        shape = (self.tile, self.tile, *self.channels)
+        shape = (*self.tile, *self.channels)
         if self.compression == "none":
             return np.frombuffer(content, self.dtype.newbyteorder("<")).reshape(shape)
         return sums(np.frombuffer(zlib.decompress(content), np.uint8), shape, self.dtype)
@@ -179,6 +111,7 @@ def write_geotiff(
     tile: int,
     overviews: bool,
     resume: bool,
+    overwrite: bool,
     progress: Progress | bool | None,
     executor: Any,
 ) -> Written:
@@ -205,52 +138,30 @@ def write_geotiff(
     if n_levels > 1 and any(w % (2 * side) and w < n for w, n in zip(window, raster.size, strict=True)):
         raise ValueError(f"window must have sides of whole pairs of tiles, of {2 * side} pixels, got {window}")
     folder = DiskFolder(file.with_name(file.name + ".parts"))
-    layout = TiffLayout(
-        folder, raster.size, window, side, raster.painter.channels, dtype, raster.painter.empty, n_levels, compression
-    )
-    prepare(raster, layout, f"{raster.fingerprint} tiff {side} {compression} {n_levels}", file, resume)
-    written = write_levels(
-        raster,
-        layout,
-        dtype=dtype,
-        blank=raster.painter.empty,
-        halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
-        progress=progress,
-        executor=executor,
-    )
-    write_whole(file, lambda out: assemble(layout, out, told, geo))
-    shutil.rmtree(folder.path)
+    store = TiffStore(
+        folder, raster.size, window, (side, side), raster.painter.channels, dtype, raster.painter.empty, n_levels,
+        compression,
+    )  # fmt: skip
+    place = "-".join(map(str, geo.get(34735, ("H", []))[1]))
+    fingerprint = f"{raster.fingerprint} tiff 2 {side} {compression} {n_levels} {told} {place}"
+    with only_writer(file):
+        there = fingerprints_at(folder, file)
+        goes_on = begin(raster, store, there, fingerprint, resume=resume, overwrite=overwrite, n_copies=2)
+        if goes_on and there[0][0] == file:  # and no part of another
+            n_windows = int((raster.index.counts > 0).sum())
+            return Written(0, n_windows, raster.n_windows - n_windows)
+        folder.put(MANIFEST, fingerprint.encode())
+        written = write_levels(
+            raster,
+            store,
+            halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
+            progress=progress,
+            executor=executor,
+        )
+        tags = {**geo, 305: ("s", f"topleft: {fingerprint};".encode() + b"\0")}
+        write_own(file, lambda out: assemble(raster, store, out, told, tags))
+        folder.remove()
     return written
-
-
-def prepare(raster: Tiles, layout: TiffLayout, fingerprint: str, file: Path, resume: bool) -> None:
-    """Make the folder of parts, or take the one that an earlier run of the same raster has left."""
-    folder = layout.folder
-    manifest = folder.get("manifest.json")
-    if resume and manifest is not None:
-        if json.loads(manifest).get("fingerprint") != fingerprint:
-            raise ValueError(
-                f"{folder.path} is not of this raster: the mesh, an option or the size of windows differs; "
-                "remove it, or write elsewhere"
-            )
-        folder.sweep()
-        return
-    counts = raster.index.counts
-    w, h = raster.window_size
-    n_pixels = int((counts > 0).sum()) * w * h
-    n = n_pixels * layout.dtype.itemsize * int(np.prod(layout.channels, dtype=int))
-    if layout.compression != "none" and n > 1 << 28:
-        row, column = np.unravel_index(int(np.argmax(counts)), counts.shape)
-        sample = raster.draw_window(int(row), int(column))[: 4 * layout.tile, : 4 * layout.tile]
-        tile = layout.tile
-        corners = [(y, x) for y in range(0, sample.shape[0], tile) for x in range(0, sample.shape[1], tile)]
-        parts = [sample[y : y + tile, x : x + tile].astype(layout.dtype) for y, x in corners]
-        n = int(n * min(1.0, 1.25 * sum(len(layout.encoded(part)) for part in parts) / (len(parts) * tile * tile
-                * layout.dtype.itemsize * int(np.prod(layout.channels, dtype=int)))))  # fmt: skip
-    check_space(file.absolute().parent, 2 * (n + n // 3 * (layout.n_levels > 1)), f"a raster of {raster.shape}")
-    if folder.exists():
-        shutil.rmtree(folder.path)
-    folder.put("manifest.json", json.dumps({"fingerprint": fingerprint}).encode())
 
 
 def geo_tags(crs: str | int | None, grid: Grid | None) -> Tags:
@@ -304,101 +215,87 @@ Tags = dict[int, tuple[str, Any]]
 class LevelTiles:
     """Where the tiles of a level lie in the file."""
 
-    offsets: npt.NDArray[np.uint64]  # (rows, columns)
-    lengths: npt.NDArray[np.uint32]
+    offsets: npt.NDArray[np.int64]  # (rows, columns)
+    lengths: npt.NDArray[np.int64]
     is_blank: npt.NDArray[np.bool_]
 
 
-def assemble(layout: TiffLayout, out: IO[bytes], nodata: float | None, geo: Tags) -> None:
+def assemble(raster: Tiles, store: TiffStore, out: IO[bytes], nodata: float | None, more: Tags) -> None:
     """Write the file of the parts: header, directories, tiles of the smallest level first."""
-    blank = layout.encoded(np.empty((0, 0, *layout.channels), layout.dtype))
-    levels = [lengths_of(layout, level, len(blank)) for level in range(layout.n_levels)]
+    blank = store.encoded(store.filled(np.empty((0, 0, *store.channels), store.dtype)))
+    blocks = blocks_with_pixels(raster, store.n_levels)
+    levels = [lengths_of(store, level, own, len(blank)) for level, own in enumerate(blocks)]
     n_bytes = sum(int(own.lengths[~own.is_blank].sum()) + len(blank) for own in levels)
     n_tiles = sum(own.lengths.size for own in levels)
     is_big = n_bytes + 16 * n_tiles + 4096 * len(levels) >= LIMIT_CLASSIC
-    tags = [tags_of(layout, level, own, is_big, nodata, geo) for level, own in enumerate(levels)]
+    tags = [tags_of(store, level, own, is_big, nodata, more) for level, own in enumerate(levels)]
     at = 16 if is_big else 8
     starts = []
     for own_tags in tags:
         starts.append(at)
         at += directory_bytes(own_tags, is_big)
-    for level in reversed(range(layout.n_levels)):
-        at = place_tiles(layout, level, levels[level], len(blank), at)
+    for own in reversed(levels):
+        at = place_tiles(own, len(blank), at)
     out.write(struct.pack("<2sHHHQ", b"II", 43, 8, 0, starts[0]) if is_big else struct.pack("<2sHI", b"II", 42, 8))
     for level, own in enumerate(levels):
         following = starts[level + 1] if level + 1 < len(starts) else 0
-        out.write(directory(tags_of(layout, level, own, is_big, nodata, geo), starts[level], following, is_big))
-    for level in reversed(range(layout.n_levels)):
-        if levels[level].is_blank.any():
+        out.write(directory(tags_of(store, level, own, is_big, nodata, more), starts[level], following, is_big))
+    for level in reversed(range(store.n_levels)):
+        own = levels[level]
+        if own.is_blank.any():
             out.write(blank)
-        for row, column in blocks_of(layout, level):
-            rows, columns = layout.tiles_of(level, row, column)
-            copy_part(layout.folder.path / layout.name(level, row, column), 4 * len(rows) * len(columns), out)
+        for row, column in np.argwhere(~own.is_blank).tolist():
+            name = store.name(level, row, column)
+            content = store.content(name)
+            if len(content) != own.lengths[row, column]:
+                raise OSError(f"{store.folder.place(name)} has changed while the raster was written")
+            out.write(content)
 
 
-def blocks_of(layout: TiffLayout, level: int) -> list[tuple[int, int]]:
-    """The blocks of a level that are there, row by row."""
-    (w, h), (width, height) = layout.window, level_size(layout.size, level)
-    found = [(r, c) for r in range(-(-height // h)) for c in range(-(-width // w))]
-    return [block for block in found if layout.is_there(level, *block)]
-
-
-def lengths_of(layout: TiffLayout, level: int, n_blank: int) -> LevelTiles:
+def lengths_of(store: TiffStore, level: int, blocks: npt.NDArray[np.bool_], n_blank: int) -> LevelTiles:
     """The lengths of the tiles of a level, as the parts tell."""
-    columns, rows = layout.n_tiles(level)
-    lengths, is_blank = np.full((rows, columns), n_blank, np.uint32), np.ones((rows, columns), np.bool_)
-    for block in blocks_of(layout, level):
-        own_rows, own_columns = layout.tiles_of(level, *block)
-        shape = len(own_rows), len(own_columns)
-        with open(layout.folder.path / layout.name(level, *block), "rb") as part:
-            found = np.frombuffer(part.read(4 * shape[0] * shape[1]), "<u4").reshape(shape)
-        place = slice(own_rows.start, own_rows.stop), slice(own_columns.start, own_columns.stop)
-        lengths[place], is_blank[place] = found, False
-    return LevelTiles(np.zeros((rows, columns), np.uint64), lengths, is_blank)
+    (n_columns, n_rows), (columns, rows) = store.n_tiles_of_block(), store.n_tiles(level)
+    is_blank = ~blocks.repeat(n_rows, axis=0).repeat(n_columns, axis=1)[:rows, :columns]
+    lengths = np.full((rows, columns), n_blank, np.int64)
+    for row, column in np.argwhere(~is_blank).tolist():
+        name = store.name(level, row, column)
+        try:
+            lengths[row, column] = os.path.getsize(store.folder.place(name))
+        except FileNotFoundError:
+            raise store.gone(name) from None
+    return LevelTiles(np.zeros((rows, columns), np.int64), lengths, is_blank)
 
 
-def place_tiles(layout: TiffLayout, level: int, own: LevelTiles, n_blank: int, at: int) -> int:
+def place_tiles(own: LevelTiles, n_blank: int, at: int) -> int:
     """Set where the tiles of a level lie, from a place in the file on; return where they end."""
     own.offsets[own.is_blank] = at  # all of them are one
-    at += n_blank if own.is_blank.any() else 0
-    for block in blocks_of(layout, level):
-        rows, columns = layout.tiles_of(level, *block)
-        place = slice(rows.start, rows.stop), slice(columns.start, columns.stop)
-        lengths = own.lengths[place].astype(np.uint64)
-        ends = at + np.cumsum(lengths, dtype=np.uint64)
-        own.offsets[place] = (ends.reshape(lengths.shape) - lengths).astype(np.uint64)
-        at = int(ends[-1])
-    return at
-
-
-def copy_part(path: Path, skip: int, out: IO[bytes]) -> None:
-    """Copy a file but for its beginning."""
-    with open(path, "rb") as part:
-        part.seek(skip)
-        shutil.copyfileobj(part, out, COPY_BYTES)
+    lengths = own.lengths[~own.is_blank]
+    ends = at + (n_blank if own.is_blank.any() else 0) + np.cumsum(lengths)
+    own.offsets[~own.is_blank] = ends - lengths
+    return int(ends[-1]) if len(ends) else at + n_blank
 
 
 def tags_of(
-    layout: TiffLayout, level: int, own: LevelTiles, is_big: bool, nodata: float | None, geo: Tags
+    store: TiffStore, level: int, own: LevelTiles, is_big: bool, nodata: float | None, more: Tags
 ) -> Tags:  # fmt: skip
     """The tags of a directory: the letter of their type, and their numbers."""
-    width, height = level_size(layout.size, level)
-    n = int(np.prod(layout.channels, dtype=int))
-    is_rgb = n in (3, 4) and layout.dtype == np.uint8
-    kind = {"u": 1, "b": 1, "i": 2, "f": 3}[layout.dtype.kind]
+    width, height = level_size(store.size, level)
+    n = int(np.prod(store.channels, dtype=int))
+    is_rgb = n in (3, 4) and store.dtype == np.uint8
+    kind = {"u": 1, "b": 1, "i": 2, "f": 3}[store.dtype.kind]
     extra = n - (3 if is_rgb else 1)
     tags: Tags = {
         254: ("I", [1 if level else 0]),
         256: ("I", [width]),
         257: ("I", [height]),
-        258: ("H", [8 * layout.dtype.itemsize] * n),
-        259: ("H", [1 if layout.compression == "none" else 8]),
+        258: ("H", [8 * store.dtype.itemsize] * n),
+        259: ("H", [1 if store.compression == "none" else 8]),
         262: ("H", [2 if is_rgb else 1]),
         277: ("H", [n]),
         284: ("H", [1]),
-        317: ("H", [layout.predictor]),
-        322: ("I", [layout.tile]),
-        323: ("I", [layout.tile]),
+        317: ("H", [store.predictor]),
+        322: ("I", [store.tile[0]]),
+        323: ("I", [store.tile[1]]),
         324: ("Q" if is_big else "I", own.offsets.ravel()),
         325: ("I", own.lengths.ravel()),
         339: ("H", [kind] * n),
@@ -406,7 +303,7 @@ def tags_of(
     if extra:
         tags[338] = ("H", [2 if extra == 1 else 0] * extra)
     if level == 0:
-        tags |= geo
+        tags |= more
     if nodata is not None:
         whole = float(nodata)
         text = repr(int(whole)) if np.isfinite(whole) and whole == int(whole) else repr(whole)

@@ -1,6 +1,6 @@
 """Writes all windows of a raster, and levels of half the size, each window once.
 
-Input: a raster, and a layout: how a block of pixels becomes chunks. Output: the chunks. A block is a window at level 0,
+Input: a raster, and a store: where its blocks of pixels go. Output: the chunks. A block is a window at level 0,
 and as many pixels at the coarser levels; those are made of the blocks below them, as they were written. Which blocks
 are there is read off the chunks themselves, so a run that was killed goes on where it stopped.
 """
@@ -10,21 +10,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft._apps.tiles.folders import DiskFolder
+from topleft._apps.tiles.store import TileStore
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import check_progress, shown
 from topleft._core.base.cluster import is_client
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
-
-__all__ = ["Layout", "Progress", "Step", "Written", "check_executor", "halved", "n_levels_to", "write_levels"]
-
-Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -68,39 +68,6 @@ class Written:
     n_blank: int
 
 
-class Layout(Protocol):
-    """How blocks of pixels become chunks of a format."""
-
-    @property
-    def n_levels(self) -> int:
-        """How many resolutions there are."""
-
-    def seen_from_elsewhere(self) -> Layout:
-        """The same layout for processes that run in other folders."""
-
-    def is_there(self, level: int, row: int, column: int) -> bool:
-        """Whether all chunks of a block are there."""
-
-    def write(self, level: int, row: int, column: int, pixels: Array) -> None:
-        """Write the chunks of a block."""
-
-    def read(self, level: int, row: int, column: int, shape: tuple[int, ...]) -> Array:
-        """Return the pixels of a block that is there."""
-
-
-def n_levels_to(size: tuple[int, int], side: int) -> int:
-    """How many levels there are down to one that fits a square."""
-    n = 1
-    while max(size) > side << (n - 1):
-        n += 1
-    return n
-
-
-def level_size(size: tuple[int, int], level: int) -> tuple[int, int]:
-    """The size of a level, half of the one below, rounded up."""
-    return -(-size[0] >> level), -(-size[1] >> level)
-
-
 def halved(pixels: Array, nodata: float | None, *, is_mean: bool) -> Array:
     """Return pixels of half the size: the mean of four, those without data left out, or the upper left of them.
 
@@ -126,12 +93,21 @@ def halved(pixels: Array, nodata: float | None, *, is_mean: bool) -> Array:
     return np.where(n > 0, total / np.maximum(n, 1), empty).astype(pixels.dtype)
 
 
+def blocks_with_pixels(raster: Tiles, n_levels: int) -> list[npt.NDArray[np.bool_]]:
+    """For each level which of its blocks hold more than background (rows, columns): these are written."""
+    there = [raster.index.counts > 0]
+    for _ in range(1, n_levels):
+        below = there[-1]
+        even = np.pad(below, [(0, below.shape[0] % 2), (0, below.shape[1] % 2)])
+        quads = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
+        there.append(np.asarray(quads.any(axis=(1, 3))))
+    return there
+
+
 def write_levels(
     raster: Tiles,
-    layout: Layout,
+    store: TileStore,
     *,
-    dtype: Any,
-    blank: Any,
     halve: Callable[[Array], Array],
     prepare: Callable[[Array], Array] | None = None,
     progress: Progress | bool | None = None,
@@ -141,8 +117,6 @@ def write_levels(
 
     Parameters
     ----------
-    dtype, blank
-        Of the pixels as they are written, and what stands where no triangle is.
     halve : function of an array
         Makes the level above.
     prepare : function of an array, optional
@@ -150,72 +124,85 @@ def write_levels(
     executor : dask.distributed.Client, optional
         Whose workers draw and write the windows; levels are made of these here.
     """
-    there: list[npt.NDArray[Any]] = [raster.index.counts > 0]  # which blocks hold more than background
-    for _ in range(1, layout.n_levels):
-        below = there[-1]
-        even = np.pad(below, [(0, below.shape[0] % 2), (0, below.shape[1] % 2)])
-        quads = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
-        there.append(np.asarray(quads.any(axis=(1, 3))))
+    there = blocks_with_pixels(raster, store.n_levels)
     n_blocks = int(sum(level.sum() for level in there))
-    channels = () if prepare is None else prepare(raster.painter.blank((1, 1))).shape[2:]
-    channels = channels or (raster.painter.channels if prepare is None else ())
     check_progress(progress)
     bar = _bar(n_blocks) if progress is True else None
     tell = bar.tell if bar is not None else progress if callable(progress) else None
     n_done = n_drawn = n_kept = 0
 
-    def shape_of(level: int, row: int, column: int) -> tuple[int, ...]:
-        (w, h), (width, height) = raster.window_size, level_size(raster.size, level)
-        return (min(h, height - row * h), min(w, width - column * w), *channels)
-
     def make(level: int, row: int, column: int) -> None:
         if level == 0:
             pixels = raster.draw_window(row, column, threads=1 if n_threads > 1 else None)
-            layout.write(0, row, column, pixels if prepare is None else prepare(pixels))
+            store.write(0, row, column, pixels if prepare is None else prepare(pixels))
             return
-        layout.write(level, row, column, halve(together(level - 1, row, column)))
+        store.write(level, row, column, halve(together(level - 1, row, column)))
 
     def together(level: int, row: int, column: int) -> Array:
         """The four blocks of a level that lie below one of the next."""
         rows = range(2 * row, min(2 * row + 2, there[level].shape[0]))
         columns = range(2 * column, min(2 * column + 2, there[level].shape[1]))
-        height = sum(shape_of(level, r, columns[0])[0] for r in rows)
-        width = sum(shape_of(level, rows[0], c)[1] for c in columns)
-        pixels = np.empty((height, width, *channels), dtype)
-        pixels[...] = blank
+        height = sum(store.shape_of(level, r, columns[0])[0] for r in rows)
+        width = sum(store.shape_of(level, rows[0], c)[1] for c in columns)
+        pixels = np.empty((height, width, *store.channels), store.dtype)
+        pixels[...] = store.empty
         w, h = raster.window_size
         for r in rows:
             for c in columns:
                 if there[level][r, c]:
                     y, x = (r - rows[0]) * h, (c - columns[0]) * w
-                    shape = shape_of(level, r, c)
-                    pixels[y : y + shape[0], x : x + shape[1]] = layout.read(level, r, c, shape)
+                    block = store.read(level, r, c)
+                    pixels[y : y + block.shape[0], x : x + block.shape[1]] = block
         return pixels
 
     n_threads = raster.n_threads
     try:
         with ThreadPoolExecutor(n_threads, thread_name_prefix="topleft-tiles") as pool:
             for level, blocks in enumerate(there):
-                waiting: list[tuple[int, int, int]] = []
-                for row, column in np.argwhere(blocks).tolist():
-                    if layout.is_there(level, row, column):
-                        n_kept, n_done = n_kept + (level == 0), n_done + 1
-                    else:
-                        waiting.append((level, row, column))
+                listed = [(level, row, column) for row, column in np.argwhere(blocks).tolist()]
+                kept: set[tuple[int, int, int]] = set()
+                for _ in _in_turn(pool, partial(note_whole, store, kept), iter(listed), n_threads):
+                    pass
+                waiting = [block for block in listed if block not in kept]
+                n_kept, n_done = n_kept + len(kept) * (level == 0), n_done + len(kept)
                 if bar is not None:
                     bar.begin(n_done)
                 for done in (
                     _in_turn(pool, make, iter(waiting), n_threads)
                     if executor is None or level
-                    else _on_workers(executor, raster, layout, prepare, iter(waiting))
+                    else _on_workers(executor, raster, store, prepare, iter(waiting))
                 ):
                     n_drawn, n_done = n_drawn + (level == 0), n_done + 1
                     if tell is not None:
                         tell(Step(*done, n_done, n_blocks))
+        check_whole(store, there)
     finally:
         if bar is not None:
             bar.close()
     return Written(n_drawn, n_kept, int(there[0].size - there[0].sum()))
+
+
+def note_whole(store: TileStore, kept: set[tuple[int, int, int]], level: int, row: int, column: int) -> None:
+    """Add a block that is there and whole to others."""
+    if store.is_whole(level, row, column):
+        kept.add((level, row, column))
+
+
+def check_whole(store: TileStore, there: list[npt.NDArray[np.bool_]]) -> None:
+    """Raise an error if a tile that was written to a disk is not there any more.
+
+    Raises
+    ------
+    FileNotFoundError
+        If so.
+    """
+    if not isinstance(store.folder, DiskFolder):
+        return
+    for level, blocks in enumerate(there):
+        for row, column in np.argwhere(blocks).tolist():
+            name = store.missing(level, row, column)
+            if name is not None:
+                raise store.gone(name)
 
 
 def check_executor(executor: Any) -> None:
@@ -227,7 +214,7 @@ def check_executor(executor: Any) -> None:
 def _on_workers(
     client: Any,
     raster: Tiles,
-    layout: Layout,
+    store: TileStore,
     prepare: Callable[[Array], Array] | None,
     blocks: Iterator[tuple[int, int, int]],
 ) -> Iterator[tuple[int, int, int]]:
@@ -235,7 +222,7 @@ def _on_workers(
     from topleft._apps.tiles.cluster import WriteJob, write_on_cluster
     from topleft._apps.tiles.dask_array import WindowJob
 
-    seen = layout.seen_from_elsewhere()
+    seen = store.seen_from_elsewhere()
 
     def make(block: tuple[int, int, int]) -> WriteJob:
         _, row, column = block

@@ -11,19 +11,15 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, I32
 from topleft._core.base.arrays import INT32_MAX, as_array, shown
 from topleft._core.base.options import DepthTest, parse
 from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.raster.fragments import Fragments
+from topleft._meshes.picture.fragments import SceneFragments
 from topleft.typing import DepthTestOption
-
-__all__ = ["merge"]
-
-I32 = npt.NDArray[np.int32]
-F32 = npt.NDArray[np.float32]
 
 RULES = {DepthTest.LESS: 0, DepthTest.GREATER: 1, None: 2}  # tl_merge_rule in csrc/tiles.h
 
@@ -44,7 +40,8 @@ def merge(
     ----------
     buffers : iterable of Fragments, or of pairs (ids, depth)
         Of one size; ids int32 with -1 for nothing, depth float32, both (H, W) or (H, W, S). A generator is read one by
-        one: only the result and one buffer are held.
+        one: only the result and one buffer are held. Of `SceneFragments` the ids are ``.id``: the triangles of all
+        instances.
     triangles : sequence of int or of arrays of integers, optional
         For each buffer which triangles were drawn to it: the index of the first, if they are neighbours, or the index
         of each, ascending. Unless given, ids are those of the whole already.
@@ -142,12 +139,8 @@ def _as_shares(triangles: Any) -> list[Any]:
 
 
 def _as_buffer(buffer: Any, i: int) -> tuple[I32, F32]:
-    if isinstance(buffer, Fragments):
-        if buffer.samples_triangle.shape[-1] > 1:
-            return np.ascontiguousarray(buffer.samples_triangle), np.ascontiguousarray(buffer.samples_depth)
-        return np.ascontiguousarray(buffer.triangle), np.ascontiguousarray(buffer.depth)
     try:
-        ids, depth = buffer
+        ids, depth = _planes_of(buffer) if isinstance(buffer, Fragments) else buffer
     except (TypeError, ValueError):
         raise TypeError(f"buffers must be Fragments or pairs (ids, depth), got {shown(buffer)} as buffer {i}") from None
     ids, depth = as_array("ids", ids), as_array("depth", depth)
@@ -156,6 +149,12 @@ def _as_buffer(buffer: Any, i: int) -> tuple[I32, F32]:
     if ids.shape != depth.shape:
         raise ValueError(f"buffers must have ids and depth of one shape, got {ids.shape} and {depth.shape}")
     return np.ascontiguousarray(ids), np.ascontiguousarray(depth)
+
+
+def _planes_of(frags: Fragments) -> tuple[Any, Any]:
+    """Ids and depth, (H, W) or (H, W, S); ids of a scene are those of all its triangles."""
+    samples = frags.samples_id if isinstance(frags, SceneFragments) else frags.samples_triangle
+    return (samples, frags.samples_depth) if np.shape(samples)[-1:] != (1,) else (frags.id, frags.depth)
 
 
 def _as_names(which: Any, ids: I32, i: int) -> int | I32:

@@ -26,10 +26,8 @@ import numpy.typing as npt
 from topleft._apps.tiles.ahead import in_order, kept_memory
 from topleft._apps.tiles.blocks import BLOCK, Triangles
 from topleft._core import engine
-from topleft._core.base.memory import Memory
-
-I32 = npt.NDArray[np.int32]
-F64 = npt.NDArray[np.float64]
+from topleft._core.base.array_types import F64, I32
+from topleft._core.base.memory import Memory, check_fits
 
 SPAN_BYTES = 12
 
@@ -108,6 +106,7 @@ class WindowIndex:
     ) -> None:
         """`check`: looks at the corners of each block, and gets what tells where one of its triangles is."""
         self.tiling = tiling
+        check_fits((tiling.n_rows, tiling.n_columns + 1), np.int32, np.int32)
         self.counts = np.zeros((tiling.n_rows, tiling.n_columns), np.int32)
         self.n_spans = 0
         self._runs: list[_Run] = []

@@ -19,6 +19,7 @@ from topleft._apps.tiles.ahead import in_order, kept_memory
 from topleft._apps.tiles.blocks import BLOCK, Triangles, fingerprint_of, triangles_of
 from topleft._apps.tiles.drawing import KINDS, ON_GRIDS, Painter, painter_of
 from topleft._apps.tiles.spans import SPAN_BYTES, Tiling, WindowIndex
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_pair, as_path, as_size
 from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
 from topleft._core.base.options import check_choice
@@ -28,9 +29,6 @@ from topleft.typing import RasterKindOption, TiffCompressionOption, YOption, Zar
 if TYPE_CHECKING:
     from topleft._apps.tiles.levels import Progress, Written
 
-__all__ = ["Tiles", "Window", "tiles"]
-
-Array = npt.NDArray[Any]
 Path = str | os.PathLike[str]
 
 #: Pixels a side of a window. 80 px a triangle, two cores: 166 Mpx/s with 1024, 203 with 2048, 152 with 4096; what is
@@ -450,6 +448,7 @@ class Tiles:
         compression: ZarrCompressionOption = "gzip",
         levels: int = 1,
         resume: bool = False,
+        overwrite: bool = False,
         progress: Progress | bool | None = None,
         executor: Any = None,
         storage: dict[str, Any] | None = None,
@@ -468,7 +467,10 @@ class Tiles:
             How many resolutions, each half of the one before: from 2 on a group in the manner of OME-Zarr 0.5, with the
             arrays "0", "1", ...
         resume : bool
-            Go on with what an interrupted run has left, and draw no window again that is whole.
+            Go on with what an interrupted run has left, and draw no window again that is whole: a tile on a disk that
+            is missing or cannot be read is drawn again.
+        overwrite : bool
+            Replace what is there, if topleft wrote it.
         progress : function of a `Step`, or True, optional
             Called after each window; True shows a bar (tqdm).
         executor : dask.distributed.Client, optional
@@ -480,15 +482,19 @@ class Tiles:
         Raises
         ------
         FileExistsError
-            If something is there and `resume` is not set.
+            If something is there, and neither `resume` nor `overwrite` is set, or it was not written by topleft: no
+            file or folder of somebody else is removed.
+        BlockingIOError
+            If another call writes it, in this process or another one.
         ValueError
             If what is there is of another run: of another mesh, other options or another size of windows.
         OSError
-            If it would not fit the disk, told before a byte is written, or cannot be written.
+            If it would not fit the disk, told before a byte is written; if it cannot be written; if a tile has gone or
+            is damaged when it is read again, with its name.
         """
         from topleft._apps.tiles.zarr_files import write_zarr
 
-        return write_zarr(self, path, chunk, compression, levels, resume, progress, executor, storage)
+        return write_zarr(self, path, chunk, compression, levels, resume, overwrite, progress, executor, storage)
 
     def to_geotiff(
         self,
@@ -500,6 +506,7 @@ class Tiles:
         tile: int = 512,
         overviews: bool = True,
         resume: bool = False,
+        overwrite: bool = False,
         progress: Progress | bool | None = None,
         executor: Any = None,
     ) -> Written:
@@ -520,7 +527,7 @@ class Tiles:
             Pixels a side of a tile, a multiple of 16 that divides the sides of windows.
         overviews : bool
             Whether levels of half the size follow, down to one tile: means of numbers, every second label.
-        resume, progress, executor
+        resume, overwrite, progress, executor
             As in `to_zarr`.
 
         Raises
@@ -532,7 +539,9 @@ class Tiles:
         """
         from topleft._apps.tiles.geotiff import write_geotiff
 
-        return write_geotiff(self, path, crs, nodata, compression, tile, overviews, resume, progress, executor)
+        return write_geotiff(
+            self, path, crs, nodata, compression, tile, overviews, resume, overwrite, progress, executor
+        )
 
     def to_deepzoom(
         self,
@@ -541,6 +550,7 @@ class Tiles:
         tile: int = 256,
         colors: Callable[[Array], npt.NDArray[np.uint8]] | None = None,
         resume: bool = False,
+        overwrite: bool = False,
         progress: Progress | bool | None = None,
         executor: Any = None,
     ) -> Written:
@@ -556,7 +566,7 @@ class Tiles:
             Returns uint8 (H, W), (H, W, 3) or (H, W, 4). Unless given, labels get a colour each, masks become black and
             white, counts greys up to 255, depths, heights and values greys from the lowest to the highest, and uint8
             colours stay what they are; other colours need it.
-        resume, progress, executor
+        resume, overwrite, progress, executor
             As in `to_zarr`.
 
         Raises
@@ -566,7 +576,7 @@ class Tiles:
         """
         from topleft._apps.tiles.deepzoom import write_deepzoom
 
-        return write_deepzoom(self, path, tile, colors, resume, progress, executor)
+        return write_deepzoom(self, path, tile, colors, resume, overwrite, progress, executor)
 
 
 def extent_of(triangles: Triangles) -> Extent:

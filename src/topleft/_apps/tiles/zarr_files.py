@@ -12,40 +12,31 @@ import json
 import os
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from topleft._apps.tiles.folders import DiskFolder, Folder, check_space, folder_of
-from topleft._apps.tiles.levels import Progress, Written, check_executor, halved, level_size, write_levels
+from topleft._apps.tiles.folders import Folder, folder_of, only_writer
+from topleft._apps.tiles.levels import Progress, Written, check_executor, halved, write_levels
+from topleft._apps.tiles.store import TileStore, begin, level_size
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_size, check_progress
 from topleft._core.base.options import check_choice
+from topleft._core.base.remote import as_place
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
 
-__all__ = ["write_zarr"]
-
-Array = npt.NDArray[Any]
 
 COMPRESSIONS = ("gzip", "zstd", "none")
 
 
 @dataclass(frozen=True)
-class ZarrLayout:
-    """Blocks of pixels as chunks of Zarr arrays."""
+class ZarrStore(TileStore):
+    """Tiles as chunks of Zarr arrays."""
 
-    folder: Folder
-    size: tuple[int, int]
-    window: tuple[int, int]
-    chunk: tuple[int, int]
-    channels: tuple[int, ...]
-    dtype: np.dtype[Any]
-    empty: Any
-    n_levels: int
     encode: Callable[[bytes], bytes]
     decode: Callable[[bytes], bytes]
 
@@ -54,48 +45,14 @@ class ZarrLayout:
         tail = "/0" * len(self.channels)
         return ("" if self.n_levels == 1 else f"{level}/") + f"c/{row}/{column}{tail}"
 
-    def chunks_of(self, level: int, row: int, column: int) -> list[tuple[int, int]]:
-        """The chunks of a block that lie in the level."""
-        (w, h), (cw, ch), (width, height) = self.window, self.chunk, level_size(self.size, level)
-        rows = range(row * (h // ch), min((row + 1) * (h // ch), -(-height // ch)))
-        columns = range(column * (w // cw), min((column + 1) * (w // cw), -(-width // cw)))
-        return [(r, c) for r in rows for c in columns]
+    def encoded(self, pixels: Array) -> bytes:
+        """Return a chunk as it is stored."""
+        return self.encode(np.ascontiguousarray(pixels, self.dtype.newbyteorder("<")).data)  # type: ignore[arg-type]
 
-    def seen_from_elsewhere(self) -> ZarrLayout:
-        """The same layout for processes that run in other folders."""
-        return replace(self, folder=self.folder.absolute())
-
-    def is_there(self, level: int, row: int, column: int) -> bool:
-        """Whether all chunks of a block are there."""
-        return all(self.folder.has(self.name(level, r, c)) for r, c in self.chunks_of(level, row, column))
-
-    def write(self, level: int, row: int, column: int, pixels: Array) -> None:
-        """Write the chunks of a block."""
-        (w, h), (cw, ch) = self.window, self.chunk
-        for r, c in self.chunks_of(level, row, column):
-            y, x = r * ch - row * h, c * cw - column * w
-            part = pixels[y : y + ch, x : x + cw]
-            if part.shape[:2] != (ch, cw):  # chunks of the border are as large as others
-                whole = np.empty((ch, cw, *self.channels), self.dtype)
-                whole[...] = self.empty
-                whole[: part.shape[0], : part.shape[1]] = part
-                part = whole
-            content = np.ascontiguousarray(part, self.dtype.newbyteorder("<"))
-            self.folder.put(self.name(level, r, c), self.encode(content.data))  # type: ignore[arg-type]
-
-    def read(self, level: int, row: int, column: int, shape: tuple[int, ...]) -> Array:
-        """Return the pixels of a block that is there."""
-        (w, h), (cw, ch) = self.window, self.chunk
-        pixels = np.empty(shape, self.dtype)
-        for r, c in self.chunks_of(level, row, column):
-            content = self.folder.get(self.name(level, r, c))
-            if content is None:
-                raise OSError(f"chunk {self.name(level, r, c)} has gone while the raster was written")
-            part = np.frombuffer(self.decode(content), self.dtype.newbyteorder("<")).reshape(ch, cw, *self.channels)
-            y, x = r * ch - row * h, c * cw - column * w
-            own = pixels[y : y + ch, x : x + cw]
-            own[...] = part[: own.shape[0], : own.shape[1]]
-        return pixels
+    def decoded(self, content: bytes) -> Array:
+        """Return the pixels of a chunk."""
+        pixels = np.frombuffer(self.decode(content), self.dtype.newbyteorder("<"))
+        return pixels.reshape(*self.tile[::-1], *self.channels)
 
 
 def write_zarr(
@@ -105,6 +62,7 @@ def write_zarr(
     compression: str,
     levels: int,
     resume: bool,
+    overwrite: bool,
     progress: Progress | bool | None,
     executor: Any,
     storage: dict[str, Any] | None,
@@ -120,30 +78,22 @@ def write_zarr(
     check_halves(window, n_levels, raster.size)
     encode, decode, codec = codec_of(compression)
     folder = folder_of(path, storage)
-    empty = raster.painter.empty
-    layout = ZarrLayout(
-        folder, raster.size, window, size, raster.painter.channels, raster.dtype, empty, n_levels, encode, decode
-    )
-    words = f"zarr {size} {compression} {n_levels}"
-    fingerprint = f"{raster.fingerprint} {words}"
-    found = folder.get("zarr.json")
-    if found is not None or folder.exists():
-        check_resumable(found, fingerprint, str(path), resume)
-    if isinstance(folder, DiskFolder):
-        if found is None:
-            check_space(folder.path, bytes_of(raster, n_levels, compression == "none"), f"a raster of {raster.shape}")
-        else:
-            folder.sweep()
-    write_metadata(raster, layout, codec, fingerprint)
-    return write_levels(
-        raster,
-        layout,
-        dtype=raster.dtype,
-        blank=empty,
-        halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
-        progress=progress,
-        executor=executor,
-    )
+    store = ZarrStore(
+        folder, raster.size, window, size, raster.painter.channels, raster.dtype, raster.painter.empty, n_levels,
+        encode, decode,
+    )  # fmt: skip
+    fingerprint = f"{raster.fingerprint} zarr {size} {compression} {n_levels}"
+    with only_writer(as_place("path", path)):
+        there: list[tuple[object, str | None]] = [(path, fingerprint_in(folder))] if folder.exists() else []
+        begin(raster, store, there, fingerprint, resume=resume, overwrite=overwrite)
+        write_metadata(raster, store, codec, fingerprint)
+        return write_levels(
+            raster,
+            store,
+            halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
+            progress=progress,
+            executor=executor,
+        )
 
 
 def codec_of(compression: str) -> tuple[Callable[[bytes], bytes], Callable[[bytes], bytes], list[dict[str, Any]]]:
@@ -181,41 +131,12 @@ def check_halves(window: tuple[int, int], n_levels: int, size: tuple[int, int]) 
         raise ValueError(f"window must have even sides for several levels, got {window[0]} x {window[1]}")
 
 
-def check_resumable(found: bytes | None, fingerprint: str, path: str, resume: bool) -> None:
-    """Raise an error unless a run may go on with what is there.
-
-    Raises
-    ------
-    FileExistsError
-        If something is there and nobody said to go on with it.
-    ValueError
-        If it is of another run.
-    """
-    if not resume:
-        raise FileExistsError(f"{path} exists: resume=True goes on with it, if it is of this raster; else remove it")
+def fingerprint_in(folder: Folder) -> str | None:
+    """What the metadata says of the raster; None where it is not ours."""
     try:
-        kept = json.loads(found or b"")["attributes"]["topleft"]["fingerprint"]
-    except (ValueError, KeyError, TypeError):
-        kept = None
-    if kept != fingerprint:
-        raise ValueError(
-            f"{path} is not of this raster: the mesh, an option or the size of windows differs; write elsewhere"
-        )
-
-
-def bytes_of(raster: Tiles, n_levels: int, is_plain: bool) -> int:
-    """How many bytes a raster takes at most on disk.
-
-    Where it is compressed and the plain size would not fit, the fullest window tells by how much it shrinks.
-    """
-    counts = raster.index.counts
-    w, h = raster.window_size
-    n = int((counts > 0).sum()) * w * h * raster.dtype.itemsize * int(np.prod(raster.painter.channels, dtype=int))
-    if not is_plain and n > 1 << 28:
-        row, column = np.unravel_index(int(np.argmax(counts)), counts.shape)
-        sample = raster.draw_window(int(row), int(column))
-        n = int(n * min(1.0, 1.25 * len(gzipped(np.ascontiguousarray(sample).data)) / sample.nbytes))  # type: ignore[arg-type]
-    return n + (n // 3 if n_levels > 1 else 0)
+        return str(json.loads(folder.get("zarr.json") or b"")["attributes"]["topleft"]["fingerprint"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
 
 
 def json_number(value: Any) -> Any:
@@ -229,48 +150,48 @@ def json_number(value: Any) -> Any:
     return number
 
 
-def write_metadata(raster: Tiles, layout: ZarrLayout, codec: list[dict[str, Any]], fingerprint: str) -> None:
+def write_metadata(raster: Tiles, store: ZarrStore, codec: list[dict[str, Any]], fingerprint: str) -> None:
     """Write zarr.json of all levels."""
     own: dict[str, Any] = {"fingerprint": fingerprint, "kind": raster.kind}
     if raster.grid is not None:
         own |= {"extent": list(raster.grid.extent), "y": raster.grid.y}
     arrays = []
-    for level in range(layout.n_levels):
-        width, height = level_size(layout.size, level)
-        channels = list(layout.channels)
+    for level in range(store.n_levels):
+        width, height = level_size(store.size, level)
+        channels = list(store.channels)
         arrays.append({
             "zarr_format": 3,
             "node_type": "array",
             "shape": [height, width, *channels],
-            "data_type": str(layout.dtype),
+            "data_type": str(store.dtype),
             "chunk_grid": {
-                "name": "regular", "configuration": {"chunk_shape": [layout.chunk[1], layout.chunk[0], *channels]}
+                "name": "regular", "configuration": {"chunk_shape": [*store.tile[::-1], *channels]}
             },
             "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-            "fill_value": json_number(layout.empty),
+            "fill_value": json_number(store.empty),
             "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}, *codec],
             "dimension_names": ["y", "x", "channel"][: 2 + len(channels)],
             "attributes": {},
         })  # fmt: skip
-    if layout.n_levels == 1:
+    if store.n_levels == 1:
         arrays[0]["attributes"] = {"topleft": own}
-        layout.folder.put("zarr.json", _json(arrays[0]))
+        store.folder.put("zarr.json", _json(arrays[0]))
         return
     # First what tells whose this is: a run that is killed here goes on.
-    attributes = {"topleft": own, "ome": _multiscales(raster, layout)}
-    layout.folder.put("zarr.json", _json({"zarr_format": 3, "node_type": "group", "attributes": attributes}))
+    attributes = {"topleft": own, "ome": _multiscales(raster, store)}
+    store.folder.put("zarr.json", _json({"zarr_format": 3, "node_type": "group", "attributes": attributes}))
     for level, array in enumerate(arrays):
-        layout.folder.put(f"{level}/zarr.json", _json(array))
+        store.folder.put(f"{level}/zarr.json", _json(array))
 
 
-def _multiscales(raster: Tiles, layout: ZarrLayout) -> dict[str, Any]:
+def _multiscales(raster: Tiles, store: ZarrStore) -> dict[str, Any]:
     """What OME-Zarr says of levels: a pixel of level k is 2**k of those of level 0."""
     step = (1.0, 1.0) if raster.grid is None else raster.grid.pixel_size[::-1]
-    tail = [1.0] * len(layout.channels)
+    tail = [1.0] * len(store.channels)
     axes = [{"name": name, "type": "space"} for name in "yx"]
-    axes += [{"name": "channel", "type": "channel"}] * len(layout.channels)
+    axes += [{"name": "channel", "type": "channel"}] * len(store.channels)
     datasets = []
-    for level in range(layout.n_levels):
+    for level in range(store.n_levels):
         scale = [step[0] * 2**level, step[1] * 2**level, *tail]
         shift = [step[0] * (2**level - 1) / 2, step[1] * (2**level - 1) / 2, *([0.0] * len(tail))]
         transforms = [{"type": "scale", "scale": scale}, {"type": "translation", "translation": shift}]

@@ -14,42 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.threads import run_parts
 
-__all__ = [
-    "apart_from",
-    "as_aligned",
-    "as_background",
-    "as_checked_triangles",
-    "as_colors",
-    "as_count",
-    "as_frozen",
-    "as_names",
-    "as_number",
-    "as_out",
-    "as_pair",
-    "as_path",
-    "as_places",
-    "as_point_size",
-    "as_real",
-    "as_size",
-    "as_square",
-    "as_subpixel_bits",
-    "as_transform",
-    "as_triangles",
-    "as_values",
-    "as_vector",
-    "as_vertices",
-    "as_window",
-    "check_progress",
-    "check_regular",
-    "check_rows",
-    "is_frozen",
-    "narrow_triangles",
-    "refuse_rows",
-    "set_aligned",
-    "set_read_only",
-    "shown",
-]
-
 #: The largest side of a picture and the largest number of triangles or vertices: ids and indices are int32.
 INT32_MAX = 2**31 - 1
 
@@ -278,14 +242,14 @@ def as_number(name: str, value: object) -> float:
     return float(array)
 
 
-def as_count(name: str, value: object) -> int:
-    """Return a whole number of at least 1."""
+def as_count(name: str, value: object, smallest: int = 1) -> int:
+    """Return a whole number that is not below another."""
     try:
         n = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         raise TypeError(f"{name} must be an integer, got {shown(value)}") from None
-    if n < 1:
-        raise ValueError(f"{name} must be at least 1, got {n}")
+    if n < smallest:
+        raise ValueError(f"{name} must be at least {smallest}, got {n}")
     return n
 
 

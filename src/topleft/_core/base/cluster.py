@@ -14,8 +14,6 @@ from typing import Any
 from topleft._core.engine.isa import build_info
 from topleft.errors import MissingPackageError, TopleftError
 
-__all__ = ["MOST_RESTARTS", "check_workers", "is_client", "quiet", "result_of", "wait_for_scheduler"]
-
 MOST_RESTARTS = 5
 """How often a task is sent again that was cancelled or lost with the scheduler."""
 

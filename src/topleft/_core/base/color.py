@@ -12,12 +12,9 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_array, shown
 
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-U8 = npt.NDArray[np.uint8]
 Color = tuple[int, ...]
 ColorLike: TypeAlias = str | Sequence[float] | npt.NDArray[Any]
 """What `as_color` takes."""

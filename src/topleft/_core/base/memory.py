@@ -12,9 +12,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from topleft._core import engine
 
-__all__ = ["FreshMemory", "KeptMemory", "Memory", "MemoryOf", "ScratchMemory", "check_fits", "empty", "fits",
-           "release_memory", "times_that_fit"]  # fmt: skip
-
 HUGE_PAGE = 2 << 20
 CACHE_LINE = 64
 

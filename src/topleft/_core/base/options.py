@@ -6,21 +6,6 @@ from enum import IntEnum, StrEnum
 from functools import cache, cached_property
 from typing import TypeVar
 
-__all__ = [
-    "Alpha",
-    "Blend",
-    "ClipDepth",
-    "Cull",
-    "DepthTest",
-    "Per",
-    "PointShape",
-    "Resolve",
-    "Sampling",
-    "Sink",
-    "check_choice",
-    "parse",
-]
-
 
 class Sampling(StrEnum):
     """Where a pixel is sampled, or which squares count."""

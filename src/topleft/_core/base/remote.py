@@ -7,6 +7,7 @@ file:// is a path of this machine.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -14,8 +15,6 @@ from typing import Any
 
 from topleft._core.base.arrays import shown
 from topleft.errors import MissingPackageError
-
-__all__ = ["Place", "RemotePath", "as_place", "is_url", "place_of"]
 
 #: File systems on which what is being written shows before it is whole: there it gets another name first. Stores of
 #: objects show an object when all of it is there.
@@ -133,6 +132,17 @@ class RemotePath:
         except FileNotFoundError:
             return 0
 
+    def names_below(self) -> list[str]:
+        """The names of all files below it, with slashes."""
+        fs, name = self._reached
+        return [found[len(name.rstrip("/")) + 1 :] for found in fs.find(name)]
+
+    def unlink(self) -> None:
+        """Remove the file, if it is there."""
+        fs, name = self._reached
+        with suppress(FileNotFoundError):
+            fs.rm_file(name)
+
     def read_bytes(self) -> bytes:
         """Return what the file holds."""
         fs, name = self._reached
@@ -141,6 +151,12 @@ class RemotePath:
     def write_bytes(self, content: bytes) -> None:
         """Write the file, whole or not at all."""
         fs, name = self._reached
+        try:
+            self._send(fs, name, content)
+        except (NotImplementedError, ValueError) as error:  # what there is for that kind of URL reads only
+            raise ValueError(f"cannot write to {self.url}: {error}") from None
+
+    def _send(self, fs: Any, name: str, content: bytes) -> None:
         protocols = {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
         if not protocols & SHOWS_PARTS:
             fs.pipe_file(name, content)

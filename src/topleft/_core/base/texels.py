@@ -15,14 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32
 from topleft._core.base.arrays import as_array
 from topleft._core.base.color import LIGHT_OF_SRGB, decode_srgb
 from topleft._core.base.options import check_choice
 from topleft.typing import EncodingOption, FilterOption, WrapOption
-
-__all__ = ["MOST_KEPT_BYTES", "ValueLevels", "as_levels", "as_light", "halve", "levels_of"]
-
-F32 = NDArray[np.float32]
 
 MOST_KEPT_BYTES = 1 << 27
 """What the levels of a texture may take and be kept with it; those of 2048 x 2048 texels of four channels take 2/3."""

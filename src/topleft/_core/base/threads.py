@@ -17,8 +17,6 @@ from topleft._core.base.memory import SCRATCH
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
-__all__ = ["available_threads", "count_threads", "parse_threads", "run_parts", "threads_for", "threads_of_rows"]
-
 Part = TypeVar("Part")
 
 #: Triangles of a scene of instances, of lines or of arrays that are worth a thread; draws: `choices.threads_to_draw`.

@@ -12,8 +12,6 @@ from typing import IO
 
 from topleft._core.base.remote import Place, RemotePath
 
-__all__ = ["is_whole", "remove_stale_parts", "write_whole"]
-
 #: A file that nobody has written to for so long was left by a process that was killed.
 STALE_S = 3600
 

@@ -77,7 +77,7 @@ cdef Block find_block(int64_t n_bytes):
     return block
 
 
-def lease_block(int64_t n_bytes, allocate):
+def lease_block(int64_t n_bytes, allocate: Callable[[int], U8]) -> memoryview:
     """Return memory for an array, which comes back when the array dies; `allocate(n_bytes)` is asked where none waits."""
     cdef Lease lease
     cdef Block block = find_block(n_bytes)
@@ -99,6 +99,6 @@ def keep_blocks(int64_t n_bytes):
         drop_blocks(n_bytes)
 
 
-def waiting_memory():
+def waiting_memory() -> int:
     """Return how many bytes wait for an array."""
     return waiting_bytes

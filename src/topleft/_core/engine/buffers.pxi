@@ -10,14 +10,15 @@ cdef class Viewport:
 
     cdef tl_view view
 
-    def __init__(self, size, int subpixel_bits, int guard_bits, bint zero_to_one, bint near_clip, bint far_clip):
+    def __init__(self, size: tuple[int, int], int subpixel_bits, int guard_bits, bint zero_to_one, bint near_clip,
+                 bint far_clip):
         self.view.half_width_px, self.view.half_height_px = size[0] / 2, size[1] / 2
         self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in size)
         self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
         self.view.near_clip, self.view.far_clip = near_clip, far_clip
 
     @property
-    def size(self):
+    def size(self) -> tuple[int, int]:
         """Width and height of the whole picture."""
         return int(2 * self.view.half_width_px), int(2 * self.view.half_height_px)
 
@@ -40,9 +41,9 @@ cdef class Source:
     cdef tl_source source
     cdef object arrays
     cdef readonly bint is_clip_space, is_affine
-    cdef readonly object matrix
+    cdef readonly object matrix  #: Array | None
 
-    def __init__(self, vertices, matrix=None, bint is_affine=False):
+    def __init__(self, vertices: Array, matrix: Array | None = None, bint is_affine=False):
         """`matrix`: finite, (4, 4); it is rounded to the dtype of the vertices."""
         cdef const uint8_t[::1] raw = as_bytes(vertices)
         if matrix is not None:
@@ -58,7 +59,8 @@ cdef class Source:
         self.source.n, self.source.n_components = vertices.shape
         self.is_clip_space = matrix is not None or self.source.n_components == 4
 
-    def snap(self, int64_t first, int64_t end, int subpixel_bits, bint with_depth, uint8_t[::1] records, int64_t[:, ::1] wide):
+    def snap(self, int64_t first, int64_t end, int subpixel_bits, bint with_depth, uint8_t[::1] records,
+             int64_t[:, ::1] wide or None) -> tuple[int, int, int]:
         """Snap the pixels of vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
@@ -69,7 +71,7 @@ cdef class Source:
                 counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
-    def take(self, int64_t first, int64_t end, double[:, ::1] points, int bits=-1):
+    def take(self, int64_t first, int64_t end, double[:, ::1] points or None, int bits=-1) -> int:
         """Widen the numbers of vertices [first, end) into points, or only look at them; returns how many cannot be drawn.
 
         `bits` from 0 on: they are rounded to 2**-bits px.
@@ -79,7 +81,8 @@ cdef class Source:
             n_bad = K.take_points(&self.source, first, end, bits, &points[0, 0] if points is not None else NULL)
         return n_bad
 
-    def project(self, int64_t first, int64_t end, Viewport viewport, uint8_t[::1] records, int64_t[:, ::1] wide):
+    def project(self, int64_t first, int64_t end, Viewport viewport, uint8_t[::1] records,
+                int64_t[:, ::1] wide or None) -> tuple[int, int, int]:
         """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
@@ -90,14 +93,15 @@ cdef class Source:
                 counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
-    def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points):
+    def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points) -> tuple[int, int]:
         """Project vertices [first, end) to points (V, PLACED); returns the numbers of bad and of clipped ones, x NaN."""
         cdef tl_vertex_counts counts
         with nogil:
             counts = K.project_points(&self.source, first, end, &viewport.view, &points[0, 0])
         return counts.n_bad, counts.n_clipped
 
-    def project_blocks(self, const uint8_t[::1] is_used, Viewport viewport, uint8_t[::1] records):
+    def project_blocks(self, const uint8_t[::1] is_used, Viewport viewport,
+                       uint8_t[::1] records) -> tuple[int, int, int]:
         """Project and snap the blocks of VERTEX_BLOCK vertices that are used; returns as `project` does."""
         cdef int64_t i = 0, end, n = is_used.shape[0], n_bad = 0, n_wide = 0, n_clipped = 0
         cdef tl_vertex_counts counts
@@ -129,7 +133,8 @@ cdef class Target:
     cdef int32_t flip
     cdef float[:, ::1] bounds
 
-    def __init__(self, int sink, pixels, depth, covered, samples=None, bint earlier_wins=False, bounds=None):
+    def __init__(self, int sink, pixels: Array, depth: F32 | None, covered: U64 | None, samples: I32 | None = None,
+                 bint earlier_wins=False, bounds: F32 | None = None):
         """`bounds`: `bounds_shape` float32, with which large triangles and clusters that lie behind are left out."""
         self.sink, self.flip, self.bounds = sink, TL_FLIP if earlier_wins else 0, bounds
         self.height, self.width = pixels.shape
@@ -138,12 +143,12 @@ cdef class Target:
         self.samples, self.sample_bits = samples, 0 if samples is None else len(samples).bit_length() - 1
 
     @staticmethod
-    def covered_shape(int64_t height, int64_t width, int64_t n_samples=1):
+    def covered_shape(int64_t height, int64_t width, int64_t n_samples=1) -> tuple[int, int]:
         """Return the shape of the uint64 scratch that a mask needs: any rows of it are enough for as many of the mask."""
         return height, tl_covered_words(width * n_samples)
 
     @staticmethod
-    def bounds_shape(int64_t height, int64_t width):
+    def bounds_shape(int64_t height, int64_t width) -> tuple[int, int]:
         """Return the shape of the float32 scratch that bounds of depth take."""
         return height, tl_segments(width)
 
@@ -167,7 +172,7 @@ cdef class Target:
         return t
 
 
-def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices):
+def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices) -> int:
     """Return the first row with an index outside ``[0, n_vertices)``, -1 if there is none."""
     cdef int64_t n = triangles.shape[0], row = -1
     if 0 < n < HELD_VERTICES:
@@ -178,7 +183,7 @@ def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices):
     return row
 
 
-def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_t[:, ::1] out):
+def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_t[:, ::1] out) -> int:
     """Write the indices as int32; returns the first row with one outside ``[0, n_vertices)``, -1 if there is none."""
     cdef int64_t n = triangles.shape[0], row = -1
     if 0 < n < HELD_VERTICES:
@@ -189,8 +194,8 @@ def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_
     return row
 
 
-def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, int64_t n_rows, bint earlier_wins, float depth,
-                   float background):
+def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, int64_t n_rows, bint earlier_wins,
+                   float depth, float background):
     """Write the depth of rows of a picture whose triangles all lie at one; ids as `Target` has them drawn become ids."""
     cdef int64_t n = n_rows * ids.shape[1]
     if n:
@@ -198,7 +203,7 @@ def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, in
             K.set_flat_depth(&ids[first_row, 0], n, TL_FLIP if earlier_wins else 0, depth, background, &out[first_row, 0])
 
 
-def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles):
+def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles) -> int:
     """Return the lowest index of a vertex in use that has no fixed-point position, -1 if there is none."""
     cdef int64_t n = triangles.shape[0], n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex), found = -1
     if n and n_vertices:
@@ -211,9 +216,10 @@ cdef class Pieces:
     """What the clip planes leave of the triangles that they cut."""
 
     cdef tl_pieces pieces
-    cdef readonly object arrays
+    cdef readonly object arrays  #: tuple[Any, ...] | None
 
-    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, Viewport viewport, const int32_t[::1] ids=None):
+    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, Viewport viewport,
+                 const int32_t[::1] ids=None):
         """`ids`: the triangles that may be cut, ascending; unless given, all of them."""
         cdef tl_pieces *p = &self.pieces
         cdef int64_t n = triangles.shape[0] if ids is None else ids.shape[0]
@@ -242,5 +248,5 @@ cdef class Pieces:
         with nogil:
             K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &viewport.view, p)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self.pieces.n_pieces

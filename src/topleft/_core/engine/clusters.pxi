@@ -7,7 +7,8 @@ CLUSTER_BYTES = sizeof(tl_cluster)
 BLOCK = VERTEX_BLOCK
 
 
-def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, int64_t n_vertices, uint8_t[::1] is_used):
+def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, int64_t n_vertices,
+                  uint8_t[::1] is_used) -> int:
     """Mark the blocks of VERTEX_BLOCK vertices that some triangles use; an id of -1 is of none.
 
     Returns -1, or a triangle with an index outside [0, n_vertices).
@@ -20,7 +21,8 @@ def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, int64_t
     return bad
 
 
-def list_cut(const int32_t[::1] ids, const int32_t[:, ::1] corners, const uint8_t[::1] records, int32_t[::1] cut):
+def list_cut(const int32_t[::1] ids, const int32_t[:, ::1] corners, const uint8_t[::1] records,
+             int32_t[::1] cut) -> int:
     """List those of some triangles that a clip plane may cut, maybe more than once; returns how many."""
     cdef const tl_vertex *vertices = <const tl_vertex *>data(records)
     cdef const tl_vertex *v
@@ -39,7 +41,8 @@ def list_cut(const int32_t[::1] ids, const int32_t[:, ::1] corners, const uint8_
     return n_cut
 
 
-def order_triangles(Source source, const int32_t[:, ::1] triangles, const double[::1] box, uint32_t[::1] keys, uint64_t[:, ::1] room, int32_t[::1] order):
+def order_triangles(Source source, const int32_t[:, ::1] triangles, const double[::1] box, uint32_t[::1] keys,
+                    uint64_t[:, ::1] room, int32_t[::1] order):
     """Write the order of triangles along a curve that keeps neighbours together; `box`: low and high of the vertices.
 
     `keys` and `order` have a number a triangle, `room` has two rows of them.
@@ -51,8 +54,8 @@ def order_triangles(Source source, const int32_t[:, ::1] triangles, const double
             K.sort_keys(&keys[0], n, &room[0, 0], &room[1, 0], &order[0])
 
 
-def cut_clusters(const int32_t[:, ::1] triangles, const int32_t[::1] order, int32_t[::1] seen, uint8_t[::1] clusters, int32_t[::1] vertices,
-                 uint8_t[:, ::1] corners):
+def cut_clusters(const int32_t[:, ::1] triangles, const int32_t[::1] order, int32_t[::1] seen, uint8_t[::1] clusters,
+                 int32_t[::1] vertices, uint8_t[:, ::1] corners) -> tuple[int, int]:
     """Cut sorted triangles into clusters; returns how many, and how many vertices of the mesh `vertices` then lists for them.
 
     `seen`: -1 for each vertex of the mesh; `clusters` has room for one a triangle, `vertices` for three.
@@ -64,7 +67,8 @@ def cut_clusters(const int32_t[:, ::1] triangles, const int32_t[::1] order, int3
     return n_clusters, n_used
 
 
-def measure_clusters(Source source, const uint8_t[:, ::1] corners, uint8_t[::1] clusters, double[:, ::1] group_boxes, int64_t first, int64_t end):
+def measure_clusters(Source source, const uint8_t[:, ::1] corners, uint8_t[::1] clusters, double[:, ::1] group_boxes,
+                     int64_t first, int64_t end):
     """Measure the clusters [first, end), of whole groups, and the boxes of these."""
     if end > first:
         with nogil:
@@ -81,7 +85,8 @@ cdef class ClusterView:
 
     cdef tl_cluster_view view
 
-    def __init__(self, Source source, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, tl_sink sink):
+    def __init__(self, Source source, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width,
+                 double margin_px, double error, tl_sink sink):
         """`source`: whose matrix is clip from object; `mesh`: how it is seen; beyond `margin_px` around the window nothing shows.
 
         `error`: of the vertex stage, as a share of the terms that it adds up; `sink`: what becomes of a covered sample.
@@ -113,8 +118,8 @@ cdef class ClusterView:
         v.sample_px[0], v.sample_px[1] = 0.5 + mesh.snapped.mesh.sample_x_fx / unit, 0.5 + mesh.snapped.mesh.sample_y_fx / unit
 
 
-def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, const double[:, :, ::1] matrices, Target target, bint is_drawn,
-               uint8_t[::1] shown):
+def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, const double[:, :, ::1] matrices,
+               Target target, bint is_drawn, uint8_t[::1] shown):
     """Tell of boxes (N, 6), each under a matrix of its own (N, 4, 4), whether they may show in a picture.
 
     They do not where they lie outside of it, between samples or, if it `is_drawn`, behind what it shows. `view`: with any
@@ -134,7 +139,8 @@ cdef class Clustered:
     cdef object arrays
     cdef readonly int64_t n_triangles
 
-    def __init__(self, const uint8_t[::1] clusters, const double[:, ::1] group_boxes, const uint8_t[:, ::1] corners, const int32_t[::1] names):
+    def __init__(self, const uint8_t[::1] clusters, const double[:, ::1] group_boxes, const uint8_t[:, ::1] corners,
+                 const int32_t[::1] names):
         self.arrays = clusters, group_boxes, corners, names
         self.n_triangles = corners.shape[0]
         self.mesh.n_clusters = clusters.shape[0] // <int64_t>sizeof(tl_cluster)
@@ -142,7 +148,7 @@ cdef class Clustered:
             self.mesh.clusters, self.mesh.group_boxes = <const tl_cluster *>&clusters[0], &group_boxes[0, 0]
             self.mesh.corners, self.mesh.names = &corners[0, 0], &names[0]
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self.mesh.n_clusters
 
     def survey(self, ClusterView view, int64_t step, int64_t[::1] n_of):
@@ -152,7 +158,7 @@ cdef class Clustered:
         with nogil:
             K.survey_clusters(&self.mesh, &view.view, step, &n_of[0])
 
-    def count_hidden(self, SnappedMesh mesh, ClusterView view, Target target, int64_t step):
+    def count_hidden(self, SnappedMesh mesh, ClusterView view, Target target, int64_t step) -> tuple[int, int]:
         """Count one cluster of each `step` that the picture may show; returns how many, and how many of them it hides."""
         cdef tl_window window = mesh.window(0, target.height, target.width)
         cdef tl_target rows = target.rows(0)
@@ -161,8 +167,9 @@ cdef class Clustered:
             n = K.count_hidden(&self.mesh, &view.view, &window, &rows, step, &n_hidden)
         return n, n_hidden
 
-    def draw(self, SnappedMesh mesh, Source source, ClusterView seen, bint may_be_hidden, Target target, int64_t first_row, int64_t n_rows,
-             int32_t[::1] room, int32_t[::1] others, bint is_first, bint is_last):
+    def draw(self, SnappedMesh mesh, Source source, ClusterView seen, bint may_be_hidden, Target target,
+             int64_t first_row, int64_t n_rows, int32_t[::1] room, int32_t[::1] others, bint is_first,
+             bint is_last) -> tuple[int, int, int]:
         """Draw what the rows of a picture show.
 
         `mesh`: how, and what triangle 0 is called; its own triangles are not read. `room`: three numbers a cluster, and one.

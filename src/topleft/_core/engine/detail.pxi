@@ -94,7 +94,8 @@ cdef double pixels_a_unit(const double *m, double width, double height, const do
     return most / nearest * (1 + 1e-9)  # a billionth more for what float64 rounds here
 
 
-def pixels_per_unit(const double[:, ::1] matrix, size, const double[::1] window, const double[:, ::1] extents):
+def pixels_per_unit(const double[:, ::1] matrix, size: tuple[int, int], const double[::1] window,
+                    const double[:, ::1] extents) -> float | None:
     """Return how many pixels a point that shows moves at most where it moves by one unit, on surfaces of these extents (N, 10).
 
     None where nothing is known of that. `matrix`: clip from object; `window`: lower and upper x, and y, in normalised
@@ -104,8 +105,9 @@ def pixels_per_unit(const double[:, ::1] matrix, size, const double[::1] window,
     return None if isnan(found) else found
 
 
-def coarsest_levels(const double[:, :, ::1] matrices, size, const double[::1] window, const double[:, ::1] extents,
-                    const double[::1] bounds, double tolerance, int64_t[::1] levels, double[::1] scales):
+def coarsest_levels(const double[:, :, ::1] matrices, size: tuple[int, int], const double[::1] window,
+                    const double[:, ::1] extents, const double[::1] bounds, double tolerance, int64_t[::1] levels,
+                    double[::1] scales):
     """Write the last level that is sure to be within a tolerance, 0 for none but the first, under each matrix (N, 4, 4).
 
     `extents`, `bounds`: of the levels, the first that of the mesh itself; `scales`: pixels a unit for that level.

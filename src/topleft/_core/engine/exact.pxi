@@ -5,7 +5,7 @@ cdef class ExactPieces:
     """What clip planes leave of triangles whose vertices are not snapped."""
 
     cdef tl_exact_pieces pieces
-    cdef readonly object arrays
+    cdef readonly object arrays  #: tuple[Array, ...] | None
 
     def __init__(self, Source source, const double[:, ::1] points, const int32_t[:, ::1] triangles, Viewport viewport):
         cdef double[:, ::1] own_points, weights
@@ -26,10 +26,10 @@ cdef class ExactPieces:
                 K.clip_points(&source.source, &points[0, 0], &triangles[0, 0], triangles.shape[0], &viewport.view,
                               &self.pieces)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self.pieces.n_pieces
 
-    def join(self, points, triangles):
+    def join(self, points: F64, triangles: I32) -> tuple[F64, I32, I32]:
         """Return points, triangles and names of a mesh, its cut triangles collapsed to one point, and of the pieces."""
         n, is_cut = len(points), np.isnan(points[:, 0])[triangles].any(axis=1)
         own = [np.asarray(array) for array in self.arrays] if len(self) else [np.empty((0, 3)), *[None] * 4]
@@ -53,7 +53,8 @@ cdef class UnsnappedPoints:
     cdef int64_t n_vertices
     cdef object arrays
 
-    def __init__(self, points_given, const int32_t[:, ::1] triangles_given, ExactPieces pieces=None, double band=1.0):
+    def __init__(self, points_given: F64, const int32_t[:, ::1] triangles_given, ExactPieces pieces=None,
+                 double band=1.0):
         """`points_given`: (V, 2), (V, 3) or (V, PLACED); `band` less than 1 draws wrong pictures, to test bands."""
         cdef const double[:, ::1] points = points_given
         cdef const int32_t[:, ::1] triangles = triangles_given
@@ -72,7 +73,7 @@ cdef class UnsnappedPoints:
         self.points.band = band
 
     @property
-    def counts(self):
+    def counts(self) -> tuple[int, int, int, int, int, int]:
         """`tl_exact_counts` of all that has been drawn, in its order."""
         cdef tl_exact_counts *c = &self.counted
         return c.n_triangles, c.n_on_grid, c.n_asked, c.n_turns, c.n_expansions, c.n_integers

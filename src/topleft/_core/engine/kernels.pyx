@@ -1,6 +1,6 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 # cython: freethreading_compatible=True
-# cython: auto_pickle=False, emit_code_comments=False
+# cython: auto_pickle=False, emit_code_comments=False, annotation_typing=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
 from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
@@ -10,19 +10,7 @@ from libc.string cimport memcpy, memset
 
 import numpy as np
 
-include "contract.pxi"
-
-cdef extern from "dispatch.h" nogil:
-    enum:
-        TL_N_ISA
-    const char *tl_isa_name(int i_isa)
-    bint tl_isa_built(int i_isa)
-    bint tl_isa_available(int i_isa)
-    const char *tl_isa_flags(int i_isa)
-    const tl_kernels *tl_kernels_for(const char *name)
-    const tl_meshlet_kernels *tl_meshlets_beside(const tl_kernels *kernels)
-    const char *tl_compiler()
-    const char *tl_version()
+include "contract.pxi"  # what the headers of csrc declare: packaging/bindings.py makes it
 
 # The kernels in use. Scalar until `isa.py` has chosen: never NULL. What draws meshlets beside them may be NULL; to ask
 # the CPU again takes up to 0.1 ms on a virtual machine.
@@ -83,24 +71,24 @@ BLENDED_ROWS = TL_BLENDED_ROWS
 FEW_OF_BITS, FEW_STORED, FEW_LABELLED = <int>TL_FEW_OF_BITS, <int>TL_FEW_STORED, <int>TL_FEW_LABELLED
 MAX_LAYERS = TL_MAX_LAYERS
 LENS_RINGS = TL_LENS_RINGS
-SCALARS = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
+SCALARS: dict[np.dtype[Any], int] = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
 
 
 cdef inline const void *data(const uint8_t[::1] view) noexcept nogil:
     return &view[0] if view is not None and view.shape[0] > 0 else NULL
 
 
-def area_stride(int64_t width):
+def area_stride(int64_t width) -> int:
     """Return how many cells `SnappedMesh.draw_area` needs for a row of pixels."""
     return tl_area_stride(width)
 
 
-def blend_cells(int64_t width):
+def blend_cells(int64_t width) -> int:
     """Return how many cells `SnappedMesh.blend` needs for areas."""
     return tl_blend_cells(width)
 
 
-def as_bytes(array):
+def as_bytes(array: Array) -> U8:
     """Return the memory of a contiguous array as a flat uint8 view."""
     return array.reshape(-1).view(np.uint8)
 

@@ -6,7 +6,8 @@ cdef class LensTable:
 
     cdef tl_lens lens
 
-    def __init__(self, bint is_fisheye, k, p, s, tilt, px_from_plane, double tolerance_px):
+    def __init__(self, bint is_fisheye, k: Sequence[float], p: Sequence[float], s: Sequence[float], tilt: Sequence[float],
+                 px_from_plane: Sequence[Sequence[float]], double tolerance_px):
         """The terms: k (6,), p (2,), s (4,); `tilt`: cosine and sine of tau_x, then of tau_y; `px_from_plane` (2, 3)."""
         cdef int i
         memset(&self.lens, 0, sizeof(self.lens))
@@ -33,7 +34,7 @@ cdef class LensTable:
         for i in range(TL_LENS_RINGS):
             self.lens.allowed[i] = allowed[i]
 
-    def places(self, const double[:, ::1] points):
+    def places(self, const double[:, ::1] points) -> F64:
         """Return the places (N, 2) in the image plane at which points (N, 3) in eye space are seen."""
         cdef double[:, ::1] out = np.empty((points.shape[0], 2))
         if points.shape[0]:
@@ -51,7 +52,7 @@ cdef class LensTable:
                 K.bend_vertices(&lens, &source.source, &eye_from[0, 0], first, end, &bent[0, 0], &records[0, 0])
 
     def find_bent(self, const float[:, ::1] records, const int32_t[:, ::1] triangles, int64_t first, int64_t end,
-                  int32_t[::1] bent, int32_t[::1] outside):
+                  int32_t[::1] bent, int32_t[::1] outside) -> tuple[int, int]:
         """Write the triangles of [first, end) that may be bent, and those that cannot show; return how many."""
         cdef int64_t n_bent = 0, n_outside = 0
         if end > first:
@@ -61,7 +62,7 @@ cdef class LensTable:
         return n_bent, n_outside
 
     def count_parts(self, const double[:, ::1] points, const float[:, ::1] records, const int32_t[:, ::1] triangles,
-                    const int32_t[::1] ids, double near, int64_t most):
+                    const int32_t[::1] ids, double near, int64_t most) -> tuple[int, int]:
         """Return how many parts listed triangles have, up to `most` and a few, and how many points of their own."""
         cdef tl_bent_parts parts
         memset(&parts, 0, sizeof(parts))

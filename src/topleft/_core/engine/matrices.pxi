@@ -26,7 +26,7 @@ cdef void multiply(const double[:, :] left, const double[:, :] right, double[:, 
             out[i, j] = total
 
 
-def product(a, b):
+def product(a: ArrayLike, b: ArrayLike) -> F64:
     """Return the matrix product of float64 arrays (n, k) and (k, m); either may be a vector (k,)."""
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
     is_row, is_column = a.ndim == 1, b.ndim == 1
@@ -75,7 +75,7 @@ cdef int invert(double[8] *rows, Py_ssize_t n) except -1:
     return 0
 
 
-def inverse(a):
+def inverse(a: Array) -> F64:
     """Return the inverse of a float64 matrix (n, n), n at most 4; a LinAlgError if it is singular."""
     cdef const double[:, :] given = as_numbers(a, 2)
     cdef Py_ssize_t n = given.shape[0], i, j
@@ -103,7 +103,7 @@ cdef double determinant_of(const double[:, :] m) noexcept:
     )
 
 
-def determinant(a):
+def determinant(a: ArrayLike) -> float:
     """Return the determinant of a float64 matrix (3, 3)."""
     cdef const double[:, :] m = as_numbers(a, 2)
     if m.shape[0] != 3 or m.shape[1] != 3:
@@ -112,7 +112,8 @@ def determinant(a):
 
 
 @cython.cdivision(True)  # IEEE: no number where there is none
-def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width, double height):
+def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width,
+                double height) -> tuple[bool, F64, float]:
     """Return how a camera sees a space whose origin is at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
 
     `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale. The rows: eye,
@@ -169,7 +170,7 @@ def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const
     return has_perspective, result, unit
 
 
-def row_products(a, b):
+def row_products(a: ArrayLike, b: ArrayLike) -> F64:
     """Return the products (N,) of rows of float64 arrays (N, 3) with a row, or each with the same row of the other."""
     cdef const double[:, :] left = as_numbers(a, 2)
     cdef const double[:, :] right = np.broadcast_to(as_numbers(b, np.ndim(b)), np.shape(a))
@@ -184,7 +185,7 @@ def row_products(a, b):
     return result
 
 
-def length(vector):
+def length(vector: ArrayLike) -> float:
     """Return the root of the sum of the squares of a vector of float64."""
     cdef const double[:] given = as_numbers(vector, 1)
     cdef double total = 0.0
@@ -194,7 +195,7 @@ def length(vector):
     return sqrt(total)
 
 
-def cosine_and_sine(double degrees):
+def cosine_and_sine(double degrees) -> tuple[float, float]:
     """Return the cosine and the sine of an angle in degrees; of whole quarters 0, 1 and -1 as they are."""
     cdef double turns = fmod(degrees, 360.0)
     cdef int quarter = <int>rint(turns / 90.0)
@@ -224,7 +225,7 @@ def cosine_and_sine(double degrees):
     return cosine + 0.0, sine + 0.0  # no -0
 
 
-def log2(double a):
+def log2(double a) -> float:
     """Return the binary logarithm of a positive float64, within two of its last bits, or of those of 1."""
     cdef int exponent, k
     cdef double m = frexp(a, &exponent), total = 0.0, t
@@ -236,7 +237,7 @@ def log2(double a):
     return exponent + 2.8853900817779268 * t * total
 
 
-def cube_root(double a):
+def cube_root(double a) -> float:
     """Return the cube root of a finite float64, within two of its last bits."""
     cdef int exponent, thirds, k
     cdef double m = frexp(fabs(a), &exponent), root = 1.0
@@ -262,7 +263,7 @@ cdef double arc_tangent(double t) noexcept nogil:
     return 4.0 * t * total
 
 
-def arc_sine(double sine):
+def arc_sine(double sine) -> float:
     """Return the angle in degrees, -90 to 90, of a sine of -1 to 1, within four of its last bits."""
     cdef double half = arc_tangent(fabs(sine) / (1.0 + sqrt((1.0 - sine) * (1.0 + sine))))
     cdef double angle = min(90.0, 2.0 * half / RADIANS_A_DEGREE)
@@ -270,7 +271,7 @@ def arc_sine(double sine):
 
 
 @cython.cdivision(True)  # 0 over 0 is no number, and is not read
-def off_axis(points):
+def off_axis(points: ArrayLike) -> tuple[F64, F64]:
     """Return the distances (N,) of points (N, 3) from the z axis, and their angles from where it points, in radians."""
     cdef const double[:, :] given = as_numbers(points, 2)
     cdef Py_ssize_t i, n = given.shape[0]

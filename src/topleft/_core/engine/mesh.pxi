@@ -2,7 +2,8 @@
 # What reads triangles returns -1, or a row with an index outside the vertices.
 
 
-def vertex_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] out):
+def vertex_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end,
+                   double[:, ::1] out) -> int:
     """Write the unit normals of vertices [first, end), the faces weighted by the angle."""
     cdef int64_t bad = -1
     cdef const int32_t *corners = &triangles[0, 0] if triangles.shape[0] else NULL
@@ -12,7 +13,8 @@ def vertex_normals(Source source, const int32_t[:, ::1] triangles, int64_t first
     return bad
 
 
-def face_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] out, float[:, ::1] rows):
+def face_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] out or None,
+                 float[:, ::1] rows or None) -> int:
     """Write the unit normals of triangles [first, end), float64 or rows of four float32; the other is None."""
     cdef int64_t bad = -1
     cdef double *wide = &out[0, 0] if out is not None and out.shape[0] else NULL
@@ -24,7 +26,7 @@ def face_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, 
 
 
 def find_turned(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, const float[:, ::1] normals,
-                const int32_t[:, ::1] row_of_corner, uint8_t[::1] is_turned):
+                const int32_t[:, ::1] row_of_corner, uint8_t[::1] is_turned) -> int:
     """Write 1 for the triangles of [first, end) whose corners have normals that point to the other side, else 0."""
     cdef int64_t bad = -1
     if end > first:
@@ -36,7 +38,7 @@ def find_turned(Source source, const int32_t[:, ::1] triangles, int64_t first, i
 
 
 def face_angles(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] normals,
-                double[:, ::1] angles):
+                double[:, ::1] angles) -> int:
     """Write the unit normals and the angles of triangles [first, end)."""
     cdef int64_t bad = -1
     if end > first:
@@ -75,7 +77,7 @@ cdef class Fans:
 
     def sum_creases(self, int64_t first, int64_t end, const int32_t[::1] starts, const int32_t[:, ::1] groups,
                     const int32_t[:, ::1] own_triangles, int64_t first_row, double[:, ::1] of_vertices,
-                    double[:, ::1] of_groups, int32_t[:, ::1] row_of_corner):
+                    double[:, ::1] of_groups, int32_t[:, ::1] row_of_corner or None):
         """Write the normals of vertices [first, end) and of their groups, and the rows of their corners unless that is None."""
         cdef tl_creases c
         c.starts, c.groups, c.own_triangles = &starts[0], &groups[0, 0], &own_triangles[0, 0]
@@ -87,7 +89,7 @@ cdef class Fans:
                 K.sum_creases(&self.fans, &c, first, end)
 
 
-def box_of_faces(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[::1] box):
+def box_of_faces(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[::1] box) -> int:
     """Write low and high of the corners of triangles [first, end), at least one."""
     cdef int64_t bad
     with nogil:
@@ -95,7 +97,8 @@ def box_of_faces(Source source, const int32_t[:, ::1] triangles, int64_t first, 
     return bad
 
 
-def unit_vectors(Source vectors, const double[:, ::1] turn, int64_t first, int64_t end, double[:, ::1] out, float[:, ::1] rows):
+def unit_vectors(Source vectors, const double[:, ::1] turn or None, int64_t first, int64_t end,
+                 double[:, ::1] out or None, float[:, ::1] rows or None):
     """Write vectors [first, end) as unit ones, by a matrix (3, 3) from the right or None; out as for `face_normals`."""
     cdef const double *matrix = &turn[0, 0] if turn is not None else NULL
     cdef double *wide = &out[0, 0] if out is not None and out.shape[0] else NULL
@@ -119,7 +122,8 @@ def color_rows(const uint8_t[:, ::1] colors, int64_t first, int64_t end, float[:
             K.color_rows(&colors[0, 0], colors.shape[1], first, end, &rows[0, 0])
 
 
-def group_rows(const uint32_t[:, ::1] rows, int table_bits, int32_t[::1] table, int32_t[::1] first, int32_t[::1] group):
+def group_rows(const uint32_t[:, ::1] rows, int table_bits, int32_t[::1] table, int32_t[::1] first,
+               int32_t[::1] group) -> int:
     """Write the first row of each group of equal rows, and the group of each row, of at least one; return how many groups
     there are, or -1 if many hashes meet. `table`: 2**table_bits numbers of -1, more than there are rows.
     """
@@ -158,7 +162,7 @@ cdef class Tree:
             K.build_tree(&self.tree)
 
     def find_nearest(self, const double[:, ::1] points, int64_t first, int64_t end, int32_t[::1] triangle,
-                     double[:, ::1] at=None):
+                     double[:, ::1] at=None) -> float:
         """Write the nearest triangle of points [first, end), and where on it; return the largest distance."""
         cdef double *out = &at[0, 0] if at is not None and at.shape[0] > 0 else NULL
         cdef double largest = 0.0
@@ -168,7 +172,7 @@ cdef class Tree:
         return largest
 
     def find_reach(self, const double[:, ::1] points, const int32_t[:, ::1] triangles,
-                   int64_t first, int64_t end, double known, double share, double least):
+                   int64_t first, int64_t end, double known, double share, double least) -> tuple[float, float, int]:
         """Return how far triangles [first, end) are at least and at most, and the most pieces that one was cut into."""
         cdef tl_reach reach
         reach.known, reach.bound, reach.n_pieces = known, 0.0, 0

@@ -10,18 +10,19 @@ SEEN_BYTES = sizeof(tl_seen_meshlet)
 MAX_DRAWN_PX = TL_MAX_DRAWN_PX
 
 
-def has_meshlets():
+def has_meshlets() -> bool:
     """Tell whether there is code for meshlets beside the kernels in use, and a CPU for it."""
     return BESIDE != NULL
 
 
-def most_meshlets(int64_t n_triangles):
+def most_meshlets(int64_t n_triangles) -> int:
     """Return how many meshlets a part of a mesh is grown into at most."""
     return tl_most_meshlets(n_triangles)
 
 
 def grow_meshlets(Source source, const int32_t[:, ::1] triangles, const int32_t[::1] order, int64_t first, int64_t end,
-                  int32_t[::1] numbers, uint8_t[::1] room, uint8_t[::1] meshlets, float[:, ::1] records, uint8_t[::1] n_triangles):
+                  int32_t[::1] numbers, uint8_t[::1] room, uint8_t[::1] meshlets, float[:, ::1] records,
+                  uint8_t[::1] n_triangles) -> int:
     """Grow triangles order[first] to order[end - 1] into meshlets, with a record of bounds each; returns how many.
 
     `numbers`: -1 for each vertex; `room`: GROW_ROOM bytes. The rest has room for `most_meshlets`.
@@ -42,7 +43,8 @@ cdef class Grown:
     cdef tl_meshlets mesh
     cdef object arrays
 
-    def __init__(self, const uint8_t[::1] meshlets, const float[:, ::1] bounds, const uint8_t[::1] n_triangles, largest):
+    def __init__(self, const uint8_t[::1] meshlets, const float[:, ::1] bounds, const uint8_t[::1] n_triangles,
+                 largest: Sequence[float]):
         """`bounds` (MESHLET_BOUNDS, N + MESHLET_TAIL); `largest`: the absolute coordinate of each axis."""
         cdef int k
         self.arrays = meshlets, bounds, n_triangles
@@ -52,7 +54,7 @@ cdef class Grown:
         for k in range(3):
             self.mesh.largest[k] = largest[k]
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self.mesh.n_meshlets
 
 
@@ -69,7 +71,7 @@ cdef class MeshletPass:
         """`mesh`: how it is seen, and what triangle 0 is called; its own triangles are not read. `source`: the matrix."""
         self.meshlets, self.mesh, self.source, self.seen, self.target = meshlets, mesh, source, seen, target
 
-    def find(self, int64_t first, int64_t end, int32_t[::1] found, int32_t[::1] odd):
+    def find(self, int64_t first, int64_t end, int32_t[::1] found, int32_t[::1] odd) -> tuple[int, int]:
         """List those of meshlets [first, end) that the picture may show, and in `odd` those that need care.
 
         `found` has room for SEEN_BYTES of each, `odd` for a number. Returns how many there are of the first, and of the second.
@@ -84,7 +86,7 @@ cdef class MeshletPass:
                 n = kernels.list(&drawn, first, end, <tl_seen_meshlet *>&found[0], &odd[0], &n_odd)
         return n, n_odd
 
-    def split_rows(self, const int32_t[::1] found, int64_t n, int n_parts):
+    def split_rows(self, const int32_t[::1] found, int64_t n, int n_parts) -> list[int]:
         """Return the rows at which to cut the picture into parts that show about as many meshlets each."""
         cdef const tl_seen_meshlet *list = <const tl_seen_meshlet *>&found[0]
         cdef int64_t n_of[256]
@@ -104,8 +106,8 @@ cdef class MeshletPass:
             rows.append(min(max(int((cell + share) * height / 256), rows[len(rows) - 1] + 1), height - n_parts + i))
         return [*rows, height]
 
-    def draw(self, const int32_t[::1] found, int64_t n, const int32_t[::1] odd, int64_t n_odd, int64_t first_row, int64_t end_row,
-             bint is_first, int32_t[::1] room, int32_t[::1] others):
+    def draw(self, const int32_t[::1] found, int64_t n, const int32_t[::1] odd, int64_t n_odd, int64_t first_row,
+             int64_t end_row, bint is_first, int32_t[::1] room, int32_t[::1] others) -> int:
         """Draw rows [first_row, end_row) of what is listed, cleared before if `is_first`. `room`: as long as `found`.
 
         `others`, a number for each triangle, gets those that a clip plane may cut, or that 64 bits cannot hold; returns how

@@ -66,7 +66,7 @@ cdef class Stop:
         """Say it."""
         say(&self.is_set)
 
-    def run(self, work):
+    def run(self, work: Callable[[], object]):
         """Call `work` in a thread that hears the word; what is given up raises KeyboardInterrupt."""
         cdef tl_thread_pause *own = own_pause()
         cdef const int32_t *before = own.stop
@@ -77,7 +77,7 @@ cdef class Stop:
             own.stop = before
 
 
-def hear_signals_in(unsigned long thread, threads) -> None:
+def hear_signals_in(unsigned long thread, threads: object) -> None:
     """Name the main thread, and where each has `kept` its scratch, which a signal handler that draws must not touch."""
     global main_thread, scratch
     main_thread, scratch = thread, threads

@@ -7,7 +7,7 @@ cdef class Transfer:
     cdef tl_transfer transfer
     cdef object arrays
 
-    def __init__(self, tables, int n_channels, bint is_straight):
+    def __init__(self, tables: tuple[I32, U8] | None, int n_channels, bint is_straight):
         cdef const int32_t[::1] decode
         cdef const uint8_t[::1] encode
         self.transfer.n_channels, self.transfer.is_straight = n_channels, is_straight
@@ -24,7 +24,7 @@ cdef class Palette:
     cdef bint is_u8
     cdef Transfer transfer
 
-    def __init__(self, colors, Transfer transfer):
+    def __init__(self, colors: Array, Transfer transfer or None):
         self.n_channels, self.is_u8, self.transfer = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8, transfer
         if self.is_u8:  # four bytes a colour, aligned
             wide = np.zeros(max(1, len(colors)), np.int32)
@@ -38,7 +38,7 @@ cdef class Palette:
         K.mean_flat(labels, sample_bits, stride, n, data(self.colors), self.n_channels, self.is_u8, own,
                     &pixels[first * self.n_channels * (1 if self.is_u8 else 4)])
 
-    def mean_flat(self, const int32_t[:, :, ::1] labels, pixels, int64_t first_row, int64_t n_rows):
+    def mean_flat(self, const int32_t[:, :, ::1] labels, pixels: Array, int64_t first_row, int64_t n_rows):
         """Write the mean colour of the triangles that the samples see over rows of pixels; labels (S, H, W)."""
         cdef uint8_t[::1] flat = as_bytes(pixels)
         cdef int64_t width = labels.shape[2]
@@ -48,7 +48,8 @@ cdef class Palette:
                 self.mean(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, &flat[0], first_row * width)
 
 
-def fill_bands(meshes, int32_t[:, ::1] labels, uint64_t[::1] covered, Palette palette, pixels, ground, Bins bins, int64_t first_band, int64_t end_band):
+def fill_bands(meshes: Sequence[SnappedMesh], int32_t[:, ::1] labels, uint64_t[::1] covered, Palette palette,
+               pixels: Array, ground: Array | None, Bins bins, int64_t first_band, int64_t end_band):
     """Write the mean colours of samples over bands of (H, W[, C]) pixels: `meshes` is the mesh as each of them sees it.
 
     `labels`: memory for those of a band, (S, rows * W); `covered`: a bit for each pixel of it. `ground`: a row (W[, C]) that all
@@ -87,7 +88,8 @@ def fill_bands(meshes, int32_t[:, ::1] labels, uint64_t[::1] covered, Palette pa
     raise_if_given_up()
 
 
-def find_instances(const int32_t[:, ::1] ids, const int64_t[::1] first_ids, int32_t[:, ::1] out, int32_t[:, ::1] boxes):
+def find_instances(const int32_t[:, ::1] ids, const int64_t[::1] first_ids, int32_t[:, ::1] out,
+                   int32_t[:, ::1] boxes or None):
     """Write which instance each id belongs to, and widen the boxes (N, 4) of those that show, unless these are None.
 
     `first_ids`: (N + 1,), where the ids of each instance begin, and the last of all end.
@@ -99,7 +101,8 @@ def find_instances(const int32_t[:, ::1] ids, const int64_t[::1] first_ids, int3
                              &boxes[0, 0] if boxes is not None and n else NULL)
 
 
-def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
+def mean_colors(painted: Array, pixels: Array, int64_t first_row, int64_t n_rows, int n_channels,
+                Transfer transfer or None):
     """Write the mean of planes of colours (S, H, W[, C]) over rows of pixels."""
     cdef const uint8_t[::1] planes = as_bytes(painted)
     cdef uint8_t[::1] flat = as_bytes(pixels)
@@ -113,8 +116,9 @@ def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channe
             K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, own, &flat[first])
 
 
-def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
-              int n_channels, const float[::1] background, uint8_t[::1] pixels):
+def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_row, int64_t n_rows,
+              const uint8_t[::1] colors, bint is_flat, bint is_u8, int n_channels, const float[::1] background or None,
+              uint8_t[::1] pixels):
     """Write what is seen through layers, planes (K, H, W), in rows [first_row, first_row + n_rows) of a picture.
 
     `colors`: of the triangles, or of the layers of these rows, (K, n_rows, W, n_channels) float32. `background` may be None.
@@ -132,8 +136,9 @@ def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_r
         K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
 
 
-def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32_t[::1] slot, const double[:, :, ::1] steps,
-                const int32_t[:, ::1] rows, const float[:, ::1] values, float[:, :, ::1] out):
+def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32_t[::1] slot,
+                const double[:, :, ::1] steps, const int32_t[:, ::1] rows, const float[:, ::1] values,
+                float[:, :, ::1] out):
     """Write what values change by along x and y at pixels (N,), (N, K, 2).
 
     `slot`: of each triangle its place among those that show, whose corners have `steps` (M, 3, 3) and `rows` (M, 3).
@@ -151,8 +156,9 @@ def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32
         K.fill_slopes(&sloped, &ids[0], &weights[0, 0], n, &out[0, 0, 0])
 
 
-def fill_texels(const float[:, ::1] texels, const int64_t[:, ::1] rows, tuple codes, const int32_t[::1] ids, const float[:, ::1] uv,
-            slopes, float background, float[:, ::1] out):
+def fill_texels(const float[:, ::1] texels, const int64_t[:, ::1] rows, codes: tuple[int, int, int],
+                const int32_t[::1] ids, const float[:, ::1] uv, slopes: F32 | None, float background,
+                float[:, ::1] out):
     """Write the values (N, C) of texels (., C) and their halvings, `rows` of (offset, width, height), at pixels (N,).
 
     `codes`: of the filter and of both wraps, as in ``csrc/shading.h``; `slopes` (N, 2, 2), or None without halvings.
@@ -185,7 +191,8 @@ cdef class PixelPoints:
     cdef tl_points points
     cdef object array
 
-    def __init__(self, positions, int kind, const double[:, ::1] rows, half_size, double background, bint is_f64_out):
+    def __init__(self, positions: Array, int kind, const double[:, ::1] rows, half_size: tuple[float, float],
+                 double background, bint is_f64_out):
         """`positions`: (V, 3) float32 or float64; `rows`: (N, 4); `half_size`: half of width and height of the whole picture."""
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef int i, k
@@ -198,7 +205,7 @@ cdef class PixelPoints:
             for k in range(4):
                 self.points.rows[i][k] = rows[i, k]
 
-    def fill(self, SnappedMesh mesh, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows):
+    def fill(self, SnappedMesh mesh, const int32_t[:, ::1] ids, out: Array, int64_t first_row, int64_t n_rows):
         """Write rows of what is told of the pixels of a visibility buffer, (H, W) or (H, W, C)."""
         cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
         cdef uint8_t[::1] flat
@@ -232,7 +239,8 @@ cdef class Valued:
         with nogil:
             K.list_planes(&self.mesh, first, end)
 
-    def fill_planes(self, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows, int64_t x_px, int64_t y_px):
+    def fill_planes(self, const int32_t[:, ::1] ids, out: Array, int64_t first_row, int64_t n_rows, int64_t x_px,
+                    int64_t y_px):
         """Write the values of the pixels in the rows [first_row, first_row + n_rows) of a float32 or float64 array.
 
         Pixel (0, 0) of the array is (x_px, y_px) of the whole picture.
@@ -249,7 +257,8 @@ cdef class Valued:
             K.fill_planes(&self.mesh, &window, &ids[first_row, 0], is_f32, &flat[first_row * width * (4 if is_f32 else 8)])
 
 
-def list_edges(SnappedMesh mesh, int64_t[::1] starts, int32_t[::1] last_low, int32_t[::1] highs, uint64_t[::1] edges):
+def list_edges(SnappedMesh mesh, int64_t[::1] starts, int32_t[::1] last_low, int32_t[::1] highs,
+               uint64_t[::1] edges) -> int:
     """Write the edges of the triangles that are not culled; returns how many, -1 when an index is outside the vertices.
 
     `edges` has room for three a triangle; the others are scratch, as in `tl_edge_scratch`.
@@ -263,8 +272,8 @@ def list_edges(SnappedMesh mesh, int64_t[::1] starts, int32_t[::1] last_low, int
     return n if bad_row < 0 else -1
 
 
-def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels, const float[:, ::1] depth, double depth_bias,
-               bint is_farthest, bint is_smooth, int64_t width, int64_t first_row, int64_t n_rows):
+def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels, const float[:, ::1] depth or None,
+               double depth_bias, bint is_farthest, bint is_smooth, int64_t width, int64_t first_row, int64_t n_rows):
     """Clear the rows [first_row, first_row + n_rows) of a buffer that is `width` pixels wide and draw lines into them."""
     cdef tl_edges lines
     cdef tl_line_target target
@@ -282,8 +291,9 @@ def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels,
     raise_if_given_up()
 
 
-def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] sizes_fx, bint is_disc, int32_t x_fx, int32_t y_fx,
-               Target target, origin, int subpixel_bits, int64_t first_row, int64_t n_rows):
+def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] sizes_fx or None, bint is_disc,
+               int32_t x_fx, int32_t y_fx, Target target, origin: tuple[int, int], int subpixel_bits, int64_t first_row,
+               int64_t n_rows):
     """Clear rows of ids and depth and draw snapped points there, as the sample (x_fx, y_fx) off the centre sees them.
 
     `sizes_fx`: a size each, or None: all have `size_fx`. Column 0 and row 0 of the target are the pixel `origin`.

@@ -8,13 +8,13 @@ CELL_ROWS = TL_CELL_ROWS
 LEAST_SHARE_CELLS = TL_LEAST_SHARE_CELLS
 
 
-def polygon_stride(int64_t width):
+def polygon_stride(int64_t width) -> int:
     """Return how many bits or cells a row of a mask or of labels needs."""
     return tl_polygon_stride(width)
 
 
 def snap_points(Source source, int64_t first, int64_t end, int bits, int grid_bits, int64_t x_px, int64_t y_px,
-                int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx):
+                int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx or None) -> tuple[int, int]:
     """Snap points [first, end) to columns of coordinates from the corner; returns the numbers of bad and wide points."""
     cdef int64_t[2] corner
     cdef tl_vertex_counts counts
@@ -50,7 +50,7 @@ cdef class SnappedPolygons:
     cdef object arrays
     cdef readonly int64_t n_polygons, n_rings, width, height
 
-    def __init__(self, int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx, const int64_t[::1] rings,
+    def __init__(self, int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx or None, const int64_t[::1] rings,
                  const int64_t[::1] polygons, int64_t width, int64_t height, int bits, bint is_nonzero):
         self.n_polygons, self.n_rings = polygons.shape[0] - 1, rings.shape[0] - 1
         self.width, self.height = width, height
@@ -66,7 +66,7 @@ cdef class SnappedPolygons:
         return <tl_polygon_box *>&self.boxes[0, 0]
 
     @property
-    def boxes_px(self):
+    def boxes_px(self) -> I32:
         """The pixels that each polygon reaches into: left, top, right, bottom (P, 4), cut off at the window."""
         return np.asarray(self.boxes)[: self.n_polygons]
 
@@ -76,7 +76,7 @@ cdef class SnappedPolygons:
         set.pause = pause_of_thread()
         return set
 
-    def bound(self, int64_t first, int64_t end):
+    def bound(self, int64_t first, int64_t end) -> int:
         """Find the boxes of polygons [first, end); returns the largest number of edges of one."""
         cdef tl_polygon_box *boxes = self.box()
         cdef int64_t most
@@ -89,7 +89,7 @@ cdef class SnappedPolygons:
         self.weights, self.is_simple = np.zeros(self.n_rings + 1, np.int8), np.zeros(self.n_polygons + 1, np.uint8)
         self.set.weights, self.set.is_simple = &self.weights[0], &self.is_simple[0]
 
-    def certify_words(self):
+    def certify_words(self) -> int:
         """Return how many int64 of room `certify` needs."""
         cdef int64_t most = 1, i, first, end
         for i in range(self.n_polygons):
@@ -97,7 +97,7 @@ cdef class SnappedPolygons:
             most = max(most, tl_certify_words(self.set.rings[end] - self.set.rings[first], end - first))
         return most
 
-    def certify(self, int64_t first, int64_t end, int64_t[::1] room):
+    def certify(self, int64_t first, int64_t end, int64_t[::1] room or None):
         """Find out of polygons [first, end) whether their rings meet; without `room` they are trusted not to."""
         cdef tl_polygons set = self.asking()
         cdef int64_t *words = &room[0] if room is not None else NULL
@@ -108,11 +108,11 @@ cdef class SnappedPolygons:
                 K.certify_polygons(&set, first, end, &self.weights[0], &self.is_simple[0], words)
         raise_if_given_up()
 
-    def which_are_simple(self):
+    def which_are_simple(self) -> NDArray[np.bool_]:
         """Return of which polygons the rings do not meet, (P,) bool."""
         return np.asarray(self.is_simple)[: self.n_polygons].view(np.bool_)
 
-    def weights_of_rings(self):
+    def weights_of_rings(self) -> I8:
         """Return what the signed area of each ring counts, (R,) int8; it means something where rings do not meet."""
         return np.asarray(self.weights)[: self.n_rings]
 
@@ -120,7 +120,7 @@ cdef class SnappedPolygons:
         """Sample pixels at so many sub-pixels from their centre from now on."""
         self.set.sample_x_fx, self.set.sample_y_fx = sample_x_fx, sample_y_fx
 
-    def sort(self, int64_t band_rows, int64_t n_bands, int64_t[::1] starts, int32_t[::1] listed):
+    def sort(self, int64_t band_rows, int64_t n_bands, int64_t[::1] starts, int32_t[::1] listed or None):
         """List the polygons of each band; a first call without `listed` finds their number, starts[n_bands + 1]."""
         cdef tl_polygon_box *boxes = self.box()
         cdef int32_t *to = &listed[0] if listed is not None else NULL
@@ -143,9 +143,10 @@ cdef class SnappedPolygons:
                            &bits[0], &out[0, 0])
         raise_if_given_up()
 
-    def label(self, uint8_t[::1] pixels, int n_bytes, const int32_t[::1] values, int32_t background, int test,
-              bint waits, int64_t band_rows, const int64_t[::1] starts, const int32_t[::1] listed, int64_t first_band,
-              int64_t end_band, int32_t[::1] cells, uint8_t[::1] scratch, PieceScratch pieces):
+    def label(self, uint8_t[::1] pixels, int n_bytes, const int32_t[::1] values or None, int32_t background, int test,
+              bint waits, int64_t band_rows, const int64_t[::1] starts or None, const int32_t[::1] listed or None,
+              int64_t first_band, int64_t end_band, int32_t[::1] cells, uint8_t[::1] scratch,
+              PieceScratch pieces or None):
         """Paint bands of rows: the background, then their polygons; without `listed` all of them."""
         cdef tl_polygons set = self.asking()
         cdef tl_label_job job
@@ -164,9 +165,9 @@ cdef class SnappedPolygons:
                 K.label_polygons(&set, &job)
         raise_if_given_up()
 
-    def add_shares(self, float[::1] pixels, const float[:, ::1] colors, int64_t band_rows, const int64_t[::1] starts,
-                   const int32_t[::1] listed, int64_t first_band, int64_t end_band, int32_t[::1] cells,
-                   PieceScratch pieces, bint is_alone):
+    def add_shares(self, float[::1] pixels, const float[:, ::1] colors or None, int64_t band_rows,
+                   const int64_t[::1] starts, const int32_t[::1] listed, int64_t first_band, int64_t end_band,
+                   int32_t[::1] cells, PieceScratch pieces or None, bint is_alone):
         """Add the shares of polygons to bands of rows, to at most 1; with colours (P, C) mix these in by them.
 
         `is_alone`: the only polygon is drawn over what there is.
@@ -189,8 +190,8 @@ cdef class SnappedPolygons:
                 K.share_polygons(&set, &job)
         raise_if_given_up()
 
-    def list_shares(self, int64_t first, int64_t end, int64_t[::1] starts, indices, float[::1] areas,
-                    int32_t[::1] cells, PieceScratch pieces):
+    def list_shares(self, int64_t first, int64_t end, int64_t[::1] starts, indices: Array, float[::1] areas,
+                    int32_t[::1] cells, PieceScratch pieces or None) -> int:
         """Append the shares of polygons [first, end) to a table that holds starts[first] entries.
 
         Returns how many are finished; `areas` has 16 numbers more than it has room for.

@@ -7,8 +7,9 @@ cdef class Mipmap:
     cdef tl_texture texture
     cdef object texels
 
-    def __init__(self, const uint16_t[:, ::1] texels, const int32_t[:, ::1] levels, int filter_code, int wrap_u, int wrap_v,
-                 int uv_set=0, transform=None, tangent=(1, 0), float hand=1):
+    def __init__(self, const uint16_t[:, ::1] texels, const int32_t[:, ::1] levels, int filter_code, int wrap_u,
+                 int wrap_v, int uv_set=0, transform: Sequence[Sequence[float]] | None = None,
+                 tangent: Sequence[float] = (1, 0), float hand=1):
         cdef int k
         self.texels = texels
         self.texture.texels = &texels[0, 0]
@@ -30,7 +31,8 @@ cdef class Surroundings:
     cdef tl_surroundings surroundings
     cdef object texels
 
-    def __init__(self, const float[:, ::1] texels, const int32_t[:, ::1] levels, sky, ground, float diffuse, from_shading):
+    def __init__(self, const float[:, ::1] texels or None, const int32_t[:, ::1] levels or None, sky: Sequence[float],
+                 ground: Sequence[float], float diffuse, from_shading: Sequence[Sequence[float]]):
         cdef tl_surroundings *e = &self.surroundings
         cdef int k
         self.texels = texels
@@ -63,10 +65,11 @@ cdef class ShadingTable:
     cdef uint8_t[::1] materials
     cdef uint8_t[::1] lights
 
-    def __init__(self, const float[:, ::1] normals, bint finds_inverse_w, const int32_t[:, ::1] normal_of_corner,
-                 const float[:, ::1] corner_normals, const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
-                 const float[:, ::1] uv, const float[:, ::1] uv1, const float[:, ::1] colors, bint has_alpha, float front_side,
-                 const int32_t[::1] material_of, const float[::1] decode):
+    def __init__(self, const float[:, ::1] normals, bint finds_inverse_w,
+                 const int32_t[:, ::1] normal_of_corner or None, const float[:, ::1] corner_normals or None,
+                 const float[:, ::1] face_normals or None, positions: Array, const uint8_t[::1] is_turned or None,
+                 const float[:, ::1] uv or None, const float[:, ::1] uv1 or None, const float[:, ::1] colors or None,
+                 bint has_alpha, float front_side, const int32_t[::1] material_of or None, const float[::1] decode):
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef tl_shading *s = &self.shading
         self.arrays = (normals, normal_of_corner, corner_normals, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
@@ -86,7 +89,7 @@ cdef class ShadingTable:
         s.n_materials = s.n_lights = 0
         s.matcap = NULL
 
-    def set_materials(self, materials):
+    def set_materials(self, materials: Sequence[tuple[Any, ...]]):
         """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None, None or what makes
         it full: (is_metallic, metallic, roughness, occlusion, normal_scale, emission, four textures or None))."""
         cdef tl_material *m
@@ -108,7 +111,7 @@ cdef class ShadingTable:
                 m[k].normal_map, m[k].emission_map = texture_of(full[8]), texture_of(full[9])
         self.shading.materials, self.shading.n_materials = m, len(materials)
 
-    def set_lights(self, lights, ambient):
+    def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]):
         """Take rows (kind, at, color, falloff)."""
         cdef tl_light *light
         cdef int k
@@ -130,7 +133,9 @@ cdef class ShadingTable:
         """Have the opacity of the surface in the picture's alpha; the materials are full."""
         self.shading.wants_opacity = True
 
-    def set_view(self, int show, Mipmap matcap, eye_from, bint has_perspective, eye, ray, background, background_bytes):
+    def set_view(self, int show, Mipmap matcap or None, eye_from: Sequence[Sequence[float]], bint has_perspective,
+                 eye: Sequence[float], ray: Sequence[Sequence[float]], background: Sequence[float],
+                 background_bytes: Sequence[int]):
         """Take what the picture tells, where it is seen from, and what is behind it."""
         cdef tl_shading *s = &self.shading
         cdef int k
@@ -147,7 +152,7 @@ cdef class ShadingTable:
             s.background_bytes[k] = background_bytes[k]
         self.set_fog((0, 0, 0), 0, 0, 0, 0)
 
-    def set_fog(self, color, float near, float scale, float distance_start, float distance_scale):
+    def set_fog(self, color: Sequence[float], float near, float scale, float distance_start, float distance_scale):
         """Take the depth cue."""
         cdef tl_shading *s = &self.shading
         copy_floats(s.fog_color, color, 3)
@@ -177,8 +182,8 @@ def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out)
             i = end + 1
 
 
-def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,
-          int64_t first_row, int64_t n_rows):
+def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, const float[:, ::1] depth,
+          uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
     """Write rows of the picture (H, W, 4) of a visibility buffer."""
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     if n_rows and ids.shape[1]:
@@ -191,7 +196,8 @@ def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, con
 
 
 def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
-                  const float[:, :, ::1] depth, Split split, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
+                  const float[:, :, ::1] depth, Split split or None, uint8_t[:, :, ::1] pixels, int64_t first_row,
+                  int64_t n_rows):
     """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
 
     `ids` and `depth`: (S, H, W), or with `split` (1, H, W), what the first sample sees.
@@ -209,8 +215,8 @@ def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] 
         raise_if_given_up()
 
 
-def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
-                  int64_t n_rows):
+def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, float[:, :, ::1] out,
+                  int64_t first_row, int64_t n_rows):
     """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     if n_rows and ids.shape[1]:
@@ -219,8 +225,8 @@ def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] 
         raise_if_given_up()
 
 
-def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
-            float[:, ::1] depth, int64_t first_row, int64_t n_rows):
+def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles,
+            int32_t[:, ::1] ids, float[:, ::1] depth, int64_t first_row, int64_t n_rows):
     """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     cdef tl_target target
@@ -238,8 +244,8 @@ def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, c
     raise_if_given_up()
 
 
-def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
-                 bint is_peeled, int64_t first_row, int64_t n_rows):
+def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids,
+                 float[:, :, ::1] depth, bint is_peeled, int64_t first_row, int64_t n_rows):
     """Draw triangles, but for what their materials cut out, over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
     cdef int64_t height = ids.shape[1], width = ids.shape[2]
     cdef tl_window window = mesh.window(first_row, n_rows, width)

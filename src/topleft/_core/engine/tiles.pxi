@@ -1,8 +1,8 @@
 # Windows of huge rasters: which triangles each of them needs; visibility buffers put together. Included by kernels.pyx.
 
 
-def list_spans(tuple tiling, const double[:, :, ::1] corners_px,
-               int64_t first_triangle, int32_t[:, ::1] boxes, int64_t[::1] starts, int32_t[:, ::1] spans):
+def list_spans(tiling: tuple[int, int, int, int, int], const double[:, :, ::1] corners_px, int64_t first_triangle,
+               int32_t[:, ::1] boxes, int64_t[::1] starts, int32_t[:, ::1] spans or None) -> int:
     """Count the spans of each row of windows into starts[row + 1], or write them where spans is not None.
 
     `boxes`, (N, 4): what the first call leaves for the second.
@@ -28,7 +28,7 @@ def list_spans(tuple tiling, const double[:, :, ::1] corners_px,
 SHORT_SPAN = TL_SHORT_SPAN
 
 
-def sort_spans(const int32_t[:, ::1] spans, int64_t[::1] starts, int32_t[::1] out):
+def sort_spans(const int32_t[:, ::1] spans, int64_t[::1] starts, int32_t[::1] out or None) -> int:
     """Count the triangles of the windows of a row into starts[column + 1], or write them, of spans that are short.
 
     Returns how many spans are longer than `SHORT_SPAN` windows.
@@ -58,7 +58,7 @@ cdef class StridedMesh:
     cdef Py_buffer points, triangles
     cdef int64_t n_triangles
 
-    def __cinit__(self, points, triangles):
+    def __cinit__(self, points: Array, triangles: Array):
         """`points`: (V, C), `triangles`: (T, 3) int32 or int64; the numbers of a row lie side by side."""
         PyObject_GetBuffer(points, &self.points, PyBUF_STRIDED_RO)
         PyObject_GetBuffer(triangles, &self.triangles, PyBUF_STRIDED_RO)
@@ -72,7 +72,7 @@ cdef class StridedMesh:
         PyBuffer_Release(&self.points)
         PyBuffer_Release(&self.triangles)
 
-    def take(self, const int32_t[::1] which, int64_t first, uint8_t[::1] out):
+    def take(self, const int32_t[::1] which or None, int64_t first, uint8_t[::1] out) -> int:
         """Copy the corners of some triangles, or of those from `first` on; `out` says how many.
 
         Returns the first that names a vertex that does not exist, or -1.

@@ -27,10 +27,9 @@ cdef class SnappedMesh:
     cdef readonly UnsnappedPoints exact  # vertices that are not snapped; None: they are
     cdef const uint8_t[::1] is_used  # the blocks of vertices that have been snapped; None: all
 
-    def __init__(
-        self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, how, Viewport viewport, const uint8_t[::1] is_used=None, UnsnappedPoints exact=None,
-    ):
+    def __init__(self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide or None,
+                 const int32_t[:, ::1] triangles, Pieces pieces or None, how: tuple[int, int, int, int, int, int],
+                 Viewport viewport or None, const uint8_t[::1] is_used=None, UnsnappedPoints exact=None):
         """`how`: that of a view, see `topleft._core.raster.view.How`; with `exact` there are no records."""
         cdef int test
         self.viewport, self.is_used, self.exact = viewport, is_used, exact
@@ -54,19 +53,19 @@ cdef class SnappedMesh:
         raise TypeError("what has been drawn refers to memory of this process and is not pickled or copied deeply: take "
                         "its arrays, such as .triangle and .depth")
 
-    def seen_from(self, int32_t x_fx, int32_t y_fx):
+    def seen_from(self, int32_t x_fx, int32_t y_fx) -> SnappedMesh:
         """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
         cdef SnappedMesh seen = self.copy()
         seen.snapped.mesh.sample_x_fx, seen.snapped.mesh.sample_y_fx = x_fx, y_fx
         return seen
 
-    def numbered_from(self, int32_t first_id):
+    def numbered_from(self, int32_t first_id) -> SnappedMesh:
         """Return the same mesh with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
         cdef SnappedMesh named = self.copy()
         named.snapped.first_id = first_id
         return named
 
-    def named(self, const int32_t[::1] names):
+    def named(self, const int32_t[::1] names) -> SnappedMesh:
         """Return the same mesh with other ids in the buffers that `draw` fills: triangle i is called names[i]."""
         cdef SnappedMesh named = self.copy()
         named.snapped.names = &names[0] if names.shape[0] else NULL
@@ -74,23 +73,23 @@ cdef class SnappedMesh:
         return named
 
     @property
-    def is_named(self):
+    def is_named(self) -> bool:
         """Whether buffers hold other ids than the indices of triangles."""
         return self.snapped.names != NULL or self.snapped.first_id != 0
 
-    def moved(self, int64_t x_px, int64_t y_px):
+    def moved(self, int64_t x_px, int64_t y_px) -> SnappedMesh:
         """Return the same mesh behind a window that begins x_px columns and y_px rows later."""
         cdef SnappedMesh part = self.copy()
         part.x_px += x_px
         part.y_px += y_px
         return part
 
-    def finds_inverse_w(self, int64_t n_pixels):
+    def finds_inverse_w(self, int64_t n_pixels) -> bool:
         """Whether a picture of so many pixels is shaded sooner with 1/w of the vertices that show than with that of all."""
         cdef const tl_source *source = self.snapped.mesh.source
         return source != NULL and source.matrix != NULL and self.snapped.mesh.n_vertices > n_pixels
 
-    def with_inverse_w(self, int64_t n_pixels, empty=np.empty):
+    def with_inverse_w(self, int64_t n_pixels, empty: Callable[..., Array] = np.empty) -> SnappedMesh:
         """Return the same mesh with 1/w of all vertices at hand, if so many pixels ask for enough of them.
 
         `empty(shape, dtype)` gives memory for them.
@@ -129,7 +128,7 @@ cdef class SnappedMesh:
         w.width, w.height, w.test, w.pause = width, n_rows, self.test, pause_of_thread()
         return w
 
-    def guess_seen(self, int64_t width, int64_t height):
+    def guess_seen(self, int64_t width, int64_t height) -> tuple[float, float, float]:
         """Return about how many triangles reach into the picture, how often they cover each pixel, and their rows in all.
 
         From the boxes and areas of up to 128 of them; one with a vertex that is wide or outside of a clip plane counts as
@@ -172,7 +171,7 @@ cdef class SnappedMesh:
         each = self.snapped.n_triangles / <double>n
         return n_seen * each, total * each / n_pixels, n_rows * each
 
-    def guess_scatter(self, int64_t n_rows):
+    def guess_scatter(self, int64_t n_rows) -> float:
         """Return the share of triangles that are taller than `n_rows` or lie farther from the next, from up to 64 of them.
 
         0 where vertices are not snapped.
@@ -192,7 +191,8 @@ cdef class SnappedMesh:
             n_far += high - low > far
         return n_far / <double>max(1, n)
 
-    def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
+    def count_classes(self, int sink, int64_t width, int64_t height,
+                      const int32_t[:, ::1] samples=None) -> tuple[int, list[tuple[int, float, float]]]:
         """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.
 
         Returns the first bad row or -1, and triangles, samples in their boxes, and covered samples of each `tl_class`.
@@ -217,7 +217,7 @@ cdef class SnappedMesh:
             with nogil:
                 K.drop_sides(&self.snapped, &is_single[0], first, end, &triangles[0, 0])
 
-    def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
+    def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True) -> int:
         """Draw rows of a picture, which the first of several meshes clears and the last one finishes.
 
         Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
@@ -238,7 +238,8 @@ cdef class SnappedMesh:
         raise_if_given_up()
         return bad_row
 
-    def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first, int32_t[::1] others):
+    def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first,
+                   int32_t[::1] others) -> tuple[int, int]:
         """Clear rows of a picture and draw there the triangles from `first` on for which `others` has room, 16 numbers left.
 
         What of them lies in other rows is listed in `others`; returns the first bad row or -1, and how many those are.
@@ -269,7 +270,8 @@ cdef class SnappedMesh:
         self.note(&counts)
         raise_if_given_up()
 
-    def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide, bint is_clamped):
+    def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide,
+                  bint is_clamped) -> int:
         """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
 
         `cells`: those of these rows, clear. Returns as `draw` does, or AREA_OVERFLOW when the cells must be wide.
@@ -286,8 +288,8 @@ cdef class SnappedMesh:
         raise_if_given_up()
         return status
 
-    def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
-              bint is_flat, bint is_u8, int n_channels, const uint8_t[::1] ground=None):
+    def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row,
+              int64_t n_rows, bint is_flat, bint is_u8, int n_channels, const uint8_t[::1] ground=None):
         """Colour the rows [first_row, first_row + n_rows) by their labels; `ground`, of flat ones: the colour elsewhere."""
         cdef int64_t width = labels.shape[1]
         cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
@@ -303,9 +305,10 @@ cdef class SnappedMesh:
                 K.paint_gouraud(&self.snapped, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
                                 &pixels[first_row * width * pixel_bytes])
 
-    def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
-              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells,
-              bint is_few=False):
+    def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors,
+              int n_channels, bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows,
+              const uint8_t[::1] ground or None, int32_t[::1] packed or None, int32_t[::1] cells or None,
+              bint is_few=False) -> int:
         """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
 
         `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. `is_few`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows. Returns as `draw` does.
@@ -329,7 +332,7 @@ cdef class SnappedMesh:
         raise_if_given_up()
         return bad_row
 
-    def is_few(self, int64_t width, int64_t height, int n_samples, int most):
+    def is_few(self, int64_t width, int64_t height, int n_samples, int most) -> bool:
         """Tell whether a picture of the mesh is to be written row by row: large triangles, which are snapped.
 
         `most`: FEW_OF_BITS, FEW_STORED or FEW_LABELLED, by what is done otherwise.
@@ -337,13 +340,13 @@ cdef class SnappedMesh:
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
         return self.snapped.mesh.exact == NULL and tl_are_few(n, n_samples, width, height, <tl_few>most)
 
-    def blends_few(self, int64_t width, int64_t height):
+    def blends_few(self, int64_t width, int64_t height) -> bool:
         """Tell whether flat colours are to be blended over a background row by row: large triangles, which are snapped."""
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
         return self.snapped.mesh.exact == NULL and tl_few_are_blended(n, width, height)
 
-    def fill_few(self, pixels, int64_t first_row, int64_t n_rows, colors, Transfer transfer, const uint8_t[::1] ground,
-                 const int32_t[:, ::1] samples_fx):
+    def fill_few(self, pixels: Array, int64_t first_row, int64_t n_rows, colors: Array, Transfer transfer or None,
+                 const uint8_t[::1] ground, const int32_t[:, ::1] samples_fx) -> int:
         """Fill rows of (H, W[, C]) pixels with `ground` and the flat colours of triangles; of samples their mean.
 
         Returns as `draw` does.
@@ -393,7 +396,8 @@ cdef class Bins:
     cdef readonly int band_bits
     cdef readonly int64_t bad_row, n_bands, n_listed
 
-    def __init__(self, SnappedMesh mesh, int64_t height, int64_t width, int32_t reach_fx, int band_bits, int32_t[:, ::1] room):
+    def __init__(self, SnappedMesh mesh, int64_t height, int64_t width, int32_t reach_fx, int band_bits,
+                 int32_t[:, ::1] room):
         """`room`: (3, n_triangles + 16), or 5 rows of them, to know the columns of each band, too.
 
         `bad_row` is -1, or a triangle has an index outside the vertices.
@@ -432,7 +436,8 @@ cdef class Bins:
         return ids
 
 
-def draw_bands(meshes, targets, Bins bins, int64_t first_band, int64_t end_band):
+def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], Bins bins, int64_t first_band,
+               int64_t end_band):
     """Clear and draw bands of several pictures, a mesh each, one band of all after the other."""
     cdef SnappedMesh mesh
     cdef Target target
@@ -457,7 +462,9 @@ def draw_bands(meshes, targets, Bins bins, int64_t first_band, int64_t end_band)
 cdef class Split:
     """Pixels whose samples see several triangles, row by row: their columns, and what their samples but the first see."""
 
-    cdef readonly object rows, columns, ids, depth
+    cdef readonly object rows  #: I64
+    cdef readonly object columns, ids  #: I32
+    cdef readonly object depth  #: F32
     cdef tl_split split
 
     def __init__(self, int64_t[:, ::1] rows, int32_t[::1] columns, int32_t[:, ::1] ids, float[:, ::1] depth):
@@ -467,7 +474,7 @@ cdef class Split:
         self.split.depth, self.split.room = &depth[0, 0], columns.shape[0]
 
     @staticmethod
-    def room_of(int64_t height, int64_t width, int64_t n_bands):
+    def room_of(int64_t height, int64_t width, int64_t n_bands) -> int:
         """Return for how many pixels there must be room where a picture is drawn in bands."""
         return height * width + 16 * n_bands
 
@@ -486,8 +493,8 @@ cdef class Split:
         return split
 
 
-def draw_split_bands(meshes, Target first, int32_t[:, ::1] ids, float[:, ::1] depth, Split split, Bins bins, int64_t first_band,
-                     int64_t end_band):
+def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1] ids, float[:, ::1] depth, Split split,
+                     Bins bins, int64_t first_band, int64_t end_band):
     """Clear and draw bands of the picture that the first sample sees, and list the pixels of which others see more.
 
     `meshes`: as each sample sees it; `ids` and `depth`: memory for what the others see in a band, (S - 1, rows * (W + 16)).
@@ -528,8 +535,8 @@ def draw_split_bands(meshes, Target first, int32_t[:, ::1] ids, float[:, ::1] de
         raise_if_given_up()
 
 
-def peel(meshes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_farthest, int band_bits,
-         int64_t first_band, int64_t end_band):
+def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
+         bint is_farthest, int band_bits, int64_t first_band, int64_t end_band) -> int:
     """Write the nearest layers of all meshes together, as planes (K, H, W), in bands of 2**band_bits rows.
 
     `bins`: those of each mesh, or None, where a band is to look at all triangles. Returns as `SnappedMesh.draw` does.

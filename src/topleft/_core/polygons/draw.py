@@ -15,8 +15,6 @@ from topleft._core.base.memory import SCRATCH
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.prepared import Prepared
 
-__all__ = ["add_shares", "cells_for", "draw_labels", "draw_mask", "sort_bands"]
-
 #: Labels of a band of rows that is drawn at a time: it stays in the second-level cache.
 BAND_BYTES = 1 << 20
 

@@ -26,8 +26,6 @@ from topleft._core.polygons.prepared import Prepared, prepare
 from topleft._core.polygons.rings import as_points, as_rings, rings_of_triangles
 from topleft.typing import RuleOption
 
-__all__ = ["Overlap", "overlap"]
-
 #: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
 MAX_ENTRIES_AT_ONCE = 1 << 27
 

@@ -24,8 +24,6 @@ from topleft._core.raster.rasterize import canvas_of, open_canvas
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, sample_positions
 from topleft.typing import RuleOption, SamplingOption
 
-__all__ = ["Rule", "frame_of", "polygons"]
-
 
 class Rule(StrEnum):
     """What is inside of rings that wind round a point so many times."""

@@ -12,8 +12,6 @@ from topleft._core.base.memory import SCRATCH, Memory, times_that_fit
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.polygons.rings import RingSet
 
-__all__ = ["Frame", "Prepared", "prepare", "threads_for"]
-
 #: Points, and pixels, that are worth a thread: below, one is done before the other has begun.
 MIN_POINTS_PER_THREAD = 50_000
 MIN_PIXELS_PER_THREAD = 1 << 20

@@ -13,11 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import I64
 from topleft._core.base.arrays import apart_from, as_aligned, as_array
-
-__all__ = ["RingSet", "as_rings", "rings_of_triangles"]
-
-I64 = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,46 +25,6 @@ if TYPE_CHECKING:
     from topleft._core.raster.clusters import Clusters
     from topleft._core.raster.snap import Snapped
 
-__all__ = [
-    "ClusterRoute",
-    "Drawing",
-    "Route",
-    "can_cluster",
-    "can_draw_meshlets",
-    "can_share",
-    "can_split",
-    "cluster_route",
-    "common_depth",
-    "drawing",
-    "draws_few",
-    "earlier_wins",
-    "fills_few",
-    "first_depth",
-    "fragment_sink",
-    "is_affine",
-    "is_direct",
-    "is_flat",
-    "is_shared",
-    "must_cut",
-    "pays_float_lanes",
-    "pays_to_bound",
-    "pays_to_cluster",
-    "pays_to_draw_clusters",
-    "pays_to_draw_from",
-    "pays_to_draw_instances",
-    "pays_to_draw_meshlets",
-    "pays_to_draw_samples",
-    "pays_to_grow",
-    "pays_to_share_instances",
-    "pays_to_snap_all",
-    "pays_without_depth",
-    "route",
-    "threads_to_convert",
-    "threads_to_draw",
-    "threads_to_snap",
-    "work_ns",
-]
-
 #: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
 MIN_TO_SHARE_ARRAYS = 200_000
 

@@ -20,8 +20,6 @@ from topleft._core.raster.view import View
 from topleft.methods import Method, load_kernel
 from topleft.typing import PerOption
 
-__all__ = ["bresenham_line", "draw_classic", "fill_classic", "refuse_classic"]
-
 NAMES = {Sink.MASK: "coverage", Sink.COUNT: "overdraw", Sink.LABEL: "labels"}
 
 

@@ -23,8 +23,6 @@ from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.snap import snap_mesh, source_of
 from topleft._core.raster.view import View
 
-__all__ = ["ClusteredMesh", "Survey", "draw_clustered", "equal_bands"]
-
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
 STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}

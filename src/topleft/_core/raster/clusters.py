@@ -15,8 +15,6 @@ from topleft._core import engine
 from topleft._core.base.memory import allocate
 from topleft._core.base.threads import count_threads, run_parts
 
-__all__ = ["Backoff", "Clusters", "Meshlets"]
-
 #: `tl_cluster` of csrc/clusters.h, as far as Python reads it.
 RECORD = np.dtype({"names": ["first_triangle", "n_triangles"], "formats": [np.int64, np.int32], "offsets": [96, 112],
                    "itemsize": engine.CLUSTER_BYTES})  # fmt: skip

@@ -18,8 +18,6 @@ from topleft._core.base.threads import available_threads, parse_threads, run_par
 from topleft._core.raster.peel import DepthLayers
 from topleft.typing import PerOption
 
-__all__ = ["composite"]
-
 #: Interpolated colours that are held at a time by each thread.
 BAND_BYTES = 4 << 20
 

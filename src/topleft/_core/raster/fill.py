@@ -26,8 +26,6 @@ from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
 
-__all__ = ["Style", "draw_fill"]
-
 BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csrc/topleft.h
 
 

@@ -16,8 +16,6 @@ from topleft._core.base.texels import as_levels
 from topleft._core.raster.sampling import SplitSamples
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
-__all__ = ["Fragments", "GivenCorners", "as_sample", "view_of"]
-
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., engine.SnappedMesh]
 

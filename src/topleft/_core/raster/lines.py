@@ -22,8 +22,6 @@ from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft.typing import DepthTestOption
 
-__all__ = ["draw_wireframe"]
-
 
 def list_edges(memory: Memory, snapped: Snapped) -> NDArray[np.uint64]:
     """Return the edges of the triangles that are not culled, each once: lower index + 2**32 * higher index."""

@@ -26,8 +26,6 @@ from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption
 
-__all__ = ["DepthLayers", "check_peel", "peel", "peel_meshes"]
-
 #: All layers of a band of rows, which stay in a cache while the band is drawn.
 BAND_BYTES = 1 << 20
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import as_array, as_number, as_places, as_point_size, as_real, as_vertices
+from topleft._core.base.arrays import as_array, as_count, as_number, as_places, as_point_size, as_real, as_vertices
 from topleft._core.base.memory import FRESH, Memory, check_fits
 from topleft._core.base.options import DepthTest, PointShape, Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
@@ -24,8 +24,6 @@ from topleft._core.raster.sampling import sample_positions
 from topleft._core.raster.snap import refine, snap, source_of
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption, PointShapeOption
-
-__all__ = ["MOST_POINT_PX", "PointFragments", "draw_points", "points"]
 
 MOST_POINT_PX = 1 << 14
 """The largest size of a point, pixels: squares of it in sub-pixels stay below 2**60."""
@@ -53,7 +51,21 @@ class PointFragments(Fragments):
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], n_points: int) -> None:
-        """Take planes (S, H, W), one a sample."""
+        """Take planes (S, H, W), one a sample.
+
+        Raises
+        ------
+        ValueError
+            If ids and depth have other shapes or differ in theirs, or a number of points is negative.
+        TypeError
+            If ids are not int32, depth is not float32, or the number is none.
+        """
+        ids, depth = as_array("ids", ids), as_array("depth", depth)
+        if ids.dtype != np.int32 or depth.dtype != np.float32:
+            raise TypeError(f"ids and depth must be int32 and float32, got {ids.dtype} and {depth.dtype}")
+        if ids.ndim != 3 or not len(ids) or ids.shape != depth.shape:
+            raise ValueError(f"ids and depth must have one shape (S, H, W), got {ids.shape} and {depth.shape}")
+        n_points = as_count("n_points", n_points, smallest=0)
         self.id, self._depth = ids[0], depth[0]
         self._n_vertices = self._n_triangles = n_points
         self._planes = ids, depth

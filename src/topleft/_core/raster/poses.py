@@ -20,8 +20,6 @@ from topleft._core.raster.rasterize import Asked, draw_fragments, refuse_many
 from topleft._core.raster.view import Planned, View, ViewOptions
 from topleft.typing import DepthTestOption, EncodingOption, FilterOption, WrapOption
 
-__all__ = ["FragmentsBatch", "draw_batch", "n_poses"]
-
 
 class FragmentsBatch(Sequence[Fragments]):
     """What `rasterize` returns of a batch: a visibility buffer for each of B poses, behind each other.

@@ -35,17 +35,6 @@ from topleft._core.raster.snap import Snapped, snap_mesh, snap_to_cover
 from topleft._core.raster.view import View
 from topleft.typing import DepthTestOption
 
-__all__ = [
-    "Asked",
-    "canvas_of",
-    "draw",
-    "draw_all_samples",
-    "draw_coverage",
-    "draw_fragments",
-    "draw_overdraw",
-    "refuse_many",
-]
-
 
 def draw(
     memory: Memory,

@@ -14,11 +14,6 @@ from topleft._core.base.memory import FRESH, Memory, check_fits, empty
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts
 
-__all__ = [
-    "SAMPLE_GRID_BITS", "SplitSamples", "draw_means", "draw_planes", "draw_sorted", "draw_split", "sample_positions",
-    "split_bytes", "sum_areas",
-]  # fmt: skip
-
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
 POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
     1: ((0, 0),),

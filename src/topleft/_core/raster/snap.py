@@ -19,8 +19,6 @@ from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.view import How, View
 
-__all__ = ["Snapped", "snap_mesh", "snap_to_cover", "source_of"]
-
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
 NO_RECORDS = np.empty(0, np.uint8)
 

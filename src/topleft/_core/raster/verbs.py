@@ -20,8 +20,6 @@ from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_o
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import AlphaOption, BlendOption, DepthTestOption, PerOption, ResolveOption
 
-__all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
-
 WHY_LINES = "lines run between points of the grid"
 
 
@@ -46,23 +44,23 @@ def coverage(
     out : ndarray of bool (float32 for several samples and "area"), shape (H, W), optional
         Where the result goes. A fresh array costs its first touch, several times what drawing a small mesh costs.
     **view
-        transform : array_like, shape (4, 4). Clip space from object space.
-        origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
-        viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
-        subpixel_bits : int, 0 to 16, or "exact". Vertices snap to ``2**-subpixel_bits`` pixels; default 8. "exact":
-            they stay where they are, the float64 numbers of the array, and these decide every sample, at every
-            `sampling` but "area". `wireframe` has lines between points of the grid, and takes 0 to 16.
-        sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
-            of Direct3D; "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`). For `coverage` and
-            `overdraw` also "outer": every pixel square that a triangle meets in positive area; "inner": every square
-            that lies wholly inside a triangle.
-        method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
-            `topleft.methods.CLASSICS` names them, and docs/guide/methods.md tells where each of them fails.
-        cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
-        clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
-        near_clip, far_clip : bool. Whether that plane cuts.
-        threads : int or None. Never changes a bit.
-        plan : Plan or None. Of `plan`, for the same triangles: saves their conversion and check, and notes the times.
+        * transform : array_like, shape (4, 4). Clip space from object space.
+        * origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
+        * viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
+        * subpixel_bits : int, 0 to 16, or "exact". Vertices snap to ``2**-subpixel_bits`` pixels; default 8. "exact":
+          they stay where they are, the float64 numbers of the array, and these decide every sample, at every
+          `sampling` but "area". `wireframe` has lines between points of the grid, and takes 0 to 16.
+        * sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
+          of Direct3D; "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`). For `coverage` and
+          `overdraw` also "outer": every pixel square that a triangle meets in positive area; "inner": every square
+          that lies wholly inside a triangle.
+        * method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
+          `topleft.methods.CLASSICS` names them, and docs/guide/methods.md tells where each of them fails.
+        * cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
+        * clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
+        * near_clip, far_clip : bool. Whether that plane cuts.
+        * threads : int or None. Never changes a bit.
+        * plan : Plan or None. Of `plan`, for the same triangles: saves their conversion and check, and notes the times.
 
     Returns
     -------

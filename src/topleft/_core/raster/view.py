@@ -19,8 +19,6 @@ from topleft.typing import ClipDepthOption, CullOption, MethodOption, SamplingOp
 if TYPE_CHECKING:
     from topleft._core.raster.clusters import Clusters
 
-__all__ = ["Planned", "View", "ViewOptions"]
-
 TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
 EXACT_BITS = 8  # of the grid that all samples lie on: TL_GRID_BITS in csrc/exact
 MAX_EXACT_PX = 2**48

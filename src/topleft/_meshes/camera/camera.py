@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import (
     as_array,
     as_real,
@@ -26,7 +27,6 @@ from topleft._core.base.arrays import (
 from topleft._core.base.options import check_choice
 from topleft._meshes.camera.lens import Lens, lens_of_opencv
 from topleft._meshes.camera.matrices import (
-    F64,
     THREE_QUARTER_DEG,
     as_framed,
     box_corners,
@@ -48,8 +48,6 @@ from topleft._meshes.model.points import Points
 from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import FitOption, UpOption
-
-__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for", "pixels_of"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 

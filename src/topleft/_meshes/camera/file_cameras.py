@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_path
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.camera.matrices import F64, box_matrix, frustum_matrix, tangent
+from topleft._meshes.camera.matrices import box_matrix, frustum_matrix, tangent
 from topleft._meshes.io.load import GLTF_SUFFIXES, reading
 from topleft._meshes.io.references import InputFile
 from topleft.errors import MeshError

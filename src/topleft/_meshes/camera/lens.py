@@ -17,9 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_number, as_real
-
-F64 = npt.NDArray[np.float64]
 
 FLIP = np.array([1.0, -1.0, -1.0])
 """Between the axes of OpenCV and those of OpenGL, in both directions."""

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_number, as_real, check_regular
 from topleft._core.base.options import check_choice
 from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
@@ -22,7 +23,6 @@ from topleft._meshes.scene.adapt import MeshLike, is_mesh_like
 from topleft._meshes.scene.scene import Scene, as_subject, world_corners
 from topleft.typing import UpOption
 
-F64 = npt.NDArray[np.float64]
 Framed: TypeAlias = Mesh | Points | F64
 
 THREE_QUARTER_DEG = (35.0, 20.0)

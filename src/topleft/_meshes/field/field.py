@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, I32
 from topleft._core.base.arrays import apart_from, as_array, as_checked_triangles, as_number, as_pair
 from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
 from topleft._core.base.memory import SCRATCH
@@ -26,10 +27,6 @@ from topleft._core.raster.view import View
 from topleft._meshes.scene.adapt import MeshLike, as_polygons
 from topleft._meshes.scene.cells import Polygons
 from topleft.typing import PerOption, SurfaceOption, YOption
-
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-
 
 #: Pixels a triangle. With fewer it pays to compute all planes first: 200,000 triangles at 1080p.
 MAX_PIXELS_TO_LIST = 48

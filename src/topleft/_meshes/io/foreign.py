@@ -22,6 +22,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import Array
 from topleft._meshes.io.notes import Notes
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text
 from topleft._meshes.model.from_trimesh import placed
@@ -29,8 +30,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.polygons import triangulate
 from topleft.errors import MeshError, MissingPackageError
-
-Array = npt.NDArray[Any]
 
 NO_TRIANGLES = {
     ".svg": "it holds curves in a plane",

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, Array
 from topleft._core.base.color import encode_srgb
 from topleft._meshes.io.gltf_accessors import Accessors, Tree, entry, normalized
 from topleft._meshes.io.gltf_materials import Materials
@@ -27,9 +28,6 @@ from topleft._meshes.model.joined import placed_arrays
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft.errors import MeshError, MissingPackageError
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
 
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6

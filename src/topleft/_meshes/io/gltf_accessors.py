@@ -16,10 +16,10 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import Array
 from topleft._meshes.io.references import InputFile
 from topleft.errors import MeshError
 
-Array = npt.NDArray[Any]
 Tree = dict[str, Any]
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

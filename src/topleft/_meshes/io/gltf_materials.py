@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, encode_srgb
 from topleft._meshes.io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._meshes.io.references import InputFile
@@ -23,8 +24,6 @@ from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.texture import Texture
 from topleft.errors import MeshError
 from topleft.typing import EncodingOption, FilterOption, WrapOption
-
-F64 = npt.NDArray[np.float64]
 
 NEAREST, LINEAR = 9728, 9729
 WRAPS: dict[int, WrapOption] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}

@@ -19,8 +19,6 @@ from topleft._core.base.whole_file import write_whole
 from topleft._meshes.io import png
 from topleft.errors import ImageError
 
-__all__ = ["PICTURE_SUFFIXES", "SUFFIXES", "composite", "save_image"]
-
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 BUFFER_SUFFIXES = (".npy", ".npz")
 SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES

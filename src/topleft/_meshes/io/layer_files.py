@@ -16,14 +16,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_number
 from topleft._core.base.remote import Place, as_place, place_of
 from topleft._meshes.io.images import SUFFIXES, save_image
 from topleft.errors import ImageError
-
-__all__ = ["layer_paths", "save_layers"]
-
-Array = npt.NDArray[Any]
 
 RANGES = {"camera_normal": (-1.0, 1.0), "world_normal": (-1.0, 1.0), "barycentric": (0.0, 1.0)}
 """Layers of three channels that eight bits show: what 0 and 255 stand for."""

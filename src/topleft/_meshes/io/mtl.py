@@ -15,16 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._core.base.array_types import U8
 from topleft._core.base.color import Color, decode_srgb
 from topleft._meshes.io.references import InputFile
 from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.texture import Texture, Wrap
 from topleft.errors import MeshError
 from topleft.typing import EncodingOption
-
-U8 = npt.NDArray[np.uint8]
 
 OPTION_LENGTHS = {
     "-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1, "-blendv": 1, "-imfchan": 1, "-boost": 1,

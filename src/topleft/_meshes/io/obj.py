@@ -9,22 +9,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._core.base.array_types import F64, I64, U8
 from topleft._meshes.io.mtl import read_mtl
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.polygons import triangulate
 from topleft.errors import MeshError
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
-I64 = npt.NDArray[np.int64]
-U8 = npt.NDArray[np.uint8]
 
 BLANKS = bytes.maketrans(b"\t\v\f\r", b"   \n")
 NEWLINE, BLANK, SLASH = 10, 32, 47

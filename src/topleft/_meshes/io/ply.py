@@ -16,15 +16,13 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import I64, Array
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text, whole_numbers
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.polygons import triangulate
 from topleft._meshes.model.texture import Texture
 from topleft.errors import MeshError
-
-Array = npt.NDArray[Any]
-I64 = npt.NDArray[np.int64]
 
 DTYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",

@@ -22,8 +22,6 @@ import numpy.typing as npt
 
 from topleft.errors import ImageError
 
-__all__ = ["COMPRESSORS", "encode", "pieces"]
-
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 COLOR_TYPES = {(): 0, (2,): 4, (3,): 2, (4,): 6}
 """What stands in the header, by the axes after height and width."""

@@ -17,8 +17,6 @@ import numpy.typing as npt
 
 from topleft.errors import MeshError
 
-__all__ = ["PolygonPicture", "load_polygons"]
-
 
 @dataclass(frozen=True)
 class PolygonPicture:

@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import U8
 from topleft._meshes.io.notes import Notes
 from topleft._meshes.model.texture import MAX_TEXTURE_SIZE
 from topleft.errors import MeshError
-
-U8 = npt.NDArray[np.uint8]
 
 MAX_VERTICES = 200_000_000
 MAX_TEXTURE_PIXELS = 1 << 26

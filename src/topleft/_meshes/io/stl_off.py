@@ -13,18 +13,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import I64, Array
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text, whole_numbers
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.polygons import triangulate
 from topleft.errors import MeshError
-
-Array = npt.NDArray[Any]
-I64 = npt.NDArray[np.int64]
 
 N_HEADER_BYTES, N_TRIANGLE_BYTES = 84, 50
 HEAD = re.compile(rb"\s*((?:ST)?C?N?(4?)(n?)OFF)?(?=[\s\d]|$)", re.IGNORECASE)

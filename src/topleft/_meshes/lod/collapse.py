@@ -14,10 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import F64, I32
 from topleft.errors import MissingPackageError
-
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 
 #: Scales to be tried: the diameter of a mesh, per triangle that is wanted.
 FINENESS = (10.0, 1.0)

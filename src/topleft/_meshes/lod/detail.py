@@ -23,6 +23,7 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_number, as_size, shown
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.lod.levels import Level, Levels
@@ -32,10 +33,6 @@ from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.scene.adapt import MeshLike, as_mesh
 from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import CullOption
-
-__all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
-
-F64 = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

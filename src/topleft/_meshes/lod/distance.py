@@ -16,11 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, I32
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._meshes.model.mesh import coincident
-
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 
 #: A bound may pass what is known to be met by this share of it ...
 SHARE = 1 / 16

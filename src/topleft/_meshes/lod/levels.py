@@ -18,15 +18,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_path, shown
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.camera.matrices import bounding_sphere
 from topleft._meshes.model.mesh import Mesh
 from topleft.errors import MeshError
-
-__all__ = ["Level", "Levels", "keep_levels", "kept_levels"]
-
-F64 = npt.NDArray[np.float64]
 
 #: The arrays of a mesh, by the names that they have in files.
 ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "uv1", "material_of_triangle")

@@ -16,14 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, I32
 from topleft._core.base.arrays import shown
 from topleft._meshes.lod.collapse import STUCK, Collapsed, collapse, collapser, wanted_of
 from topleft._meshes.lod.distance import TriangleTree, measure, welded
 from topleft._meshes.lod.levels import Level, Levels, keep_levels, kept_levels
 from topleft._meshes.model.mesh import FloatArray, Mesh, coincident
 from topleft._meshes.model.normals import unit_or_zero
-
-__all__ = ["levels_of", "simplify"]
 
 #: Levels are measured against the mesh itself, or against its finest level with at most so many triangles, whose bound
 #: is added: it is small beside those of coarser levels, and the time that comparisons take goes with the triangles.
@@ -36,8 +35,6 @@ MOST_POWER = 2.0
 #: The attributes of vertices, by their names in a mesh.
 ATTRIBUTES = ("normals", "colors", "uv", "uv1")
 
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 
 _lock = threading.RLock()
 

@@ -24,17 +24,12 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import as_array, as_number, as_vector, set_read_only
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, ColorLike, as_color, light_of
 from topleft._core.base.options import parse
 from topleft._meshes.model.light import TO_HEADLIGHT, LightSpace, as_not_negative
 from topleft.typing import SpaceOption
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-
-__all__ = ["DEFAULT_ENVIRONMENT", "Environment"]
 
 N_ROUGH = 8
 """Levels beyond that of a mirror; roughness lies between them linearly."""

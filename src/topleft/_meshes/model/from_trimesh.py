@@ -17,8 +17,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.texture import Texture
 from topleft.typing import AlphaModeOption, EncodingOption
 
-__all__ = ["placed"]
-
 ALPHA_MODES: dict[str, AlphaModeOption] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
 DEFAULT_OF_TRIMESH = ((102, 102, 102), 1.0)
 """Specular colour and glossiness of trimesh's materials where nobody gave them."""

@@ -12,13 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import Array
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import NO_CREASE, Mesh, coincident, with_normals
 from topleft._meshes.model.normals import angle_weighted_normals, moved
-
-__all__ = ["joined", "placed_arrays"]
-
-Array = npt.NDArray[Any]
 
 
 def placed_arrays(

@@ -20,8 +20,6 @@ from topleft._core.base.color import Color, ColorLike, as_color
 from topleft._core.base.options import parse
 from topleft.typing import LightKindOption, SpaceOption
 
-F64 = npt.NDArray[np.float64]
-
 TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / engine.length([-0.35, 0.45, 1.0])
 """Direction of the headlight in eye space: from over the viewer's left shoulder, so that up and left read as lit."""
 

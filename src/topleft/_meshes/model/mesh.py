@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_array, as_checked_triangles, set_read_only, shown
 from topleft._core.raster.clusters import Clusters, box_of
 from topleft._meshes.model.material import Material
@@ -22,10 +23,6 @@ from topleft._meshes.model.normals import CornerNormals, angle_weighted_normals,
 from topleft._meshes.model.texture import Texture
 
 FloatArray = npt.NDArray[np.floating[Any]]
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-U8 = npt.NDArray[np.uint8]
 
 NO_CREASE = 180.0
 """The crease angle at which no edge is sharp, degrees."""

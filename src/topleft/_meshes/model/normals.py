@@ -17,19 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_checked_triangles, as_frozen, refuse_rows
 from topleft._core.base.threads import run_parts, threads_of_rows
 
-__all__ = [
-    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "creased_normals", "face_normal_rows",
-    "face_normals", "moved", "turn_of_normals", "turned_faces", "unit_or_zero", "unit_rows",
-]  # fmt: skip
-
 FloatArray = npt.NDArray[np.floating[Any]]
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-U8 = npt.NDArray[np.uint8]
 
 MAX_THREADS_OF_VERTICES = 8
 """Each thread that sums the normals of vertices goes through all triangles."""

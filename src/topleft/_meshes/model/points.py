@@ -13,15 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import F64, U8
 from topleft._core.base.arrays import INT32_MAX, as_point_size, set_read_only
 from topleft._core.base.options import PointShape, parse
 from topleft._meshes.model.mesh import FloatArray, as_color_array, as_real_array, extreme_points, read_only
 from topleft.typing import PointShapeOption, PointUnitOption
-
-__all__ = ["DEFAULT_POINT_SIZE", "PointUnit", "Points"]
-
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
 
 DEFAULT_POINT_SIZE = 2.0
 """Pixels."""

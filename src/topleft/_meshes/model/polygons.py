@@ -9,14 +9,9 @@ Sutherland, Sproull and Schumacker, "A Characterization of Ten Hidden-Surface Al
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
-I64 = npt.NDArray[np.int64]
+from topleft._core.base.array_types import F64, I64, Array
 
 FEW_POINTS = 24
 """Below that many points a loop of Python takes less time than NumPy."""

@@ -16,15 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, U8, U16
 from topleft._core.base.arrays import as_array, set_read_only
 from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.options import parse
 from topleft._core.base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
 from topleft.typing import EncodingOption, FilterOption, WrapOption
-
-U8 = npt.NDArray[np.uint8]
-U16 = npt.NDArray[np.uint16]
-F64 = npt.NDArray[np.float64]
 
 MAX_TEXTURE_SIZE = 1 << 15
 """Of a side: 16 levels."""

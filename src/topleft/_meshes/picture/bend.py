@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import set_aligned
 from topleft._core.base.memory import empty
 from topleft._core.base.options import Cull, parse
@@ -29,10 +30,6 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.lens import FLIP, Lens
 from topleft._meshes.model.mesh import Mesh, keep_corner_normals
 from topleft._meshes.model.normals import CornerNormals, moved
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 
 WIDEST = np.radians(160)
 """What lies farther from the axis is never drawn: a triangle round the back of the axis would cover everything. Those
@@ -154,12 +151,12 @@ class BentMesh:
         )
         if creased is not None and of_vertices is not None:
             first = len(of_vertices)
-            of_corner = first + creased.of_corner[parts.source]
+            of_corner = creased.of_corner[parts.source] + np.int32(first)
             own = weighed(parts.weights, creased.rows[creased.of_corner[parts.source[parts.rows]]]).reshape(-1, 3)
-            own_rows = first + len(creased.rows) + np.arange(len(own), dtype=np.int32)
+            own_rows = np.arange(len(own), dtype=np.int32) + np.int32(first + len(creased.rows))
             of_corner[parts.rows] = own_rows.reshape(-1, 3)
             table = np.concatenate([of_vertices, creased.rows, own])
-            keep_corner_normals(made, CornerNormals(table, of_corner.astype(np.int32), made.triangles.ravel()))
+            keep_corner_normals(made, CornerNormals(table, of_corner, made.triangles.ravel()))
         return made
 
     def outline(self, projection: F64, cull: str) -> npt.NDArray[np.intp]:
@@ -345,7 +342,8 @@ def bend(
     table = _lens_map(lens, px_from_plane.tobytes(), (max(size[0], 1), max(size[1], 1))).table
     # Window depth is below 0 for ranges under this one.
     near = float(projection[2, 3] / (projection[2, 2] - 1)) if near_clip else 0.0
-    given = np.ascontiguousarray(vertices, np.float32 if np.asarray(vertices).dtype == np.float32 else np.float64)
+    dtype: Any = np.float32 if np.asarray(vertices).dtype == np.float32 else np.float64
+    given: npt.NDArray[np.floating[Any]] = np.ascontiguousarray(vertices, dtype)
     corners, source = np.ascontiguousarray(triangles, np.int32), engine.Source(given)
     n_vertices, n_triangles, eye_from = len(given), len(corners), np.ascontiguousarray(camera.view, np.float64)
     bent, records = empty((n_vertices, 3), np.float64), empty((n_vertices, 4), np.float32)

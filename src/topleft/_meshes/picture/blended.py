@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import F32, U8
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.peel import peel_meshes
@@ -35,10 +36,6 @@ from topleft._meshes.picture.scene_shade import shade_by, shade_part
 from topleft._meshes.picture.shade import Shading, ShadingOptions
 from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
 
-__all__ = ["Glass", "blended_masks", "glass_of"]
-
-F32 = npt.NDArray[np.float32]
-U8 = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
 
 BLENDING = (Shading.SMOOTH, Shading.FLAT, Shading.UNLIT)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, U8
 from topleft._core.base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.options import PointShape
@@ -28,12 +29,6 @@ from topleft._meshes.model.light import TO_HEADLIGHT, Light, LightKind, LightSpa
 from topleft._meshes.model.normals import moved, turn_of_normals, unit_or_zero
 from topleft._meshes.model.points import Points, PointUnit
 from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_numbers, shade_samples
-
-__all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
 
 NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""

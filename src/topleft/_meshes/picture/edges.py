@@ -20,8 +20,6 @@ from topleft._meshes.picture.through_lens import seen_through
 from topleft._meshes.scene.scene import Instance, Scene, scene_of
 from topleft.typing import CullOption
 
-__all__ = ["EDGE_COLOR", "depth_behind", "draw_all_edges"]
-
 EDGE_COLOR = (24, 28, 40)
 TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
 

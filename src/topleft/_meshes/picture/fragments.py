@@ -28,11 +28,6 @@ from topleft._meshes.scene.scene import Instance, Scene, counted_ranges, meshes_
 if TYPE_CHECKING:
     from topleft._meshes.picture.instances import PlacedScene
 
-__all__ = [
-    "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "join",
-    "parts_of",
-]  # fmt: skip
-
 Ids = NDArray[np.int32] | NDArray[np.int64]
 """What counts the triangles of all instances: int64 where int32 does not."""
 

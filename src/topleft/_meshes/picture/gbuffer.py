@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.fragments import Fragments
@@ -26,10 +27,6 @@ from topleft._meshes.picture.fragments import VisiblePart, join, parts_of
 from topleft._meshes.picture.holes import cuts_of, without_holes
 from topleft._meshes.picture.render import rasterize_subject
 from topleft._meshes.scene.scene import Scene
-
-__all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
-
-F64 = npt.NDArray[np.float64]
 
 
 class PointKind(IntEnum):

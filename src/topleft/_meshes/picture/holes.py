@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, I32
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.fragments import Fragments
@@ -28,11 +29,6 @@ from topleft._meshes.picture.fragments import BentFragments, SceneFragments
 from topleft._meshes.picture.instances import PlacedScene
 from topleft._meshes.picture.look import ShadingInputs
 from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
-
-__all__ = ["Cut", "Holed", "cut_scene", "cuts_of", "draw_holed", "holed_instances", "solid_scene", "without_holes"]
-
-I32 = npt.NDArray[np.int32]
-F32 = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +44,7 @@ class Cut:
         """Those with holes."""
         return np.flatnonzero(self.is_cut).astype(np.int32)
 
-    def of_parts(self, source: npt.NDArray[np.int64]) -> Cut:
+    def of_parts(self, source: I32) -> Cut:
         """The same of parts of triangles."""
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 

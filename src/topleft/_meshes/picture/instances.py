@@ -35,8 +35,6 @@ from topleft._meshes.picture.through_lens import DrawnScene, scene_through
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import DepthTestOption
 
-__all__ = ["PlacedScene", "draw_nearest", "draw_scene", "draw_scene_coverage", "peel_scene", "place"]
-
 #: Snapped vertices that are held at a time: 16 bytes each.
 VERTICES_AT_ONCE = 1 << 20
 

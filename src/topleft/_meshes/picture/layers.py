@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, Array
 from topleft._core.base.arrays import as_names
 from topleft._meshes.picture.blended import blended_masks
 from topleft._meshes.picture.cloud import CLOUD_LAYERS, CloudBuffer
@@ -26,13 +27,8 @@ from topleft._meshes.picture.silhouette import silhouette as draw_silhouette
 from topleft._meshes.picture.transparent import render_transparent
 from topleft._meshes.scene.scene import meshes_of
 
-__all__ = ["LAYERS", "check_layers", "draw_layers"]
-
 NOT_OF_LIGHT = ("cull", "edges", "sampling", "subpixel_bits")
 """Options of `render` that say which triangle is seen where, not how it is lit."""
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
 
 
 def color(gbuffer: GBuffer) -> Array:

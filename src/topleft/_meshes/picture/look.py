@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64
 from topleft._core.base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts, threads_of_rows
@@ -33,11 +34,6 @@ from topleft._meshes.model.normals import (
     unit_rows,
 )
 from topleft._meshes.model.texture import Texture
-
-__all__ = ["CameraRays", "ShadingInputs", "ShadingMesh"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
 
 LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
 WRAPPED_LIGHT = 2

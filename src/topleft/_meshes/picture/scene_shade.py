@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._core.base.array_types import U8
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.points import PointFragments
@@ -26,10 +26,6 @@ from topleft._meshes.picture.fragments import SceneFragments, VisiblePart, join,
 from topleft._meshes.picture.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import ShadingOption
-
-__all__ = ["shade", "shade_by", "shade_part"]
-
-U8 = npt.NDArray[np.uint8]
 
 
 def shade(

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import shown
 from topleft._core.base.color import (
     DEFAULT_COLOR,
@@ -47,12 +48,6 @@ from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture.look import ShadingInputs
 from topleft.typing import ShadingOption
 
-__all__ = ["LookOptions", "Shading", "ShadingOptions", "shade_mesh", "shade_numbers"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
-I32 = npt.NDArray[np.int32]
 Places = tuple[npt.NDArray[np.intp], ...]
 
 MIN_PX_PER_THREAD = 1 << 14

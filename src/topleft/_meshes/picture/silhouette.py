@@ -23,8 +23,6 @@ from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, as_subject
 from topleft.typing import CullOption, SamplingOption
 
-__all__ = ["silhouette"]
-
 
 def silhouette(
     mesh: MeshLike | Scene | Points,

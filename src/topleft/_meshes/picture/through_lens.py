@@ -5,12 +5,13 @@ Input: `Mesh` or `Scene`, a camera with or without lens. Output: `DrawnMesh` or 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
+from topleft._core.base.array_types import Array
 from topleft._core.raster import choices
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.view import Planned, View
@@ -18,10 +19,6 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh, bend
 from topleft._meshes.scene.scene import Instance, Scene
-
-__all__ = ["DrawnMesh", "DrawnScene", "StaticPlan", "scene_through", "seen_through"]
-
-Array = npt.NDArray[Any]
 
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 

@@ -29,8 +29,6 @@ from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
-__all__ = ["render_transparent", "visible_layers"]
-
 CLEAR = (0, 0, 0, 0)
 
 

@@ -12,6 +12,7 @@ from typing import Any, Literal, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import F64, Array
 from topleft._core.base.arrays import as_real, as_size, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.base.remote import Place
@@ -28,11 +29,6 @@ from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, as_subject, meshes_of
 from topleft.typing import CullOption, LayerOption, SamplesOption, ShadingOption
-
-__all__ = ["ViewLayers", "gbuffer_of", "render_layers"]
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
 
 LOOKS = frozenset({"shading", "color", "background", "edges", "sampling", *LookOptions.__annotations__})
 GLASS_LOOKS = frozenset({"shading", "color", "background", "opacity", "layers", *LookOptions.__annotations__})

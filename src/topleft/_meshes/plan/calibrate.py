@@ -31,8 +31,6 @@ from topleft._meshes.plan.costs import FEATURES, Costs, features
 from topleft.scenes import blob, random_triangles
 from topleft.typing import SamplingOption
 
-__all__ = ["calibrate"]
-
 GROUPS = {"mask": Sink.MASK, "count": Sink.COUNT, "depth": Sink.NEAREST, "samples": Sink.SAMPLES, "area": Sink.COUNT}
 
 FRAMES = ((640, 360), (1280, 720), (1920, 1080))

@@ -20,8 +20,6 @@ from topleft._core.base.options import Sampling, Sink
 from topleft._core.base.whole_file import write_whole
 from topleft._core.raster.choices import NEAR_PIXELS
 
-__all__ = ["FEATURES", "Costs", "cache_file", "features", "load_costs", "save_costs", "sink_group"]
-
 #: What the time of a draw is made of, in this order: triangles by how they are drawn, samples, pixels of the picture.
 FEATURES = (
     "hidden", "tiny", "small", "middle", "rows", "long", "64-bit", "128-bit", "point", "span", "pixel", "cold",

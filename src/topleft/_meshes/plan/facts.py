@@ -24,8 +24,6 @@ from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.mesh import Mesh
 
-__all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
-
 #: The names of `tl_class` in ``csrc/topleft.h``.
 CLASSES = (
     "degenerate", "culled", "outside", "between", "tiny", "small", "middle", "rows", "long",

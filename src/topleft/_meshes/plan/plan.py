@@ -33,8 +33,6 @@ from topleft._meshes.scene.adapt import MeshLike
 from topleft.methods import METHODS
 from topleft.typing import DepthTestOption, OutputOption
 
-__all__ = ["OUTPUTS", "Plan", "plan"]
-
 #: Which verb gives an output.
 OUTPUTS = {
     "coverage": "coverage",

@@ -18,8 +18,6 @@ from topleft._meshes.plan.costs import Costs, features, sink_group
 from topleft._meshes.plan.facts import ClusterFacts, Decided, Facts, memory_of
 from topleft.methods import METHODS
 
-__all__ = ["Stage", "find_stages"]
-
 
 @dataclass(frozen=True, slots=True)
 class Stage:

@@ -7,8 +7,6 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["as_html", "as_text"]
-
 WIDTH = 110
 INDENT = " " * 12
 

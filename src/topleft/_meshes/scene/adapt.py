@@ -21,8 +21,6 @@ from topleft._meshes.model.joined import joined
 from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh, as_crease
 from topleft._meshes.scene.cells import Polygons, of_arrays, of_cells, of_grid, of_padded, of_pair, of_triangulation
 
-__all__ = ["MeshLike", "as_mesh", "as_polygons", "is_mesh_like"]
-
 MeshLike: TypeAlias = Any
 """What `as_mesh` takes."""
 

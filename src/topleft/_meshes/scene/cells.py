@@ -14,8 +14,6 @@ import numpy.typing as npt
 from topleft._core.base.arrays import as_array
 from topleft._meshes.model.polygons import triangulate
 
-__all__ = ["Polygons", "of_arrays", "of_cells", "of_grid", "of_padded", "of_pair", "of_triangulation"]
-
 CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
 """Corners of the surface cells of meshio, which come first in a row; `None`: all of the row. Of curved cells the points
 on their edges and inside are left out: they are drawn straight, from corner to corner."""

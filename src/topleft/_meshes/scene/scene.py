@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
 from topleft._core.raster.clusters import Backoff
 from topleft._meshes.io.load import load
@@ -24,10 +25,6 @@ from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
 from topleft._meshes.scene.adapt import MeshLike, as_mesh, is_mesh_like
-
-__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "collapsed", "counted_ranges", "meshes_of", "scene_of"]
-
-F64 = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,15 +11,6 @@ Microsoft, Direct3D 11.3 Functional Specification, 2015 (top-left rule);
 I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974, and J. F. Blinn, M. E. Newell, Clipping Using
 Homogeneous Coordinates, 1978 (clip before the divide);
 P. S. Heckbert, H. P. Moreton, Interpolation for Polygon Texture Mapping and Shading, 1991 (perspective weights).
-
-area.py       cuts each triangle to each pixel square: exact areas
-blend.py      blends a colour into a pixel
-integers.py   draws vertices however far away, after any snap or none
-lines.py      draws the edges of a mesh as lines
-peel.py       sorts the layers of each pixel, and composites them
-points.py     draws points as discs or squares
-polygons.py   counts winding numbers of rings: masks, and exact areas
-sampling.py   draws several samples a pixel, and conservative coverage
 """
 
 from __future__ import annotations

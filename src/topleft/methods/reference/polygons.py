@@ -21,8 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["polygon_areas", "polygon_mask", "snap_rings"]
-
 Ring = list[tuple[Fraction, Fraction]]
 Edge = tuple[Fraction, Fraction, Fraction, Fraction, int]  # upper end, lower end, direction
 

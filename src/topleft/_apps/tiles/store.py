@@ -1,0 +1,264 @@
+"""Blocks of pixels as tiles, each a chunk of its own: what GeoTIFF, Zarr and Deep Zoom share while they are written.
+
+Input: a block, which is a window at level 0 and as many pixels at the coarser levels. Output: its tiles, as the format
+encodes them. The chunks themselves tell what an earlier run has left: a tile is there and can be read, or it is not.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from topleft._apps.tiles.folders import DiskFolder, Folder, check_space
+from topleft._core.base.array_types import Array
+
+if TYPE_CHECKING:
+    from topleft._apps.tiles.tiles import Tiles
+
+
+DAMAGES = (ValueError, OSError, RuntimeError, SyntaxError, EOFError, zlib.error, struct.error)
+"""What zlib, NumPy, numcodecs and Pillow raise for a tile that is not what was written."""
+
+LARGE_BYTES = 1 << 28
+"""Rasters below are taken for as large as their pixels; of others tiles of a window are compressed to see."""
+
+MOST_SAMPLES = 16
+"""How many of them."""
+
+
+def n_levels_to(size: tuple[int, int], side: int) -> int:
+    """How many levels there are down to one that fits a square."""
+    n = 1
+    while max(size) > side << (n - 1):
+        n += 1
+    return n
+
+
+def level_size(size: tuple[int, int], level: int) -> tuple[int, int]:
+    """The size of a level, half of the one below, rounded up."""
+    return -(-size[0] >> level), -(-size[1] >> level)
+
+
+@dataclass(frozen=True)
+class TileStore(ABC):
+    """Where the tiles of a raster go, and how a format encodes them.
+
+    Attributes
+    ----------
+    folder : Folder
+    size, window, tile : (width, height), pixels
+        Of the raster at level 0, of a block, of a tile.
+    channels : tuple of int
+    dtype : dtype
+        As stored.
+    empty : number or ndarray
+        What stands where no triangle is.
+    n_levels : int
+    """
+
+    folder: Folder
+    size: tuple[int, int]
+    window: tuple[int, int]
+    tile: tuple[int, int]
+    channels: tuple[int, ...]
+    dtype: np.dtype[Any]
+    empty: Any
+    n_levels: int
+
+    #: Whether tiles of the border are filled up to the size of others.
+    is_filled: ClassVar[bool] = True
+
+    @abstractmethod
+    def name(self, level: int, row: int, column: int) -> str:
+        """The name of a tile, by its row and column among tiles."""
+
+    @abstractmethod
+    def encoded(self, pixels: Array) -> bytes:
+        """Return a tile as it is stored."""
+
+    @abstractmethod
+    def decoded(self, content: bytes) -> Array:
+        """Return the pixels of a tile."""
+
+    def seen_from_elsewhere(self) -> Self:
+        """The same for processes that run in other folders."""
+        return replace(self, folder=self.folder.absolute())
+
+    def n_tiles(self, level: int) -> tuple[int, int]:
+        """Columns and rows of tiles of a level."""
+        width, height = level_size(self.size, level)
+        return -(-width // self.tile[0]), -(-height // self.tile[1])
+
+    def n_tiles_of_block(self) -> tuple[int, int]:
+        """Columns and rows of tiles of a block, as if it did not end with the level."""
+        return -(-self.window[0] // self.tile[0]), -(-self.window[1] // self.tile[1])
+
+    def tiles_of(self, level: int, row: int, column: int) -> list[tuple[int, int]]:
+        """Rows and columns of the tiles of a block that lie in the level."""
+        (n_columns, n_rows), (columns, rows) = self.n_tiles_of_block(), self.n_tiles(level)
+        own_rows = range(row * n_rows, min((row + 1) * n_rows, rows))
+        return [(r, c) for r in own_rows for c in range(column * n_columns, min((column + 1) * n_columns, columns))]
+
+    def shape_of(self, level: int, row: int, column: int) -> tuple[int, ...]:
+        """The shape of a block."""
+        (w, h), (width, height) = self.window, level_size(self.size, level)
+        return (min(h, height - row * h), min(w, width - column * w), *self.channels)
+
+    def missing(self, level: int, row: int, column: int) -> str | None:
+        """The name of a tile of a block that is not there; None if all are."""
+        names = (self.name(level, r, c) for r, c in self.tiles_of(level, row, column))
+        return next((name for name in names if not self.folder.has(name)), None)
+
+    def is_whole(self, level: int, row: int, column: int) -> bool:
+        """Whether all tiles of a block are there; on a disk also whether they can be read."""
+        if self.missing(level, row, column) is not None:
+            return False
+        try:
+            if isinstance(self.folder, DiskFolder):
+                self.read(level, row, column)
+        except OSError:
+            return False
+        return True
+
+    def write(self, level: int, row: int, column: int, pixels: Array) -> None:
+        """Write the tiles of a block."""
+        for r, c in self.tiles_of(level, row, column):
+            part = pixels[self.place_of(r, c, row, column)]
+            self.folder.put(self.name(level, r, c), self.encoded(self.filled(part)))
+
+    def filled(self, part: Array) -> Array:
+        """Return the pixels of a tile, as many as others have."""
+        width, height = self.tile
+        if not self.is_filled or part.shape[:2] == (height, width):
+            return np.asarray(part, self.dtype)
+        whole = np.empty((height, width, *self.channels), self.dtype)
+        whole[...] = self.empty
+        whole[: part.shape[0], : part.shape[1]] = part
+        return whole
+
+    def read(self, level: int, row: int, column: int) -> Array:
+        """Return the pixels of a block that was written.
+
+        Raises
+        ------
+        OSError
+            If a tile has been removed since, or is damaged.
+        """
+        pixels = np.empty(self.shape_of(level, row, column), self.dtype)
+        for r, c in self.tiles_of(level, row, column):
+            own = pixels[self.place_of(r, c, row, column)]
+            height, width = self.tile[::-1] if self.is_filled else own.shape[:2]
+            name = self.name(level, r, c)
+            content = self.content(name)
+            try:
+                tile = self.decoded(content)
+                if tile.shape != (height, width, *self.channels):
+                    raise ValueError(f"it holds pixels of shape {tile.shape}")
+            except DAMAGES as error:
+                raise OSError(f"{self.folder.place(name)} is damaged ({error}): resume=True writes it again") from error
+            own[...] = tile[: own.shape[0], : own.shape[1]]
+        return pixels
+
+    def content(self, name: str) -> bytes:
+        """Return a tile as it is stored.
+
+        Raises
+        ------
+        FileNotFoundError
+            If it has been removed.
+        """
+        found = self.folder.get(name)
+        if found is None:
+            raise self.gone(name)
+        return found
+
+    def gone(self, name: str) -> FileNotFoundError:
+        """What is said of a tile that is not there any more."""
+        place = self.folder.place(name)
+        return FileNotFoundError(f"{place} has gone while the raster was written: resume=True writes it again")
+
+    def place_of(self, r: int, c: int, row: int, column: int) -> tuple[slice, slice]:
+        """Where a tile lies in its block."""
+        (w, h), (width, height) = self.window, self.tile
+        y, x = r * height - row * h, c * width - column * w
+        return slice(y, y + height), slice(x, x + width)
+
+
+def begin(
+    raster: Tiles,
+    store: TileStore,
+    there: list[tuple[object, str | None]],
+    fingerprint: str,
+    *,
+    resume: bool,
+    overwrite: bool,
+    n_copies: int = 1,
+    prepare: Callable[[Array], Array] = np.asarray,
+) -> bool:
+    """Go on with what is there, or make room for the raster; tell whether it goes on.
+
+    Parameters
+    ----------
+    there : list of (place, fingerprint)
+        What is there, the fingerprint None where it is not of topleft.
+    n_copies : int
+        How often all tiles are on the disk at a time.
+    prepare : function of an array
+        Makes what is written of the pixels of a window.
+
+    Raises
+    ------
+    ValueError
+        If it is to go on with another raster, or to do both.
+    FileExistsError
+        If something is there and it is to do neither, or what is there is not of topleft.
+    OSError
+        If the disk has no room.
+    """
+    if resume and overwrite:
+        raise ValueError("resume=True goes on with what is there, overwrite=True replaces it: give one of them")
+    for place, kept in there:
+        if kept is None:
+            raise FileExistsError(f"{place} was not written by topleft: move it, or write elsewhere")
+    if there and not (resume or overwrite):
+        raise FileExistsError(
+            f"{there[0][0]} exists: resume=True goes on with it, if it is of this raster; overwrite=True replaces it; "
+            "else remove it"
+        )
+    if resume and there and there[0][1] != fingerprint:
+        raise ValueError(
+            f"{there[0][0]} is not of this raster: the mesh, an option or the size of windows differs; "
+            "overwrite=True replaces it, or write elsewhere"
+        )
+    folder = store.folder
+    if resume and there:
+        if isinstance(folder, DiskFolder):
+            folder.sweep()
+        return True
+    if isinstance(folder, DiskFolder):
+        check_space(folder.path, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
+    if there:
+        folder.check_own()
+        folder.remove()
+    return False
+
+
+def bytes_of(raster: Tiles, store: TileStore, prepare: Callable[[Array], Array]) -> int:
+    """How many bytes a raster takes at most on disk; of a large one the fullest window tells by how much it shrinks."""
+    counts = raster.index.counts
+    w, h = raster.window_size
+    n = int((counts > 0).sum()) * w * h * store.dtype.itemsize * int(np.prod(store.channels, dtype=int))
+    if n > LARGE_BYTES:
+        row, column = map(int, np.unravel_index(int(np.argmax(counts)), counts.shape))
+        places = [store.place_of(r, c, row, column) for r, c in store.tiles_of(0, row, column)[:MOST_SAMPLES]]
+        pixels = prepare(raster.draw_window(row, column))
+        tiles = [store.filled(pixels[place]) for place in places]
+        share = sum(len(store.encoded(tile)) for tile in tiles) / sum(tile.nbytes for tile in tiles)
+        n = int(n * min(1.0, 1.25 * share))
+    return n + (n // 3 if store.n_levels > 1 else 0)
