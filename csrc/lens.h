@@ -36,8 +36,8 @@ typedef struct {
     double cap_cosine, cap_sine; /* of the angle from the axis beyond which nothing shows */
     double px_from_plane[6];     /* two rows: pixels from the middle of the picture, y up */
     double tolerance_px, near;
-    double plain_cosine;          /* of the angle up to which the rings go; 2: there are none */
-    float ring_scale;             /* 256 / (1 - plain_cosine) */
+    /* the squared chord from the axis up to which the rings go, negative: there are none; and 256 over it */
+    float plain_chord, ring_scale;
     float allowed[TL_LENS_RINGS]; /* the squared chord of directions below which no edge is bent, by ring */
 } tl_lens;
 

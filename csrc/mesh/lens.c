@@ -145,13 +145,16 @@ TL_INLINE void make_records(const tl_lens *lens, const vd *p, vf *record)
     const vf far = vf_sqrt(vf_add(vf_add(vf_mul(x, x), vf_mul(y, y)), vf_mul(z, z)));
     const vf inverse = vf_div(vf_set1(1.0f), far), one = vf_set1(1.0f);
     record[0] = vf_mul(x, inverse), record[1] = vf_mul(y, inverse), record[2] = vf_mul(z, inverse);
-    const vi ring = vi_floor(vf_sqrt(vf_mul(vf_sub(one, record[2]), vf_set1(lens->ring_scale))));
+    const vf ahead = vf_sub(one, record[2]);
+    const vf sides = vf_add(vf_mul(record[0], record[0]), vf_mul(record[1], record[1]));
+    const vf from_axis = vf_add(sides, vf_mul(ahead, ahead)); /* as a chord, squared */
+    const vi ring = vi_floor(vf_sqrt(vf_mul(from_axis, vf_set1(lens->ring_scale))));
     const vi last = vi_set1(TL_LENS_RINGS - 1);
     const vf allowed = vf_lookup(lens->allowed, vi_max(vi_min(ring, last), vi_set1(0)));
     const vf longer = vf_mul(far, vf_set1(lens->is_fisheye ? 1.0f : (float)lens->least_cosine));
-    const vf reach = vf_max(z, vf_mul(longer, vf_set1(1.0f + 0x1p-18f)));
+    const vf reach = vf_mul(vf_max(z, longer), vf_set1(1.0f + 0x1p-18f));
     const vm is_far = vf_ge(reach, vf_set1((float)lens->near));
-    const vm is_plain = vf_ge(record[2], vf_set1((float)lens->plain_cosine));
+    const vm is_plain = vf_ge(vf_set1(lens->plain_chord), from_axis);
     record[3] = vf_select(is_plain, allowed, vf_set1(TL_NOT_PLAIN));
     record[3] = vf_select(is_far, record[3], vf_set1(TL_TOO_NEAR));
 }

@@ -11,7 +11,7 @@ cdef class LensTable:
         """The terms: k (6,), p (2,), s (4,); `tilt`: cosine and sine of tau_x, then of tau_y; `px_from_plane` (2, 3)."""
         cdef int i
         memset(&self.lens, 0, sizeof(self.lens))
-        self.lens.is_fisheye, self.lens.tolerance_px, self.lens.plain_cosine = is_fisheye, tolerance_px, 2.0
+        self.lens.is_fisheye, self.lens.tolerance_px, self.lens.plain_chord = is_fisheye, tolerance_px, -1.0
         self.lens.has_prism, self.lens.is_tilted = any(s), bool(tilt[1] or tilt[3])
         for i in range(6):
             self.lens.k[i], self.lens.px_from_plane[i] = k[i], px_from_plane[i // 3][i % 3]
@@ -30,7 +30,8 @@ cdef class LensTable:
     def set_rings(self, double cosine, const float[::1] allowed):
         """Set the squared chords that are straight in rings up to the angle of this cosine."""
         cdef int i
-        self.lens.plain_cosine, self.lens.ring_scale = cosine, TL_LENS_RINGS * TL_LENS_RINGS / (1.0 - cosine)
+        self.lens.plain_chord = 2.0 * (1.0 - cosine)
+        self.lens.ring_scale = TL_LENS_RINGS * TL_LENS_RINGS / self.lens.plain_chord
         for i in range(TL_LENS_RINGS):
             self.lens.allowed[i] = allowed[i]
 

@@ -168,7 +168,7 @@ class BentMesh:
         area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
         sign = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: -1}[parse(Cull, "cull", cull)]
         is_drawn = np.ones(self.triangles.shape, bool)
-        places = self.triangles
+        places: npt.NDArray[np.signedinteger[Any]] = self.triangles
         if self.parts is not None:  # parts have points of their own
             is_drawn[self.parts.rows] = self.parts.is_outline
             _, same = np.unique(self.points_eye, axis=0, return_inverse=True)
