@@ -214,8 +214,8 @@ TL_INLINE void store_eye_points(double *rows, int64_t n, const vd *columns)
             rows[3 * lane + k] = lanes[k][lane];
 }
 
-/* Bends vertices [first, end), moved to eye space, as far as they are plain: others have some place.  Writes the records
- * of all. */
+/* Bends vertices [first, end), moved to eye space, as far as they are plain: others have some place.  Writes the
+ * records of all. */
 static void bend_vertices(const tl_lens *lens, const tl_source *source, const double *eye_from, int64_t first,
                           int64_t end, double *bent, float *records)
 {

@@ -127,8 +127,10 @@ static int find_cut_box(const tl_vertex_set *set, const int32_t *corners, const 
         return load_triangle(set, corners, t) && clip_box(t, window);
     const exact_point a = point_of(set->exact, corners[0]), b = point_of(set->exact, corners[1]);
     const exact_point c = point_of(set->exact, corners[2]);
-    find_pixels_around(fmin(a.x, fmin(b.x, c.x)), fmax(a.x, fmax(b.x, c.x)), window->x_px, window->width, &t->col0, &t->col1);
-    find_pixels_around(fmin(a.y, fmin(b.y, c.y)), fmax(a.y, fmax(b.y, c.y)), window->y_px, window->height, &t->row0, &t->row1);
+    const double left = fmin(a.x, fmin(b.x, c.x)), right = fmax(a.x, fmax(b.x, c.x));
+    const double top = fmin(a.y, fmin(b.y, c.y)), bottom = fmax(a.y, fmax(b.y, c.y));
+    find_pixels_around(left, right, window->x_px, window->width, &t->col0, &t->col1);
+    find_pixels_around(top, bottom, window->y_px, window->height, &t->row0, &t->row1);
     return t->col0 < t->col1 && t->row0 < t->row1;
 }
 
