@@ -14,8 +14,8 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
-#include "raster/batch.c"
-#include "raster/setup.c"
+#include "vertex/setup.c"
+#include "raster/triangles_fixed.c"
 #include "area/accumulate.c"
 #include "area/ramp.c"
 

@@ -2,9 +2,9 @@
  * In: vertex records, triangles and their colours.  Out: pixels.
  *
  * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at
- * a time, as in rows.c, and whose rows are then drawn triangle by triangle.  What 32-bit lanes cannot take empties the
- * queue and is drawn by itself.  Bands of rows see the same triangles in the same order, so threads cannot change a
- * bit. */
+ * a time, as in rows.c, and whose rows are then drawn triangle by triangle.  What lanes cannot take empties the queue
+ * and is drawn by itself.  Where clip planes cut triangles that are not snapped, all of them are, and the pieces of one
+ * in its place.  Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
 #ifndef TL_BLEND_C
 #define TL_BLEND_C
 
@@ -16,76 +16,134 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
-#include "raster/alone.c"
-#include "raster/batch.c"
+#include "raster/alone_float.c"
+#include "raster/raster.c"
+#include "raster/refine.c"
 #include "raster/rows.c"
+#include "raster/state.h"
+#include "raster/triangles_fixed.c"
+#include "raster/triangles_float.c"
 #include "blend/blend_area.c"
-#include "blend/blend_exact.c"
 #include "blend/blend_few.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
 
 typedef struct {
-    batch_state batch; /* its queue `rows` holds what waits */
+    walk_state walk; /* its queue `rows` holds what waits */
     blend_state mix;
 } blend_pass;
 
-/* Row ends of TL_LANES triangles of at most 62 x 62 samples: see rows.c for why they are exact. */
-TL_INLINE void setup_blend_rows(const lane_triangles *t, vi n_cols, int n_rows, vi stride, blend_rows *rows)
+/* Row ends of TL_LANES triangles, which it goes through; returns the lanes with one in doubt. */
+TL_INLINE vm find_blend_rows(tl_geometry g, lane_edges *e, vi sample, vi n_cols, int n_rows, vi stride,
+                             blend_rows *rows)
 {
-    lane_edges e;
-    sort_edges(t, &e);
-    vi sample = t->sample;
+    vm doubted = vm_first(0);
     for (int row = 0; row < n_rows; row++) {
         vi begin, end;
-        next_row(&e, n_cols, &begin, &end);
+        next_row(g, e, n_cols, &begin, &end, &doubted);
         begin = vi_min(begin, n_cols), end = vi_max(end, vi_set1(0)); /* corners may not be those of the box any more */
         vi_store(rows->first[row], vi_add(sample, begin));
         vi_store(rows->n[row], vi_sub(end, begin));
         sample = vi_add(sample, stride);
     }
+    return doubted;
 }
 
-static __attribute__((noinline)) void flush_blend(blend_pass *p)
+/* Decides the row ends of the lanes in doubt: on the grid by lanes, else by the exact sign. */
+static __attribute__((noinline)) void refine_blend_rows(walk_state *s, int i, lane_exact *t, vi n_cols, int n_rows,
+                                                        int32_t stride, vm doubted, blend_rows *rows)
 {
+    const box_queue *q = &s->rows;
+    int32_t sample[TL_MAX_LANES];
+    if (vm_any(vm_and(try_grid(s, t, 0), doubted))) {
+        lane_edges e;
+        sort_float_edges(s, t, TL_FAR_BAND, &e);
+        doubted = vm_and(find_blend_rows(TL_FLOAT, &e, t->sample, n_cols, n_rows, vi_set1(stride), rows), t->live);
+    }
+    vi_store(sample, t->sample);
+    for (unsigned left = vm_bits(doubted); left; left &= left - 1) {
+        const int k = __builtin_ctz(left), n = q->size[i + k] >> 16;
+        asked_triangle a;
+        set_asked(s, q, i, k, t, TL_FAR_BAND, &a);
+        for (int row = 0; row < n; row++) {
+            int64_t first, end;
+            decide_row(&a, row, &first, &end, s->counts);
+            rows->first[row][k] = sample[k] + row * stride + (int32_t)first;
+            rows->n[row][k] = (int32_t)(end - first);
+        }
+        s->counts->n_asked += n;
+    }
+}
+
+TL_INLINE void flush_blend_rows(blend_pass *p, tl_geometry g)
+{
+    walk_state *s = &p->walk;
     blend_state *b = &p->mix;
-    box_queue *q = &p->batch.rows;
+    box_queue *q = &s->rows;
+    const int32_t stride = (int32_t)b->stride;
     const int n = q->n;
     q->n = 0;
     for (int i = 0; i < n; i += TL_LANES) {
-        lane_triangles t;
+        lane_exact t;
+        row_lanes r;
         blend_rows rows;
-        vd no_depth[3];
-        const int end = n - i < TL_LANES ? n - i : TL_LANES;
-        int max_rows = 0;
-        pop(&p->batch, TL_SINK_BLEND, q, i, n, &t, no_depth);
-        for (int k = 0; k < end; k++)
-            max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
-        setup_blend_rows(&t, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, vi_set1((int32_t)b->stride),
-                         &rows);
+        const int end = lanes_at(i, n), max_rows = most_rows(q, i, n);
+        const vi n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
+        load_rows(s, g, TL_SINK_BLEND, q, i, n, TL_FAR_BAND, &t, &r);
+        const vm doubted = find_blend_rows(g, &r.edges, r.sample, n_cols, max_rows, vi_set1(stride), &rows);
+        if (g == TL_FLOAT && __builtin_expect(vm_bits(doubted) & r.live, 0))
+            refine_blend_rows(s, i, &t, n_cols, max_rows, stride, vm_and(doubted, t.live), &rows);
         for (int k = 0; k < end; k++) {
             const int64_t id = q->id[i + k];
-            if (!b->is_flat)
-                begin_gouraud_of_mesh(b, id);
-            else if (!begin_flat(b, id))
+            if ((g == TL_FLOAT && !(r.live >> k & 1)) || (b->is_flat && !begin_flat(b, id)))
                 continue;
+            if (!b->is_flat && g == TL_FIXED)
+                begin_gouraud_of_mesh(b, id);
+            else if (!b->is_flat)
+                begin_exact_gouraud(b, id, -1);
             mix_runs(b, &rows.first[0][k], &rows.n[0][k], TL_MAX_LANES, q->size[i + k] >> 16);
         }
     }
 }
+static __attribute__((noinline)) void flush_blend_fixed(blend_pass *p) { flush_blend_rows(p, TL_FIXED); }
+static __attribute__((noinline)) void flush_blend_float(blend_pass *p) { flush_blend_rows(p, TL_FLOAT); }
+TL_INLINE void flush_blend(blend_pass *p, tl_geometry g)
+{
+    if (g == TL_FIXED)
+        flush_blend_fixed(p);
+    else
+        flush_blend_float(p);
+}
+
+/* A triangle of the list that is drawn, with the name of one of the mesh; TL_FLOAT. */
+static __attribute__((noinline)) void blend_alone_float(blend_pass *p, int64_t drawn, int64_t name)
+{
+    blend_state *b = &p->mix;
+    const int64_t n_whole = b->snapped->n_triangles;
+    if (b->is_flat && !begin_flat(b, name))
+        return;
+    if (!b->is_flat)
+        begin_exact_gouraud(b, name, drawn < n_whole ? -1 : drawn - n_whole);
+    draw_lone(&p->walk, (int32_t)drawn, TL_SINK_BLEND);
+}
 
 /* Setup and cull of TL_LANES triangles, which come after all that wait. */
-TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live)
+TL_INLINE void blend_batch(blend_pass *p, tl_geometry g, const int32_t *corners, vi id, vm live)
 {
-    batch_state *s = &p->batch;
+    walk_state *s = &p->walk;
     lane_batch b;
-    if (!load_batch(s, corners, id, live, &b))
+    if (!load_batch(s, g, TL_SINK_BLEND, corners, id, live, &b))
         return;
-    find_boxes(s, &b);
-    const vi special = vi_set1(s->limits.special_x); /* of a sample it may be the greatest number, not the least */
-    const vm is_special = vm_or(vm_or(vi_eq(b.c.x[0], special), vi_eq(b.c.x[1], special)), vi_eq(b.c.x[2], special));
-    vm drawn = vm_and(b.drawn, has_box(&b)), alone = vm_and(b.alone, vm_or(is_special, has_box(&b)));
+    if (g == TL_FIXED)
+        find_fixed_boxes(s, &b);
+    vm drawn = vm_and(b.drawn, has_box(&b)), alone = b.alone;
+    if (g == TL_FIXED) {
+        const vi special = vi_set1(s->limits.special_x); /* of a sample it may be the greatest number, not the least */
+        const vm is_special =
+            vm_or(vm_or(vi_eq(b.c.x[0], special), vi_eq(b.c.x[1], special)), vi_eq(b.c.x[2], special));
+        alone = vm_and(alone, vm_or(is_special, has_box(&b)));
+    }
     if (TL_LANES == 1) { /* one lane gains nothing from the rows above */
         alone = vm_or(alone, drawn);
         drawn = vm_and_not(drawn, alone);
@@ -93,38 +151,85 @@ TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live
     if (vm_any(alone)) {
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
-        for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1) {
+        for (unsigned lanes = vm_bits(alone); lanes && s->bad_row < 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
             const vm before = vm_first(lane);
-            push(&s->rows, vm_and(drawn, before), b.col, b.row, b.n_cols, b.n_rows, id);
+            push(&s->rows, g, vm_and(drawn, before), &b, id);
             drawn = vm_and_not(drawn, before);
-            flush_blend(p);
-            if (tl_is_given_up(p->mix.window))
+            flush_blend(p, g);
+            if (tl_is_given_up(s->window))
                 return;
-            blend_alone(&p->mix, ids[lane]);
+            if (g == TL_FIXED)
+                blend_alone(&p->mix, ids[lane]);
+            else
+                blend_alone_float(p, ids[lane], ids[lane]);
         }
     }
-    if (vm_any(drawn)) {
-        push(&s->rows, drawn, b.col, b.row, b.n_cols, b.n_rows, id);
-        if (s->rows.n > TL_QUEUE - TL_LANES)
-            flush_blend(p);
-    }
+    if (vm_any(drawn) && push(&s->rows, g, drawn, &b, id))
+        flush_blend(p, g);
 }
 
 /* Every triangle; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
-static int64_t blend_batches(blend_pass *p)
+TL_INLINE void blend_batches(blend_pass *p, tl_geometry g)
 {
-    batch_state *s = &p->batch;
-    const tl_snapped *snapped = s->snapped;
+    walk_state *s = &p->walk;
+    const tl_snapped *snapped = p->mix.snapped;
     const tl_share all = {.first = 0, .end = snapped->n_triangles};
     int32_t corners[3 * TL_LANES];
-    for (int64_t i = 0; i < all.end && s->bad_row < 0 && !tl_is_given_up(p->mix.window); i += TL_LANES) {
-        tl_count_work(p->mix.window, TL_SETUP_PX * TL_LANES);
-        blend_batch(p, share_corners(snapped, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
+    for (int64_t i = 0; i < all.end && s->bad_row < 0 && !tl_is_given_up(s->window); i += TL_LANES) {
+        tl_count_work(s->window, TL_SETUP_PX * TL_LANES);
+        blend_batch(p, g, share_corners(snapped, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
                     vm_first(all.end - i));
     }
-    flush_blend(p);
-    return s->bad_row;
+    flush_blend(p, g);
+}
+
+/* Every triangle by itself, of any method and far away. */
+static void blend_each_fixed(blend_pass *p)
+{
+    const tl_snapped *snapped = p->mix.snapped;
+    const tl_window *window = p->mix.window;
+    p->walk.bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
+    for (int64_t i = 0; p->walk.bad_row < 0 && i < snapped->n_triangles && !tl_is_given_up(window); i++) {
+        tl_count_work(window, TL_SETUP_PX);
+        blend_alone(&p->mix, i);
+    }
+}
+
+/* The same, and in its place the pieces of one that clip planes cut. */
+static void blend_each_float(blend_pass *p)
+{
+    walk_state *s = &p->walk;
+    const tl_snapped *snapped = p->mix.snapped;
+    const tl_exact_pieces *pieces = snapped->mesh.exact->pieces;
+    const int64_t n_pieces = pieces ? pieces->n_pieces : 0;
+    s->bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
+    for (int64_t i = 0, k = 0; i < snapped->n_triangles && s->bad_row < 0 && !tl_is_given_up(s->window); i++) {
+        tl_count_work(s->window, TL_SETUP_PX);
+        blend_alone_float(p, i, i);
+        for (; k < n_pieces && pieces->source[k] == i; k++)
+            blend_alone_float(p, snapped->n_triangles + k, i);
+    }
+}
+
+static void blend_fixed(blend_pass *p)
+{
+    start_fixed(&p->walk, p->mix.snapped, p->mix.window, &p->mix.target);
+    if (p->mix.snapped->method == TL_METHOD_AUTO && is_near(p->mix.window))
+        blend_batches(p, TL_FIXED);
+    else
+        blend_each_fixed(p);
+}
+
+static __attribute__((noinline)) void blend_float(blend_pass *p)
+{
+    const tl_snapped drawn = drawn_mesh(p->mix.snapped);
+    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    start_float(&p->walk, &drawn, p->mix.window, &p->mix.target, &counts);
+    if (drawn.mesh.exact->pieces || p->walk.is_far)
+        blend_each_float(p);
+    else
+        blend_batches(p, TL_FLOAT);
 }
 
 static tl_mix mix_of(const tl_canvas *canvas)
@@ -164,25 +269,17 @@ static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, 
     for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
         pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width,
                 canvas->n_channels, canvas->packed + row * b->stride);
-    int64_t bad_row = -1;
-    if (snapped->mesh.exact) {
-        bad_row = blend_exact(b);
-    } else if (canvas->is_area) {
-        bad_row = blend_areas(b);
-    } else if (snapped->method == TL_METHOD_AUTO && is_near(window)) {
-        start_batch(&p.batch, snapped, window, &b->target);
-        bad_row = blend_batches(&p);
-    } else {
-        bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
-        for (int64_t i = 0; bad_row < 0 && i < snapped->n_triangles && !tl_is_given_up(window); i++) {
-            tl_count_work(window, TL_SETUP_PX);
-            blend_alone(b, i);
-        }
-    }
+    p.walk.bad_row = -1;
+    if (snapped->mesh.exact)
+        blend_float(&p);
+    else if (canvas->is_area)
+        p.walk.bad_row = blend_areas(b);
+    else
+        blend_fixed(&p);
     for (int64_t row = 0; canvas->packed && row < window->height; row++)
         unpack_u8(canvas->packed + row * b->stride, window->width, canvas->n_channels,
                   (uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels);
-    return bad_row;
+    return p.walk.bad_row;
 }
 
 static int64_t blend(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)

@@ -14,7 +14,7 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
-#include "raster/batch.c"
+#include "raster/triangles_fixed.c"
 #include "area/area.c"
 #include "area/ramp.c"
 #include "blend/blend_rows.c"

@@ -11,7 +11,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
-#include "raster/setup.c"
+#include "vertex/setup.c"
 #include "area/area.c"
 #include "area/ramp.c"
 #include "blend/blend_strip.c"

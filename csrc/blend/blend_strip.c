@@ -16,14 +16,14 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
-#include "raster/setup.c"
+#include "vertex/setup.c"
 #include "area/accumulate.c"
 #include "area/area.c"
 #include "area/ramp.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
-#include "blend/mix_few.c"
 #include "blend/mix_f32.c"
+#include "blend/mix_few.c"
 #include "blend/mix_u8.c"
 
 /* The pixels [col, col + TL_LANES) of a row that begins at `at`; of them those in m that the areas say. */

@@ -13,11 +13,11 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
+#include "vertex/setup.c"
 #include "exact/pieces_exact.c"
 #include "exact/sign.c"
+#include "sink/sink.c"
 #include "raster/alone.c"
-#include "raster/setup.c"
-#include "raster/sink.c"
 #include "pixels/paint.c"
 #include "pixels/weights_one.c"
 #include "blend/mix.h"
@@ -132,7 +132,7 @@ static void find_piece(blend_state *b, int64_t x_px, int64_t y_px)
     const tl_vertex_set set = piece_set(p, &b->snapped->mesh);
     resolve_state best = b->resolve;
     double best_weight = -INFINITY;
-    for (int64_t i = first_piece(p, b->id); i < p->n_pieces && p->source[i] == b->id; i++) {
+    for (int64_t i = first_piece(p->source, p->n_pieces, b->id); i < p->n_pieces && p->source[i] == b->id; i++) {
         if (load_triangle(&set, p->triangles + 3 * i, &b->resolve.triangle) == 0)
             continue;
         const tl_triangle *t = &b->resolve.triangle;

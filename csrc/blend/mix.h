@@ -10,8 +10,8 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "raster/batch.c"
-#include "raster/sink.c"
+#include "sink/sink.c"
+#include "raster/state.h"
 #include "area/ramp.c"
 #include "pixels/weights_one.c"
 

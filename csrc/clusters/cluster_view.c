@@ -19,9 +19,9 @@
 #include "clusters.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "clusters/behind.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
+#include "clusters/behind.h"
 
 /* Row i of the matrix over a box: its value at the centre, how far it goes from there, and a bound of its terms. */
 typedef struct {

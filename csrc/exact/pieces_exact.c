@@ -21,20 +21,6 @@ TL_INLINE exact_point piece_point(const tl_exact_pieces *p, int64_t i)
     return (exact_point){p->points[3 * i], p->points[3 * i + 1]};
 }
 
-/* First piece of a triangle, by bisection in the ascending sources. */
-static int64_t first_exact_piece(const tl_exact_pieces *p, int64_t id)
-{
-    int64_t low = 0, high = p ? p->n_pieces : 0;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (p->source[middle] < id)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* The sign of the area of triangle i of the fan from an apex, and about twice the area. */
 static int fan_sign(const tl_exact_pieces *p, int64_t first, int n, int apex, int i, double *area)
 {

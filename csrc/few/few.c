@@ -13,8 +13,8 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
+#include "sink/covered.c"
 #include "raster/alone.c"
-#include "raster/covered.c"
 #include "raster/raster.c"
 #include "few/row_runs.c"
 #include "few/row_spans.c"
@@ -108,6 +108,13 @@ static int64_t draw_few(const tl_snapped *snapped, const tl_window *window, cons
     else
         draw_few_of_samples(snapped, window, target);
     return -1;
+}
+
+/* A mesh of either kind. */
+static int64_t draw_mesh(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+{
+    return draws_few(snapped, window, target, share) ? draw_few(snapped, window, target)
+                                                     : draw(snapped, window, target, share);
 }
 
 #endif

@@ -9,8 +9,8 @@
 #include "topleft.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
+#include "sink/hooks.h"
 #include "raster/alone.c"
-#include "raster/hooks.h"
 
 /* The covered columns [first, end) of a row, none where they are equal. */
 typedef struct {

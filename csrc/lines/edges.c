@@ -15,7 +15,7 @@
 #include "topleft.h"
 #include "vertex/clip.c"
 #include "vertex/project.c"
-#include "raster/setup.c"
+#include "raster/sides.c"
 
 /* The corners in ascending order: the lowest is the lower index of two edges, the middle one of the third. */
 static inline void sort_corners(const int32_t *c, int32_t *sorted)

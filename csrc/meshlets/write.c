@@ -7,8 +7,8 @@
 
 #include "lanes/halves.h"
 #include "lanes/lanes.h"
+#include "sink/fragments.h"
 #include "meshlets/batch.h"
-#include "raster/fragments.h"
 
 #if TL_HAS_HALVES
 

@@ -11,8 +11,8 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
-#include "raster/setup.c"
-#include "raster/sink.c"
+#include "vertex/setup.c"
+#include "sink/sink.c"
 #include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 

@@ -15,7 +15,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "raster/covered.c"
+#include "sink/covered.c"
 
 TL_INLINE uint8_t mean_u8(const uint8_t *values, int sample_bits, const tl_transfer *transfer)
 {

@@ -21,8 +21,8 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/project.c"
+#include "vertex/setup.c"
 #include "exact/sign.c"
-#include "raster/setup.c"
 
 #define TL_SPAN 512 /* pixels of a row that are shaded together */
 #define TL_SPAN_ROOM (TL_SPAN + 2 * TL_MAX_LANES)

@@ -16,7 +16,7 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
-#include "raster/setup.c"
+#include "vertex/setup.c"
 #include "pixels/runs.c"
 #include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"

@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "topleft.h"
+#include "vertex/clip.c"
 #include "exact/pieces_exact.c"
 #include "exact/sign.c"
 
@@ -45,7 +46,9 @@ static int holds(const exact_point *p, exact_point sample)
 /* The piece of a triangle that holds a sample, -1 if none does. */
 static int64_t piece_at(const tl_exact_pieces *pieces, int64_t id, exact_point sample, exact_point *corners)
 {
-    for (int64_t i = first_exact_piece(pieces, id); pieces && i < pieces->n_pieces && pieces->source[i] == id; i++) {
+    const int64_t n = pieces ? pieces->n_pieces : 0;
+    const int32_t *source = pieces ? pieces->source : NULL;
+    for (int64_t i = first_piece(source, n, id); i < n && source[i] == id; i++) {
         for (int k = 0; k < 3; k++)
             corners[k] = piece_point(pieces, pieces->triangles[3 * i + k]);
         if (holds(corners, sample))

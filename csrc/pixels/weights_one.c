@@ -10,8 +10,8 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
+#include "vertex/setup.c"
 #include "exact/sign.c"
-#include "raster/setup.c"
 #include "pixels/weights_exact.c"
 
 /* The triangle (or piece) under the last pixel: neighbours mostly share it. */
@@ -116,7 +116,7 @@ static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id
         return 0;
     const tl_pieces *p = snapped->pieces;
     const tl_vertex_set cut = piece_set(p, &snapped->mesh);
-    for (int64_t i = first_piece(p, id); i < p->n_pieces && p->source[i] == id; i++) {
+    for (int64_t i = first_piece(p->source, p->n_pieces, id); i < p->n_pieces && p->source[i] == id; i++) {
         if (!load_resolved(s, &cut, p->triangles + 3 * i) || !covers(&s->triangle, x_px, y_px, bits))
             continue;
         for (int k = 0; k < 3; k++)

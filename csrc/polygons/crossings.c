@@ -14,10 +14,10 @@
 
 #include <stdint.h>
 
-#include "lanes/lanes.h"
 #include "polygons.h"
-#include "polygons/points.c"
+#include "lanes/lanes.h"
 #include "vertex/fixed.h"
+#include "polygons/points.c"
 
 #define TL_FEW_ROWS \
     6 /* edges of so many rows are walked a vector at a time; longer ones by a vector of rows: 4 and 8 are slower */

@@ -11,8 +11,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "lanes/lanes.h"
 #include "polygons.h"
+#include "lanes/lanes.h"
 #include "polygons/crossings.c"
 #include "polygons/mask.c"
 #include "polygons/row_bits.c"

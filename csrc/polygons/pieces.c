@@ -15,11 +15,11 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "lanes/lanes.h"
 #include "polygons.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
 #include "polygons/points.c"
 #include "polygons/sort_pairs.c"
-#include "vertex/fixed.h"
 
 #define TL_THIN 0x1p-44 /* px of height */
 

@@ -6,9 +6,9 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "lanes/lanes.h"
 #include "polygons.h"
 #include "topleft.h"
+#include "lanes/lanes.h"
 #include "vertex/fixed.h"
 
 /* A coordinate from the window's corner in sub-pixels; 0 when it is not finite or out of range. */

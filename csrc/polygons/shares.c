@@ -11,14 +11,14 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "polygons.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
 #include "area/area.c"
 #include "area/ramp.c"
-#include "lanes/lanes.h"
-#include "polygons.h"
 #include "polygons/crossings.c"
 #include "polygons/pieces.c"
 #include "polygons/points.c"
-#include "topleft.h"
 
 #define TL_WHOLE (1 << TL_AREA_BITS)
 

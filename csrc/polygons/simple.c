@@ -18,12 +18,12 @@
 
 #include <stdint.h>
 
-#include "lanes/lanes.h"
 #include "polygons.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
 #include "polygons/crossings.c"
 #include "polygons/points.c"
 #include "polygons/sort_pairs.c"
-#include "vertex/fixed.h"
 
 /* Edges of a leaf, as tl_certify_words has it: 32 take a fifth off rings of noise, and add a third to contours. */
 #define TL_CHAIN_EDGES 16

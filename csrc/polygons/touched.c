@@ -8,12 +8,12 @@
 
 #include <stdint.h>
 
-#include "lanes/lanes.h"
 #include "polygons.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
 #include "polygons/pieces.c"
 #include "polygons/points.c"
 #include "polygons/row_bits.c"
-#include "vertex/fixed.h"
 
 #define TL_NO_SHARE 0x1p-40 /* of a pixel: what is less is rounding, see pieces.c */
 

@@ -10,9 +10,9 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
-#include "raster/census.c"
-#include "raster/setup.c"
-#include "raster/sink.c"
+#include "vertex/setup.c"
+#include "sink/census.c"
+#include "sink/sink.c"
 
 #define TL_INT int64_t
 #define TL_OP(name) i64_##name

@@ -13,8 +13,8 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
-#include "raster/batch.c"
-#include "raster/setup.c"
+#include "vertex/setup.c"
+#include "raster/triangles_fixed.c"
 
 typedef struct {
     const tl_snapped *snapped;

@@ -1,5 +1,5 @@
 /* Raster: every triangle of a mesh, a vector of them at a time, through setup and cull to the code for its size.
- * In: vertex records and triangles.  Out: the target's buffers. */
+ * In: vertices and triangles.  Out: the target's buffers. */
 #ifndef TL_RASTER_C
 #define TL_RASTER_C
 
@@ -10,19 +10,24 @@
 #include "clusters.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
 #include "vertex/fixed.h"
+#include "vertex/setup.c"
 #include "vertex/snap.c"
 #include "clusters/cluster_view.c"
+#include "sink/census.c"
+#include "sink/covered.c"
+#include "sink/peel.c"
+#include "sink/sink.c"
 #include "raster/alone.c"
-#include "raster/batch.c"
-#include "raster/census.c"
-#include "raster/covered.c"
-#include "raster/peel.c"
+#include "raster/alone_float.c"
+#include "raster/boxes.c"
 #include "raster/rows.c"
 #include "raster/sampled.c"
 #include "raster/sampled_alone.c"
-#include "raster/setup.c"
-#include "raster/sink.c"
+#include "raster/state.h"
+#include "raster/triangles_fixed.c"
+#include "raster/triangles_float.c"
 
 TL_INLINE void draw_one(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
                         tl_sink sink)
@@ -35,8 +40,26 @@ TL_INLINE void draw_one(const tl_snapped *snapped, int64_t i, const tl_window *w
         TL_SINK_CALL(draw_alone, target->sink, snapped, i, window, target)
 }
 
+/* Loads TL_LANES triangles, and finds those that lanes can take, and of TL_FLOAT the boxes.  Returns 0, with the row in
+ * `bad_row`, when an index lies outside the vertices. */
+TL_INLINE int load_batch(walk_state *s, tl_geometry g, tl_sink sink, const int32_t *corners, vi id, vm live,
+                         lane_batch *b)
+{
+    if (has_bad_index(corners, s->limits.last_vertex)) {
+        int32_t ids[TL_MAX_LANES];
+        vi_store(ids, id);
+        s->bad_row = ids[0];
+        return 0;
+    }
+    if (g == TL_FIXED)
+        load_fixed_batch(s, corners, live, b);
+    else
+        load_float_batch(s, sink, corners, live, b);
+    return 1;
+}
+
 /* Lists the triangles that the passes which draw the rest of the picture are to draw, too. */
-TL_INLINE void list_others(const batch_state *s, const lane_batch *b, vi id)
+TL_INLINE void list_others(const walk_state *s, const lane_batch *b, vi id)
 {
     tl_share *share = s->share;
     const batch_limits *limits = &s->limits;
@@ -50,7 +73,7 @@ TL_INLINE void list_others(const batch_state *s, const lane_batch *b, vi id)
 }
 
 /* The lesser side of boxes before the window cut them. */
-TL_INLINE vi shorter_side(const batch_state *s, const lane_batch *b)
+TL_INLINE vi shorter_side(const walk_state *s, const lane_batch *b)
 {
     const int bits = s->window->subpixel_bits;
     const vi first = extent_pixels(b->x_min, s->limits.round.first, bits);
@@ -58,15 +81,17 @@ TL_INLINE vi shorter_side(const batch_state *s, const lane_batch *b)
     return vi_min(vi_sub(end, first), vi_sub(b->bottom, b->top));
 }
 
-/* Leaves to draw_alone what lanes could take but should not. */
-TL_INLINE void take_out(const batch_state *s, tl_sink sink, lane_batch *b)
+/* Leaves to be drawn alone what lanes could take but should not, and to nobody what is turned away for certain. */
+TL_INLINE void take_out(const walk_state *s, tl_geometry g, tl_sink sink, lane_batch *b)
 {
     if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows.c */
         const vm over_small = vm_and(b->drawn, vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX)));
         b->alone = vm_or(b->alone, over_small);
         b->drawn = vm_and_not(b->drawn, over_small);
     }
-    if (sink_has_depth(sink_of(s->target, sink))) {
+    if (g == TL_FLOAT) {
+        drop_turned(s, b);
+    } else if (sink_has_depth(sink_of(s->target, sink))) {
         const vi size = vi_mul(vi_sub(b->x_max, b->x_min), vi_sub(b->y_max, b->y_min)), one = vi_set1(1);
         const vi box = vi_shift_right(vi_sub(size, one), TL_SLIVER_BITS);
         /* box > area * 2^12, as setup_plane */
@@ -76,36 +101,39 @@ TL_INLINE void take_out(const batch_state *s, tl_sink sink, lane_batch *b)
     }
 }
 
-TL_INLINE void draw_each_alone(const batch_state *s, tl_sink sink, vm alone, vi id)
+TL_INLINE void draw_each_alone(walk_state *s, tl_geometry g, tl_sink sink, vm alone, vi id)
 {
     if (!vm_any(alone))
         return;
     int32_t ids[TL_MAX_LANES];
     vi_store(ids, id);
-    for (unsigned lanes = vm_bits(alone); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
-        draw_one(s->snapped, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
+    for (unsigned lanes = vm_bits(alone); lanes && s->bad_row < 0 && !tl_is_given_up(s->window); lanes &= lanes - 1)
+        if (g == TL_FLOAT)
+            draw_one_float(s, ids[__builtin_ctz(lanes)]);
+        else
+            draw_one(s->snapped, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
 }
 
-TL_INLINE void flush_queue_small(batch_state *s, tl_sink sink)
+TL_INLINE void flush_queue_small(walk_state *s, tl_geometry g, tl_sink sink)
 {
     if (sink == TL_SINK_SAMPLES)
         flush_small_of_samples(s);
     else
-        TL_LIST_CALL(flush_small, sink, s)
+        TL_WALK_CALL(flush_small, s, g, sink)
 }
-TL_INLINE void flush_queue_middle(batch_state *s, tl_sink sink)
+TL_INLINE void flush_queue_middle(walk_state *s, tl_geometry g, tl_sink sink)
 {
     if (sink == TL_SINK_SAMPLES)
         flush_middle_of_samples(s);
     else
-        TL_LIST_CALL(flush_middle, sink, s)
+        TL_WALK_CALL(flush_middle, s, g, sink)
 }
-TL_INLINE void flush_queue_rows(batch_state *s, tl_sink sink)
+TL_INLINE void flush_queue_rows(walk_state *s, tl_geometry g, tl_sink sink)
 {
     if (sink == TL_SINK_SAMPLES)
         flush_rows_of_samples(s);
     else
-        TL_LIST_CALL(flush_rows, sink, s)
+        TL_WALK_CALL(flush_rows, s, g, sink)
 }
 
 /* The triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
@@ -123,102 +151,113 @@ TL_INLINE void sort_boxes(const lane_batch *b, vm *boxes)
     boxes[BOX_ROWS] = vm_and(over, beyond);
 }
 
+/* TL_FLOAT: fewer boxes of up to 2x2 samples wait with the small ones. */
+#define TL_FEW_TINY ((TL_LANES + 3) / 4)
+
 /* Tiny boxes at once; others wait until a vector is full of their kind. */
-TL_INLINE void draw_boxes(batch_state *s, tl_sink sink, const lane_batch *b, const vm *boxes, vi id)
+TL_INLINE void draw_boxes(walk_state *s, tl_geometry g, tl_sink sink, lane_batch *b, vm *boxes, vi id)
 {
-    if (vm_any(boxes[BOX_TINY])) {
-        lane_triangles t;
-        vd z[3];
-        place_triangles(s, sink, &b->c, b->col, b->row, &t, z);
-        draw_tiny(s, sink, &t, z, boxes[BOX_TINY], b->n_cols, b->n_rows, names_of(s->snapped, boxes[BOX_TINY], id));
-    }
-    if (vm_any(boxes[BOX_SMALL])) {
-        push(&s->small, boxes[BOX_SMALL], b->col, b->row, b->n_cols, b->n_rows, id);
-        if (s->small.n > TL_QUEUE - TL_LANES)
-            flush_queue_small(s, sink);
-    }
-    if (vm_any(boxes[BOX_MIDDLE])) {
-        push(&s->middle, boxes[BOX_MIDDLE], b->col, b->row, b->n_cols, b->n_rows, id);
-        if (s->middle.n > TL_QUEUE - TL_LANES)
-            flush_queue_middle(s, sink);
-    }
-    if (vm_any(boxes[BOX_ROWS])) {
-        push(&s->rows, boxes[BOX_ROWS], b->col, b->row, b->n_cols, b->n_rows, id);
-        if (s->rows.n > TL_QUEUE - TL_LANES)
-            flush_queue_rows(s, sink);
-    }
+    const vm tiny = boxes[BOX_TINY];
+    if (g == TL_FLOAT && __builtin_popcount(vm_bits(tiny)) < TL_FEW_TINY)
+        boxes[BOX_SMALL] = vm_or(boxes[BOX_SMALL], tiny);
+    else if (g == TL_FLOAT)
+        draw_tiny_float(s, sink, b, tiny, id);
+    else if (vm_any(tiny) && sink == TL_SINK_SAMPLES)
+        draw_tiny_of_samples(s, b, tiny);
+    else if (vm_any(tiny))
+        draw_tiny_fixed(s, sink, b, tiny, id);
+    if (vm_any(boxes[BOX_SMALL]) && push(&s->small, g, boxes[BOX_SMALL], b, id))
+        flush_queue_small(s, g, sink);
+    if (vm_any(boxes[BOX_MIDDLE]) && push(&s->middle, g, boxes[BOX_MIDDLE], b, id))
+        flush_queue_middle(s, g, sink);
+    if (vm_any(boxes[BOX_ROWS]) && push(&s->rows, g, boxes[BOX_ROWS], b, id))
+        flush_queue_rows(s, g, sink);
 }
 
 /* Setup and cull of TL_LANES triangles, and each to the code for its size. */
-TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
+TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
     lane_batch b;
     vm boxes[N_BOXES];
-    if (!load_batch(s, corners, id, live, &b))
+    if (!load_batch(s, g, sink, corners, id, live, &b))
         return;
-    count_faceless(s->target, sink, vm_and_not(vm_and_not(live, b.alone), b.drawn), b.area);
-    if (!vm_any(vm_or(b.drawn, b.alone)))
-        return;
-    find_boxes(s, &b);
+    if (g == TL_FIXED) {
+        count_faceless(s->target, sink, vm_and_not(vm_and_not(live, b.alone), b.drawn), b.area);
+        if (!vm_any(vm_or(b.drawn, b.alone)))
+            return;
+        find_fixed_boxes(s, &b);
+    }
     if (s->share->others && !s->share->clusters)
         list_others(s, &b, id);
-    count_unseen(s->target, sink, vm_and_not(b.drawn, has_box(&b)), shorter_side(s, &b));
+    if (g == TL_FIXED)
+        count_unseen(s->target, sink, vm_and_not(b.drawn, has_box(&b)), shorter_side(s, &b));
     b.drawn = vm_and(b.drawn, has_box(&b));
-    take_out(s, sink, &b);
-    draw_each_alone(s, sink, b.alone, id);
+    take_out(s, g, sink, &b);
+    draw_each_alone(s, g, sink, b.alone, id);
     if (!vm_any(b.drawn))
         return;
     sort_boxes(&b, boxes);
     if (sink == TL_SINK_CENSUS)
         count_boxes(s->target->census, boxes, b.n_cols, b.n_rows, b.absolute, s->window->subpixel_bits);
     else
-        draw_boxes(s, sink, &b, boxes, id);
+        draw_boxes(s, g, sink, &b, boxes, id);
 }
 
-TL_INLINE void flush_queues(batch_state *s, tl_sink sink)
+/* The triangles of a share, or of a cluster. */
+TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const tl_share *part)
 {
+    const void *vertices = g == TL_FIXED ? (const void *)s->snapped->mesh.vertices : (const void *)s->points->points;
+    const size_t n_bytes = g == TL_FIXED ? sizeof(tl_vertex) : (size_t)s->points->stride * sizeof(double);
+    const tl_snapped *snapped = s->snapped;
+    int32_t corners[3 * TL_LANES];
+    int is_given_up = 0;
+    for (int64_t i = part->first; i < part->end && s->bad_row < 0 && !is_given_up; i += TL_LANES) {
+        tl_count_work(s->window, TL_SETUP_PX * TL_LANES);
+        is_given_up = tl_is_given_up(s->window);
+        const vm live = vm_first(part->end - i);
+        const vi id = part->ids ? vi_load_masked(live, part->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
+        if (TL_LANES > 1 && !part->ids && !part->clusters && i + 5 * TL_LANES <= part->end)
+            fetch_rows(vertices, n_bytes, snapped->triangles + 3 * (i + 4 * TL_LANES));
+        if (TL_LANES > 1 && g == TL_FIXED && part->ids && i + 9 * TL_LANES <= part->end)
+            fetch_listed(vertices, n_bytes, snapped->triangles, part->ids + i);
+        draw_batch(s, g, sink, share_corners(snapped, part, i, corners), id, live);
+        if (g == TL_FLOAT && __builtin_expect(s->n_slivers > 0, 0))
+            draw_slivers(s);
+    }
     if (sink == TL_SINK_CENSUS)
         return; /* nothing waits */
-    flush_queue_small(s, sink);
-    flush_queue_middle(s, sink);
-    flush_queue_rows(s, sink);
+    flush_queue_small(s, g, sink);
+    flush_queue_middle(s, g, sink);
+    flush_queue_rows(s, g, sink);
 }
 
-/* As start_batch, but for squares and several samples, and for the shares of a picture. */
-TL_INLINE void start_share(batch_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+/* As start_fixed, but for squares and several samples, and for the shares of a picture. */
+TL_INLINE void start_share(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                            tl_share *share, tl_sink sink)
 {
     const int bits = window->subpixel_bits, of_samples = sink_of(target, sink) == TL_SINK_SAMPLES;
     const int32_t reach = of_samples ? sample_reach(target) : 0;
     const extent_rounding round = round_extent(window);
-    batch_limits *limits = &s->limits;
-    start_batch(s, snapped, window, target);
-    s->share = share;
-    memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
-    limits->round = (extent_rounding){round.first - reach, round.end + reach};
+    start_fixed(s, snapped, window, target);
+    set_share(s, share);
+    s->limits.round = (extent_rounding){round.first - reach, round.end + reach};
     if (window->test != TL_TEST_SAMPLE || of_samples)
-        limits->max_extent = (TL_MAX_BOX_PX - 2) << (bits < 8 ? bits : 8);
-    if (share->clusters) {
-        limits->last_vertex = vi_set1(TL_CLUSTER - 1);
-    } else if (share->others) {
-        limits->picture_top = (int32_t)share->picture->y_px;
-        limits->picture_bottom = (int32_t)min64(share->picture->y_px + share->picture->height, (int64_t)1 << 30);
-    }
+        s->limits.max_extent = (TL_MAX_BOX_PX - 2) << (bits < 8 ? bits : 8);
+    if (share->clusters)
+        s->limits.last_vertex = vi_set1(TL_CLUSTER - 1);
 }
 
 /* Every triangle of a share; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
 TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                             tl_share *share, int64_t *bad_row, tl_sink sink)
 {
-    batch_state s;
+    walk_state s;
     start_share(&s, snapped, window, target, share, sink);
     tl_cluster_pass *clusters = share->clusters;
     cluster_mesh cluster;
     tl_share part = *share;
-    int32_t corners[3 * TL_LANES];
     const int64_t n_parts = clusters ? list_clusters(clusters, window, target) : 1;
-    int is_given_up = 0;
-    for (int64_t next = 0; next < n_parts && !is_given_up; next++) {
+    for (int64_t next = 0; next < n_parts && !(next && tl_is_given_up(window)); next++) {
         if (clusters) {
             const tl_cluster *c = clusters->mesh->clusters + clusters->list[next];
             if (clusters->may_be_hidden && is_cluster_hidden(c, clusters->seen, window, target))
@@ -227,18 +266,7 @@ TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, 
             clusters->n_drawn++;
             s.snapped = &cluster.snapped;
         }
-        for (int64_t i = part.first; i < part.end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
-            tl_count_work(window, TL_SETUP_PX * TL_LANES);
-            is_given_up = tl_is_given_up(window);
-            const vm live = vm_first(part.end - i);
-            const vi id = part.ids ? vi_load_masked(live, part.ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
-            if (TL_LANES > 1 && !part.ids && !clusters && i + 5 * TL_LANES <= part.end)
-                fetch_rows(snapped->mesh.vertices, sizeof(tl_vertex), snapped->triangles + 3 * (i + 4 * TL_LANES));
-            if (TL_LANES > 1 && part.ids && i + 9 * TL_LANES <= part.end)
-                fetch_listed(snapped->mesh.vertices, sizeof(tl_vertex), snapped->triangles, part.ids + i);
-            draw_batch(&s, sink, share_corners(s.snapped, &part, i, corners), id, live);
-        }
-        flush_queues(&s, sink);
+        draw_triangles(&s, TL_FIXED, sink, &part);
     }
     if (sink != TL_SINK_CENSUS)
         flush_fragments(target, &s.fragments, s.fragments.n);
@@ -318,9 +346,84 @@ static void clear(const tl_window *window, const tl_target *target)
         clear_depth(target->bounds, tl_segments(target->stride_px) * window->height, farthest);
 }
 
+/* The pieces of listed triangles. */
+static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t n_whole, const tl_share *share)
+{
+    const tl_exact_pieces *pieces = s->snapped->mesh.exact->pieces;
+    for (int64_t i = share->first; i < share->end; i++) {
+        int64_t k = first_piece(pieces->source, pieces->n_pieces, share->ids[i]);
+        for (; k < pieces->n_pieces && pieces->source[k] == share->ids[i]; k++) {
+            if (s->bad_row >= 0 || tl_is_given_up(s->window))
+                return;
+            draw_one_float(s, (int32_t)(n_whole + k));
+        }
+    }
+}
+
+/* Every triangle of a share whose vertices are not snapped; from n_whole on they are pieces. */
+TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
+                           tl_share *share, tl_exact_counts *counts, int64_t *bad_row, tl_sink sink)
+{
+    const int counts_pieces = target->sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
+    walk_state s;
+    tl_share part = *share;
+    start_float(&s, mesh, window, target, counts);
+    set_share(&s, share);
+    part.end = counts_pieces ? min64(share->end, n_whole) : share->end;
+    draw_triangles(&s, TL_FLOAT, sink, &part);
+    draw_slivers(&s);
+    if (share->ids && mesh->mesh.exact->pieces)
+        draw_listed_pieces(&s, n_whole, share);
+    flush_fragments(target, &s.fragments, s.fragments.n);
+    if (counts_pieces && s.bad_row < 0)
+        count_pieces(&s, max64(share->first, n_whole), share->end);
+    *bad_row = s.bad_row;
+}
+
+TL_LIST_COPIES(draw_floats,
+               (const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
+                tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
+               mesh, n_whole, window, target, share, counts, bad_row)
+
+/* The mesh with the triangles that are drawn: without those that planes cut, with the pieces behind the others. */
+static tl_snapped drawn_mesh(const tl_snapped *snapped)
+{
+    const tl_exact_points *points = snapped->mesh.exact;
+    tl_snapped drawn = *snapped;
+    drawn.triangles = points->triangles, drawn.n_triangles = points->n_triangles;
+    drawn.mesh.n_vertices = points->n_points;
+    drawn.names = points->names ? points->names : snapped->names; /* pieces are of clip space, where none are given */
+    return drawn;
+}
+
+static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, const tl_target *part, tl_share *share)
+{
+    const tl_snapped drawn = drawn_mesh(snapped);
+    const int has_all = !share->ids && share->end == snapped->n_triangles;
+    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    tl_share own = *share;
+    int64_t bad_row = -1;
+    own.end = has_all ? drawn.n_triangles : share->end;
+    if (own.first < own.end)
+        TL_LIST_CALL(draw_floats, part->sink, &drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row)
+    share->n_others = own.n_others;
+    if (share->counts) {
+        share->counts->n_triangles += counts.n_triangles;
+        share->counts->n_on_grid += counts.n_on_grid;
+        share->counts->n_asked += counts.n_asked;
+        share->counts->n_turns += counts.n_turns;
+        share->counts->n_expansions += counts.n_expansions;
+        share->counts->n_integers += counts.n_integers;
+    }
+    return bad_row;
+}
+
+/* A band of less than 2^31 pixels. */
 static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
 {
     int64_t bad_row = -1;
+    if (snapped->mesh.exact)
+        return draw_exact(snapped, window, target, share);
     if (share->first >= share->end && !share->clusters)
         return bad_row;
     if (target->sink == TL_SINK_SAMPLES)
@@ -330,10 +433,8 @@ static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, con
     return bad_row;
 }
 
-/* Clears bands of less than 2^31 pixels, has `draw_band` draw them, and finishes them. */
-typedef int64_t draw_of_band(const tl_snapped *snapped, const tl_window *band, const tl_target *part, tl_share *share);
-static int64_t draw_bands_of(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
-                             tl_share *share, draw_of_band *draw_band)
+/* Clears bands of less than 2^31 pixels, draws and finishes them. */
+static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
@@ -350,7 +451,7 @@ static int64_t draw_bands_of(const tl_snapped *snapped, const tl_window *window,
         part.bounds = target->bounds ? target->bounds + row * tl_segments(target->stride_px) : NULL;
         if (share->is_first)
             clear(&band, &part);
-        const int64_t bad_row = draw_band(snapped, &band, &part, share);
+        const int64_t bad_row = draw_part(snapped, &band, &part, share);
         if (bad_row >= 0)
             return bad_row;
         if (target->sink == TL_SINK_MASK && share->is_last)

@@ -1,11 +1,16 @@
 /* Rows: triangles with boxes of 5 to 62 samples a side, by the ends of TL_LANES rows at a time.
- * In: the queue of batch.c.  Out: rows of samples to the sink.
+ * In: queues of boxes.  Out: rows of samples to the sink.
  *
- * An edge ends a row at floor(v / d), v = E' at the row's first sample, d = |dy|.  It is computed in float32 as
- * floor((v + 0.5) * (1 / d)), exactly: v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less
- * than 64 * 2^-22 = 2^-16, while (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to
- * the box swallows the error.  Squares (batch.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly,
- * half included. */
+ * An edge ends a row at floor(q), q = v / d, d = |dy|: samples up to floor(q) lie inside a right edge, samples from
+ * -floor(q) on inside a left one.
+ *
+ * TL_FIXED: v = E' at the row's first sample.  It is computed in float32 as floor((v + 0.5) * (1 / d)), exactly:
+ * v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than 64 * 2^-22 = 2^-16, while
+ * (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to the box swallows the error.
+ * Squares (triangles_fixed.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included.
+ *
+ * TL_FLOAT: v = E there, rounded.  Where q is nearer to an integer than the band says (triangles_float.c), that one
+ * column is in doubt, and refine.c decides. */
 #ifndef TL_ROWS_C
 #define TL_ROWS_C
 
@@ -13,11 +18,13 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "sink/covered.c"
+#include "sink/sink.c"
 #include "raster/alone.c"
-#include "raster/batch.c"
-#include "raster/covered.c"
-#include "raster/hooks.h"
-#include "raster/sink.c"
+#include "raster/refine.c"
+#include "raster/state.h"
+#include "raster/triangles_fixed.c"
+#include "raster/triangles_float.c"
 
 /* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on
  * either side or horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
@@ -29,23 +36,32 @@ typedef struct {
 /* These edges. */
 typedef struct {
     vf start[3], step[3], inverse[3]; /* left, right, third */
+    vf band[3], row;                  /* TL_FLOAT: in columns; the row that is next */
     vm third_is_left, third_is_right;
 } lane_edges;
 
-/* The same in memory, with the depth planes. */
+/* TL_LANES triangles of a queue. */
+typedef struct {
+    lane_edges edges;
+    lane_planes planes; /* where the sink has depth */
+    vi sample;          /* the first sample: row * stride_px + column */
+    unsigned live;
+} row_lanes;
+
+/* The same in memory. */
 typedef struct {
     float start[3][TL_MAX_LANES], step[3][TL_MAX_LANES], inverse[3][TL_MAX_LANES]; /* left, right, third */
     int32_t third_is_left[TL_MAX_LANES], third_is_right[TL_MAX_LANES];             /* 0 or -1 */
     double z0[TL_MAX_LANES], slope_x[TL_MAX_LANES], slope_y[TL_MAX_LANES], x[TL_MAX_LANES], y[TL_MAX_LANES];
+    int32_t sample[TL_MAX_LANES];
+    float band[3][TL_MAX_LANES];
+    double x0[TL_MAX_LANES], y0[TL_MAX_LANES];
 } row_edges;
 
-TL_INLINE lane_sides find_sides(const lane_triangles *t)
+/* ---- edges ----------------------------------------------------------------------------------------------- */
+
+TL_INLINE lane_sides sides_of(const vm *left, const vm *right)
 {
-    vm left[3], right[3];
-    for (int k = 0; k < 3; k++) {
-        left[k] = vi_gt(vi_set1(0), t->dy[k]);
-        right[k] = vi_gt(t->dy[k], vi_set1(0));
-    }
     const vm third0 = vm_and_not(vm_and_not(vm_all(), left[0]), right[0]);
     const vm taken1 = vm_or(vm_and_not(left[1], left[0]), vm_and_not(right[1], right[0]));
     const vm third1 = vm_and_not(vm_and_not(vm_all(), taken1), third0);
@@ -58,7 +74,33 @@ TL_INLINE lane_sides find_sides(const lane_triangles *t)
     };
 }
 
-TL_INLINE void sort_edges(const lane_triangles *t, lane_edges *r)
+TL_INLINE lane_sides find_sides(const lane_triangles *t)
+{
+    vm left[3], right[3];
+    for (int k = 0; k < 3; k++) {
+        left[k] = vi_gt(vi_set1(0), t->dy[k]);
+        right[k] = vi_gt(t->dy[k], vi_set1(0));
+    }
+    return sides_of(left, right);
+}
+
+TL_INLINE void pick_edges(const lane_sides *sides, const vf *edges, vf *picked)
+{
+    for (int side = 0; side < 3; side++)
+        picked[side] = vf_select(sides->is0[side], edges[0], vf_select(sides->is1[side], edges[1], edges[2]));
+}
+
+/* band: of TL_FLOAT */
+TL_INLINE void sort_edges(tl_geometry g, const lane_sides *sides, const vf *start, const vf *step, const vf *inverse,
+                          const vf *band, lane_edges *r)
+{
+    pick_edges(sides, start, r->start), pick_edges(sides, step, r->step), pick_edges(sides, inverse, r->inverse);
+    r->third_is_left = sides->third_is_left, r->third_is_right = sides->third_is_right;
+    if (g == TL_FLOAT)
+        pick_edges(sides, band, r->band), r->row = vf_set1(0.0f);
+}
+
+TL_INLINE void sort_fixed_edges(const lane_triangles *t, lane_edges *r)
 {
     const lane_sides sides = find_sides(t);
     vf start[3], step[3], inverse[3];
@@ -69,34 +111,128 @@ TL_INLINE void sort_edges(const lane_triangles *t, lane_edges *r)
         inverse[k] =
             vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_max(t->dy[k], vi_sub(vi_set1(0), t->dy[k])), vi_set1(1))));
     }
-    for (int side = 0; side < 3; side++) {
-        const vm is0 = sides.is0[side], is1 = sides.is1[side];
-        r->start[side] = vf_select(is0, start[0], vf_select(is1, start[1], start[2]));
-        r->step[side] = vf_select(is0, step[0], vf_select(is1, step[1], step[2]));
-        r->inverse[side] = vf_select(is0, inverse[0], vf_select(is1, inverse[1], inverse[2]));
-    }
-    r->third_is_left = sides.third_is_left;
-    r->third_is_right = sides.third_is_right;
+    sort_edges(TL_FIXED, &sides, start, step, inverse, NULL, r);
 }
 
-TL_INLINE void store_edges(const lane_edges *e, row_edges *r)
+TL_INLINE void sort_float_edges(const walk_state *s, const lane_exact *t, float far, lane_edges *r)
+{
+    const vf zero = vf_set1(0.0f);
+    vf inverse[3], band[3];
+    vm left[3], right[3];
+    set_bands(s, t, far, inverse, band);
+    for (int k = 0; k < 3; k++)
+        left[k] = vf_lt(t->dy[k], zero), right[k] = vf_lt(zero, t->dy[k]);
+    const lane_sides sides = sides_of(left, right);
+    sort_edges(TL_FLOAT, &sides, t->e, t->dx, inverse, band, r);
+}
+
+/* The triangles [i, i + TL_LANES) of a queue of n, whose rows end up to 17 or 62 columns away, as `far` says.  t: of
+ * TL_FLOAT, for what is refined. */
+TL_INLINE void load_rows(walk_state *s, tl_geometry g, tl_sink sink, const box_queue *q, int i, int n, float far,
+                         lane_exact *t, row_lanes *r)
+{
+    if (g == TL_FIXED) {
+        lane_triangles own;
+        vd z[3];
+        pop_fixed(s, sink, q, i, n, &own, z);
+        sort_fixed_edges(&own, &r->edges);
+        r->sample = own.sample, r->live = (1u << lanes_at(i, n)) - 1;
+        if (sink_has_depth(sink))
+            r->planes = plane_lanes(&own, z);
+        return;
+    }
+    pop_float(s, sink, q, i, n, t);
+    setup_float(s, sink, t, 0);
+    sort_float_edges(s, t, far, &r->edges);
+    r->sample = t->sample, r->live = vm_bits(t->live);
+    if (sink_has_depth(sink))
+        r->planes = plane_of_lanes(s, t);
+}
+
+TL_INLINE void store_edges(tl_geometry g, tl_sink sink, const row_lanes *lanes, row_edges *r)
 {
     const vi zero = vi_set1(0), yes = vi_set1(-1);
+    const lane_edges *e = &lanes->edges;
+    const lane_planes *p = &lanes->planes;
     for (int side = 0; side < 3; side++) {
         vf_store(r->start[side], e->start[side]);
         vf_store(r->step[side], e->step[side]);
         vf_store(r->inverse[side], e->inverse[side]);
+        if (g == TL_FLOAT)
+            vf_store(r->band[side], e->band[side]);
     }
     vi_store(r->third_is_left, vi_select(e->third_is_left, yes, zero));
     vi_store(r->third_is_right, vi_select(e->third_is_right, yes, zero));
+    vi_store(r->sample, lanes->sample);
+    if (!sink_has_depth(sink))
+        return;
+    vd_store(r->z0, p->z0), vd_store(r->slope_x, p->slope_x), vd_store(r->slope_y, p->slope_y);
+    vd_store(r->x, p->x), vd_store(r->y, p->y);
+    if (g == TL_FLOAT)
+        vd_store(r->x0, p->x0), vd_store(r->y0, p->y0);
 }
 
-/* floor(v / d) for TL_LANES rows. */
-TL_INLINE vi row_quotients(const row_edges *r, int side, int i, vf rows)
+/* ---- row ends -------------------------------------------------------------------------------------------- */
+
+/* Whether the end of a row lies in the band. */
+TL_INLINE vm is_near_integer(vf q, vf band)
 {
-    const vf v = vf_add(vf_set1(r->start[side][i]), vf_mul(vf_set1(r->step[side][i]), rows));
-    return vi_floor(vf_mul(v, vf_set1(r->inverse[side][i])));
+    const vf off = vf_off_integer(q);
+    return vf_ge(band, vf_max(off, vf_sub(vf_set1(0.0f), off)));
 }
+
+/* The last samples inside left edges, counted to the left, and inside right ones, from quotients of three edges. */
+TL_INLINE void meet_third(const vi *quotient, vm third_is_left, vm third_is_right, vi *left, vi *right)
+{
+    /* no branch: which side the third edge is on cannot be predicted */
+    *left = vi_select(third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
+    *right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
+}
+
+/* The samples from `begin` on, up to `end`, of the row of each triangle that its edges are at; goes on to the next
+ * row.  Adds to *doubted the lanes with an end in doubt. */
+TL_INLINE void next_row(tl_geometry g, lane_edges *e, vi n_cols, vi *begin, vi *end, vm *doubted)
+{
+    const vi zero = vi_set1(0), one = vi_set1(1);
+    vi quotient[3], left, right;
+    for (int side = 0; side < 3; side++) {
+        if (g == TL_FIXED) {
+            quotient[side] = vi_floor(vf_mul(e->start[side], e->inverse[side]));
+            e->start[side] = vf_add(e->start[side], e->step[side]);
+            continue;
+        }
+        const vf q = vf_mul(vf_fma(e->step[side], e->row, e->start[side]), e->inverse[side]);
+        quotient[side] = vi_floor(q);
+        *doubted = vm_or(*doubted, is_near_integer(q, e->band[side]));
+    }
+    if (g == TL_FLOAT)
+        e->row = vf_add(e->row, vf_set1(1.0f));
+    meet_third(quotient, e->third_is_left, e->third_is_right, &left, &right);
+    *begin = vi_max(vi_sub(zero, left), zero), *end = vi_min(vi_add(right, one), n_cols);
+}
+
+/* The same of TL_LANES rows of triangle k, from row0 on. */
+TL_INLINE void find_rows_of_one(tl_geometry g, const row_edges *r, int k, vm third_is_left, vm third_is_right, int row0,
+                                int n_cols, vi *first, vi *end, vm *doubted)
+{
+    const vi zero = vi_set1(0), one = vi_set1(1);
+    const vf rows = vf_from_vi(vi_add(vi_iota(), vi_set1(row0)));
+    vi quotient[3], left, right;
+    for (int side = 0; side < 3; side++) {
+        const vf start = vf_set1(r->start[side][k]), step = vf_set1(r->step[side][k]);
+        const vf v = g == TL_FIXED ? vf_add(start, vf_mul(step, rows)) : vf_fma(step, rows, start);
+        const vf q = vf_mul(v, vf_set1(r->inverse[side][k]));
+        quotient[side] = vi_floor(q);
+        if (g == TL_FLOAT)
+            *doubted = vm_or(*doubted, is_near_integer(q, vf_set1(r->band[side][k])));
+    }
+    meet_third(quotient, third_is_left, third_is_right, &left, &right);
+    *first = vi_sub(zero, left), *end = vi_add(right, one);
+    if (g == TL_FLOAT) /* quotients of level edges are of any size */
+        *first = vi_max(*first, zero), *end = vi_min(*end, vi_set1(n_cols));
+}
+
+/* ---- boxes of up to 16 rows and TL_LANES columns --------------------------------------------------------- */
 
 /* Rows of a block of at most TL_LANES columns; the depth of a sample is the sum of its row's and its column's. */
 TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row,
@@ -124,64 +260,6 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
     }
 }
 
-/* One triangle of the queue, in blocks of TL_LANES x TL_LANES samples. */
-TL_INLINE void draw_rows(const batch_state *s, const tl_target *target, tl_sink sink, const row_edges *r, int i,
-                         int32_t sample, int32_t size, int32_t id)
-{
-    const double unit2 = (double)(2 << s->window->subpixel_bits);
-    const int n_cols = size & 0xffff, n_rows = size >> 16;
-    const vi zero = vi_set1(0);
-    const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[i]));
-    const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[i]));
-    int32_t bits[TL_MAX_LANES];
-    double z_row[TL_MAX_LANES];
-    const vd steps = ramp(unit2);
-    for (int row0 = 0; row0 < n_rows; row0 += TL_LANES) {
-        const int64_t at = (uint32_t)sample + row0 * target->stride_px;
-        const vf rows = vf_from_vi(vi_add(vi_iota(), vi_set1(row0)));
-        vi left = row_quotients(r, 0, i, rows), right = row_quotients(r, 1, i, rows);
-        const vi third = row_quotients(r, 2, i, rows);
-        /* no branch: which side the third edge is on cannot be predicted */
-        left = vi_select(third_is_left, vi_min(left, third), left);
-        right = vi_select(third_is_right, vi_min(right, third), right);
-        const vi first = vi_sub(zero, left), end = vi_select(vm_first(n_rows - row0), vi_add(right, vi_set1(1)), zero);
-        if (sink_has_depth(sink)) {
-            const vd ys = vd_add(vd_set1(r->y[i] + row0 * unit2), steps);
-            vd_store(z_row, vd_add(vd_set1(r->z0[i]), vd_mul(vd_set1(r->slope_y[i]), ys)));
-        }
-        for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
-            const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
-            const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
-                                              vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
-            const unsigned drawn = vm_bits(vi_gt(in_block, zero));
-            if (!drawn)
-                continue;
-            const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            vd z_col = vd_set1(0);
-            if (sink_has_depth(sink))
-                z_col = vd_mul(vd_set1(r->slope_x[i]), vd_add(vd_set1(r->x[i] + col0 * unit2), steps));
-            vi_store(bits, in_block);
-            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
-                       width <= TL_HALF_LANES, z_col, id);
-        }
-    }
-}
-
-/* The samples from `begin` on, up to `end`, of the row of each triangle that its edges are at; goes on to the next
- * row. */
-TL_INLINE void next_row(lane_edges *e, vi n_cols, vi *begin, vi *end)
-{
-    const vi zero = vi_set1(0), one = vi_set1(1);
-    vi quotient[3];
-    for (int side = 0; side < 3; side++) {
-        quotient[side] = vi_floor(vf_mul(e->start[side], e->inverse[side]));
-        e->start[side] = vf_add(e->start[side], e->step[side]);
-    }
-    const vi left = vi_select(e->third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-    const vi right = vi_select(e->third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-    *begin = vi_max(vi_sub(zero, left), zero), *end = vi_min(vi_add(right, one), n_cols);
-}
-
 /* The rows of TL_LANES triangles: of each its covered samples, a bit each, and its depth at column 0.  Column k adds
  * slope_x * ((x + k * step) - x0). */
 typedef struct {
@@ -190,27 +268,6 @@ typedef struct {
     int32_t sample[TL_MAX_LANES];
     double slope_x[TL_MAX_LANES], x[TL_MAX_LANES], x0[TL_MAX_LANES], step;
 } middle_rows;
-
-TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_planes *p, vi n_cols, int n_rows,
-                            double unit2, middle_rows *m)
-{
-    const vi zero = vi_set1(0);
-    const vd step = vd_set1(unit2);
-    lane_edges e;
-    sort_edges(t, &e);
-    vd y;
-    if (sink_has_depth(sink))
-        y = p->y;
-    for (int row = 0; row < n_rows; row++) {
-        vi begin, end;
-        next_row(&e, n_cols, &begin, &end);
-        vi_store(m->bits[row], vi_bit_ranges(begin, vi_max(end, zero)));
-        if (sink_has_depth(sink)) {
-            vd_store(m->z[row], vd_add(p->z0, vd_mul(p->slope_y, y)));
-            y = vd_add(y, step);
-        }
-    }
-}
 
 /* Draws the triangles in `live` of those at i in a queue. */
 TL_INLINE void draw_middle(const tl_snapped *snapped, const tl_target *shared, const box_queue *q, int i, unsigned live,
@@ -235,76 +292,149 @@ TL_SINK_COPIES(draw_middle,
                 const middle_rows *m),
                snapped, shared, q, i, live, m)
 
-TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
+/* Sets the rows of TL_LANES triangles; returns the lanes with a row end in doubt. */
+TL_INLINE vm find_middle_rows(tl_geometry g, tl_sink sink, row_lanes *r, vi n_cols, int n_rows, double step,
+                              middle_rows *m)
 {
-    const double unit2 = (double)(2 << s->window->subpixel_bits);
+    const vi zero = vi_set1(0);
+    const lane_planes *p = &r->planes;
+    vm doubted = vm_first(0);
+    vi_store(m->sample, r->sample);
+    if (sink_has_depth(sink)) {
+        vd_store(m->slope_x, p->slope_x), vd_store(m->x, p->x), vd_store(m->x0, p->x0);
+        m->step = step;
+        vd y = p->y;
+        for (int row = 0; row < n_rows; row++, y = vd_add(y, vd_set1(step)))
+            vd_store(m->z[row], vd_add(p->z0, vd_mul(p->slope_y, g == TL_FIXED ? y : vd_sub(y, p->y0))));
+    }
+    for (int row = 0; row < n_rows; row++) {
+        vi begin, end;
+        next_row(g, &r->edges, n_cols, &begin, &end, &doubted);
+        vi_store(m->bits[row], vi_bit_ranges(begin, vi_max(end, zero)));
+    }
+    return doubted;
+}
+
+TL_INLINE void flush_middle(walk_state *s, tl_geometry g, tl_sink sink)
+{
     box_queue *q = &s->middle;
+    const double step = plane_step(s, g);
     const int n = q->n;
     q->n = 0;
     for (int i = 0; i < n; i += TL_LANES) {
-        lane_triangles t;
-        lane_planes p;
+        lane_exact t;
+        row_lanes r;
         middle_rows m;
-        vd z[3];
-        const int end = n - i < TL_LANES ? n - i : TL_LANES;
-        int max_rows = 0;
-        pop(s, sink, q, i, n, &t, z);
-        vi_store(m.sample, t.sample);
-        if (sink_has_depth(sink)) {
-            p = plane_lanes(&t, z);
-            vd_store(m.slope_x, p.slope_x), vd_store(m.x, p.x), vd_store(m.x0, vd_set1(0.0));
-            m.step = unit2;
+        load_rows(s, g, sink, q, i, n, TL_NEAR_BAND, &t, &r);
+        const int max_rows = most_rows(q, i, n);
+        const vi n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
+        const vm doubted = find_middle_rows(g, sink, &r, n_cols, max_rows, step, &m);
+        if (g == TL_FLOAT && __builtin_expect(vm_bits(doubted) & r.live, 0))
+            refine_middle_rows(s, q, i, &t, vm_and(doubted, t.live), max_rows, m.bits);
+        TL_SINK_CALL(draw_middle, s->target->sink, s->snapped, s->target, q, i, r.live, &m)
+    }
+}
+TL_WALK_COPIES(flush_middle)
+
+/* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
+
+/* Triangle k of those at i in the queue, in blocks of TL_LANES x TL_LANES samples.  With an int for k, gcc spills a
+ * register more of the mask's copy: 3 % of its time on AVX-512. */
+TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
+                         const lane_exact *t, int i, int64_t k)
+{
+    const double unit = plane_step(s, g);
+    const box_queue *q = &s->rows;
+    const int32_t size = q->size[i + k], id = name_of(s->snapped, q->id[i + k]), sample = r->sample[k];
+    const int n_cols = size & 0xffff, n_rows = size >> 16;
+    const vi zero = vi_set1(0);
+    const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[k]));
+    const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[k]));
+    int32_t bits[TL_MAX_LANES];
+    double z_row[TL_MAX_LANES];
+    const vd steps = ramp(unit);
+    for (int row0 = 0; row0 < n_rows; row0 += TL_LANES) {
+        const int64_t at = (uint32_t)sample + row0 * target->stride_px;
+        vm doubted = vm_first(0);
+        vi first, end;
+        find_rows_of_one(g, r, k, third_is_left, third_is_right, row0, n_cols, &first, &end, &doubted);
+        doubted = vm_and(doubted, vm_first(n_rows - row0));
+        if (g == TL_FLOAT && __builtin_expect(vm_any(doubted), 0)) {
+            row_ends ends;
+            refine_row_ends(s, i, (int)k, t, row0, vm_bits(doubted), &ends);
+            first = vi_load(ends.first), end = vi_load(ends.end);
         }
-        for (int k = 0; k < end; k++)
-            max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
-        setup_middle(sink, &t, &p, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, unit2, &m);
-        TL_SINK_CALL(draw_middle, s->target->sink, s->snapped, s->target, q, i, (1u << end) - 1, &m)
+        end = vi_select(vm_first(n_rows - row0), end, zero);
+        if (sink_has_depth(sink)) {
+            const vd y = vd_add(vd_set1(r->y[k] + row0 * unit), steps);
+            const vd from = g == TL_FIXED ? y : vd_sub(y, vd_set1(r->y0[k]));
+            vd_store(z_row, vd_add(vd_set1(r->z0[k]), vd_mul(vd_set1(r->slope_y[k]), from)));
+        }
+        for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
+            const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
+            const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
+                                              vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
+            const unsigned drawn = vm_bits(vi_gt(in_block, zero));
+            if (!drawn)
+                continue;
+            const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
+            vd z_col = vd_set1(0);
+            if (sink_has_depth(sink)) {
+                const vd x = vd_add(vd_set1(r->x[k] + col0 * unit), steps);
+                z_col = vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
+            }
+            vi_store(bits, in_block);
+            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
+                       width <= TL_HALF_LANES, z_col, id);
+        }
     }
 }
 
-TL_LIST_COPIES(flush_middle, (batch_state *s), s)
-
-/* Draws n triangles at i in a queue. */
-TL_INLINE void draw_all_rows(const batch_state *s, const row_edges *r, const int32_t *sample, int i, int n,
-                             tl_sink sink)
+/* The triangles in `live` of those at i in the queue; TL_FIXED: the first n. */
+TL_INLINE void draw_all_rows(walk_state *s, tl_geometry g, const row_edges *r, const lane_exact *t, int i, int n,
+                             unsigned live, tl_sink sink)
 {
     const tl_target target = *s->target; /* a copy that no store can change */
-    const box_queue *q = &s->rows;
-    for (int k = 0; k < n; k++)
-        draw_rows(s, &target, sink, r, k, sample[k], q->size[i + k], name_of(s->snapped, q->id[i + k]));
+    for (int64_t k = 0; k < n; k++)
+        if (g == TL_FIXED || live >> k & 1)
+            draw_rows(s, g, &target, sink, r, t, i, k);
 }
 
-TL_SINK_COPIES(draw_all_rows, (const batch_state *s, const row_edges *r, const int32_t *sample, int i, int n), s, r,
-               sample, i, n)
+TL_INLINE void draw_rows_fixed(walk_state *s, const row_edges *r, int i, int n, tl_sink sink)
+{
+    draw_all_rows(s, TL_FIXED, r, NULL, i, n, 0, sink);
+}
+TL_SINK_COPIES(draw_rows_fixed, (walk_state * s, const row_edges *r, int i, int n), s, r, i, n)
 
-TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
+TL_INLINE void draw_rows_float(walk_state *s, const row_edges *r, const lane_exact *t, int i, unsigned live,
+                               tl_sink sink)
+{
+    draw_all_rows(s, TL_FLOAT, r, t, i, TL_LANES, live, sink);
+}
+TL_SINK_COPIES(draw_rows_float, (walk_state * s, const row_edges *r, const lane_exact *t, int i, unsigned live), s, r,
+               t, i, live)
+
+TL_INLINE void flush_rows(walk_state *s, tl_geometry g, tl_sink sink)
 {
     box_queue *q = &s->rows;
     const int n = q->n;
     q->n = 0;
     for (int i = 0; i < n; i += TL_LANES) {
-        lane_triangles t;
+        lane_exact t;
+        row_lanes lanes;
         row_edges r;
-        vd z[3];
-        int32_t sample[TL_MAX_LANES];
-        pop(s, sink, q, i, n, &t, z);
-        lane_edges edges;
-        sort_edges(&t, &edges);
-        store_edges(&edges, &r);
-        vi_store(sample, t.sample);
-        if (sink_has_depth(sink)) {
-            const lane_planes p = plane_lanes(&t, z);
-            vd_store(r.z0, p.z0);
-            vd_store(r.slope_x, p.slope_x);
-            vd_store(r.slope_y, p.slope_y);
-            vd_store(r.x, p.x);
-            vd_store(r.y, p.y);
+        load_rows(s, g, sink, q, i, n, TL_FAR_BAND, &t, &lanes);
+        store_edges(g, sink, &lanes, &r);
+        if (g == TL_FIXED) {
+            TL_SINK_CALL(draw_rows_fixed, s->target->sink, s, &r, i, lanes_at(i, n))
+            continue;
         }
-        const int end = n - i < TL_LANES ? n - i : TL_LANES;
-        TL_SINK_CALL(draw_all_rows, s->target->sink, s, &r, sample, i, end)
+        const int64_t n_asked = s->counts->n_asked;
+        TL_SINK_CALL(draw_rows_float, s->target->sink, s, &r, &t, i, lanes.live)
+        if (s->counts->n_asked != n_asked)
+            try_grid(s, &t, 0);
     }
 }
-
-TL_LIST_COPIES(flush_rows, (batch_state *s), s)
+TL_WALK_COPIES(flush_rows)
 
 #endif

@@ -1,9 +1,10 @@
 /* Sampled: triangles in lanes, tested at all samples of a pixel at once.
- * In: triangles and queues of batch.c, in boxes that hold every pixel with a covered sample.  Out: bits of samples.
+ * In: triangles that are snapped and queues of boxes, which hold every pixel with a covered sample.  Out: bits of
+ * samples.
  *
  * A sample moves an edge function by 2 (dx * y - dy * x), from the centre, and nothing else: load, cull, setup and
- * queues are shared.  Ranges are those of squares (batch.c).  A box is up to a pixel too large, so where row ends
- * decide, a horizontal edge is tested. */
+ * queues are shared.  Ranges are those of squares (triangles_fixed.c).  A box is up to a pixel too large, so where row
+ * ends decide, a horizontal edge is tested. */
 #ifndef TL_SAMPLED_C
 #define TL_SAMPLED_C
 
@@ -11,10 +12,10 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "raster/batch.c"
-#include "raster/covered.c"
-#include "raster/hooks.h"
+#include "sink/covered.c"
 #include "raster/rows.c"
+#include "raster/state.h"
+#include "raster/triangles_fixed.c"
 
 #define TL_MAX_WORDS (TL_MIDDLE_BOX * TL_MAX_SAMPLES / 64) /* of a row of a middle box */
 
@@ -25,7 +26,7 @@ TL_INLINE vi sample_shift(vi dx, vi dy, const int32_t *sample_fx)
 }
 
 /* Boxes of up to size x size pixels; t->e are doubled edge functions, not shifted. */
-TL_INLINE void draw_box_of_samples(batch_state *s, const lane_triangles *t, vm live, vi n_cols, vi n_rows, int size)
+TL_INLINE void draw_box_of_samples(walk_state *s, const lane_triangles *t, vm live, vi n_cols, vi n_rows, int size)
 {
     const int bits = s->window->subpixel_bits, n_samples = 1 << s->target->sample_bits;
     const int32_t stride = (int32_t)s->target->stride_px;
@@ -59,13 +60,15 @@ TL_INLINE void draw_box_of_samples(batch_state *s, const lane_triangles *t, vm l
     s->fragments.n = n;
 }
 
-static __attribute__((noinline)) void draw_tiny_of_samples(batch_state *s, const lane_triangles *t, vm live, vi n_cols,
-                                                           vi n_rows)
+static __attribute__((noinline)) void draw_tiny_of_samples(walk_state *s, const lane_batch *b, vm live)
 {
-    draw_box_of_samples(s, t, live, n_cols, n_rows, 2);
+    lane_triangles t;
+    vd z[3];
+    place_triangles(s, TL_SINK_SAMPLES, &b->c, b->col, b->row, &t, z);
+    draw_box_of_samples(s, &t, live, b->n_cols, b->n_rows, 2);
 }
 
-static __attribute__((noinline)) void flush_small_of_samples(batch_state *s)
+static __attribute__((noinline)) void flush_small_of_samples(walk_state *s)
 {
     box_queue *q = &s->small;
     const int n = q->n;
@@ -73,7 +76,7 @@ static __attribute__((noinline)) void flush_small_of_samples(batch_state *s)
     for (int i = 0; i < n; i += TL_LANES) {
         lane_triangles t;
         vd z[3];
-        pop(s, TL_SINK_SAMPLES, q, i, n, &t, z);
+        pop_fixed(s, TL_SINK_SAMPLES, q, i, n, &t, z);
         const vi size = vi_load(q->size + i);
         draw_box_of_samples(s, &t, vm_first(n - i), vi_and(size, vi_set1(0xffff)), vi_shift_right(size, 16),
                             TL_SMALL_BOX);
@@ -117,11 +120,10 @@ TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_lef
                                  int sample_bits)
 {
     const vi zero = vi_set1(0), minus_one = vi_set1(-1);
-    vi quotient[3];
+    vi quotient[3], left, right;
     for (int side = 0; side < 3; side++)
         quotient[side] = vi_floor(vf_mul(v[side], inverse[side]));
-    const vi left = vi_select(third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-    const vi right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
+    meet_third(quotient, third_is_left, third_is_right, &left, &right);
     const vm beyond_flat = vm_and_not(vm_and_not(vi_gt(zero, quotient[2]), third_is_left), third_is_right);
     const vi end = vi_min(vi_sub(right, minus_one), n_cols);
     const vi begin = vi_min(vi_max(vi_sub(zero, left), zero), n_cols);
@@ -136,7 +138,7 @@ TL_INLINE vw add_span(vw words, lane_span span, int32_t col, int sample_bits, ui
     return vw_add_range(words, vi_max(vi_sub(span.begin, from), zero), vi_max(vi_sub(span.end, from), zero), pattern);
 }
 
-static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
+static __attribute__((noinline)) void flush_middle_of_samples(walk_state *s)
 {
     const tl_target target = *s->target; /* a copy that no store can change */
     const int bits = s->window->subpixel_bits, sample_bits = target.sample_bits, per_word = 64 >> sample_bits;
@@ -151,7 +153,7 @@ static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
         vd z[3];
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
         int max_rows = 0, max_cols = 0;
-        pop(s, TL_SINK_SAMPLES, q, i, n, &t, z);
+        pop_fixed(s, TL_SINK_SAMPLES, q, i, n, &t, z);
         vi_store(first, t.sample);
         setup_sampled(&t, &e);
         for (int k = 0; k < end; k++) {
@@ -220,7 +222,7 @@ TL_INLINE void draw_sampled_rows(const tl_target *target, const float (*starts)[
     }
 }
 
-static __attribute__((noinline)) void flush_rows_of_samples(batch_state *s)
+static __attribute__((noinline)) void flush_rows_of_samples(walk_state *s)
 {
     const tl_target target = *s->target; /* a copy that no store can change */
     const int bits = s->window->subpixel_bits;
@@ -233,7 +235,7 @@ static __attribute__((noinline)) void flush_rows_of_samples(batch_state *s)
         float starts[TL_MAX_SAMPLES][3][TL_MAX_LANES], steps[3][TL_MAX_LANES], inverses[3][TL_MAX_LANES];
         int32_t first[TL_MAX_LANES];
         vd z[3];
-        pop(s, TL_SINK_SAMPLES, q, i, n, &t, z);
+        pop_fixed(s, TL_SINK_SAMPLES, q, i, n, &t, z);
         vi_store(first, t.sample);
         setup_sampled(&t, &e);
         for (int side = 0; side < 3; side++) {

@@ -14,9 +14,9 @@
 #include "vertex/clip.c"
 #include "vertex/corners.h"
 #include "vertex/fixed.h"
+#include "vertex/setup.c"
+#include "sink/covered.c"
 #include "raster/alone.c"
-#include "raster/covered.c"
-#include "raster/setup.c"
 
 /* Marks the spans of all samples in a row, in the words that hold the pixels [from, to); `at` is the pixel of column
  * 0. */

@@ -10,11 +10,11 @@
  * does.  No more is needed: with the box, these are all the axes that can separate the two. */
 #include <stdint.h>
 
-#include "base/integers.h"
 #include "topleft.h"
+#include "base/integers.h"
 #include "lanes/lanes.h"
-#include "raster/setup.c"
-#include "raster/sink.c"
+#include "vertex/setup.c"
+#include "sink/sink.c"
 
 #ifndef TL_WALK /* read by itself, as an editor does */
 #define TL_INT int64_t

@@ -15,10 +15,10 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
-#include "exact/draw_exact.c"
+#include "vertex/setup.c"
 #include "exact/sign.c"
-#include "raster/peel.c"
-#include "raster/setup.c"
+#include "sink/peel.c"
+#include "raster/raster.c"
 #include "pixels/runs.c"
 #include "shade/full.c"
 #include "shade/shade.c"
@@ -152,7 +152,7 @@ static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int3
             const tl_target target = {
                 .sink = TL_SINK_PAINT, .pixels = c->tile.ids, .depth = c->tile.depth, .stride_px = TL_CUTOUT_TILE};
             tl_share share = {.ids = &id, .end = 1, .is_first = 1, .is_last = 1};
-            draw_mesh(&c->snapped, &part, &target, &share);
+            draw(&c->snapped, &part, &target, &share);
             for (int64_t row = 0; row < part.height; row++)
                 keep_opaque(c, s, &shading->materials[material], top + row, left, (int)part.width, row * TL_CUTOUT_TILE,
                             (top + row) * c->target->stride_px + left);

@@ -6,8 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "lanes/inline.h"
 #include "topleft.h"
+#include "lanes/inline.h"
 
 /* n_bytes is a constant where this is inlined, so that a row is a move or two. */
 TL_INLINE int64_t copy_corners(const tl_corners *c, const int32_t *which, int64_t first, int64_t n, char *out,

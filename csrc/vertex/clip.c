@@ -225,13 +225,13 @@ static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
                            p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx, NULL};
 }
 
-/* First piece of a triangle, by bisection in the ascending sources. */
-static int64_t first_piece(const tl_pieces *p, int64_t id)
+/* First of n pieces of a triangle, by bisection in their ascending sources. */
+static int64_t first_piece(const int32_t *source, int64_t n, int64_t id)
 {
-    int64_t low = 0, high = p->n_pieces;
+    int64_t low = 0, high = n;
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
-        if (p->source[middle] < id)
+        if (source[middle] < id)
             low = middle + 1;
         else
             high = middle;
@@ -258,7 +258,7 @@ static inline triangle_parts parts_of(const tl_snapped *snapped, int64_t i, int3
     parts.is_cut = 1, parts.n = 0;
     if (!pieces)
         return parts;
-    const int64_t first = first_piece(pieces, i);
+    const int64_t first = first_piece(pieces->source, pieces->n_pieces, i);
     while (first + parts.n < pieces->n_pieces && pieces->source[first + parts.n] == i)
         parts.n++;
     parts.set = piece_set(pieces, &snapped->mesh);

@@ -16,8 +16,8 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "base/integers.h"
 #include "topleft.h"
+#include "base/integers.h"
 
 #define TL_NARROW_LIMIT 0x1p30
 #define TL_WIDE_LIMIT 0x1p62

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from first_pictures import camera_of, first_picture
+from gltf_files import GltfFile
 from PIL import Image
 
 import topleft as tl
@@ -68,6 +69,65 @@ def test_render_environment_is_light_from_all_around(run, checks, text, up, envi
 def test_render_opacity_is_glass(run, layers):
     assert run("render", "torus-knot", "-o", "a.png", "--opacity", 0.4, *layers, *SMALL) == (0, [])
     assert np.array_equal(pixels("a.png"), tl.render_transparent(KNOT, camera_of(KNOT), SIZE, opacity=0.4))
+
+
+@pytest.mark.parametrize(("cull", "is_shown"), [((), 0), (("--cull", "none"), 1), (("--cull", "front"), 1)])
+def test_render_cull_that_is_typed_wins_over_the_material(run, folder, cull, is_shown):
+    file = GltfFile(materials=[{}]).shown([[0, 0, 0], [0, 1, 0], [1, 0, 0]], material=0)  # seen from behind
+    (folder / "a.glb").write_bytes(file.glb())
+    view = ["--azimuth", 0, "--elevation", 0, "--background", "transparent"]
+    assert run("render", "a.glb", "-o", "a.png", *view, *cull, *SMALL) == (0, [])
+    assert pixels("a.png")[..., 3].any() == is_shown
+
+
+def animated(folder):
+    """A triangle that turns about y: at 0 seconds it shows its front, at 1 its edge; the camera turns in clip 1."""
+    file = GltfFile(cameras=[{"type": "orthographic", "orthographic": {"xmag": 2, "ymag": 2, "znear": 1, "zfar": 9}}])
+    file.shown()
+    file.node(camera=0, translation=[0, 0, 5])
+    turn = {"input": file.accessor([0.0, 1.0]), "output": file.accessor([[0, 0, 0, 1.0], [0, 0.5**0.5, 0, 0.5**0.5]])}
+    for node in (0, 1):
+        channel = {"sampler": 0, "target": {"node": node, "path": "rotation"}}
+        file.add("animations", {"name": f"of {node}", "samplers": [turn], "channels": [channel]})
+    (folder / "a.glb").write_bytes(file.glb())
+
+
+@pytest.mark.parametrize(
+    ("time", "is_shown"),
+    [
+        (("--time", 0, "--clip", 0), 1),
+        (("--time", 1, "--clip", "of 0"), 0),
+        (("--time", 1, "--clip", "of 1"), 1),
+        (("--time", 1, "--clip", 1, "--camera", 0), 0),
+    ],
+)
+def test_render_time_is_that_of_the_animation(run, folder, time, is_shown):
+    animated(folder)
+    view = ["--azimuth", 0, "--elevation", 0, "--background", "transparent"]
+    assert run("render", "a.glb", "-o", "a.png", *view, *time, *SMALL) == (0, [])
+    assert pixels("a.png")[..., 3].any() == is_shown
+    (folder / "jobs.json").write_text('{"job": [{"mesh": "a.glb", "out": "b.png", "time": 1, "clip": "of 1"}]}')
+    assert run("render", "--jobs-file", "jobs.json", *view, *SMALL) == (0, [])
+    assert pixels("b.png")[..., 3].any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["a.glb", "--time", "-1"], "topleft: argument --time: must be a number of seconds, 0 or more, got '-1'"),
+        (["a.glb", "--time", "nan"], "topleft: argument --time: must be a number of seconds, 0 or more, got 'nan'"),
+        (["a.glb", "--time", "1", "--clip", "x"], "clip must be 0 to 1, or one of 'of 0', 'of 1', got 'x'"),
+        (["a.glb", "--clip", "1"], "topleft: --clip needs --time: which second of it"),
+        (["cube", "--time", "1"], "topleft: --time needs a file with animations, got the built-in shape 'cube'"),
+    ],
+)
+def test_render_impossible_time_is_one_line_and_status_2(run, folder, arguments, line):
+    animated(folder)
+    status, lines = run("render", *arguments, "-o", "a.png", *SMALL)
+    assert status == 2
+    assert len(lines) == 1
+    assert line in lines[0]
+    assert not (folder / "a.png").exists()
 
 
 def test_render_unlit_shows_the_color(run):

@@ -15,14 +15,14 @@ FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 
 #: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
 LADDER = (
-    ("base",), ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("few",),
-    ("area", "exact", "points", "meshlets"),
+    ("base",), ("lanes",), ("vertex",), ("clusters", "exact", "mesh"), ("sink",), ("raster",), ("few",),
+    ("area", "points", "meshlets"),
     ("pixels",), ("blend", "lines", "polygons", "shade", "tiles"),
 )  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}
 
 #: Where lower files declare functions of higher ones: a sink is compiled into the walkers.
-HOOKS = "raster/hooks.h"
+HOOKS = "sink/hooks.h"
 
 FLAGS_AVX2 = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt")
 FLAGS_AVX512 = (*FLAGS_AVX2, "-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd")
@@ -137,7 +137,7 @@ def test_lines_have_at_most_120_columns(path):
 
 #: What reads the indices of triangles, which may be the caller's memory and change: each once, and looks at them then.
 READERS_OF_INDICES = {
-    "vertex/corners.h", "raster/batch.c", "lines/edges.c", "mesh/creases.c", "mesh/nearest.c", "pixels/planes.c",
+    "vertex/corners.h", "raster/state.h", "lines/edges.c", "mesh/creases.c", "mesh/nearest.c", "pixels/planes.c",
     "pixels/runs.c", "pixels/weights_one.c", "tiles/corners.c",
 }  # fmt: skip
 

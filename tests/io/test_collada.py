@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 import zipfile
 from xml.etree import ElementTree
 
@@ -39,7 +40,7 @@ def collada(primitives=POLYLIST, positions=CHEVRON, node="<instance_geometry url
 
 def simple(content):
     notes = Notes("a.dae")
-    return ElementTree.fromstring(simplified(content, notes)), [line.partition(": ")[2] for line in notes.lines]
+    return ElementTree.fromstring(simplified(content, notes)[0]), [line.partition(": ")[2] for line in notes.lines]
 
 
 def area_of(root):
@@ -82,6 +83,41 @@ def test_collada_animations_and_lines_are_told():
     lines = POLYLIST + "<lines count='1'><p>0 1</p></lines>"
     _, notes = simple(collada(lines, more="<library_animations><animation/></library_animations>"))
     assert notes == ["lines not drawn", "animations not played: everything is at rest"]
+
+
+def sided(*values):
+    """A face in the colour of the first effect; effects say whether they have two sides, or None: nothing."""
+    extra = "<extra><technique profile='GOOGLEEARTH'><double_sided>{}</double_sided></technique></extra>"
+    look = "<technique sid='c'><phong><diffuse><color>1 0 0 1</color></diffuse></phong></technique>"
+    profiles = [look if value is None else look + extra.format(value) for value in values]
+    effects = [f"<effect id='e{i}'><profile_COMMON>{own}</profile_COMMON></effect>" for i, own in enumerate(profiles)]
+    materials = [f"<material id='m{i}'><instance_effect url='#e{i}'/></material>" for i in range(len(values))]
+    bound = "<technique_common><instance_material symbol='a' target='#m0'/></technique_common>"
+    return collada(
+        POLYLIST.replace("count='1'", "count='1' material='a'"),
+        node=f"<instance_geometry url='#g'><bind_material>{bound}</bind_material></instance_geometry>",
+        more=f"<library_effects>{''.join(effects)}</library_effects>"
+        f"<library_materials>{''.join(materials)}</library_materials>",
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "has_both"), [([None], True), ([1], True), ([0], False), ([0, 0], False), ([None, 0], True)]
+)
+def test_collada_shows_both_sides_unless_the_file_says_one(tmp_path, values, has_both):
+    pytest.importorskip("collada", reason="needs pycollada, of the extra formats")
+    path = tmp_path / "a.dae"
+    path.write_bytes(sided(*values))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MeshWarning)
+        (material,) = tl.load(path).materials
+    assert material.color == (255, 0, 0)
+    assert material.double_sided == has_both
+
+
+def test_collada_of_some_materials_of_one_side_is_told():
+    assert simple(sided(0, 1))[1] == ["materials of one side among others drawn from both sides"]
+    assert simple(sided(0, 0))[1] == simple(sided(None, 1))[1] == []
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,14 @@ def test_load_gltf_base_color_is_light_and_its_cutout_is_kept(tmp_path):
     assert (material.metallic, material.roughness) == (1, 0.5)
 
 
+def test_as_mesh_of_trimesh_with_a_cutoff_above_one_shows_nothing():
+    trimesh = pytest.importorskip("trimesh")
+    shape = trimesh.creation.box()
+    material = trimesh.visual.material.PBRMaterial(alphaMode="MASK", alphaCutoff=1.5)
+    shape.visual = trimesh.visual.TextureVisuals(uv=np.zeros((8, 2)), material=material)
+    assert not tl.render(shape, size=(16, 12), background="transparent")[..., 3].any()
+
+
 def test_load_obj_doubled_vertices_become_one(write):
     mesh = files.load(write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 4 5 6\n"))
     assert len(mesh.vertices) == 4

@@ -258,6 +258,15 @@ def test_gltf_material_defaults_are_those_of_the_standard(load):
     assert (material.double_sided, material.alpha_mode, material.unlit) == (False, "opaque", False)
 
 
+@pytest.mark.parametrize(("cutoff", "n_shown"), [(0, 1), (1, 1), (1.1, 0), (-1, 1)])
+def test_gltf_alpha_cutoff_above_one_hides_what_is_opaque(load, cutoff, n_shown):
+    file = GltfFile(materials=[{"alphaMode": "MASK", "alphaCutoff": cutoff}]).shown(material=0)
+    mesh = load(file)
+    camera = tl.Camera.look_at((0.25, 0.25, 1), (0.25, 0.25, 0))
+    picture = tl.render(mesh, camera, (8, 8), background=(0, 0, 0, 0))
+    assert int(picture[4, 4, 3]) == 255 * n_shown
+
+
 def test_gltf_unlit_material_is_unlit(load):
     material = material_of(load, extensions={"KHR_materials_unlit": {}}, alphaMode="BLEND")
     assert (material.unlit, material.is_metallic_rough, material.alpha_mode) == (True, False, "blend")
@@ -369,6 +378,20 @@ def test_gltf_spec_gloss_material_is_made_metallic_rough_and_told(tmp_path, diff
     assert material.opacity == 0.5
 
 
+def test_gltf_spec_gloss_wins_over_the_metallic_rough_material_beside_it(tmp_path):
+    gloss = {"diffuseFactor": [1, 0, 0, 1], "specularFactor": [0.04] * 3, "glossinessFactor": 0.75}
+    fallback = {"baseColorFactor": [0, 1, 0, 1], "roughnessFactor": 0.5}
+    row = {"pbrMetallicRoughness": fallback, "extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}
+    unlit = {**row, "extensions": {**row["extensions"], "KHR_materials_unlit": {}}}
+    file = GltfFile(materials=[row, unlit])
+    file.node(mesh=file.mesh(file.primitive(material=0), file.primitive(material=1)))
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.warns(MeshWarning, match="made metallic-rough"):
+        glossy, plain = tl.load(tmp_path / "a.glb").materials
+    assert (glossy.color, glossy.roughness) == ((255, 0, 0), 0.25)
+    assert (plain.color, plain.unlit) == ((0, 255, 0), True)  # which has the base colour, and nothing else
+
+
 def test_gltf_spec_gloss_textures_become_metallic_rough_ones(tmp_path):
     file = GltfFile()
     info = {"index": file.texture(np.full((2, 2, 4), (255, 0, 0, 100), np.uint8))}
@@ -406,6 +429,8 @@ def test_gltf_what_is_not_read_is_told_once(tmp_path, tree, message):
         (b'{"meshes": {}}', "it is glTF 1.0, and 2.0 is read"),
         (b"glTF\1\0\0\0" + bytes(12), "it is glTF 1.0, and 2.0 is read"),
         (b'{"asset": {"version": "3.0"}}', "its version of glTF is '3.0'"),
+        (b'{"asset": {"version": "2.1", "minVersion": "2.1"}}', "it needs version '2.1' of glTF, and 2.0 is read"),
+        (b'{"asset": {"version": "2.0", "minVersion": 3}}', "it needs version '3' of glTF, and 2.0 is read"),
         (b'{"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_new"]}', "needs the extension EXT_new"),
         (b"[1, 2]", "its JSON is no object"),
         (b"[" * 100_000, "nested too deeply|broken"),
@@ -417,6 +442,11 @@ def test_gltf_of_another_kind_is_refused_in_true_words(tmp_path, content, messag
     with pytest.raises(MeshError, match=message) as caught:
         tl.load(tmp_path / "a.gltf")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("asset", [{"version": "2.1"}, {"version": "2.1", "minVersion": "2.0"}])
+def test_gltf_of_a_later_version_that_2_0_may_read_is_read(load, asset):
+    assert len(load(GltfFile(asset=asset).shown()).triangles) == 1
 
 
 @pytest.mark.parametrize(

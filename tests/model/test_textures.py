@@ -33,6 +33,34 @@ def test_levels_by_blocks_of_rows_are_those_of_the_whole(size, n_texels, encodin
     assert_same(module.texels_of(image, rows, light=light), levels_at_once(image, light))
 
 
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+@pytest.mark.parametrize("cutoff", [0.2, 0.35, 0.5])
+def test_levels_of_a_cutout_let_through_what_the_picture_does(wrap, cutoff):
+    image = np.zeros((48, 36, 4), np.uint8)
+    image[..., 3] = np.random.default_rng(3).choice([0, 255, 150], (12, 9), p=[0.5, 0.4, 0.1]).repeat(4, 0).repeat(4, 1)
+    rows = module.level_rows(36, 48, has_halves=True)
+    texels = module.texels_of(image, rows, light=module.LIGHT_OF_BYTE["srgb"])
+    before = texels.copy()
+    module.keep_coverage(texels, rows, 65535 * cutoff, (wrap, wrap))
+    assert_same(texels[:, :3], before[:, :3])
+    assert_same(texels[: rows[1][0]], before[: rows[1][0]])
+    shares = []
+    for offset, width, height in rows[:-2]:
+        level = texels[offset : offset + height * (width + 1), 3].reshape(height, width + 1)
+        assert_same(level[:, -1], level[:, 0])
+        around = module.around_points(level[:, :-1], (wrap, wrap))
+        shares.append(module.n_above(around, 1, 65535 * cutoff) / module.N_COVERAGE_POINTS)
+    assert 0.1 < shares[0] < 0.6
+    assert np.abs(np.subtract(shares, shares[0])).max() < 0.003  # of 4096 points a thousandth may miss
+
+
+def test_opaque_textures_and_those_without_halvings_are_cut_as_they_are():
+    for texture in (tl.Texture(np.full((4, 4), 9, np.uint8)), tl.Texture(np.zeros((4, 4, 4), np.uint8), "bilinear")):
+        assert texture.engine_cut_at(0.5) is texture.engine
+    clear = tl.Texture(np.zeros((4, 4, 4), np.uint8))
+    assert clear.engine_cut_at(0.5) is clear.engine_cut_at(0.5) is not clear.engine
+
+
 def test_a_texture_without_halvings_has_one_level():
     assert module.level_rows(5, 3, has_halves=False) == [(0, 5, 3)]
     assert module.level_rows(5, 3, has_halves=True) == [(0, 5, 3), (18, 2, 1), (21, 1, 1)]

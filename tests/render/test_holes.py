@@ -114,6 +114,29 @@ def test_cutout_keeps_what_has_no_holes_and_is_cut_by_the_near_plane(sampling, b
     assert_same(frags.samples_triangle, np.select([shows_leaf, shows_floor], [1, 0], -1).astype(np.int32))
 
 
+WIRES = np.full((64, 64, 4), 200, np.uint8)
+WIRES[..., 3] = np.where((np.indices((64, 64)) % 16 < 3).any(axis=0), 255, 0)
+SOFT = WIRES.copy()
+SOFT[..., 3] = 255 - 3 * np.hypot(*(np.indices((64, 64)) - 32))  # a spot that fades
+
+
+@pytest.mark.parametrize("size", [64, 41, 32, 23, 16])
+@pytest.mark.parametrize(
+    ("image", "cutoff", "opacity"), [(WIRES, 0.5, 1), (WIRES, 0.1, 1), (SOFT, 0.7, 1), (SOFT, 0.35, 0.5)]
+)
+def test_cutout_keeps_its_area_in_small_pictures(image, cutoff, opacity, size):
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    material = tl.Material(texture=tl.Texture(image), alpha_cutoff=cutoff, opacity=opacity)
+    mesh = tl.Mesh(square, [[0, 1, 2], [0, 2, 3]], uv=(square[:, :2] + 1) / 2, materials=[material])
+    camera = tl.Camera.look_at((0, 0, 5), (0, 0, 0), ortho_height=2)
+    large, small = (
+        tl.render(mesh, camera, (n, n), sampling="msaa16", background="transparent")[..., 3].mean() / 255
+        for n in (256, size)
+    )
+    assert 0.2 < large < 0.7
+    assert abs(small - large) < 0.06  # what is between two halvings; without their scales up to 0.6
+
+
 @ON_EACH_BITS
 def test_render_cuts_holes_out(bits):
     mesh = layers((0, 1, 2, 3))

@@ -77,11 +77,37 @@ def test_silhouette_leaves_backs_out(sampling):
         assert (got >= np.maximum(*parts)).all()
 
 
-def test_cull_front_leaves_nothing_of_single_sided_triangles():
-    assert not tl.rasterize_mesh(ALL, FRAMED, SIZE, cull="front").mask.any()
-    ids = tl.rasterize_mesh(MIXED, FRAMED, SIZE, cull="front").triangle
-    assert (ROWS[ids[ids >= 0]] == 1).all()
-    assert (ids >= 0).any()
+BOTH_SIDES = replace(KNOT, materials=[replace(ONE, double_sided=True), TWO], material_of_triangle=ROWS)
+"""`MIXED`, whose materials leave no side out."""
+
+PICTURES = {
+    "ids": lambda mesh, cull: tl.rasterize_mesh(mesh, NEAR, SIZE, cull=cull).triangle,
+    "samples": lambda mesh, cull: tl.rasterize_mesh(mesh, NEAR, SIZE, cull=cull, sampling="msaa4").samples_triangle,
+    "scene": lambda mesh, cull: tl.rasterize_mesh(tl.Scene([mesh, mesh]), NEAR, SIZE, cull=cull).triangle,
+    "edges": lambda mesh, cull: tl.render(mesh, NEAR, SIZE, cull=cull, edges=True),
+    "silhouette": lambda mesh, cull: tl.silhouette(mesh, NEAR, SIZE, cull=cull),
+    "layers": lambda mesh, cull: tl.render_layers(mesh, NEAR, SIZE, layers=("color",), cull=cull)["color"],
+    "glass": lambda mesh, cull: tl.render_transparent(mesh, NEAR, SIZE, opacity=0.5, cull=cull),
+    "peeled": lambda mesh, cull: tl.visible_layers(mesh, NEAR, SIZE, cull=cull, layers=4).triangle,
+}
+
+
+@pytest.mark.parametrize("cull", ["none", "back", "front"])
+@pytest.mark.parametrize("draw", PICTURES.values(), ids=PICTURES)
+def test_a_side_that_is_named_wins_over_the_materials(draw, cull):
+    assert_same(draw(MIXED, cull), draw(BOTH_SIDES, cull))
+
+
+@pytest.mark.parametrize("draw", PICTURES.values(), ids=PICTURES)
+def test_unless_a_side_is_named_materials_say_what_shows(draw):
+    assert_same(draw(BOTH_SIDES, None), draw(BOTH_SIDES, "none"))
+    assert (draw(MIXED, None) != draw(BOTH_SIDES, None)).any()
+
+
+def test_points_and_arrays_take_no_side_for_both():
+    assert_same(tl.coverage(KNOT.vertices[:, :2], KNOT.triangles, 8, cull=None), tl.coverage(
+        KNOT.vertices[:, :2], KNOT.triangles, 8))  # fmt: skip
+    assert tl.rasterize_mesh(tl.Points(KNOT.vertices), FRAMED, SIZE, cull=None).mask.any()
 
 
 def test_cull_back_is_the_same_with_both():

@@ -13,6 +13,7 @@ from topleft._core.base.options import Cull, Sampling
 from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
 from topleft._meshes.io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._meshes.io.load import as_seconds
 from topleft._meshes.model.mesh import DEFAULT_CREASE, as_crease
 from topleft._meshes.model.points import DEFAULT_POINT_SIZE
 from topleft._meshes.picture.layers import LAYERS, check_layers
@@ -131,6 +132,20 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
     add(
+        "--time",
+        type=_seconds,
+        default=None,
+        metavar="SECONDS",
+        help="of an animation of a glTF file (default: at rest)",
+    )
+    add(
+        "--clip",
+        type=_clip,
+        default=None,
+        metavar="N|NAME|all",
+        help="which animation --time is of, from 0 (default the first)",
+    )
+    add(
         "--threads",
         type=positive,
         default=None,
@@ -183,7 +198,12 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)",
     )
     add("--wireframe", action="store_true", help="draw the edges over it")
-    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add(
+        "--cull",
+        choices=[str(side) for side in Cull],
+        default=None,
+        help="the side to leave out, whatever materials say (default: backs of those that have one side)",
+    )
     samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
     add(
         "--sampling",
@@ -256,6 +276,17 @@ def _point_size(text: str) -> float:
         return float(as_point_size("--point-size", float(text), 1))
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be a positive number of pixels, got {text!r}") from None
+
+
+def _seconds(text: str) -> float:
+    try:
+        return as_seconds(float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a number of seconds, 0 or more, got {text!r}") from None
+
+
+def _clip(text: str) -> int | str:
+    return int(text) if text.isdecimal() else text
 
 
 def _crease(text: str) -> float:

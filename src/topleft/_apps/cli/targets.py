@@ -50,6 +50,8 @@ class MeshSource:
     texture: str | None = None
     crease: float = DEFAULT_CREASE
     point_size: float = DEFAULT_POINT_SIZE
+    time: float | None = None
+    clip: int | str | None = None
 
     def __call__(self) -> Mesh | Points:
         """Read it."""
@@ -64,10 +66,12 @@ class MeshSource:
 
     def _mesh(self) -> Mesh | Points:
         if self.name in SHAPES:
+            if self.time is not None:
+                raise UsageError(f"--time needs a file with animations, got the built-in shape {self.name!r}")
             return Mesh(*shape(self.name), crease=self.crease)
         if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
             raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
-        return load(self.name, crease=self.crease)
+        return load(self.name, crease=self.crease, time=self.time, clip=self.clip)
 
 
 def read_texture(path: str) -> Texture:
@@ -152,10 +156,12 @@ class FileCamera:
 
     path: str
     index: int
+    time: float | None = None
+    clip: int | str | None = None
 
     def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:  # noqa: ARG002
         """Read it."""
-        cameras = [] if self.path in SHAPES else load_cameras(self.path)
+        cameras = [] if self.path in SHAPES else load_cameras(self.path, time=self.time, clip=self.clip)
         if self.index >= len(cameras):
             raise MeshError(f"--camera {self.index}: {self.path!r} has {len(cameras)} cameras")
         return cameras[self.index]
@@ -180,13 +186,16 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
     """
     if options.camera is not None and options.views > 1:
         raise UsageError("--camera does not go with --views: a camera of a file stands still")
+    if options.clip is not None and options.time is None:
+        raise UsageError("--clip needs --time: which second of it")
     pattern = _pattern(options.out, options)
     drawing = _render_options(options)
     groups = []
     names = names_of(options.meshes)
     for i_mesh, source in enumerate(options.meshes, start):
         name = names[i_mesh - start]
-        mesh = MeshSource(source, options.texture, options.crease, options.point_size)
+        moment = options.time, options.clip
+        mesh = MeshSource(source, options.texture, options.crease, options.point_size, *moment)
         jobs = []
         for i_view in range(options.views):
             # Not str.format: a folder may have other braces in its name.
@@ -196,7 +205,7 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
                 azimuth_deg, options.elevation, options.fov, options.up, options.ortho, fits=options.views == 1
             )
             if options.camera is not None:
-                camera = FileCamera(source, options.camera)
+                camera = FileCamera(source, options.camera, *moment)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
             jobs.append(Job(mesh, camera, options.size, drawing, path, layers))

@@ -72,7 +72,7 @@ CONTROLS: dict[str, list[tuple[str, str, list[tuple[Any, str]] | None]]] = {
          + [(name, name) for name in ("center", "msaa2", "msaa4", "msaa8", "msaa16")]),
         ("tolerance", "tolerance", [(0, "none: the mesh itself")]
          + [(px, f"{px:g} px: a coarser level") for px in (0.25, 0.5, 1, 2, 4)]),
-        ("cull", "cull", [(name, name) for name in ("none", "back", "front")]),
+        ("cull", "cull", [("none", "as materials say"), ("back", "back"), ("front", "front")]),
         ("wireframe", "edges", None),
     ],
     "Camera": [
@@ -502,10 +502,11 @@ def as_job(shown: Shown, view: MeshView) -> tuple[str, bytes]:
         f'up = "{view.up}"',
         'background = "transparent"',
         f'sampling = "{view.sampling}"',
-        f'cull = "{view.cull}"',
         f"tolerance = {float(view.tolerance)!r}",
         f"ortho = {'false' if view.fov else 'true'}",
     ]
+    if view.cull != "none":
+        lines.append(f'cull = "{view.cull}"')
     if view.fov:
         lines.append(f"fov = {float(view.fov)!r}")
     lines.append(f'shading = "{view.layer if view.layer in SHADINGS else "ids"}"')

@@ -62,7 +62,7 @@ class ViewOptions(WindowOptions, total=False):
 
     transform: ArrayLike | None
     sampling: SamplingOption
-    cull: CullOption
+    cull: CullOption | None
     threads: int | None
 
 
@@ -101,6 +101,8 @@ class View:
     plan: Planned | None = None
     single_sided: tuple[NDArray[np.uint8], int] | None = None
     """1 for each triangle of which one side is not drawn, and the `tl_cull` that names that side."""
+    sides_by_material: bool = True
+    """Whether materials say which sides are drawn: no `cull` was given."""
     is_exact: bool = False
     """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 
@@ -117,9 +119,9 @@ class View:
     def without_backs(self, is_single: NDArray[np.uint8] | None, *, is_mirrored: bool = False) -> View:
         """Return the view without the backs of these triangles (T,); in a mirror their winding is turned over."""
         back = CULL_CODES[Cull.FRONT if is_mirrored else Cull.BACK]
-        if is_single is None or self.cull == back:
+        if is_single is None or not self.sides_by_material:
             return self
-        if not self.cull and is_single.all():
+        if is_single.all():
             return replace(self, cull=back)
         return replace(self, single_sided=(is_single, back))
 
@@ -153,7 +155,7 @@ class View:
         viewport = options.get("viewport")
         transform = options.get("transform")
         method = find_method(options.get("method", "auto"))
-        plan = options.get("plan")
+        plan, cull = options.get("plan"), options.get("cull")
         if not (plan is None or hasattr(plan, "fitted")):
             raise TypeError(f"plan must be a Plan or None, got {type(plan).__name__}")
         view = cls(
@@ -165,13 +167,14 @@ class View:
             grid_bits=grid_bits,
             sampling=sampling,
             method=method.code or 0,
-            cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
+            cull=CULL_CODES[Cull.NONE if cull is None else parse(Cull, "cull", cull)],
             zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
             is ClipDepth.ZERO_TO_ONE,
             near_clip=bool(options.get("near_clip", True)),
             far_clip=bool(options.get("far_clip", True)),
             threads=parse_threads(options.get("threads")),
             classic=method if method.code is None else None,
+            sides_by_material=cull is None,
             is_exact=is_exact,
         )
         if is_exact:

@@ -16,21 +16,25 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_path
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import box_matrix, frustum_matrix, tangent
-from topleft._meshes.io.load import GLTF_SUFFIXES, reading
+from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, reading
 from topleft._meshes.io.references import InputFile
 from topleft.errors import MeshError
 
 if TYPE_CHECKING:
-    from topleft._meshes.io.gltf import CameraOfFile
+    from topleft._meshes.io.gltf.reader import CameraOfFile
 
 
-def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
+def load_cameras(
+    path: str | os.PathLike[str], *, time: float | None = None, clip: int | str | None = None
+) -> list[Camera]:
     r"""The cameras of a glTF or GLB file, in the order of the nodes that hold them; of other formats none.
 
     Parameters
     ----------
     path : path
         The file that `load` reads the mesh from.
+    time, clip
+        As for `load`: where an animation has the nodes of the cameras at a time.
 
     Returns
     -------
@@ -43,7 +47,9 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     FileNotFoundError
         If there is no such file.
     MeshError
-        If the file is broken, or a camera of it has numbers that none can have.
+        If the file is broken, or a camera of it has numbers that none can have, or there is no such animation.
+    ValueError
+        If `time` is negative, infinite or NaN.
 
     Examples
     --------
@@ -57,11 +63,12 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     []
     """
     source = InputFile(as_path("path", path))
+    source.moment = as_moment(time, clip)
 
     def cameras() -> list[Camera]:
         if source.path.suffix.lower() not in GLTF_SUFFIXES:
             return []
-        from topleft._meshes.io.gltf import read_cameras  # as late as in `load`
+        from topleft._meshes.io.gltf.reader import read_cameras  # as late as in `load`
 
         return [_camera(own, source) for own in read_cameras(source)]
 

@@ -14,6 +14,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -67,8 +68,8 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
     _check_what_it_is(source, suffix)
     try:
         with quiet():
-            scene = _scene(trimesh, source, suffix)
-            parts = list(_parts(scene, source))
+            scene, double_sided = _scene(trimesh, source, suffix)
+            parts = [_sided(part, double_sided) for part in _parts(scene, source)]
     except NotImplementedError:
         readable = " ".join(sorted(trimesh.available_formats() | {"obj", "ply", "stl", "gltf", "glb"}))
         raise MeshError(
@@ -111,10 +112,13 @@ def _check_what_it_is(source: InputFile, suffix: str) -> None:
             raise MeshError(f"cannot read {str(source.path)!r}: its objects are in further files of the archive")
 
 
-def _scene(trimesh: Any, source: InputFile, suffix: str) -> Any:
-    """What trimesh reads of a file; of COLLADA, after its polygons have been cut."""
+def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | None]:
+    """What trimesh reads of a file, and whether all materials have two sides, or None: each says so itself.
+
+    COLLADA is read after its polygons have been cut; of the sides of its materials trimesh reads nothing.
+    """
     if suffix not in (".dae", ".zae"):
-        return trimesh.load_scene(str(source.path), process=False)
+        return trimesh.load_scene(str(source.path), process=False), None
 
     class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
         def get(self, name: str) -> bytes:
@@ -133,8 +137,16 @@ def _scene(trimesh: Any, source: InputFile, suffix: str) -> Any:
         content, resolver = archive[name].read(), trimesh.resolvers.ZipResolver(archive)
     else:
         content = source.path.read_bytes()
-    simple = io.BytesIO(simplified(content, source.notes))
-    return trimesh.load_scene(simple, file_type="dae", resolver=resolver, process=False)
+    simple, double_sided = simplified(content, source.notes)
+    scene = trimesh.load_scene(io.BytesIO(simple), file_type="dae", resolver=resolver, process=False)
+    return scene, double_sided
+
+
+def _sided(mesh: Mesh, double_sided: bool | None) -> Mesh:
+    """The mesh with materials of two sides, or of one; None: as they are."""
+    if double_sided is None:
+        return mesh
+    return replace(mesh, materials=tuple(replace(one, double_sided=double_sided) for one in mesh.materials))
 
 
 def _note_missing_pictures(source: InputFile) -> None:
@@ -179,8 +191,8 @@ def quiet() -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-def simplified(content: bytes, notes: Notes) -> bytes:
-    """The file with triangles alone.
+def simplified(content: bytes, notes: Notes) -> tuple[bytes, bool]:
+    """The file with triangles alone, and whether its materials have two sides: unless all say that they have one.
 
     Raises
     ------
@@ -212,7 +224,16 @@ def simplified(content: bytes, notes: Notes) -> bytes:
                 notes.add("materials that are not there", row.get("target", "")[1:])
     if root.find(f"{space}library_animations/{space}animation") is not None:
         notes.add("animations not played: everything is at rest")
-    return ElementTree.tostring(root)
+    return ElementTree.tostring(root), _has_two_sides(root, space, notes)
+
+
+def _has_two_sides(root: Element, space: str, notes: Notes) -> bool:
+    """Whether materials are drawn from both sides, as without a word of theirs: no effect says 0, or not all do."""
+    effects = list(root.iter(f"{space}effect"))
+    n_single = sum(row.findtext(f".//{space}double_sided", "").strip() == "0" for row in effects)
+    if 0 < n_single < len(effects):
+        notes.add("materials of one side among others drawn from both sides")
+    return n_single == 0 or n_single < len(effects)
 
 
 def _is_material(target: str, space: str, named: dict[str | None, Element]) -> bool:

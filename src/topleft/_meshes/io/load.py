@@ -5,6 +5,7 @@ Input: a path. Output: one `Mesh`, and warnings of what it lacks.
 
 from __future__ import annotations
 
+import operator
 import os
 import warnings
 from collections.abc import Callable, Iterator
@@ -13,9 +14,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from topleft._core.base.arrays import as_path
+from topleft._core.base.arrays import as_number, as_path, shown
 from topleft._meshes.io.notes import tell
-from topleft._meshes.io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
+from topleft._meshes.io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile, Moment
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh, as_crease
 from topleft._meshes.model.points import Points
@@ -32,6 +33,8 @@ def load(
     crease: float = DEFAULT_CREASE,
     max_vertices: int = MAX_VERTICES,
     max_texture_pixels: int = MAX_TEXTURE_PIXELS,
+    time: float | None = None,
+    clip: int | str | None = None,
 ) -> Mesh | Points:
     r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
 
@@ -46,23 +49,31 @@ def load(
         A file with more, or one that says so, is refused.
     max_texture_pixels : int
         Pictures with more are left out.
+    time : float, optional
+        Seconds, 0 or more: nodes, skins and morph targets of glTF are where an animation has them then; behind its end,
+        where it ends. Unless given everything is at rest.
+    clip : int or str, optional
+        The index or the name of the animation; "all" plays all of them, and where two move the same the first has it.
+        Unless given the first one plays, and `MeshWarning` tells of others.
 
     Returns
     -------
     Mesh, or Points
         `Points` of a file that holds points and no triangles. Of a mesh polygons are cut into triangles, groups and
         objects are one mesh, in the order of the file; the nodes of a scene are placed by their transforms, skins and
-        morph targets are at rest. Normals are those of the file. A file without normals gets its vertices merged where
-        they are equal, so that shading has no seams where a format (STL) or a texture had to double them; triangles of
-        glTF without normals are flat, as its standard says. Colours are those of the vertices or the faces, if there
-        are any; `uv` those of the file. Materials are those of MTL and glTF.
+        morph targets are at rest, or at the `time`. Normals are those of the file. A file without normals gets its
+        vertices merged where they are equal, so that shading has no seams where a format (STL) or a texture had to
+        double them; triangles of glTF without normals are flat, as its standard says. Colours are those of the vertices
+        or the faces, if there are any; `uv` those of the file. Materials are those of MTL and glTF.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     MeshError
-        If the file is broken, has no triangles, or is of an unsupported format.
+        If the file is broken, has no triangles, or is of an unsupported format, or has no such animation.
+    ValueError
+        If `time` is negative, infinite or NaN.
     MissingPackageError
         If trimesh, or a package that it needs for this format, is not installed.
 
@@ -90,16 +101,40 @@ def load(
     """
     crease = as_crease(crease)
     source = InputFile(as_path("path", path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
+    source.moment = as_moment(time, clip)
     mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
     return mesh
+
+
+def as_moment(time: float | None, clip: int | str | None) -> Moment | None:
+    """The time and the clip, checked as far as that goes without the file; None: everything is at rest."""
+    if time is None:
+        if clip is not None:
+            raise ValueError(f"clip {shown(clip)} needs a time")
+        return None
+    seconds = as_seconds(time)
+    if clip is not None and not isinstance(clip, str):
+        try:
+            clip = operator.index(clip)
+        except TypeError:
+            raise TypeError(f"clip must be an index or a name, got {shown(clip)}") from None
+    return Moment(seconds, clip)
+
+
+def as_seconds(time: float) -> float:
+    """A time, if it is one."""
+    seconds = as_number("time", time)
+    if not 0 <= seconds < np.inf:
+        raise ValueError(f"time must be a number of seconds, 0 or more, got {time!r}")
+    return seconds
 
 
 def _mesh(source: InputFile, crease: float) -> Mesh | Points:
     """The mesh of the file; a reader is imported when a file needs it."""
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
-            from topleft._meshes.io.gltf import read_gltf
+            from topleft._meshes.io.gltf.reader import read_gltf
 
             parts = read_gltf(source)
         case ".obj":
@@ -173,6 +208,9 @@ def reading(source: InputFile, read: Callable[[], Made]) -> Made:
         raise MeshError(f"{str(path)!r} is a folder, not a mesh")
     if not path.is_file():
         raise MeshError(f"{str(path)!r} is a pipe or a device, not a file")
+    if source.moment is not None and path.suffix.lower() not in GLTF_SUFFIXES:
+        time = source.moment.time
+        raise MeshError(f"{str(path)!r} has no time={time:g}: animations are read of glTF and GLB alone")
     try:
         with _strict_parsing(), np.errstate(all="ignore"):
             return read()

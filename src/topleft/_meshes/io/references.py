@@ -40,6 +40,15 @@ class Cloud(NamedTuple):
     normals: npt.NDArray[Any] | None = None
 
 
+class Moment(NamedTuple):
+    """Which time of which animation of a file is read."""
+
+    time: float
+    """Seconds."""
+    clip: int | str | None = None
+    """The index or the name of the animation."""
+
+
 class InputFile:
     """A mesh file, the files beside it, what may be taken from them, and what was missing.
 
@@ -57,6 +66,7 @@ class InputFile:
         self.path = path
         self.notes = Notes(str(path))
         self.clouds: list[Cloud] = []
+        self.moment: Moment | None = None
         self.max_vertices = max_vertices
         self.max_texture_pixels = max_texture_pixels
         self._pictures: dict[tuple[Path, str], U8 | None] = {}

@@ -81,7 +81,7 @@ def choose_detail(
     size: int | tuple[int, int],
     *,
     tolerance: float,
-    cull: CullOption = "none",
+    cull: CullOption | None = None,
     material: Material | None = None,
     transform: npt.ArrayLike | None = None,
     viewport: tuple[int, int] | None = None,
@@ -196,7 +196,7 @@ def check_tolerance(tolerance: float) -> float:
     return float(tolerance)
 
 
-def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str, material: Material | None) -> str | None:
+def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, material: Material | None) -> str | None:
     """Why nothing but the mesh itself will do, as far as that is known without its levels."""
     if tolerance == 0:
         return "tolerance=0: the picture of the mesh itself, to the bit"
@@ -204,7 +204,7 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str, material:
         return "it has no triangles"
     if camera.lens is not None:
         return "a lens bends the picture by what no bound is known of"
-    if str(cull) != "none":
+    if cull is not None and str(cull) != "none":
         return f"cull={str(cull)!r}: which way a triangle is turned has no bound"
     if any(has_holes(one, mesh) for one in (mesh.materials if material is None else (material,))):
         return "a material cuts holes, and they have no bound"
@@ -253,7 +253,7 @@ def detailed(
     matrices = mesh.clip_from_objects(sight.clip_from_world)
     meshes = meshes_of(mesh)
     for one, at in mesh.meshes.values():
-        if not why_whole(one, camera, tolerance, options.get("cull", "none"), options.get("material")):
+        if not why_whole(one, camera, tolerance, options.get("cull"), options.get("material")):
             levels = levels_of(one)
             for i, level in zip(at.tolist(), sight.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
                 meshes[i] = levels[level].mesh if level else one
@@ -266,7 +266,7 @@ def level_of(
     size: tuple[int, int],
     tolerance: float,
     *,
-    cull: str = "none",
+    cull: str | None = None,
     material: Material | None = None,
     viewport: tuple[int, int] | None = None,
     origin: tuple[int, int] = (0, 0),

@@ -69,11 +69,12 @@ def _metallic_rough(source: Any) -> Material:
     emission = np.zeros(3) if source.emissiveFactor is None else np.asarray(source.emissiveFactor, np.float64)
     mode = source.alphaMode if source.alphaMode in ALPHA_MODES else "OPAQUE"
     cutoff = 0.5 if source.alphaCutoff is None else float(source.alphaCutoff)
+    is_hidden = mode == "MASK" and cutoff > 1
     return Material(
         None if factor is None else _rgb(np.rint(255 * encode_srgb(linear).clip(0, 1))),
         _texture(source.baseColorTexture),
         alpha_cutoff=min(max(cutoff, 0.0), 1.0) if mode == "MASK" else None,
-        opacity=min(max(float(linear[3]), 0.0), 1.0),
+        opacity=0.0 if is_hidden else min(max(float(linear[3]), 0.0), 1.0),
         alpha_mode=ALPHA_MODES[mode],
         double_sided=source.doubleSided is not False,
         emission=tuple(np.maximum(emission, 0).tolist()),

@@ -53,7 +53,7 @@ class Material:
         "blend": what is behind shows through, in pictures of `render`, up to 16 layers of a pixel. Unless given: "mask"
         with an `alpha_cutoff`, else "opaque".
     double_sided : bool
-        Whether the back of the triangles shows, too; if not it is culled.
+        Whether the back of the triangles shows, too; if not it is culled, unless `cull` says which side is.
     emission : (3,) of float
         Linear light that the surface sends out by itself, 0 up; 1 is white.
     emission_texture : Texture, optional

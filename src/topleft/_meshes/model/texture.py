@@ -2,11 +2,12 @@
 
 Input: uint8 pixels. Output: what the kernels read.
 
-Based on: Williams, L., "Pyramidal Parametrics", SIGGRAPH 1983.
+Based on: Williams, L., "Pyramidal Parametrics", SIGGRAPH 1983; Castano, I., "Computing Alpha Mipmaps", 2010.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
@@ -43,6 +44,12 @@ class Encoding(StrEnum):
 
 
 LIGHT_OF_BYTE = {Encoding.SRGB: LIGHT_OF_SRGB.astype(np.float64), Encoding.LINEAR: np.arange(256) / 255}
+N_COVERAGE_POINTS = 1 << 12
+"""Points at which the share of a texture that an alpha test lets through is counted; a thousandth of them may miss."""
+
+LEAST_SCALE, MOST_SCALE = 1 / 16, 256.0
+"""Of the opacity of a halving; at the most every texel is opaque that is not clear."""
+
 BLOCK_TEXELS = 1 << 17
 """Texels that are halved together: 4 MB of float64, which stay in a cache."""
 
@@ -89,7 +96,8 @@ class Texture:
     Notes
     -----
     Texels are kept as linear light in 65535ths, so filters and halvings take the mean of light. A halving is the mean
-    over the area of its texels, also where a side is odd.
+    over the area of its texels, also where a side is odd. Under a material with an `alpha_cutoff` the opacity of a
+    halving is scaled, so that as much of its area shows as of the picture: leaves and wires stay in small pictures.
 
     Examples
     --------
@@ -143,9 +151,23 @@ class Texture:
     @cached_property
     def compiled(self) -> engine.Mipmap:
         """What the kernels read; made when it is first needed."""
+        return self._mipmap(None)
+
+    def engine_cut_at(self, cutoff: float) -> engine.Mipmap:
+        """The same for an alpha test: its halvings let through as much of their area as the picture does."""
+        if not self.has_alpha or self.filter is not Filter.TRILINEAR or not 0 < cutoff <= 1:
+            return self.compiled
+        cut: dict[float, engine.Mipmap] = self.__dict__.setdefault("_cut", {})
+        if cutoff not in cut:
+            cut[cutoff] = self._mipmap(cutoff)
+        return cut[cutoff]
+
+    def _mipmap(self, cutoff: float | None) -> engine.Mipmap:
         height, width = self.image.shape[:2]
         rows = level_rows(width, height, has_halves=self.filter is Filter.TRILINEAR)
         texels = texels_of(self.image, rows, light=LIGHT_OF_BYTE[Encoding(self.encoding)])
+        if cutoff is not None:
+            keep_coverage(texels, rows, 65535 * cutoff, self.wrap)
         wrap_u, wrap_v = (WRAP_CODES[Wrap(one)] for one in self.wrap)
         filter_code = FILTER_CODES[Filter(self.filter)]
         table = np.array(rows, dtype=np.int32)
@@ -234,6 +256,55 @@ def texels_of(image: U8, rows: list[tuple[int, int, int]], *, light: F64) -> U16
         if first is not None:
             first.take(own)
     return texels
+
+
+def keep_coverage(texels: U16, rows: list[tuple[int, int, int]], cutoff: float, wrap: str | tuple[str, str]) -> None:
+    """Scale the opacity of each halving so that a cutoff lets through as much of its area as of the picture, in place.
+
+    The mean of opacity does not: thin parts fall below the cutoff, and small holes are filled.
+    """
+    wanted = None
+    for offset, width, height in rows:
+        level = texels[offset : offset + height * (width + 1), 3].reshape(height, width + 1)
+        around = around_points(level[:, :-1], wrap)
+        scale, n_shown = 1.0, n_above(around, 1, cutoff)
+        if wanted is None:
+            wanted = n_shown
+        best, least_miss = scale, abs(n_shown - wanted)
+        low, high = LEAST_SCALE, MOST_SCALE
+        while least_miss > N_COVERAGE_POINTS >> 10 and high > low * (1 + 2**-12):
+            scale = math.sqrt(low * high)
+            n_shown = n_above(around, scale, cutoff)
+            low, high = (low, scale) if n_shown >= wanted else (scale, high)
+            if abs(n_shown - wanted) < least_miss:
+                best, least_miss = scale, abs(n_shown - wanted)
+        if best != 1:
+            np.rint(np.minimum(level * best, 65535), out=level, casting="unsafe")
+
+
+def n_above(around: tuple[F64, F64], scale: float, cutoff: float) -> int:
+    """At how many points the opacity is at least the cutoff when texels are scaled and end at 1."""
+    corners, weights = around
+    between = (np.minimum(corners * scale, 65535) * weights).sum(axis=0)
+    return int(np.count_nonzero(between > cutoff - 0.5))
+
+
+def around_points(level: U16, wrap: str | tuple[str, str]) -> tuple[F64, F64]:
+    """The four texels (4, N) around each of points that are spread evenly over a level, and their weights.
+
+    Based on: Roberts, M., "The Unreasonable Effectiveness of Quasirandom Sequences", 2018.
+    """
+    number = np.arange(N_COVERAGE_POINTS)
+    pairs, shares = [], []
+    for n, step, how in zip(level.shape, (0.7548776662466927, 0.5698402909980532), wrap[::-1], strict=True):
+        place = (0.5 + number * step) % 1 * n - 0.5
+        first = np.floor(place)
+        pair = np.stack([first, first + 1]).astype(np.intp)
+        pairs.append(pair % n if how == Wrap.REPEAT else pair.clip(0, n - 1))
+        shares.append(np.stack([1 - (place - first), place - first]))
+    (rows, columns), (down, right) = pairs, shares
+    corners = level[rows[:, None], columns].astype(np.float64)
+    return corners.reshape(4, -1), (down[:, None] * right).reshape(4, -1)
 
 
 class LevelWriter:

@@ -46,7 +46,7 @@ def draw_cloud(
     """
     if depth_test != "less":
         raise ValueError(f"points are drawn with depth_test 'less', got {depth_test!r}")
-    if options.get("cull", "none") != "none":
+    if options.get("cull") not in (None, "none"):
         raise ValueError("points have no side to cull")
     frame = options.get("viewport") or size
     positions: npt.NDArray[Any] = cloud.positions

@@ -31,20 +31,17 @@ def draw_all_edges(
     camera: Camera,
     options: ShadingOptions,
     *,
-    cull: CullOption,
+    cull: CullOption | None,
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
     behind = depth_behind(frags.depth)
     for instance in scene_of(subject):
-        own_camera, own_cull = camera.placed(instance.transform), cull_of(cull, instance)
-        back = cull_of("back", instance)
+        own_camera = camera.placed(instance.transform)
         vertices, triangles = instance.mesh.vertices, instance.mesh.triangles
-        is_single = instance.mesh.single_sided(options.material)
-        kinds = [(triangles, own_cull)]
-        if is_single is not None and own_cull != back:
-            kinds = [(triangles[is_single == 0], own_cull)]
-            if own_cull == "none":  # of the others the edges of what shows its front
-                kinds.append((triangles[is_single == 1], back))
+        is_single = None if cull is not None else instance.mesh.single_sided(options.material)
+        kinds = [(triangles, cull_of(cull or "none", instance))]
+        if is_single is not None:  # of some the edges of what shows its front
+            kinds = [(triangles[is_single == 0], "none"), (triangles[is_single == 1], cull_of("back", instance))]
         for some, side in kinds:
             draw_edges(picture, behind, vertices, some, own_camera, cull=side, threads=options.threads)
 

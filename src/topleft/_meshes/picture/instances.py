@@ -147,6 +147,8 @@ class PlacedScene:
 
     @cached_property
     def _has_sides(self) -> bool:
+        if not self._view.sides_by_material:
+            return False
         masks = (mesh.single_sided(self._material) for mesh, _ in self.whole.meshes.values())
         return any(mask is not None and not mask.all() for mask in masks)
 

@@ -241,7 +241,7 @@ class ShadingInputs:
             shininess = one.shininess if one.specular > 0 else 0.0
             cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
             full = full_part(one, mesh) if all_full or is_full(one) else None
-            compiled = None if texture is None else texture.compiled
+            compiled = None if texture is None else texture.engine_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
             row = color, back, side, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, compiled, full
             rows.append(row)
         self.shading.set_materials(rows)

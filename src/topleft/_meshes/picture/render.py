@@ -55,7 +55,7 @@ def render(
     shading: ShadingOption = "smooth",
     color: ColorLike = DEFAULT_COLOR,
     background: ColorLike = WHITE,
-    cull: CullOption = "none",
+    cull: CullOption | None = None,
     edges: bool = False,
     sampling: SamplesOption = "center",
     subpixel_bits: int | Literal["exact"] = 8,
@@ -83,8 +83,9 @@ def render(
         sRGB colour of a mesh without colours: "red", "#f00", (255, 0, 0) and (1.0, 0.0, 0.0) are the same.
     background : str, (3,) or (4,) integers of 0 to 255 or floats of 0 to 1
         sRGB, and alpha if it is not opaque; white unless given, "transparent" is `(0, 0, 0, 0)`.
-    cull : {"none", "back", "front"}
-        Triangles to leave out, by the side that is seen; besides the backs of materials that are not double-sided.
+    cull : {"none", "back", "front"}, optional
+        Triangles to leave out, by the side that is seen, whatever their materials say: "none" shows both sides of all.
+        Unless given: the backs of materials that are not `double_sided`.
     edges : bool
         Whether the edges that show are drawn over it, as smooth dark lines.
     sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
@@ -154,7 +155,7 @@ def rasterize_mesh(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    cull: CullOption = "none",
+    cull: CullOption | None = None,
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,

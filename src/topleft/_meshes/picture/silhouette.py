@@ -30,7 +30,7 @@ def silhouette(
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
     sampling: SamplingOption = "center",
-    cull: CullOption = "none",
+    cull: CullOption | None = None,
     tolerance: float = 0.0,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
@@ -48,8 +48,8 @@ def silhouette(
         640 x 480 unless given.
     sampling : str
         As `coverage` takes it: "center" gives bool, "area" float32.
-    cull : {"none", "back", "front"}
-        Triangles to leave out, by the side that is seen.
+    cull : {"none", "back", "front"}, optional
+        As for `render`: the side to leave out, whatever materials say.
     tolerance : float
         As for `render`: how far the outline may lie from where it belongs, pixels.
     threads : int, optional

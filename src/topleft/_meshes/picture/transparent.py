@@ -45,7 +45,7 @@ class PeelOptions(WindowOptions, total=False):
     layers: int
     depth_test: DepthTestOption
     sampling: SamplesOption
-    cull: CullOption
+    cull: CullOption | None
     threads: int | None
 
 
@@ -58,7 +58,7 @@ def render_transparent(
     layers: int = 8,
     shading: ShadingOption = "smooth",
     background: ColorLike = WHITE,
-    cull: CullOption = "none",
+    cull: CullOption | None = None,
     subpixel_bits: int | Literal["exact"] = 8,
     tolerance: float = 0.0,
     threads: int | None = None,

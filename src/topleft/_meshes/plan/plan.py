@@ -377,7 +377,7 @@ def plan_mesh(
     viewport = options.get("viewport")
     options["transform"] = camera.clip_from_world(viewport or size)
     found = choose_detail(
-        mesh, camera, size, tolerance=tolerance, cull=options.get("cull", "none"), viewport=viewport,
+        mesh, camera, size, tolerance=tolerance, cull=options.get("cull"), viewport=viewport,
         origin=options.get("origin", (0, 0)),
     )  # fmt: skip
     return found.mesh, plan_detail(found)

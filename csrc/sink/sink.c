@@ -10,11 +10,11 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
-#include "raster/covered.c"
-#include "raster/fragments.h"
-#include "raster/hooks.h"
-#include "raster/peel.c"
-#include "raster/setup.c"
+#include "vertex/setup.c"
+#include "sink/covered.c"
+#include "sink/fragments.h"
+#include "sink/hooks.h"
+#include "sink/peel.c"
 
 /* Samples interpolated by weights at a time. */
 #define TL_CHUNK 64

@@ -1,5 +1,10 @@
-/* Setup: a vector of triangles whose vertices are not snapped, as edge functions in float32 with a band of doubt.
- * In: points in pixels, a queue of boxes.  Out: lane_exact; which lanes lie on a grid; planes of depth.
+/* Float: TL_LANES triangles at a time whose vertices are not snapped, as edge functions in float32 with a band of
+ * doubt.
+ * In: points in pixels and triangles.  Out: boxes, edge functions, depth planes; which lanes lie on a grid.
+ *
+ * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers that stand in the
+ * array, with the top-left rule where one is 0.  Boxes are exact: the samples in the extent, of which centre - x is
+ * exact from column 0 on; left of it a rounded one may be one too low, and is compared.
  *
  * Points are measured in float64 from the first sample of the box.  Extents are at most TL_MAX_BOX_PX.  u = 2^-24;
  * X = max(width, 1), Y = max(height, 1) of the extent.  The first sample lies in the extent, so every |x - cx| <= X,
@@ -29,11 +34,12 @@
  * 5. Vertices on 2^-8 px: ties are systematic, so lanes that ask are looked at, and the band of those on the grid is 0.
  *    Boxes of up to 4x4 samples: points are measured without an error, edge functions are multiples of 2^-16, and while
  *    XY <= 64 nothing is rounded in 2., as all its numbers are below 2^7; they are moved by half a unit where a tie is
- *    not within, and otherwise the other way.  Larger boxes: integers of 2^-8 px, as batch.c and rows.c have them.
+ *    not within, and otherwise the other way.  Larger boxes: integers of 2^-8 px, as triangles_fixed.c and rows.c have
+ *    them.
  *
  * tests/raster/test_exact.py draws with bands four times narrower, which give wrong pictures. */
-#ifndef TL_SETUP_EXACT_C
-#define TL_SETUP_EXACT_C
+#ifndef TL_TRIANGLES_FLOAT_C
+#define TL_TRIANGLES_FLOAT_C
 
 #include <stdint.h>
 #include <string.h>
@@ -42,10 +48,10 @@
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
 #include "vertex/project.c"
+#include "vertex/setup.c"
 #include "exact/sign.c"
-#include "raster/batch.c"
-#include "raster/setup.c"
-#include "raster/sink.c"
+#include "sink/sink.c"
+#include "raster/state.h"
 
 #define TL_BOX_BAND 0x1.8p-20f /* 24 u */
 #define TL_ROW_BAND 0x1.8p-22f /* 6 u */
@@ -56,58 +62,11 @@
 #define TL_EXACT_BOX 64.0f    /* pixels */
 #define TL_HALF_UNIT 0x1p-17f /* half of what edge functions on the grid are multiples of */
 
-/* A queue of boxes, and X * Y of each extent. */
-typedef struct {
-    box_queue boxes;
-    float xy[TL_QUEUE + TL_MAX_LANES];
-} exact_queue;
-
-/* Everything that one pass over a mesh needs; on the stack of draw_exact. */
-typedef struct {
-    const tl_snapped *mesh; /* with the triangles that are drawn */
-    const tl_exact_points *points;
-    const tl_window *window;
-    const tl_target *target;
-    tl_exact_counts *counts;
-    tl_share *share;
-    int64_t left, top, right, bottom; /* picture pixels */
-    double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner; of squares 0 */
-    vi last_vertex;
-    int64_t bad_row;    /* of triangles, -1: none so far */
-    int has_places;     /* of vertices, and all of the window lies within their limit */
-    int may_be_on_grid; /* the triangles that asked last were: of so many vectors, that is looked at first */
-    exact_queue small, middle, rows;
-    int n_slivers; /* triangles of the queues that have no depth plane, and wait to be drawn by themselves */
-    int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
-    fragment_list fragments;
-} exact_state;
-
-/* TL_LANES triangles, turned so that their areas are positive. */
-typedef struct {
-    vi ids;
-    vd x[3], y[3], z[3];           /* z: where there is depth */
-    tl_test test;                  /* a constant where the sink is */
-    vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
-    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
-    vf xy;                         /* X * Y */
-    vf from_x[3], from_y[3], band; /* of boxes of up to 4x4: points from the first sample, and the band of samples */
-    vi sample;                     /* the first sample: row * stride_px + column */
-    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
-    vm turned;                     /* corners 1 and 2 have changed places in e, dx and dy */
-    vm to_turn;                    /* and are still to do so in x and y */
-    vm on_grid;                    /* e, dx and dy are exact, in units of their own */
-} lane_exact;
-
-/* z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in pixels from corner 0. */
-typedef struct {
-    vd z0, slope_x, slope_y;
-} exact_planes;
-
 /* The corners of a triangle that is turned, or not. */
-TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exact_point *p)
+TL_INLINE void load_turned(const walk_state *s, int32_t id, int is_turned, exact_point *p)
 {
     int32_t corners[3];
-    read_corners(s->mesh, id, corners);
+    read_corners(s->snapped, id, corners);
     p[0] = point_of(s->points, corners[0]);
     p[1] = point_of(s->points, corners[is_turned ? 2 : 1]);
     p[2] = point_of(s->points, corners[is_turned ? 1 : 2]);
@@ -140,7 +99,7 @@ TL_INLINE vd area_of_points(const vd *x, const vd *y)
 }
 
 /* Asks for the sign of the area of each lane in `doubted`. */
-static __attribute__((noinline)) void ask_turns(const exact_state *s, vi all_ids, unsigned doubted, unsigned *negative,
+static __attribute__((noinline)) void ask_turns(const walk_state *s, vi all_ids, unsigned doubted, unsigned *negative,
                                                 unsigned *flat)
 {
     int32_t ids[TL_MAX_LANES];
@@ -158,7 +117,7 @@ static __attribute__((noinline)) void ask_turns(const exact_state *s, vi all_ids
 
 /* Finds the triangles that are to be turned, and those without an area: of a float64 area the sign holds beyond 2^-51
  * of its terms (J. R. Shewchuk), and is asked for otherwise.  Of vertices on 2^-8 px it is exact. */
-TL_INLINE void find_turns(const exact_state *s, lane_exact *t, vm on_grid)
+TL_INLINE void find_turns(const walk_state *s, lane_exact *t, vm on_grid)
 {
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
     const vd x2 = vd_sub(t->x[2], t->x[0]), y2 = vd_sub(t->y[2], t->y[0]);
@@ -190,11 +149,11 @@ TL_INLINE void turn_points(lane_exact *t)
 }
 
 /* Leaves out the side that is culled. */
-TL_INLINE void cull_turned(const exact_state *s, lane_exact *t)
+TL_INLINE void cull_turned(const walk_state *s, lane_exact *t)
 {
-    if (s->mesh->cull == TL_CULL_BACK)
+    if (s->snapped->cull == TL_CULL_BACK)
         t->live = vm_and(t->live, t->turned);
-    else if (s->mesh->cull == TL_CULL_FRONT)
+    else if (s->snapped->cull == TL_CULL_FRONT)
         t->live = vm_and_not(t->live, t->turned);
 }
 
@@ -243,7 +202,7 @@ TL_INLINE void measure_points(lane_exact *t)
 }
 
 /* The same of points that are rounded to places. */
-TL_INLINE void measure_places(const exact_state *s, const vi *x_fx, const vi *y_fx, vi col, vi row, lane_exact *t)
+TL_INLINE void measure_places(const walk_state *s, const vi *x_fx, const vi *y_fx, vi col, vi row, lane_exact *t)
 {
     const vf unit = vf_set1(TL_PLACE_UNIT);
     const vi x = vi_add(vi_shift_left(col, TL_PLACE_BITS), vi_set1(place_of(s->centre_x)));
@@ -256,7 +215,7 @@ TL_INLINE void measure_places(const exact_state *s, const vi *x_fx, const vi *y_
 }
 
 /* The same for boxes of up to 4x4 samples, from points in float32; finds the turns, too. */
-TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t, vm on_grid)
+TL_INLINE void set_box_edges(const walk_state *s, lane_exact *t, vm on_grid)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f);
     const vf band = vf_select(on_grid, zero, vf_add(t->band, t->band));
@@ -287,7 +246,7 @@ TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t, vm on_grid)
 }
 
 /* The triangles of which all vertices lie on 2^-8 px; of_boxes: and that are so small that set_box_edges is exact. */
-TL_INLINE vm find_on_grid(const exact_state *s, const lane_exact *t, int of_boxes)
+TL_INLINE vm find_on_grid(const walk_state *s, const lane_exact *t, int of_boxes)
 {
     vd off = vd_set1(0.0);
     for (int k = 0; k < 3; k++)
@@ -311,7 +270,8 @@ TL_INLINE void set_ties(lane_exact *t, vm m)
     t->on_grid = vm_or(t->on_grid, m);
 }
 
-/* Sets the edge functions of the lanes in m to those of batch.c, half a unit inwards: none is ever 0 at a sample. */
+/* Sets the edge functions of the lanes in m to those of triangles_fixed.c, half a unit inwards: none is ever 0 at a
+ * sample. */
 static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
 {
     vi x[3], y[3]; /* doubled, from the first sample */
@@ -345,7 +305,7 @@ static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
 }
 
 /* Looks whether triangles that ask lie on the grid, and if so takes their edges from it; returns which. */
-static __attribute__((noinline)) vm try_grid(exact_state *s, lane_exact *t, int of_boxes)
+static __attribute__((noinline)) vm try_grid(walk_state *s, lane_exact *t, int of_boxes)
 {
     const vm good = vm_and_not(find_on_grid(s, t, of_boxes), t->on_grid);
     if (vm_any(vm_and(good, t->live))) {
@@ -388,18 +348,110 @@ TL_INLINE void store_points_to_pick(const lane_exact *t, picked_points *m)
 }
 
 /* When a triangle covers a pixel, by what is drawn: squares have masks and counts alone. */
-TL_INLINE tl_test test_of(const exact_state *s, tl_sink sink)
+TL_INLINE tl_test test_of(const walk_state *s, tl_sink sink)
 {
     return sink == TL_SINK_MASK || sink == TL_SINK_COUNT ? s->window->test : TL_TEST_SAMPLE;
 }
 
+/* The first pixels whose samples are not left of x. */
+TL_INLINE vi first_pixels(vd x, vd centre, int is_left_of_0)
+{
+    const vi n = vi_ceil(vd_sub(x, centre));
+    if (!is_left_of_0)
+        return n;
+    const vm is_low = vm_and_not(vm_all(), vd_ge(vd_add(vd_from_vi(n), centre), x));
+    return vi_add(n, vi_select(is_low, vi_set1(1), vi_set1(0)));
+}
+
+/* The pixels from *first to *end whose samples lie in extents, or whose squares meet them in more than a line, or lie
+ * in them. */
+TL_INLINE void find_pixels_of(vd low, vd high, tl_test test, double centre, int is_left_of_0, vi *first, vi *end)
+{
+    const vd at = vd_set1(centre);
+    if (test == TL_TEST_SAMPLE) {
+        *first = first_pixels(low, at, is_left_of_0), *end = first_pixels(high, at, is_left_of_0);
+        return;
+    }
+    *first = test == TL_TEST_OUTER ? vi_round(vd_floor(low)) : vi_ceil(low);
+    *end = test == TL_TEST_OUTER ? vi_ceil(high) : vi_round(vd_floor(high));
+}
+
+/* The pixels around the extent of a triangle in which edges are tested. */
+TL_INLINE double border_of(tl_test test) { return test == TL_TEST_SAMPLE ? 0.0 : 2.0; }
+
+/* The boxes of the points. */
+TL_INLINE void find_boxes_of_points(const walk_state *s, tl_sink sink, vm live, lane_batch *b)
+{
+    const vd *x = b->t.x, *y = b->t.y;
+    const vd sum = vd_add(vd_add(vd_add(x[0], x[1]), vd_add(y[0], y[1])), vd_add(x[2], y[2]));
+    const vd x_min = vd_min(vd_min(x[0], x[1]), x[2]), x_max = vd_max(vd_max(x[0], x[1]), x[2]);
+    const vd y_min = vd_min(vd_min(y[0], y[1]), y[2]), y_max = vd_max(vd_max(y[0], y[1]), y[2]);
+    const vd width = vd_sub(x_max, x_min), height = vd_sub(y_max, y_min);
+    const tl_test test = test_of(s, sink);
+    const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test));
+    const vd widest = vd_set1(s->is_far ? -1.0 : TL_MAX_BOX_PX - border_of(test));
+    const vd farthest = vd_max(vd_max(x_max, y_max), vd_sub(vd_set1(0.0), vd_min(x_min, y_min)));
+    const vm in_range = vm_and(vd_ge(vd_set1(0x1p30), farthest), vd_ge(vd_set1(0x1p33), sum)); /* not where it is NaN */
+    const vm fits = vm_and(in_range, vd_ge(widest, vd_max(width, height)));
+    const int is_left_of_0 = s->limits.left < 0 || s->limits.top < 0;
+    vi left, right;
+    b->alone = vm_and_not(live, fits), b->drawn = vm_and(live, fits);
+    find_pixels_of(x_min, x_max, test, s->centre_x, is_left_of_0, &left, &right);
+    find_pixels_of(y_min, y_max, test, s->centre_y, is_left_of_0, &b->top, &b->bottom);
+    cut_boxes(s, left, right, b);
+    b->xy = vf_mul(vf_max(vf_add(vf_from_vd(width), border), one), vf_max(vf_add(vf_from_vd(height), border), one));
+}
+
+/* The pixels whose samples lie between places, or up to a unit beside them. */
+TL_INLINE void find_pixels_of_places(vi low, vi high, double centre, vi *first, vi *end)
+{
+    const int32_t at = place_of(centre), unit = 1 << TL_PLACE_BITS;
+    *first = vi_shift_right(vi_add(low, vi_set1(unit - 2 - at)), TL_PLACE_BITS);
+    *end = vi_shift_right(vi_add(high, vi_set1(unit + 1 - at)), TL_PLACE_BITS);
+}
+
+/* The boxes of the places; returns 0 where one has more than 4x4 samples and has to be exact. */
+TL_INLINE int find_boxes_of_places(const walk_state *s, vm live, lane_batch *b)
+{
+    const vi *x = b->x_fx, *y = b->y_fx;
+    const vi x_min = vi_min(vi_min(x[0], x[1]), x[2]), x_max = vi_max(vi_max(x[0], x[1]), x[2]);
+    const vi y_min = vi_min(vi_min(y[0], y[1]), y[2]), y_max = vi_max(vi_max(y[0], y[1]), y[2]);
+    const vi width = vi_sub(x_max, x_min), height = vi_sub(y_max, y_min);
+    const vi widest = vi_set1(TL_MAX_BOX_PX << TL_PLACE_BITS);
+    const vf one = vf_set1(1.0f), unit = vf_set1(TL_PLACE_UNIT);
+    /* a special vertex has TL_SPECIAL for x: its triangle is too wide, or special throughout */
+    const vm too_large = vm_or(vi_gt_unsigned(width, widest), vi_gt_unsigned(height, widest));
+    vi left, right;
+    b->alone = vm_and(live, vm_or(too_large, vi_eq(x_min, vi_set1(TL_SPECIAL)))), b->drawn = vm_and_not(live, b->alone);
+    find_pixels_of_places(x_min, x_max, s->centre_x, &left, &right);
+    find_pixels_of_places(y_min, y_max, s->centre_y, &b->top, &b->bottom);
+    cut_boxes(s, left, right, b);
+    b->xy = vf_mul(vf_max(vf_mul(vf_from_vi(width), unit), one), vf_max(vf_mul(vf_from_vi(height), unit), one));
+    return !vm_any(vm_and(vm_and(b->drawn, has_box(b)), vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX))));
+}
+
+/* Loads TL_LANES triangles, and finds their boxes. */
+TL_INLINE void load_float_batch(const walk_state *s, tl_sink sink, const int32_t *corners, vm live, lane_batch *b)
+{
+    b->is_placed = 0;
+    if (sink_has_depth(sink) && s->has_places) {
+        for (int k = 0; k < 3; k++)
+            vd_load_places(s->points->points, corners + k, &b->t.x[k], &b->t.y[k], &b->t.z[k], &b->x_fx[k],
+                           &b->y_fx[k]);
+        b->is_placed = find_boxes_of_places(s, live, b);
+    } else {
+        load_points(s->points, sink, corners, b->t.x, b->t.y, b->t.z);
+    }
+    if (!b->is_placed)
+        find_boxes_of_points(s, sink, live, b);
+}
+
 /* The first samples of boxes. */
-TL_INLINE void place_exact(const exact_state *s, tl_sink sink, vi col, vi row, vf xy, lane_exact *t)
+TL_INLINE void place_float(const walk_state *s, tl_sink sink, vi col, vi row, vf xy, lane_exact *t)
 {
     t->sample_x = vd_add(vd_from_vi(col), vd_set1(s->centre_x));
     t->sample_y = vd_add(vd_from_vi(row), vd_set1(s->centre_y));
-    t->sample = vi_add(vi_mul(vi_sub(row, vi_set1((int32_t)s->top)), vi_set1((int32_t)s->target->stride_px)),
-                       vi_sub(col, vi_set1((int32_t)s->left)));
+    t->sample = first_samples(s, col, row);
     t->test = test_of(s, sink);
     t->xy = vf_mul(xy, vf_set1((float)s->points->band));
     t->on_grid = vm_first(0);
@@ -410,7 +462,7 @@ TL_INLINE void place_exact(const exact_state *s, tl_sink sink, vi col, vi row, v
 #define TL_MOST_EXTENT 1e120
 
 /* Puts by what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range. */
-TL_INLINE void take_out_slivers(exact_state *s, lane_exact *t)
+TL_INLINE void take_out_slivers(walk_state *s, lane_exact *t)
 {
     const vd width = vd_sub(vd_max(vd_max(t->x[0], t->x[1]), t->x[2]), vd_min(vd_min(t->x[0], t->x[1]), t->x[2]));
     const vd height = vd_sub(vd_max(vd_max(t->y[0], t->y[1]), t->y[2]), vd_min(vd_min(t->y[0], t->y[1]), t->y[2]));
@@ -425,21 +477,19 @@ TL_INLINE void take_out_slivers(exact_state *s, lane_exact *t)
     }
 }
 
-/* Loads the triangles [i, i + TL_LANES) of a queue. */
-TL_INLINE void pop_exact(const exact_state *s, tl_sink sink, const exact_queue *queue, int i, lane_exact *t)
+/* The triangles [i, i + TL_LANES) of a queue of n. */
+TL_INLINE void pop_float(const walk_state *s, tl_sink sink, const box_queue *q, int i, int n, lane_exact *t)
 {
     int32_t corners[3 * TL_LANES];
-    const box_queue *q = &queue->boxes;
-    const int n = q->n;
-    pop_corners(s->mesh, s->last_vertex, q, i, n, corners);
+    pop_corners(s->snapped, s->limits.last_vertex, q, i, n, corners);
     load_points(s->points, sink, corners, t->x, t->y, t->z);
     t->ids = vi_load(q->id + i);
     t->live = vm_first(n - i);
-    place_exact(s, sink, vi_load(q->col + i), vi_load(q->row + i), vf_load(queue->xy + i), t);
+    place_float(s, sink, vi_load(q->col + i), vi_load(q->row + i), vf_load(q->xy + i), t);
 }
 
 /* Edge functions of triangles that have been loaded.  of_boxes, a constant: of up to 4x4 samples. */
-TL_INLINE void setup_exact(exact_state *s, tl_sink sink, lane_exact *t, int of_boxes)
+TL_INLINE void setup_float(walk_state *s, tl_sink sink, lane_exact *t, int of_boxes)
 {
     const vm good = s->may_be_on_grid ? find_on_grid(s, t, of_boxes) : vm_first(0);
     s->counts->n_triangles += __builtin_popcount(vm_bits(t->live));
@@ -467,10 +517,11 @@ TL_INLINE void setup_exact(exact_state *s, tl_sink sink, lane_exact *t, int of_b
     }
 }
 
-/* The depth planes.  The same operations as plane_of_points in alone_exact.c. */
-TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const lane_exact *t)
+/* The same operations as plane_of_points in alone_float.c. */
+TL_INLINE lane_planes plane_of_lanes(const walk_state *s, const lane_exact *t)
 {
-    exact_planes p = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)};
+    const vd zero = vd_set1(0.0);
+    lane_planes p = {zero, zero, zero, t->sample_x, t->sample_y, t->x[0], t->y[0]};
     if (s->points->stride < 3)
         return p;
     const vd *z = t->z;
@@ -487,15 +538,40 @@ TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const lane_exact *t)
     return p;
 }
 
-/* z0 + slope_y * (y - y0), and slope_x * (x - x0), of the samples so many rows or columns behind the first. */
-TL_INLINE vd row_depth(const exact_planes *p, const lane_exact *t, double row)
+/* Leaves out for certain what is turned away. */
+TL_INLINE void drop_turned(const walk_state *s, lane_batch *b)
 {
-    const vd y = vd_sub(vd_add(t->sample_y, vd_set1(row)), t->y[0]);
-    return vd_add(p->z0, vd_mul(p->slope_y, y));
+    if (s->snapped->cull == TL_CULL_NONE)
+        return;
+    const vd *x = b->t.x, *y = b->t.y;
+    const vd width = vd_sub(vd_max(vd_max(x[0], x[1]), x[2]), vd_min(vd_min(x[0], x[1]), x[2]));
+    const vd height = vd_sub(vd_max(vd_max(y[0], y[1]), y[2]), vd_min(vd_min(y[0], y[1]), y[2]));
+    const vd area = area_of_points(x, y), box = vd_mul(width, height);
+    const vd bound = vd_add(vd_mul(box, vd_set1(0x1p-50)), vd_set1(1e-280)), zero = vd_set1(0.0);
+    b->drawn = vm_and_not(b->drawn, vd_ge(s->snapped->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
 }
-TL_INLINE vd col_depth(const exact_planes *p, const lane_exact *t, double col)
+
+/* Whether int32 counts the pixels of a window. */
+TL_INLINE int is_near_0(const tl_window *window)
 {
-    return vd_mul(p->slope_x, vd_sub(vd_add(t->sample_x, vd_set1(col)), t->x[0]));
+    const int64_t farthest = (int64_t)1 << 30;
+    return is_near(window) && window->x_px + window->width < farthest && window->y_px + window->height < farthest;
+}
+
+/* The window lies within 2^48 pixels of 0, where centres and samples are float64. */
+static void start_float(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                        tl_exact_counts *counts)
+{
+    const int64_t limit = TL_PLACE_LIMIT_PX - TL_MAX_BOX_PX - 2;
+    const double unit = 1.0 / (double)(1 << window->subpixel_bits);
+    const int of_squares = window->test != TL_TEST_SAMPLE;
+    start_walk(s, snapped, window, target);
+    s->points = snapped->mesh.exact, s->counts = counts;
+    s->centre_x = of_squares ? 0.0 : 0.5 + snapped->mesh.sample_x_fx * unit;
+    s->centre_y = of_squares ? 0.0 : 0.5 + snapped->mesh.sample_y_fx * unit;
+    s->is_far = !is_near_0(window), s->may_be_on_grid = 0;
+    s->has_places = s->points->stride == TL_PLACED && max64(-window->x_px, window->x_px + window->width) <= limit &&
+                    max64(-window->y_px, window->y_px + window->height) <= limit;
 }
 
 #endif

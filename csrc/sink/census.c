@@ -8,7 +8,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
-#include "raster/setup.c"
+#include "vertex/setup.c"
 
 /* The sink that triangles are drawn, or counted, for. */
 TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink)

@@ -1,11 +1,12 @@
 /* The functions that lower files call of higher ones, and all of them: a sink is compiled into the walkers and into the
- * lanes, so that inner loops know what they draw, and three sinks are rooms of their own.  What includes this file and
+ * lanes, so that inner loops know what they draw, and two sinks are rooms of their own.  What includes this file and
  * draws for such a sink must be compiled together with the file that defines it, as kernels.c does. */
 #ifndef TL_HOOKS_H
 #define TL_HOOKS_H
 
 #include <stdint.h>
 
+#include "topleft.h"
 #include "lanes/lanes.h"
 
 /* TL_SINK_BLEND, in blend/mix_few.c: the colours of the pixels [at, at + n). */
@@ -15,13 +16,5 @@ static void mix_run(struct blend_state *b, int64_t at, int64_t n);
 /* TL_SINK_SPANS, in few/row_spans.c: the n samples from `at` on are covered. */
 struct span_table;
 static void note_span(struct span_table *t, int64_t at, int64_t n);
-
-/* TL_SINK_SAMPLES, in raster/sampled.c: what it does instead of batch.c and rows.c. */
-struct batch_state;
-struct lane_triangles;
-static void draw_tiny_of_samples(struct batch_state *s, const struct lane_triangles *t, vm live, vi n_cols, vi n_rows);
-static void flush_small_of_samples(struct batch_state *s);
-static void flush_middle_of_samples(struct batch_state *s);
-static void flush_rows_of_samples(struct batch_state *s);
 
 #endif

@@ -1,11 +1,11 @@
 /* Alone: one triangle of any finite float64 vertices by itself, by the ends of rows in float64.
  * In: points in pixels.  Out: spans of samples to the sink.
  *
- * As rows_exact.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
+ * As rows.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
  * itself, 3 u for each column of the box.  What is not finite is asked.  Extents of any size may come: a box is the
  * samples of the window, and the first of them lies in the extent. */
-#ifndef TL_ALONE_EXACT_C
-#define TL_ALONE_EXACT_C
+#ifndef TL_ALONE_FLOAT_C
+#define TL_ALONE_FLOAT_C
 
 #include <float.h>
 #include <math.h>
@@ -14,12 +14,13 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
-#include "exact/rows_exact.c"
-#include "exact/setup_exact.c"
+#include "vertex/setup.c"
 #include "exact/sign.c"
+#include "sink/sink.c"
 #include "raster/alone.c"
-#include "raster/setup.c"
-#include "raster/sink.c"
+#include "raster/refine.c"
+#include "raster/state.h"
+#include "raster/triangles_float.c"
 
 /* A triangle by itself, with positive area. */
 typedef struct {
@@ -70,7 +71,7 @@ TL_INLINE double larger_of(double a, double b) { return b > a ? b : a; }
 TL_INLINE double least_of(double a, double b, double c) { return lesser_of(lesser_of(a, b), c); }
 TL_INLINE double most_of(double a, double b, double c) { return larger_of(larger_of(a, b), c); }
 
-/* The same operations as plane_of_lanes and take_out_slivers in setup_exact.c. */
+/* The same operations as plane_of_lanes and take_out_slivers in triangles_float.c. */
 static void plane_of_points(lone_triangle *t, double width, double height)
 {
     const exact_point *p = t->edges.corners;
@@ -100,7 +101,7 @@ static float weighted_depth(const lone_triangle *t, exact_point sample)
 }
 
 /* The edge functions at the first sample of the box, with their bands. */
-static void setup_lone_edges(const exact_state *s, lone_triangle *t, double width, double height)
+static void setup_lone_edges(const walk_state *s, lone_triangle *t, double width, double height)
 {
     asked_triangle *e = &t->edges;
     const double border = e->test == TL_TEST_SAMPLE ? 0.0 : 2.0;
@@ -277,12 +278,13 @@ TL_INLINE void put_lone_depths(const tl_target *target, tl_sink sink, const lone
 }
 
 /* Sets up triangle i; returns whether there is anything to draw.  A vertex that is not finite ends the pass. */
-static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, tl_test test, int with_depth)
+static int setup_lone(walk_state *s, int32_t i, lone_triangle *t, tl_test test, int with_depth)
 {
     asked_triangle *e = &t->edges;
+    const tl_window *w = s->window;
     exact_point *p = e->corners;
     int32_t corners[3];
-    read_corners(s->mesh, i, corners);
+    read_corners(s->snapped, i, corners);
     for (int k = 0; k < 3; k++)
         p[k] = point_of(s->points, corners[k]);
     const double x0 = least_of(p[0].x, p[1].x, p[2].x), x1 = most_of(p[0].x, p[1].x, p[2].x);
@@ -293,19 +295,19 @@ static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, tl_test test,
             return 0;
         }
     e->test = test;
-    e->n_cols = (int)find_lone_box(x0, x1, test, s->centre_x, s->left, s->right, &t->col);
-    t->n_rows = find_lone_box(y0, y1, test, s->centre_y, s->top, s->bottom, &t->row);
+    e->n_cols = (int)find_lone_box(x0, x1, test, s->centre_x, w->x_px, w->x_px + w->width, &t->col);
+    t->n_rows = find_lone_box(y0, y1, test, s->centre_y, w->y_px, w->y_px + w->height, &t->row);
     if (e->n_cols <= 0 || t->n_rows <= 0)
         return 0;
     const int sign = edge_sign(p[0], p[1], p[2], s->counts), second = sign < 0 ? 2 : 1;
-    if (is_culled(sign, s->mesh->cull))
+    if (is_culled(sign, s->snapped->cull))
         return 0;
     if (sign < 0) {
         const exact_point first = p[1];
         p[1] = p[2], p[2] = first;
     }
     e->sample_x = (double)t->col + s->centre_x, e->sample_y = (double)t->row + s->centre_y;
-    t->id = name_of(s->mesh, i);
+    t->id = name_of(s->snapped, i);
     if (!setup_on_grid(t))
         setup_lone_edges(s, t, x1 - x0, y1 - y0);
     t->asks_all = e->band[0] == INFINITY || e->band[1] == INFINITY || e->band[2] == INFINITY;
@@ -332,7 +334,7 @@ static __attribute__((noinline)) void ask_lone_ends(const asked_triangle *a, int
     }
 }
 
-TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
+TL_INLINE void draw_lone(walk_state *s, int32_t i, tl_sink sink)
 {
     const tl_target target = *s->target; /* copies that no store can change */
     lone_triangle found;
@@ -340,7 +342,7 @@ TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
     if (!setup_lone(s, i, &found, test_of(s, sink), sink_has_depth(sink)))
         return;
     const lone_triangle t = found;
-    const int64_t stride = target.stride_px, corner = (t.row - s->top) * stride + t.col - s->left;
+    const int64_t stride = target.stride_px, corner = (t.row - s->window->y_px) * stride + t.col - s->window->x_px;
     const int is_slow = sink_has_depth(sink) && !t.has_plane;
     if (!is_slow)
         tl_count_work(s->window, t.n_rows * t.edges.n_cols);
@@ -366,13 +368,14 @@ TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
     }
 }
 
-TL_SINK_COPIES(draw_lone, (exact_state * s, int32_t i), s, i)
+TL_SINK_COPIES(draw_lone, (walk_state * s, int32_t i), s, i)
 
 /* Counts the squares that any of the pieces [first, end) of one triangle meets, or holds, once each. */
-static void count_squares_of_pieces(exact_state *s, int64_t first, int64_t end)
+static void count_squares_of_pieces(walk_state *s, int64_t first, int64_t end)
 {
     lone_triangle t[TL_MAX_PIECES];
-    int64_t row0 = s->bottom, row1 = s->top;
+    const int64_t left = s->window->x_px, top = s->window->y_px;
+    int64_t row0 = top + s->window->height, row1 = top;
     int n = 0;
     for (int64_t i = first; i < end && n < TL_MAX_PIECES; i++) {
         if (!setup_lone(s, (int32_t)i, &t[n], s->window->test, 0))
@@ -390,21 +393,34 @@ static void count_squares_of_pieces(exact_state *s, int64_t first, int64_t end)
                 continue;
             if (find_lone_end(&t[i], row - t[i].row, &from, &to))
                 ask_lone_ends(&t[i].edges, row - t[i].row, 1, &from, &to, s->counts);
-            const int64_t col = t[i].col - s->left;
+            const int64_t col = t[i].col - left;
             spans[n_spans++] = (row_span){col + from, col + to};
         }
-        count_spans(spans, n_spans, s->window, s->target, row - s->top);
+        count_spans(spans, n_spans, s->window, s->target, row - top);
     }
 }
 
 /* The triangles [first, end), which are pieces: those of one triangle have one name. */
-static __attribute__((noinline)) void count_pieces(exact_state *s, int64_t first, int64_t end)
+static __attribute__((noinline)) void count_pieces(walk_state *s, int64_t first, int64_t end)
 {
     for (int64_t i = first, next; i < end && s->bad_row < 0 && !tl_is_given_up(s->window); i = next) {
-        for (next = i + 1; next < end && s->mesh->names[next] == s->mesh->names[i];)
+        for (next = i + 1; next < end && s->snapped->names[next] == s->snapped->names[i];)
             next++;
         count_squares_of_pieces(s, i, next);
     }
+}
+
+static __attribute__((noinline)) void draw_one_float(walk_state *s, int32_t i)
+{
+    TL_SINK_CALL(draw_lone, s->target->sink, s, i)
+}
+
+/* Draws the slivers that queues set aside: they have no depth plane. */
+static __attribute__((noinline)) void draw_slivers(walk_state *s)
+{
+    for (int k = 0; k < s->n_slivers && s->bad_row < 0 && !tl_is_given_up(s->window); k++)
+        draw_one_float(s, s->slivers[k]);
+    s->n_slivers = 0;
 }
 
 #endif

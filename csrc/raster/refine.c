@@ -1,32 +1,25 @@
-/* Rows: triangles with boxes of 5 to 62 samples a side, by the ends of rows in float32.
- * In: queues of setup_exact.c.  Out: rows of samples to the sink.
- *
- * An edge ends a row at floor(q), q = v / |dy|, v the edge function at the row's first sample: samples up to floor(q)
- * lie inside a right edge, samples from -floor(q) on inside a left one.  Where q is nearer to an integer than the band
- * says (setup_exact.c), that one column is in doubt, and the exact sign decides. */
-#ifndef TL_ROWS_EXACT_C
-#define TL_ROWS_EXACT_C
+/* Refine: row ends of vertices that are not snapped which lie in the band of doubt.
+ * In: a vector of triangles, and rows.  Out: row ends, by float64 and, where that does not tell, by the exact sign. */
+#ifndef TL_REFINE_C
+#define TL_REFINE_C
 
 #include <math.h>
 #include <stdint.h>
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "exact/setup_exact.c"
 #include "exact/sign.c"
-#include "raster/alone.c"
-#include "raster/batch.c"
-#include "raster/rows.c"
-#include "raster/sink.c"
+#include "sink/sink.c"
+#include "raster/state.h"
+#include "raster/triangles_float.c"
 
 #define TL_NEAR_BAND 0x1.2p-19f /* 36 u: of row ends up to 17 columns away */
 #define TL_FAR_BAND 0x1.04p-17f /* 130 u: up to 62 */
 
-/* The edges of TL_LANES triangles: left, right and third. */
+/* The samples [first, end) of TL_LANES rows of one triangle. */
 typedef struct {
-    vf start[3], step[3], inverse[3], band[3];
-    vm third_is_left, third_is_right;
-} exact_edges;
+    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+} row_ends;
 
 /* The row ends of one triangle, for what is asked. */
 typedef struct {
@@ -38,7 +31,7 @@ typedef struct {
 } asked_triangle;
 
 /* The band of an edge of a triangle: in columns. */
-TL_INLINE void set_bands(const exact_state *s, const lane_exact *t, float far, vf *inverse, vf *band)
+TL_INLINE void set_bands(const walk_state *s, const lane_exact *t, float far, vf *inverse, vf *band)
 {
     const vf zero = vf_set1(0.0f), margin = vf_mul(t->xy, vf_set1(TL_ROW_BAND));
     const vf slack = vf_set1(far * (float)s->points->band), never = vf_set1(-1.0f);
@@ -49,39 +42,6 @@ TL_INLINE void set_bands(const exact_state *s, const lane_exact *t, float far, v
         band[k] = vf_select(vm_or(level, t->on_grid), never, vf_add(vf_mul(margin, inverse[k]), slack));
     }
 }
-
-TL_INLINE void sort_exact_edges(const exact_state *s, const lane_exact *t, float far, exact_edges *r)
-{
-    const vf zero = vf_set1(0.0f);
-    vf inverse[3], band[3];
-    vm left[3], right[3];
-    set_bands(s, t, far, inverse, band);
-    for (int k = 0; k < 3; k++)
-        left[k] = vf_lt(t->dy[k], zero), right[k] = vf_lt(zero, t->dy[k]);
-    /* as find_sides in rows.c */
-    const vm third0 = vm_and_not(vm_and_not(vm_all(), left[0]), right[0]);
-    const vm taken1 = vm_or(vm_and_not(left[1], left[0]), vm_and_not(right[1], right[0]));
-    const vm third1 = vm_and_not(vm_and_not(vm_all(), taken1), third0);
-    const vm third2 = vm_and_not(vm_and_not(vm_all(), third0), third1);
-    const vm is0[3] = {left[0], right[0], third0}, is1[3] = {left[1], right[1], third1};
-    for (int side = 0; side < 3; side++) {
-        r->start[side] = vf_select(is0[side], t->e[0], vf_select(is1[side], t->e[1], t->e[2]));
-        r->step[side] = vf_select(is0[side], t->dx[0], vf_select(is1[side], t->dx[1], t->dx[2]));
-        r->inverse[side] = vf_select(is0[side], inverse[0], vf_select(is1[side], inverse[1], inverse[2]));
-        r->band[side] = vf_select(is0[side], band[0], vf_select(is1[side], band[1], band[2]));
-    }
-    r->third_is_left = vm_or(vm_and(third1, left[1]), vm_and(third2, left[2]));
-    r->third_is_right = vm_or(vm_and(third1, right[1]), vm_and(third2, right[2]));
-}
-
-/* Whether the end of a row lies in the band. */
-TL_INLINE vm is_near_integer(vf q, vf band)
-{
-    const vf off = vf_off_integer(q);
-    return vf_ge(band, vf_max(off, vf_sub(vf_set1(0.0f), off)));
-}
-
-/* ---- what is asked ------------------------------------------------------------------------------------- */
 
 /* Whether column k of a row lies inside edge i. */
 TL_INLINE int is_column_inside(const asked_triangle *a, int i, double y, int64_t k, tl_exact_counts *counts)
@@ -135,7 +95,7 @@ TL_INLINE void decide_row(const asked_triangle *a, int64_t row, int64_t *first, 
 }
 
 /* Lane k of a vector of triangles, in the numbers that lanes have. */
-static __attribute__((noinline)) void set_asked(const exact_state *s, const box_queue *q, int i, int k,
+static __attribute__((noinline)) void set_asked(const walk_state *s, const box_queue *q, int i, int k,
                                                 const lane_exact *t, float far, asked_triangle *a)
 {
     vf inverse[3], band[3];
@@ -168,29 +128,6 @@ TL_INLINE vi decide_floors(const vd *x, const vd *y, int k, tl_test test, vd sam
 }
 
 /* ---- boxes of up to 16 rows and TL_LANES columns -------------------------------------------------------- */
-
-/* Sets the bits of the rows of TL_LANES triangles; returns the lanes with a row end in doubt. */
-TL_INLINE vm find_middle_rows(const lane_exact *t, const exact_edges *e, vi n_cols, int n_rows,
-                              int32_t (*bits)[TL_MAX_LANES])
-{
-    const vi zero = vi_set1(0), one = vi_set1(1);
-    vm doubted = vm_first(0);
-    vf at = vf_set1(0.0f);
-    for (int row = 0; row < n_rows; row++) {
-        vi quotient[3];
-        for (int side = 0; side < 3; side++) {
-            const vf q = vf_mul(vf_fma(e->step[side], at, e->start[side]), e->inverse[side]);
-            quotient[side] = vi_floor(q);
-            doubted = vm_or(doubted, is_near_integer(q, e->band[side]));
-        }
-        at = vf_add(at, vf_set1(1.0f));
-        const vi left = vi_select(e->third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-        const vi right = vi_select(e->third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-        const vi begin = vi_max(vi_sub(zero, left), zero), end = vi_max(vi_min(vi_add(right, one), n_cols), zero);
-        vi_store(bits[row], vi_bit_ranges(begin, end));
-    }
-    return vm_and(doubted, t->live);
-}
 
 /* Columns of one edge that are in doubt, in a vector of triangles: lane | row << 8 | col << 16. */
 typedef struct {
@@ -262,8 +199,8 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
 
 /* Decides all rows of the lanes in doubt: by their grid, by float64 at each column in doubt, by the exact sign; and
  * rows whose bands are wide by themselves. */
-static __attribute__((noinline)) void ask_middle_rows(exact_state *s, const box_queue *q, int i, lane_exact *t,
-                                                      vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES])
+static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const box_queue *q, int i, lane_exact *t,
+                                                         vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES])
 {
     const vi size = vi_load(q->size + i), n_cols = vi_and(size, vi_set1(0xffff));
     picked_points m;
@@ -298,89 +235,10 @@ static __attribute__((noinline)) void ask_middle_rows(exact_state *s, const box_
     }
 }
 
-TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
-{
-    box_queue *q = &s->middle.boxes;
-    for (int i = 0; i < q->n; i += TL_LANES) {
-        lane_exact t;
-        exact_edges e;
-        exact_planes p;
-        middle_rows m;
-        const int end = q->n - i < TL_LANES ? q->n - i : TL_LANES;
-        int max_rows = 0;
-        pop_exact(s, sink, &s->middle, i, &t);
-        setup_exact(s, sink, &t, 0);
-        vi_store(m.sample, t.sample);
-        for (int k = 0; k < end; k++)
-            max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
-        if (sink_has_depth(sink)) {
-            p = plane_of_lanes(s, &t);
-            vd_store(m.slope_x, p.slope_x), vd_store(m.x, t.sample_x), vd_store(m.x0, t.x[0]);
-            m.step = 1.0;
-            for (int row = 0; row < max_rows; row++)
-                vd_store(m.z[row], row_depth(&p, &t, row));
-        }
-        sort_exact_edges(s, &t, TL_NEAR_BAND, &e);
-        const vi n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
-        const vm doubted = find_middle_rows(&t, &e, n_cols, max_rows, m.bits);
-        if (__builtin_expect(vm_any(doubted), 0))
-            ask_middle_rows(s, q, i, &t, doubted, max_rows, m.bits);
-        TL_SINK_CALL(draw_middle, s->target->sink, s->mesh, s->target, q, i, vm_bits(t.live), &m)
-    }
-    q->n = 0;
-}
-
-TL_LIST_COPIES(flush_middle_exact, (exact_state * s), s)
-
-/* ---- boxes of up to 62 x 62 samples --------------------------------------------------------------------- */
-
-/* exact_edges in memory, with the depth planes. */
-typedef struct {
-    float start[3][TL_MAX_LANES], step[3][TL_MAX_LANES], inverse[3][TL_MAX_LANES], band[3][TL_MAX_LANES];
-    unsigned third_is_left, third_is_right;
-    double z0[TL_MAX_LANES], slope_x[TL_MAX_LANES], slope_y[TL_MAX_LANES], x0[TL_MAX_LANES], y0[TL_MAX_LANES];
-} exact_rows;
-
-TL_INLINE void store_exact_edges(const exact_edges *e, exact_rows *r)
-{
-    for (int side = 0; side < 3; side++) {
-        vf_store(r->start[side], e->start[side]), vf_store(r->step[side], e->step[side]);
-        vf_store(r->inverse[side], e->inverse[side]), vf_store(r->band[side], e->band[side]);
-    }
-    r->third_is_left = vm_bits(e->third_is_left), r->third_is_right = vm_bits(e->third_is_right);
-}
-
-/* The ends of TL_LANES rows of one triangle of the queue. */
-typedef struct {
-    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
-} row_ends;
-
-/* Finds them; returns the rows in doubt. */
-TL_INLINE unsigned find_row_ends_exact(const exact_rows *r, int k, int row0, int n_rows, int n_cols, row_ends *ends)
-{
-    const vi zero = vi_set1(0);
-    const vf rows = vf_from_vi(vi_add(vi_iota(), vi_set1(row0)));
-    const vm third_is_left = vm_first(r->third_is_left >> k & 1 ? TL_LANES : 0);
-    const vm third_is_right = vm_first(r->third_is_right >> k & 1 ? TL_LANES : 0);
-    vm doubted = vm_first(0);
-    vi quotient[3];
-    for (int side = 0; side < 3; side++) {
-        const vf v = vf_fma(vf_set1(r->step[side][k]), rows, vf_set1(r->start[side][k]));
-        const vf q = vf_mul(v, vf_set1(r->inverse[side][k]));
-        quotient[side] = vi_floor(q);
-        doubted = vm_or(doubted, is_near_integer(q, vf_set1(r->band[side][k])));
-    }
-    const vi left = vi_select(third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-    const vi right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-    vi_store(ends->first, vi_max(vi_sub(zero, left), zero));
-    vi_store(ends->end, vi_min(vi_add(right, vi_set1(1)), vi_set1(n_cols)));
-    return vm_bits(vm_and(doubted, vm_first(n_rows - row0)));
-}
-
 /* Decides TL_LANES rows of a triangle from row0 on: by float64, and, of each row where that does not tell, by the exact
  * sign. */
-static __attribute__((noinline)) void ask_row_ends(const asked_triangle *a, int row0, unsigned doubted, row_ends *ends,
-                                                   tl_exact_counts *counts)
+TL_INLINE void ask_row_ends(const asked_triangle *a, int row0, unsigned doubted, row_ends *ends,
+                            tl_exact_counts *counts)
 {
     const vi zero = vi_set1(0), n_cols = vi_set1(a->n_cols);
     const vf rows = vf_from_vi(vi_add(vi_iota(), vi_set1(row0)));
@@ -414,93 +272,13 @@ static __attribute__((noinline)) void ask_row_ends(const asked_triangle *a, int 
     }
 }
 
-/* One triangle of the queue, in blocks of TL_LANES x TL_LANES samples. */
-TL_INLINE void draw_rows_exact(exact_state *s, const tl_target *target, tl_sink sink, const exact_rows *r, int i, int k,
-                               const lane_exact *t, int32_t sample)
+/* The rows from row0 on of triangle k of those at i in the queue. */
+static __attribute__((noinline)) void refine_row_ends(walk_state *s, int i, int k, const lane_exact *t, int row0,
+                                                      unsigned doubted, row_ends *ends)
 {
-    const box_queue *q = &s->rows.boxes;
-    const int n_cols = q->size[i + k] & 0xffff, n_rows = q->size[i + k] >> 16;
-    const int32_t id = name_of(s->mesh, q->id[i + k]);
-    const double sample_x = q->col[i + k] + s->centre_x, sample_y = q->row[i + k] + s->centre_y;
-    const vi zero = vi_set1(0);
-    const vd steps = ramp(1.0);
-    int32_t bits[TL_MAX_LANES];
-    double z_row[TL_MAX_LANES];
-    for (int row0 = 0; row0 < n_rows; row0 += TL_LANES) {
-        const int64_t at = (uint32_t)sample + row0 * target->stride_px;
-        row_ends ends;
-        const unsigned doubted = find_row_ends_exact(r, k, row0, n_rows, n_cols, &ends);
-        if (__builtin_expect(doubted != 0, 0)) {
-            asked_triangle a;
-            set_asked(s, q, i, k, t, TL_FAR_BAND, &a);
-            ask_row_ends(&a, row0, doubted, &ends, s->counts);
-        }
-        const vi first = vi_load(ends.first), end = vi_select(vm_first(n_rows - row0), vi_load(ends.end), zero);
-        if (sink_has_depth(sink)) {
-            const vd ys = vd_sub(vd_add(vd_set1(sample_y + row0), steps), vd_set1(r->y0[k]));
-            vd_store(z_row, vd_add(vd_set1(r->z0[k]), vd_mul(vd_set1(r->slope_y[k]), ys)));
-        }
-        for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
-            const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
-            const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
-                                              vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
-            const unsigned drawn = vm_bits(vi_gt(in_block, zero));
-            if (!drawn)
-                continue;
-            const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            vd z_col = vd_set1(0.0);
-            if (sink_has_depth(sink)) {
-                const vd x = vd_sub(vd_add(vd_set1(sample_x + col0), steps), vd_set1(r->x0[k]));
-                z_col = vd_mul(vd_set1(r->slope_x[k]), x);
-            }
-            vi_store(bits, in_block);
-            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
-                       width <= TL_HALF_LANES, z_col, id);
-        }
-    }
+    asked_triangle a;
+    set_asked(s, &s->rows, i, k, t, TL_FAR_BAND, &a);
+    ask_row_ends(&a, row0, doubted, ends, s->counts);
 }
-
-/* Draws the triangles in `live` of those at i in the queue. */
-TL_INLINE void draw_all_rows_exact(exact_state *s, const exact_rows *r, int i, unsigned live, const lane_exact *t,
-                                   const int32_t *sample, tl_sink sink)
-{
-    const tl_target target = *s->target; /* a copy that no store can change */
-    for (; live; live &= live - 1) {
-        const int k = __builtin_ctz(live);
-        draw_rows_exact(s, &target, sink, r, i, k, t, sample[k]);
-    }
-}
-
-TL_SINK_COPIES(draw_all_rows_exact,
-               (exact_state * s, const exact_rows *r, int i, unsigned live, const lane_exact *t, const int32_t *sample),
-               s, r, i, live, t, sample)
-
-TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
-{
-    box_queue *q = &s->rows.boxes;
-    for (int i = 0; i < q->n; i += TL_LANES) {
-        lane_exact t;
-        exact_edges edges;
-        exact_rows r;
-        int32_t sample[TL_MAX_LANES];
-        pop_exact(s, sink, &s->rows, i, &t);
-        setup_exact(s, sink, &t, 0);
-        sort_exact_edges(s, &t, TL_FAR_BAND, &edges);
-        store_exact_edges(&edges, &r);
-        vi_store(sample, t.sample);
-        if (sink_has_depth(sink)) {
-            const exact_planes p = plane_of_lanes(s, &t);
-            vd_store(r.z0, p.z0), vd_store(r.slope_x, p.slope_x), vd_store(r.slope_y, p.slope_y);
-            vd_store(r.x0, t.x[0]), vd_store(r.y0, t.y[0]);
-        }
-        const int64_t n_asked = s->counts->n_asked;
-        TL_SINK_CALL(draw_all_rows_exact, s->target->sink, s, &r, i, vm_bits(t.live), &t, sample)
-        if (s->counts->n_asked != n_asked)
-            try_grid(s, &t, 0);
-    }
-    q->n = 0;
-}
-
-TL_LIST_COPIES(flush_rows_exact, (exact_state * s), s)
 
 #endif

@@ -1,4 +1,4 @@
-"""Reads glTF 2.0 and GLB: nodes, meshes, materials, skins and morph targets at rest, cameras.
+"""Reads glTF 2.0 and GLB: nodes, meshes, materials, skins, morph targets, cameras; at rest or at a time.
 
 Input: a file, unchecked. Output: `Mesh` parts in the order of the nodes, placed in the world; poses of cameras.
 
@@ -21,8 +21,9 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64, Array
 from topleft._core.base.color import encode_srgb
-from topleft._meshes.io.gltf_accessors import Accessors, Tree, entry, normalized
-from topleft._meshes.io.gltf_materials import Materials
+from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, normalized
+from topleft._meshes.io.gltf.animations import posed
+from topleft._meshes.io.gltf.materials import Materials
 from topleft._meshes.io.references import Cloud, InputFile
 from topleft._meshes.model.joined import placed_arrays
 from topleft._meshes.model.mesh import Mesh
@@ -83,11 +84,11 @@ def read_gltf(source: InputFile) -> list[Mesh]:
     tree, blob = _tree_and_blob(source)
     _check_extensions(tree, source)
     accessors = Accessors(tree, blob, source)
-    reader = _Reader(tree, accessors, Materials(tree, accessors, source), source)
-    parts = list(reader.parts())
-    if tree.get("animations"):
+    if source.moment is not None:
+        tree = posed(tree, accessors, source.moment, source)
+    elif tree.get("animations"):
         source.notes.add("animations not played: everything is at rest")
-    return parts
+    return list(_Reader(tree, accessors, Materials(tree, accessors, source), source).parts())
 
 
 def read_cameras(source: InputFile) -> list[CameraOfFile]:
@@ -98,7 +99,9 @@ def read_cameras(source: InputFile) -> list[CameraOfFile]:
     MeshError
         If the file is broken.
     """
-    tree, _ = _tree_and_blob(source)
+    tree, blob = _tree_and_blob(source)
+    if source.moment is not None:
+        tree = posed(tree, Accessors(tree, blob, source), source.moment, source)
     nodes = _Nodes(tree)
     cameras = []
     for index in nodes.shown():
@@ -126,12 +129,15 @@ def _tree_and_blob(source: InputFile) -> tuple[Tree, bytes | None]:
         raise MeshError("its JSON is nested too deeply") from None
     if not isinstance(tree, dict):
         raise MeshError("its JSON is no object")
-    asset = tree.get("asset", {})
-    version = str(asset.get("version", "") if isinstance(asset, dict) else "")
+    asset = tree.get("asset")
+    asset = asset if isinstance(asset, dict) else {}
+    version, needed = str(asset.get("version", "")), str(asset.get("minVersion", "2.0"))
     if version.startswith("1") or (not version and isinstance(tree.get("meshes"), dict)):
         raise _glTF1(source)
     if not version.startswith("2"):
         raise MeshError(f"cannot read {str(source.path)!r}: its version of glTF is {version[:20]!r}, and 2.0 is read")
+    if needed not in ("2.0", "2") and not needed.startswith("1."):
+        raise MeshError(f"cannot read {str(source.path)!r}: it needs version {needed[:20]!r} of glTF, and 2.0 is read")
     return tree, blob
 
 

@@ -16,7 +16,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "raster/fragments.h"
+#include "sink/fragments.h"
 
 static void clear_layers(const tl_window *window, const tl_target *target)
 {

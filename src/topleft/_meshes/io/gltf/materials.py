@@ -18,7 +18,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, encode_srgb
-from topleft._meshes.io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
+from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._meshes.io.references import InputFile
 from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.texture import Texture
@@ -84,7 +84,8 @@ class Materials:
         own: dict[str, Any] = {"double_sided": row.get("doubleSided") is True}
         gloss = extensions.get("KHR_materials_pbrSpecularGlossiness")
         rough = row.get("pbrMetallicRoughness", {})
-        if gloss is not None and not rough:
+        is_unlit = "KHR_materials_unlit" in extensions
+        if gloss is not None and not (is_unlit and rough):
             own |= self._glossy(gloss)
         else:
             factor = _numbers(rough, "baseColorFactor", (1, 1, 1, 1))
@@ -99,8 +100,8 @@ class Materials:
         mode = row.get("alphaMode", "OPAQUE")
         own["alpha_mode"] = {"MASK": AlphaMode.MASK, "BLEND": AlphaMode.BLEND}.get(mode, AlphaMode.OPAQUE)
         if mode == "MASK":
-            own["alpha_cutoff"] = _share(_number(row, "alphaCutoff", 0.5))
-        if "KHR_materials_unlit" in extensions:
+            own |= cutoff_of(_number(row, "alphaCutoff", 0.5))
+        if is_unlit:
             for name in ("metallic", "roughness", "metallic_roughness_texture"):
                 own.pop(name, None)
             return Material(unlit=True, **own)
@@ -217,6 +218,11 @@ def uv_sets_of(row: Tree) -> tuple[int, int]:
         return 0, 1
     first, second = [*sorted(named), *({0, 1} - named)][:2]
     return first, second
+
+
+def cutoff_of(cutoff: float) -> dict[str, float]:
+    """What a material says of a cutoff: one above 1 hides what is opaque, too, as that of 1 hides what is clear."""
+    return {"alpha_cutoff": _share(cutoff)} if cutoff <= 1 else {"alpha_cutoff": 1.0, "opacity": 0.0}
 
 
 def metallic_of_specular(diffuse: F64, specular: F64) -> tuple[F64, F64]:

@@ -1,7 +1,5 @@
-/* Triangle setup: the three corners in a fixed turn, the box of samples they can cover, the weights of a sample; and
- * which side of a triangle shows.
- * In: a triangle of vertex records.  Out: tl_triangle, or nothing when it is culled, degenerate or outside; triangles,
- * those of which one side is not drawn collapsed where they show it.
+/* Triangle setup: the three corners in a fixed turn, the box of samples they can cover, the weights of a sample.
+ * In: a triangle of vertex records.  Out: tl_triangle, or nothing when it is culled, degenerate or outside.
  * Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988. */
 #ifndef TL_SETUP_C
 #define TL_SETUP_C
@@ -10,7 +8,6 @@
 
 #include "topleft.h"
 #include "vertex/clip.c"
-#include "vertex/corners.h"
 #include "vertex/fixed.h"
 
 /* A triangle with positive area (y down) and its samples inside the window. */
@@ -127,7 +124,7 @@ static inline int clip_box(tl_triangle *t, const tl_window *window)
  * steep that float64 would lose bits that float32 shows, and the exact weights are used. */
 #define TL_SLIVER_BITS 12
 
-/* The depth plane over the corners, per half sub-pixel.  The same operations as plane_lanes in batch.c. */
+/* The depth plane over the corners, per half sub-pixel.  The same operations as plane_lanes in triangles_fixed.c. */
 static inline void setup_plane(tl_triangle *t)
 {
     const double x1 = (double)(t->x_fx[1] - t->x_fx[0]), y1 = (double)(t->y_fx[1] - t->y_fx[0]), z1 = t->z[1] - t->z[0];
@@ -181,59 +178,6 @@ static inline void weights_at(const tl_triangle *t, const tl_window *window, int
     for (int k = 0; k < n; k++) {
         w1[k] = i128_to_f64(doubled_edge(t, 2, 0, col + k + window->x_px, row + window->y_px, window->subpixel_bits));
         w2[k] = i128_to_f64(doubled_edge(t, 0, 1, col + k + window->x_px, row + window->y_px, window->subpixel_bits));
-    }
-}
-
-/* Whether a triangle shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts it. */
-static int shows_side(const tl_snapped *snapped, int64_t i)
-{
-    const int wanted = snapped->cull == TL_CULL_BACK ? -1 : 1;
-    int32_t corners[3];
-    tl_triangle t;
-    read_corners(snapped, i, corners);
-    if (!is_clipped(&snapped->mesh, corners))
-        return load_triangle(&snapped->mesh, corners, &t) == wanted;
-    const tl_pieces *p = snapped->pieces;
-    if (!p)
-        return 0;
-    const tl_vertex_set cut = piece_set(p, &snapped->mesh);
-    for (int64_t k = first_piece(p, i); k < p->n_pieces && p->source[k] == i; k++)
-        if (load_triangle(&cut, p->triangles + 3 * k, &t) == wanted)
-            return 1;
-    return 0;
-}
-
-/* Collapses the pieces of a triangle that a plane cuts which do not show the side that is drawn. */
-static void drop_pieces(const tl_snapped *snapped, int64_t i)
-{
-    const tl_pieces *p = snapped->pieces;
-    const int wanted = snapped->cull == TL_CULL_BACK ? -1 : 1;
-    tl_triangle t;
-    if (!p)
-        return;
-    const tl_vertex_set cut = piece_set(p, &snapped->mesh);
-    for (int64_t k = first_piece(p, i); k < p->n_pieces && p->source[k] == i; k++) {
-        int32_t *corners = p->triangles + 3 * k;
-        if (load_triangle(&cut, corners, &t) != wanted)
-            corners[1] = corners[2] = corners[0];
-    }
-}
-
-/* Copies triangles [first, end), those collapsed to a point that are single-sided and do not show the side that the
- * cull of the mesh leaves; of what a plane cuts the pieces instead, in place. */
-static void drop_sides(const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
-                       int32_t *triangles)
-{
-    for (int64_t i = first; i < end; i++) {
-        int32_t corners[3], *own = triangles + 3 * i;
-        read_corners(snapped, i, corners);
-        const int is_cut = is_clipped(&snapped->mesh, corners),
-                  is_left = !is_single[i] || is_cut || shows_side(snapped, i);
-        own[0] = corners[0];
-        own[1] = is_left ? corners[1] : corners[0];
-        own[2] = is_left ? corners[2] : corners[0];
-        if (is_single[i] && is_cut)
-            drop_pieces(snapped, i);
     }
 }
 

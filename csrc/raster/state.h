@@ -1,0 +1,301 @@
+/* The state of a pass over a mesh, and triangles on their way through it, of either geometry: TL_FIXED, vertices that
+ * are snapped (triangles_fixed.c), and TL_FLOAT, vertices that are not (triangles_float.c).  Each walker has a copy for
+ * either: a geometry is a constant wherever it is a parameter, as a sink is, and what the other one needs is in no
+ * copy. */
+#ifndef TL_STATE_H
+#define TL_STATE_H
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/corners.h"
+#include "vertex/setup.c"
+#include "sink/fragments.h"
+#include "sink/sink.c"
+#include "raster/alone.c"
+
+typedef enum { TL_FIXED, TL_FLOAT } tl_geometry;
+
+#define TL_SMALL_BOX 4
+#define TL_MIDDLE_BOX 16
+#define TL_MAX_BOX_PX 62 /* rows.c: row ends in float32 are exact up to here */
+#define TL_QUEUE 256
+
+/* Triangles that wait until a vector is full of their kind.  Their vertices are read again then: they are still in the
+ * first-level cache, and packing twelve vectors a queue cost more. */
+typedef struct {
+    int n;
+    /* picture pixel of the first sample of the box */
+    int32_t col[TL_QUEUE + TL_MAX_LANES], row[TL_QUEUE + TL_MAX_LANES];
+    int32_t size[TL_QUEUE + TL_MAX_LANES]; /* columns | rows << 16 of the box */
+    int32_t id[TL_QUEUE + TL_MAX_LANES];
+    float xy[TL_QUEUE + TL_MAX_LANES]; /* TL_FLOAT: X * Y of the extent */
+} box_queue;
+
+/* What one pass needs to know of the window and the mesh, in int32. */
+typedef struct {
+    int32_t left, top, right, bottom;    /* picture pixels */
+    int32_t picture_top, picture_bottom; /* rows of the picture that other passes draw */
+    vi last_vertex;
+    /* TL_FIXED */
+    int32_t max_extent; /* of a triangle that 32-bit lanes can take, in units */
+    extent_rounding round;
+    int32_t special_x; /* TL_SPECIAL as load_corners gives it */
+    int second, third; /* which corner comes second and third: culled faces then have negative area */
+} batch_limits;
+
+/* Everything that one pass over a mesh needs; on the stack of draw. */
+typedef struct {
+    const tl_snapped *snapped; /* with the triangles that are drawn */
+    const tl_window *window;
+    const tl_target *target;
+    tl_share *share;
+    batch_limits limits;
+    int64_t bad_row; /* of triangles, -1: none so far */
+    /* TL_FLOAT */
+    const tl_exact_points *points;
+    tl_exact_counts *counts;
+    double centre_x, centre_y; /* of a pixel's sample, from its upper left corner; of squares 0 */
+    int is_far;                /* int32 cannot count the pixels of the window: all triangles are drawn alone */
+    int has_places;            /* of vertices, and all of the window lies within their limit */
+    int may_be_on_grid;        /* the triangles that asked last were: of so many vectors, that is looked at first */
+    int n_slivers;             /* triangles of the queues that have no depth plane, and wait to be drawn alone */
+    int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
+    /* both */
+    box_queue small, middle, rows;
+    fragment_list fragments;
+} walk_state;
+
+/* The snapped corners of TL_LANES triangles, as loaded. */
+typedef struct {
+    vi x[3], y[3];
+    vz z[3];
+} lane_corners;
+
+/* TL_LANES triangles with positive area; corners doubled and relative to the first sample of their boxes. */
+typedef struct {
+    vi x[3], y[3];
+    vi dx[3], dy[3]; /* edge k runs from corner k to corner k + 1; not doubled */
+    vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside; of SAMPLES 2E + bias at the centre */
+    vi sample;       /* the first sample: row * stride_px + column */
+} lane_triangles;
+
+/* The same of TL_FLOAT: TL_LANES triangles, turned so that their areas are positive. */
+typedef struct {
+    vi ids;
+    vd x[3], y[3], z[3];           /* z: where there is depth */
+    tl_test test;                  /* a constant where the sink is */
+    vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
+    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
+    vf xy;                         /* X * Y */
+    vf from_x[3], from_y[3], band; /* of boxes of up to 4x4: points from the first sample, and the band of samples */
+    vi sample;                     /* the first sample: row * stride_px + column */
+    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
+    vm turned;                     /* corners 1 and 2 have changed places in e, dx and dy */
+    vm to_turn;                    /* and are still to do so in x and y */
+    vm on_grid;                    /* e, dx and dy are exact, in units of their own */
+} lane_exact;
+
+/* Depth planes: z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in half sub-pixels or, TL_FLOAT, in pixels. */
+typedef struct {
+    vd z0, slope_x, slope_y;
+    vd x, y;   /* of the first sample */
+    vd x0, y0; /* TL_FLOAT; else 0 */
+} lane_planes;
+
+/* TL_LANES triangles as loaded, and what becomes of them. */
+typedef struct {
+    vi top, bottom;              /* rows of the extent in the picture */
+    vi col, row, n_cols, n_rows; /* the box of samples in the window */
+    vm alone;                    /* lanes cannot take them */
+    vm drawn;                    /* the others that are to be drawn */
+    /* TL_FIXED */
+    lane_corners c;
+    vi x_min, x_max, y_min, y_max;
+    vi area, absolute; /* twice the area; positive where the side that is drawn shows */
+    /* TL_FLOAT */
+    lane_exact t;
+    vi x_fx[3], y_fx[3]; /* places, where vertices have them */
+    int is_placed;       /* boxes are those of the places: none has more than 4x4 samples */
+    vf xy;               /* as the head of triangles_float.c has it */
+} lane_batch;
+
+/* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
+TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
+{
+    const vm bad01 =
+        vm_or(vi_gt_unsigned(vi_load(corners), last_vertex), vi_gt_unsigned(vi_load(corners + TL_LANES), last_vertex));
+    return vm_any(vm_or(bad01, vi_gt_unsigned(vi_load(corners + 2 * TL_LANES), last_vertex)));
+}
+
+/* Whether there is a sample in the boxes. */
+TL_INLINE vm has_box(const lane_batch *b) { return vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)); }
+
+/* The boxes of extents from `left` to `right`, and from b->top to b->bottom; empty ones have no columns or no rows. */
+TL_INLINE void cut_boxes(const walk_state *s, vi left, vi right, lane_batch *b)
+{
+    const batch_limits *limits = &s->limits;
+    b->col = vi_max(left, vi_set1(limits->left));
+    b->n_cols = vi_sub(vi_min(right, vi_set1(limits->right)), b->col);
+    b->row = vi_max(b->top, vi_set1(limits->top));
+    b->n_rows = vi_sub(vi_min(b->bottom, vi_set1(limits->bottom)), b->row);
+}
+
+/* The place of the first samples of boxes in the target: row * stride_px + column. */
+TL_INLINE vi first_samples(const walk_state *s, vi col, vi row)
+{
+    return vi_add(vi_mul(vi_sub(row, vi_set1(s->limits.top)), vi_set1((int32_t)s->target->stride_px)),
+                  vi_sub(col, vi_set1(s->limits.left)));
+}
+
+/* From sample to sample, in units of depth planes. */
+TL_INLINE double plane_step(const walk_state *s, tl_geometry g)
+{
+    return g == TL_FIXED ? (double)(2 << s->window->subpixel_bits) : 1.0;
+}
+
+/* ---- queues ---------------------------------------------------------------------------------------------- */
+
+/* Returns whether the queue is full. */
+TL_INLINE int push(box_queue *q, tl_geometry g, vm m, const lane_batch *b, vi id)
+{
+    vi_compress(q->col + q->n, m, b->col);
+    vi_compress(q->row + q->n, m, b->row);
+    vi_compress(q->size + q->n, m, vi_or(b->n_cols, vi_shift_left(b->n_rows, 16)));
+    vi_compress(q->id + q->n, m, id);
+    if (g == TL_FLOAT)
+        vi_compress((int32_t *)(q->xy + q->n), m, vi_bits_of_vf(b->xy));
+    q->n += __builtin_popcount(vm_bits(m));
+    return q->n > TL_QUEUE - TL_LANES;
+}
+
+/* The corners of the triangles [i, i + TL_LANES) of a queue of n. */
+TL_INLINE void pop_corners(const tl_snapped *snapped, vi last_vertex, const box_queue *q, int i, int n, int32_t *own)
+{
+    for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
+        memcpy(own + 3 * k, snapped->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1], 3 * sizeof *own);
+    for (int k = 0; k < 3; k++) { /* as read_corners */
+        const vi corners = vi_load(own + k * TL_LANES);
+        vi_store(own + k * TL_LANES, vi_select(vi_gt_unsigned(corners, last_vertex), last_vertex, corners));
+    }
+}
+
+/* How many triangles of a queue of n a vector at i holds. */
+TL_INLINE int lanes_at(int i, int n) { return n - i < TL_LANES ? n - i : TL_LANES; }
+
+/* The most rows of the boxes [i, i + TL_LANES) of a queue of n. */
+TL_INLINE int most_rows(const box_queue *q, int i, int n)
+{
+    const int end = lanes_at(i, n);
+    int most = 0;
+    for (int k = 0; k < end; k++)
+        most = q->size[i + k] >> 16 > most ? q->size[i + k] >> 16 : most;
+    return most;
+}
+
+/* Copies of a walker of queues, which takes the geometry and the sink last, and a call of the right one. */
+#define TL_WALK_COPIES(f)                                                           \
+    TL_INLINE void f##_fixed(walk_state *s, tl_sink sink) { f(s, TL_FIXED, sink); } \
+    TL_INLINE void f##_float(walk_state *s, tl_sink sink) { f(s, TL_FLOAT, sink); } \
+    TL_LIST_COPIES(f##_fixed, (walk_state * s), s)                                  \
+    TL_LIST_COPIES(f##_float, (walk_state * s), s)
+#define TL_WALK_CALL(f, s, g, sink)      \
+    if ((g) == TL_FIXED)                 \
+        TL_LIST_CALL(f##_fixed, sink, s) \
+    else                                 \
+        TL_LIST_CALL(f##_float, sink, s)
+
+/* ---- the list of samples --------------------------------------------------------------------------------- */
+
+/* Appends the lanes in m to a list of n; returns its new length.  The length is passed by value: in memory, every call
+ * would wait for the last one's store. */
+TL_INLINE int emit(fragment_list *f, int n, tl_sink sink, vm m, vi sample, vi id, vf depth)
+{
+    vi_compress(f->sample + n, m, sample);
+    if (sink != TL_SINK_MASK && sink != TL_SINK_COUNT)
+        vi_compress(f->id + n, m, id);
+    if (sink_has_depth(sink))
+        vi_compress((int32_t *)(f->depth + n), m, vi_bits_of_vf(depth));
+    return n + __builtin_popcount(vm_bits(m));
+}
+
+/* Writes a full list out; returns its length. */
+TL_INLINE int make_room(walk_state *s, int n)
+{
+    if (n <= TL_FRAGMENTS)
+        return n;
+    flush_fragments(s->target, &s->fragments, n);
+    return 0;
+}
+
+/* ---- triangles of a share -------------------------------------------------------------------------------- */
+
+/* Copies the corners of the triangles [i, i + TL_LANES) of a share, unchecked; behind the end zeros.  What another
+ * thread then writes to the indices is not seen any more. */
+TL_INLINE const int32_t *share_corners(const tl_snapped *snapped, const tl_share *share, int64_t i, int32_t *own)
+{
+    if (!share->ids && i + TL_LANES <= share->end) {
+        const int32_t *given = snapped->triangles + 3 * i;
+        for (int k = 0; k < 3 * TL_LANES; k += 16) /* 5 % of a million-triangle mesh */
+            __builtin_prefetch(given + 12 * 48 + k);
+        const vi first = vi_load(given), second = vi_load(given + TL_LANES), third = vi_load(given + 2 * TL_LANES);
+        vi_store(own, first);
+        vi_store(own + TL_LANES, second);
+        vi_store(own + 2 * TL_LANES, third);
+        return own;
+    }
+    for (int k = 0; k < TL_LANES; k++) {
+        const int64_t id = i + k >= share->end ? -1 : share->ids ? share->ids[i + k] : i + k;
+        if (id >= 0)
+            memcpy(own + 3 * k, snapped->triangles + 3 * id, 3 * sizeof *own);
+        else
+            memset(own + 3 * k, 0, 3 * sizeof *own);
+    }
+    return own;
+}
+
+/* The rows of vertices of triangles that come later. */
+TL_INLINE void fetch_rows(const void *rows, size_t n_bytes, const int32_t *corners)
+{
+    for (int k = 2; k < 3 * TL_LANES; k += 6) /* indices that were not checked: addresses, and no pointers */
+        __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[k] * n_bytes));
+}
+
+/* The same of triangles in a list, and the rows of indices of those that come after them. */
+TL_INLINE void fetch_listed(const void *rows, size_t n_bytes, const int32_t *triangles, const int32_t *ids)
+{
+    for (int k = 0; k < TL_LANES; k++) {
+        const int32_t *corners = triangles + 3 * (int64_t)ids[4 * TL_LANES + k];
+        __builtin_prefetch(triangles + 3 * (int64_t)ids[8 * TL_LANES + k]);
+        __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[0] * n_bytes));
+        __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[2] * n_bytes));
+    }
+}
+
+/* The window has fewer than 2^31 samples; what lanes draw needs it within 2^30 pixels of 0. */
+TL_INLINE void start_walk(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target)
+{
+    const int64_t farthest = (int64_t)1 << 30;
+    s->snapped = snapped, s->window = window, s->target = target, s->bad_row = -1;
+    s->small.n = s->middle.n = s->rows.n = s->fragments.n = s->n_slivers = 0;
+    s->limits.left = (int32_t)window->x_px, s->limits.top = (int32_t)window->y_px;
+    s->limits.right = (int32_t)min64(window->x_px + window->width, farthest);
+    s->limits.bottom = (int32_t)min64(window->y_px + window->height, farthest);
+    s->limits.picture_top = s->limits.top, s->limits.picture_bottom = s->limits.bottom;
+    s->limits.last_vertex = vi_set1((int32_t)(snapped->mesh.n_vertices - 1));
+}
+
+/* The rows that the passes of a share draw. */
+TL_INLINE void set_share(walk_state *s, tl_share *share)
+{
+    s->share = share;
+    memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
+    if (share->others && !share->clusters) {
+        s->limits.picture_top = (int32_t)share->picture->y_px;
+        s->limits.picture_bottom = (int32_t)min64(share->picture->y_px + share->picture->height, (int64_t)1 << 30);
+    }
+}
+
+#endif

@@ -1,0 +1,134 @@
+"""The nodes of a glTF file at a time of its animations.
+
+Input: the JSON, unchecked, and a moment. Output: the JSON with nodes whose translations, rotations, scales and weights
+are those of the moment.
+
+Based on: Khronos Group, "glTF 2.0 Specification", 2021, 3.11 and appendix C.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from topleft._core import engine
+from topleft._core.base.array_types import F64
+from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry
+from topleft._meshes.io.references import InputFile, Moment
+from topleft.errors import MeshError
+
+ALL_CLIPS = "all"
+N_NUMBERS = {"translation": 3, "rotation": 4, "scale": 3, "weights": None}
+N_PARTS = {"STEP": 1, "LINEAR": 1, "CUBICSPLINE": 3}
+"""Of a key: a spline has a tangent before the value and one behind it."""
+
+NEARLY_ONE = 0.9995
+"""Cosine of half the angle between rotations that are as evenly mixed by numbers: off by less than 1e-6 of it."""
+
+
+def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -> Tree:
+    """The file at a moment: before the first key of a property its value, behind the last one that.
+
+    Raises
+    ------
+    MeshError
+        If it has no animations or not that clip, or a sampler is broken.
+    """
+    rows = tree.get("animations")
+    if not rows:
+        raise MeshError(f"{str(source.path)!r} has no animations, so it has no time={moment.time:g}")
+    found: dict[tuple[int, str], list[float]] = {}
+    for animation in chosen(tree, rows, moment.clip, source):
+        for channel in animation["channels"]:
+            target = channel["target"]
+            if "node" not in target:  # that of an extension
+                continue
+            node, path = entry(tree, "nodes", target["node"]), target.get("path")
+            if path not in N_NUMBERS:
+                raise MeshError(f"an animation moves {path!r} of a node"[:120])
+            if "matrix" in node and path != "weights":
+                source.notes.add("animations of nodes that have a matrix not played")
+            elif (target["node"], path) not in found:
+                sampler = entry(animation, "samplers", channel.get("sampler"))
+                found[target["node"], path] = value_at(sampler, accessors, moment.time, path).tolist()
+    nodes = list(tree["nodes"]) if found else []
+    for (index, path), value in found.items():
+        nodes[index] = {**nodes[index], path: value}
+    return {**tree, "nodes": nodes} if found else tree
+
+
+def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFile) -> list[Tree]:
+    """The animations that play: that of an index or a name, all of them, or the first, and others are told.
+
+    Raises
+    ------
+    MeshError
+        If there is no such one.
+    """
+    animations = [entry(tree, "animations", i) for i in range(len(rows))]
+    names = [str(row.get("name", i)) for i, row in enumerate(animations)]
+    if clip is None:
+        for name in names[1:]:
+            source.notes.add("animations not played", name)
+        return animations[:1]
+    if isinstance(clip, str):
+        if clip in names:
+            return [animations[names.index(clip)]]
+        if clip == ALL_CLIPS:
+            return animations
+    elif 0 <= clip < len(animations):
+        return [animations[clip]]
+    some = ", ".join(map(repr, names[:10])) + (", ..." if len(names) > 10 else "")
+    span = "0" if len(names) == 1 else f"0 to {len(names) - 1}"
+    raise MeshError(f"cannot read {str(source.path)!r}: clip must be {span}, or one of {some}, got {clip!r}")
+
+
+def value_at(sampler: Tree, accessors: Accessors, time: float, path: str) -> F64:
+    """The value (C,) of a sampler at a time.
+
+    Raises
+    ------
+    MeshError
+        If its keys do not go up, or its numbers are not those of as many keys.
+    """
+    kind = sampler.get("interpolation", "LINEAR")
+    if kind not in N_PARTS:
+        raise MeshError(f"an animation has the interpolation {kind!r}"[:120])
+    keys, values = (accessors.array(sampler.get(name)).astype(np.float64) for name in ("input", "output"))
+    keys = keys.ravel()
+    n, n_parts = len(keys), N_PARTS[kind]
+    if not n or not (np.isfinite(keys).all() and (np.diff(keys) >= 0).all()):
+        raise MeshError("an animation is broken: its keys do not go up")
+    n_numbers = N_NUMBERS[path] or values.size // (n * n_parts)
+    if values.size != n * n_parts * n_numbers:
+        raise MeshError(f"an animation has {values.size} numbers for {n} keys of {path}")
+    of_key = values.reshape(n, n_parts, n_numbers)
+    value = of_key[:, n_parts // 2]
+    time = float(np.float32(time))  # as the keys are: 0.1 is not before its own key
+    i = int(np.searchsorted(keys, time, side="right")) - 1
+    if i < 0 or i == n - 1 or kind == "STEP":
+        return value[max(i, 0)]
+    span = keys[i + 1] - keys[i]
+    u = float((time - keys[i]) / span)
+    before, behind = value[i], value[i + 1]
+    if kind == "CUBICSPLINE":
+        rise = (3 - 2 * u) * u * u
+        leaving, arriving = span * ((u - 2) * u + 1) * u * of_key[i, 2], span * (u - 1) * u * u * of_key[i + 1, 0]
+        return (1 - rise) * before + leaving + rise * behind + arriving
+    first, second = slerp_weights(before, behind, u) if path == "rotation" else (1 - u, u)
+    return first * before + second * behind
+
+
+def slerp_weights(a: F64, b: F64, u: float) -> tuple[float, float]:
+    """How much of two quaternions a rotation has that goes the short way from one to the other, evenly.
+
+    Based on: Shoemake, K., "Animating Rotation with Quaternion Curves", SIGGRAPH 1985.
+    """
+    cosine = float((a * b).sum()) / max(float(np.sqrt((a * a).sum() * (b * b).sum())), 1e-300)
+    sign = -1.0 if cosine < 0 else 1.0
+    if not abs(cosine) < NEARLY_ONE:
+        return 1 - u, sign * u
+    angle_deg = 90 - engine.arc_sine(abs(cosine))
+    before, behind, whole = (engine.cosine_and_sine(share * angle_deg)[1] for share in (1 - u, u, 1.0))
+    return before / whole, sign * behind / whole
