@@ -3,7 +3,6 @@
 A room imports from those above it alone, and no study from another.
 
 scenes/    what is drawn
-exact/     the exact picture of it
 peers/     who draws it: topleft and others, one file each
 harness/   what measures: processes, turns, records
 report/    tables, charts and pages, and the protocol of a study

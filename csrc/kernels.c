@@ -13,6 +13,7 @@
 #include "exact/take_points.c"
 #include "mesh/bend.c"
 #include "mesh/creases.c"
+#include "mesh/ears.c"
 #include "mesh/equal.c"
 #include "mesh/nearest.c"
 #include "mesh/normals.c"
@@ -116,6 +117,7 @@ const tl_kernels TL_KERNELS = {
     .list_corners = list_corners,
     .find_creases = find_creases,
     .sum_creases = sum_creases,
+    .cut_faces = cut_faces,
     .box_of_faces = box_of_faces,
     .unit_vectors = unit_vectors,
     .move_points = move_points,

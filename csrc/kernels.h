@@ -179,21 +179,20 @@ typedef struct tl_kernels {
     /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
     void (*set_inverse_w)(const tl_source *source, const float *rows, int64_t first, int64_t end, float *out);
 
-    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity.  `view` may be NULL
-     * in pixel space. */
-    void (*shade)(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                  const int32_t *ids, const float *depth, uint8_t *pixels);
+    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity; as the sample sees it
+     * that lies at_fx = (x, y) sub-pixels from the centre, NULL: that which each mesh is seen from. */
+    void (*shade)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
+                  const float *depth, uint8_t *pixels);
 
     /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target.
      * With `split`, whose rows begin with the window's, there is the plane of the first sample alone. */
-    void (*shade_samples)(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
-                          const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
-                          const int32_t *ids, const float *depth, const tl_split *split, uint8_t *pixels);
+    void (*shade_samples)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
+                          int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
+                          const tl_split *split, uint8_t *pixels);
 
     /* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show
      * is NORMALS. */
-    void (*shade_normals)(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
-                          const tl_shading *shading, const int32_t *ids, float *out);
+    void (*shade_normals)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, float *out);
 
     /* Per pixel of `ids` (rows of window->width): what is told of its point, float32 or float64. */
     void (*fill_points)(const tl_snapped *snapped, const tl_window *window, const tl_points *points, const int32_t *ids,
@@ -257,6 +256,10 @@ typedef struct tl_kernels {
 
     /* Normals of vertices [first, end) as vertex_normals has them, and of their groups. */
     void (*sum_creases)(const tl_fans *fans, const tl_creases *creases, int64_t first, int64_t end);
+
+    /* Triangles of faces with any number of corners, as rows of `corners`: n_corners - 2 of each that has three; room
+     * as tl_ear_words tells for the largest.  Returns how many faces are finished. */
+    int64_t (*cut_faces)(const tl_faces *faces, int64_t *triangles, int64_t *room);
 
     /* Low and high of the corners of triangles [first, end): six numbers. */
     int64_t (*box_of_faces)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *box);

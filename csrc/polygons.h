@@ -23,6 +23,7 @@ typedef struct {
     int bits;
     int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
+    int64_t *crossings_left;          /* of all threads: how often rings may cross, see slabs.c */
     struct tl_pause *pause;           /* of this call, or NULL: what has begun is drawn to its end */
 } tl_polygons;
 
@@ -62,7 +63,7 @@ typedef struct {
 } tl_edge_piece;
 
 /* Where pieces wait to be resolved. */
-#define TL_PIECE_WORDS 8
+#define TL_PIECE_WORDS 31
 typedef struct {
     tl_edge_piece *pieces; /* (n_pieces,), at least as many as a polygon has edges */
     int64_t *room;         /* (TL_PIECE_WORDS * n_pieces,) */

@@ -1,6 +1,7 @@
 /* The contract of shading: what a surface is made of, what lights it, and where it is seen from.
  * Colours are linear light, 1 is white.  Vectors are those of one space, the shading space, whose origin is near the
  * mesh. */
+#include "topleft.h" /* before the guard: it includes this file behind its types */
 #ifndef TOPLEFT_SHADING_H
 #define TOPLEFT_SHADING_H
 
@@ -125,5 +126,20 @@ typedef struct {
     float background[4]; /* linear light and opacity */
     uint8_t background_bytes[4];
 } tl_shading;
+
+/* An instance of a picture: what was drawn of it, and how it is shaded. */
+typedef struct {
+    const tl_snapped *snapped; /* whose first id is not read */
+    const tl_shading *shading;
+    int32_t first_id; /* what its triangle 0 is called in the picture's ids */
+} tl_shaded;
+
+/* The instances of a picture, by their first ids, which ascend; a mesh is one.  All show the same, over one background,
+ * and have the samples, the fog and the view in common. */
+typedef struct {
+    const tl_shaded *instances;
+    int64_t n;           /* at least 1 */
+    const tl_view *view; /* or NULL in pixel space */
+} tl_shaded_scene;
 
 #endif

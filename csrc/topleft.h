@@ -9,9 +9,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "faces.h"
 #include "lens.h"
 #include "nearest.h"
-#include "shading.h"
 #include "tiles.h"
 
 /* Where there is no number. The sign is clear; that of Microsoft's NAN depends on the compiler. */
@@ -482,6 +482,7 @@ typedef struct {
 #include "clusters.h"
 #include "exact.h"
 #include "polygons.h"
+#include "shading.h"
 #include "kernels.h"
 #include "meshlets.h"
 

@@ -1,6 +1,7 @@
 """One fixed hypothesis profile, the command line as a fixture, the count of pixels compared with the reference."""
 
 import signal
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import topleft as tl
+from topleft._core.raster import choices
+from topleft._core.raster import costs as cost_table
 
 collect_ignore = [] if Path(__file__).parents[1].joinpath("benchmarks").is_dir() else ["studies"]
 
@@ -28,6 +31,16 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.relative_to(Path(__file__).parents[1]).as_posix() not in SLOW:
             item.add_marker(pytest.mark.quick)
+
+
+cost_table.use_costs(cost_table.Costs())  # those that ship, not those of this machine
+
+
+@pytest.fixture
+def force():
+    """Forces choices of the library until the test has ended, as `choices.forced` does."""
+    with ExitStack() as stack:
+        yield lambda **values: stack.enter_context(choices.forced(**values))
 
 
 @pytest.fixture
@@ -91,11 +104,11 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def run(folder, capsys):
     """Run the command line: its exit status and the lines of stderr."""
-    import topleft._apps.cli
+    import topleft.cli
 
     def run_cli(*arguments):
         try:
-            status = topleft.cli.main([str(argument) for argument in arguments])
+            status = topleft._apps.cli.main([str(argument) for argument in arguments])
         except SystemExit as leaving:
             status = leaving.code
         return status, capsys.readouterr().err.splitlines()

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from benchmarks.accuracy import pure
 from benchmarks.accuracy.options import Options
-from benchmarks.exact.area import draw_area
-from benchmarks.exact.pictures import coverage
-from benchmarks.exact.unsnapped import draw_unsnapped
+from benchmarks.harness.errors import coverage
 from benchmarks.harness.peer_turns import MASK_TASKS, SMOOTH_TASKS, Peers, smooth_coverage
 from benchmarks.harness.turns import spread, take_turns, turn_of
 from benchmarks.scenes.families import FAMILIES, NO_SNAP, Entry, Family, Triangles, entries, in_cells, strewn
+from topleft.methods.reference.integers import ExactPicture
+from topleft.methods.reference.integers import areas as exact_areas
 
 Rows = dict[str, list[dict[str, Any]]]
 
@@ -99,7 +99,7 @@ def count_errors(
     while facts["n_edge_px"] < options.edge_px:
         seed += 1
         scene = in_cells(family, seed, options.frame_px)
-        exact = draw_unsnapped(*scene, rasterizer.size)
+        exact = ExactPicture(*scene, rasterizer.size)
         facts["n_edge_px"] += int(exact.is_edge.sum())
         facts["n_triangles"] += len(scene[1])
         is_covered = exact.count > 0
@@ -141,7 +141,7 @@ def measure_antialiasing(
 
     rasterizer = tl.Rasterizer((options.frame_px, options.frame_px), threads=1)
     scene = in_cells(family, 1, options.frame_px)
-    exact, is_edge = draw_area(*scene, rasterizer.size), draw_unsnapped(*scene, rasterizer.size).is_edge
+    exact, is_edge = exact_areas(*scene, rasterizer.size), ExactPicture(*scene, rasterizer.size).is_edge
 
     def rms(drawn: NDArray[Any]) -> float:
         return float(f"{np.sqrt(((drawn.astype(np.float64) - exact)[is_edge] ** 2).mean()):.4g}")

@@ -11,8 +11,8 @@ import argparse
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exact.unsnapped import draw_unsnapped
 from benchmarks.scenes.families import FAMILIES, NO_SNAP, in_cells
+from topleft.methods.reference.integers import ExactPicture
 
 FRAME_PX = 2048
 
@@ -29,7 +29,7 @@ def compare(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> tupl
     """Return the edge pixels of a scene, and how many pixels the engine draws another number of times."""
     import topleft as tl
 
-    exact = draw_unsnapped(vertices, triangles, (FRAME_PX, FRAME_PX))
+    exact = ExactPicture(vertices, triangles, (FRAME_PX, FRAME_PX))
     counts = tl.overdraw(vertices, triangles, (FRAME_PX, FRAME_PX), subpixel_bits=NO_SNAP)
     return int(exact.is_edge.sum()), int((counts != exact.count).sum())
 

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exact.unsnapped import draw_unsnapped
 from benchmarks.scenes.families import Entry, Triangles
+from topleft.methods.reference.integers import ExactPicture
 
 N_POINTS = 20_000
 FAR_PX = 2**20
@@ -77,12 +77,12 @@ def measure_stability(chosen: Sequence[Entry], frame_px: int, scale: float = 1.0
     size = (frame_px, frame_px)
     scene = scenes.planar_mesh(max(8, int(N_POINTS * scale)), *size)
     touched = {change.name: touch(change.name, scene, frame_px) for change in CHANGES}
-    exact = draw_unsnapped(*scene, size)
+    exact = ExactPicture(*scene, size)
     far = (scene[0] + FAR_PX, scene[1])
     clean = dict.fromkeys(("missed", "overdrawn", "wrong", "far_missed", "far_overdrawn"), 0)
     rows: list[dict[str, Any]] = [{"method": EXACT, "precision": ""} | clean]
     for name, mesh in touched.items():
-        moved = draw_unsnapped(*mesh.scene, size).triangle
+        moved = ExactPicture(*mesh.scene, size).triangle
         rows[0][name] = count_flips(exact.triangle, renamed(moved, mesh.ids), mesh.shift_px)
     rasterizer = tl.Rasterizer(size, threads=1)
     for entry in chosen:

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.atlas.maps import tabulate
-from benchmarks.exact.clip import draw_clip, pieces_picture
 from benchmarks.scenes.families import NO_SNAP
 from topleft._apps.explore.race import PRODUCTION
-from topleft.methods.reference.integers import box_side, edge_values, signed_area, snapped_points
+from topleft.methods import reference
+from topleft.methods.reference.integers import ExactPicture
 from topleft.scene_families import (
     MIDDLE_PX,
     Axis,
@@ -129,20 +129,65 @@ def judge_clip(scene: DepthScene, picture: Picture, bits: int | str) -> DepthFau
     """Compare the triangles that show, and how many cover each pixel, with the exact picture of the clip space."""
     counts = picture.counts
     true_ids, true_count = draw_clip(scene.vertices, scene.triangles, scene.size)
-    own_count = count_pieces(scene, bits)
+    own_count = draw_pieces(scene.vertices, scene.triangles, scene.size, bits)[1]
     return DepthFaults(
         int((picture.ids != true_ids).sum()), int((counts < true_count).sum()), int((counts > true_count).sum()),
         int((counts != own_count).sum()),
     )  # fmt: skip
 
 
-def count_pieces(scene: DepthScene, bits: int | str) -> I32:
-    """Return how many pieces cover each pixel, of what the projection and the clip in float64 leave."""
-    from topleft.methods import reference
+def draw_clip(vertices: F64, triangles: I32, size: tuple[int, int]) -> tuple[I32, I32]:
+    """Return the last triangle at each pixel centre (-1: none) and the count, both (H, W), for -w <= z <= w, w > 0.
 
-    if bits == NO_SNAP:
-        return reference.overdraw(scene.vertices, scene.triangles, scene.size, subpixel_bits=NO_SNAP)
-    return pieces_picture(scene.vertices, scene.triangles, scene.size, int(bits)).count
+    No divide, no cut, nothing snapped, nothing rounded. A pixel is a ray; its weights in a triangle are 3x3
+    determinants of x, y and w, and what lies before the near or beyond the far plane is told at the point that the ray
+    meets: M. Olano, T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997.
+    """
+    width, height = size
+    ratios = [[x.as_integer_ratio() for x in row] for row in vertices.tolist()]
+    unit = max(d for row in ratios for _, d in row)
+    points = [[n * (unit // d) for n, d in row] for row in ratios]
+    # A centre times (width * height): NDC with y up, and 1.
+    columns = np.array([(2 * j + 1 - width) * height for j in range(width)], object)
+    rows = np.array([(height - 2 * i - 1) * width for i in range(height)], object)
+    ids, count = np.full((height, width), -1, np.int32), np.zeros((height, width), np.int32)
+    for index, triangle in enumerate(triangles.tolist()):
+        a, b, c = ([points[k][0], points[k][1], points[k][3]] for k in triangle)
+        normals = [cross(b, c), cross(c, a), cross(a, b)]
+        turn = sum(x * n for x, n in zip(a, normals[0], strict=True))
+        if turn == 0:
+            continue
+        sign = 1 if turn > 0 else -1
+        is_inside = np.ones((height, width), bool)
+        weights = []
+        for normal in normals:
+            nx, ny, nw = (sign * x for x in normal)
+            value = np.add.outer(ny * rows + nw * width * height, nx * columns)
+            is_owner = nx > 0 or (nx == 0 and ny < 0)  # left; top, since y points up here
+            is_inside &= (value >= 0 if is_owner else value > 0).astype(bool)
+            weights.append(value)
+        zs, ws = ([points[k][n] for k in triangle] for n in (2, 3))
+        for distances in ([z + w for z, w in zip(zs, ws, strict=True)], [w - z for z, w in zip(zs, ws, strict=True)]):
+            depth: Any = sum(value * d for value, d in zip(weights, distances, strict=True))
+            is_inside &= (depth >= 0).astype(bool)
+        ids[is_inside] = index
+        count += is_inside
+    return ids, count
+
+
+def cross(p: list[int], q: list[int]) -> tuple[int, int, int]:
+    """Return the cross product."""
+    return p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]
+
+
+def draw_pieces(vertices: F64, triangles: I32, size: tuple[int, int], bits: int | str) -> tuple[I32, I32]:
+    """Return the same of what the projection and the clip in float64 leave, after a snap to so many bits."""
+    pieces = reference.pieces(vertices, triangles, size, subpixel_bits=bits)
+    unit = 1 if bits == NO_SNAP else 2 ** int(bits)
+    xy = np.array([[float(x / unit) for x in v.xy_fx] for piece in pieces for v in piece.vertices]).reshape(-1, 2)
+    picture = ExactPicture(xy, np.arange(len(xy)), size)
+    names = np.array([piece.triangle for piece in pieces] + [-1], np.int32)
+    return names[picture.triangle], picture.count
 
 
 # Pixels with depth
@@ -204,32 +249,13 @@ def judge_layers(scene: DepthScene, picture: Picture, _: int | str) -> DepthFaul
     return DepthFaults(int(is_wrong.sum()), n_gaps, n_overdrawn, int(is_inexact.sum()))
 
 
-def plane_values(scene: DepthScene, snap: str) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_]]:
-    """Return numerators (T, H, W) and denominators (T,) of exact depths in Python integers, and what is covered."""
-    points = snapped_points(scene.vertices, snap)
-    z = [x.as_integer_ratio() for x in scene.vertices[:, 2].tolist()]
-    unit = max(denominator for _, denominator in z)
-    width, height = scene.size
-    here = [tuple(c - (o << points.bits) for c, o in zip(p, scene.origin, strict=True)) for p in points.xy]
-    numerators = np.zeros((len(scene.triangles), height, width), object)
-    denominators = np.zeros(len(scene.triangles), object)
-    covered = np.zeros(numerators.shape, bool)
-    for i, triangle in enumerate(scene.triangles.tolist()):
-        if signed_area(points, triangle) < 0:
-            triangle = [triangle[0], triangle[2], triangle[1]]
-        corners = [here[k] for k in triangle]
-        assert all(len(box_side(corners, k, n, points.bits)) == n for k, n in enumerate(scene.size))
-        is_inside = np.ones((height, width), bool)
-        for k in range(3):
-            p, q = corners[(k + 1) % 3], corners[(k + 2) % 3]
-            value, _ = edge_values(p, q, range(width), range(height), points.bits)
-            is_owner = (p[1] == q[1] and q[0] > p[0]) or q[1] < p[1]
-            is_inside &= np.asarray(value >= 0 if is_owner else value > 0, bool)
-            numerator, denominator = z[triangle[k]]
-            numerators[i] += value.astype(object) * (numerator * (unit // denominator))
-        denominators[i] = abs(signed_area(points, triangle)) * unit
-        covered[i] = is_inside
-    return numerators, denominators, covered
+def planes_at(scene: DepthScene, bits: int | str) -> NDArray[Any]:
+    """Return the exact depths of the triangles that cover each pixel after a snap: dicts, (H, W)."""
+    found = np.array([{} for _ in range(scene.size[0] * scene.size[1])], object).reshape(scene.size[::-1])
+    view = {"origin": scene.origin, "subpixel_bits": bits}
+    for fragment in reference.fragments(scene.vertices, scene.triangles, scene.size, **view):
+        found[fragment.row, fragment.column][fragment.piece.triangle] = fragment.depth()
+    return found
 
 
 def judge_depth(scene: DepthScene, picture: Picture, bits: int | str) -> DepthFaults:
@@ -238,15 +264,16 @@ def judge_depth(scene: DepthScene, picture: Picture, bits: int | str) -> DepthFa
     A depth beyond its bound is inexact, and so is a triangle that lies behind another by more than both may err.
     """
     ids, counts = picture.ids, picture.counts
-    true = plane_values(scene, "true")
-    numerators, denominators, covered = plane_values(scene, "true" if bits == NO_SNAP else str(bits))
-    true_count = true[2].sum(axis=0)
-    is_inexact = counts != covered.sum(axis=0)
+    true = planes_at(scene, NO_SNAP)
+    own = true if bits == NO_SNAP else planes_at(scene, bits)
+    count, true_count = (np.vectorize(len, otypes=[int])(planes) for planes in (own, true))
+    nearest = np.vectorize(lambda here: min(here, key=lambda k: (here[k], k), default=-1), otypes=[int])(true)
+    is_inexact = counts != count
     largest_z = [max(abs(Fraction(z)) for z in scene.vertices[t, 2].tolist()) for t in scene.triangles]
     slack = PLANE_ERROR * max(largest_z)
     largest_ulp = 0.0
     for at in zip(*np.nonzero(ids >= 0), strict=True):
-        here = {int(t): Fraction(numerators[t][at], denominators[t]) for t in np.flatnonzero(covered[:, *at])}
+        here = own[at]
         exact = here.get(int(ids[at]))
         if exact is None:
             is_inexact[at] = True
@@ -257,21 +284,9 @@ def judge_depth(scene: DepthScene, picture: Picture, bits: int | str) -> DepthFa
         is_off = error > ulp / 2 + PLANE_ERROR * largest_z[ids[at]]
         is_inexact[at] |= is_off or exact - min(here.values()) > ulp + 2 * slack
     return DepthFaults(
-        int((ids != nearest_ids(*true)).sum()), int((counts < true_count).sum()), int((counts > true_count).sum()),
+        int((ids != nearest).sum()), int((counts < true_count).sum()), int((counts > true_count).sum()),
         int(is_inexact.sum()), float(f"{largest_ulp:.3g}"),
     )  # fmt: skip
-
-
-def nearest_ids(numerators: NDArray[Any], denominators: NDArray[Any], covered: NDArray[np.bool_]) -> I32:
-    """Return the nearest triangle of each pixel, the lowest of equals, -1 for none: exact."""
-    ids = np.full(covered.shape[1:], -1, np.int32)
-    best = np.zeros(covered.shape[1:], object)
-    best_denominator = np.ones(covered.shape[1:], object)
-    for i in range(len(covered)):
-        is_nearer = (numerators[i] * best_denominator < best * denominators[i]).astype(bool)
-        is_new = covered[i] & (is_nearer | (ids < 0))
-        ids[is_new], best[is_new], best_denominator[is_new] = i, numerators[i][is_new], denominators[i]
-    return ids
 
 
 W_VALUES = power_of_ten(0, -1, -2, -3, -4, -6, -8, -10, -12)

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exact.pictures import Picture
 from benchmarks.harness.contestants import START_TIMEOUT_S, TURN_TIMEOUT_S, Child, Contestant, SkippedError
+from benchmarks.harness.errors import Picture
 from benchmarks.harness.turns import Turn
 from benchmarks.peers import load_peer, why_not
 from benchmarks.scenes.cases import Case, Scene

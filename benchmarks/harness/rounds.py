@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.exact.pictures import Picture, compare, draw_exact
 from benchmarks.harness.contestants import Child, Contestant, SkippedError, choose
+from benchmarks.harness.errors import Picture, compare, draw_exact
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, forget, tell
 from benchmarks.harness.yardstick import Yardstick, YardstickError

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.exact.pictures import SUBPIXELS, snap
 from benchmarks.peers import Drawing
 from benchmarks.scenes.cases import Scene
 
@@ -20,13 +19,14 @@ def prepare(scene: Scene, threads: int) -> Drawing:
         return draw_by_deodr(scene, threads)
     from deodr import differentiable_renderer as renderer
 
-    xy_fx, z = snap(scene)
+    snapped = scene.snapped()
+    z = snapped[:, 2] if snapped.shape[1] > 2 else np.zeros(len(snapped))
     width, height = scene.size
     n_vertices, n_triangles = len(z), len(scene.triangles)
     is_label = scene.task == "labels"
     # Without depth the first triangle wins: labels are drawn from the last to the first.
     triangles = np.ascontiguousarray(scene.triangles[::-1] if is_label else scene.triangles, np.uint32)
-    xy_px = xy_fx / SUBPIXELS if scene.transform is not None else scene.vertices[:, :2].astype(np.float64)
+    xy_px = snapped[:, :2] if scene.transform is not None else scene.vertices[:, :2].astype(np.float64)
     colors = np.zeros((n_vertices, 1))
     if is_label:  # flat: corners of their own
         xy_px, z = xy_px[triangles.reshape(-1)], np.zeros(3 * n_triangles)

@@ -52,6 +52,14 @@ class Scene:
     views: NDArray[np.float64] | None = None
     normals: NDArray[np.float32] | None = None
 
+    def snapped(self) -> NDArray[np.float64]:
+        """Return vertices in pixels, and their depth where they have one, after the snap to 1/256 pixel."""
+        from topleft.methods.reference.integers import projected, snapped
+
+        if self.transform is None:
+            return snapped(self.vertices)
+        return projected(self.vertices, self.size, transform=self.transform)
+
     def save(self, folder: Path) -> None:
         """Write the arrays, for a child to load."""
         facts = {"task": self.task, "size": self.size, "cull": self.cull}

@@ -10,38 +10,22 @@
 #include "lanes/inline.h"
 
 #define TL_LANES 8
+#define TL_MM(name) _mm256_##name
+#define TL_SI(name) _mm256_##name##_si256
+#define TL_FROM_SI(type) _mm256_castsi256_##type
 #define TL_HALF_LANES 0
 
 typedef __m256i vi;
 typedef __m256 vf;
+typedef __m256d wd;
 typedef struct {
-    __m256d lo, hi;
+    wd lo, hi;
 } vd;
 typedef __m256i vm;
 
-TL_INLINE vi vi_set1(int32_t a) { return _mm256_set1_epi32(a); }
 TL_INLINE vi vi_load(const int32_t *p) { return _mm256_loadu_si256((const __m256i *)p); }
 TL_INLINE void vi_store(int32_t *p, vi a) { _mm256_storeu_si256((__m256i *)p, a); }
 TL_INLINE vi vi_iota(void) { return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7); }
-TL_INLINE vi vi_add(vi a, vi b) { return _mm256_add_epi32(a, b); }
-TL_INLINE vi vi_sub(vi a, vi b) { return _mm256_sub_epi32(a, b); }
-TL_INLINE vi vi_mul(vi a, vi b) { return _mm256_mullo_epi32(a, b); }
-TL_INLINE vi vi_min(vi a, vi b) { return _mm256_min_epi32(a, b); }
-TL_INLINE vi vi_max(vi a, vi b) { return _mm256_max_epi32(a, b); }
-TL_INLINE vi vi_or(vi a, vi b) { return _mm256_or_si256(a, b); }
-TL_INLINE vi vi_xor(vi a, vi b) { return _mm256_xor_si256(a, b); }
-TL_INLINE vi vi_and(vi a, vi b) { return _mm256_and_si256(a, b); }
-TL_INLINE vi vi_shift_left(vi a, int n) { return _mm256_sll_epi32(a, _mm_cvtsi32_si128(n)); }
-TL_INLINE vi vi_shift_right(vi a, int n) { return _mm256_sra_epi32(a, _mm_cvtsi32_si128(n)); }
-TL_INLINE vi vi_mul_halves(vi a, vi b) { return _mm256_mullo_epi16(a, b); }
-TL_INLINE vi vi_mul_high_halves(vi a, vi b) { return _mm256_mulhi_epu16(a, b); }
-TL_INLINE vi vi_scale_halves(vi a, vi b) { return _mm256_mulhrs_epi16(a, b); }
-TL_INLINE vi vi_add_halves(vi a, vi b) { return _mm256_add_epi16(a, b); }
-TL_INLINE vi vi_sub_halves(vi a, vi b) { return _mm256_sub_epi16(a, b); }
-TL_INLINE vi vi_upper_bytes(vi a) { return _mm256_srli_epi16(a, 8); }
-TL_INLINE vi vi_add_bytes(vi a, vi b) { return _mm256_adds_epu8(a, b); }
-TL_INLINE vi vi_max_bytes(vi a, vi b) { return _mm256_max_epu8(a, b); }
-TL_INLINE vi vi_min_bytes(vi a, vi b) { return _mm256_min_epu8(a, b); }
 TL_INLINE vm vi_gt(vi a, vi b) { return _mm256_cmpgt_epi32(a, b); }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b)
 {
@@ -62,35 +46,6 @@ TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
         vi_store_masked(p, m, a);
 }
 
-/* Four int32. */
-typedef __m128i v4;
-TL_INLINE v4 v4_zero(void) { return _mm_setzero_si128(); }
-TL_INLINE v4 v4_load(const int32_t *p) { return _mm_loadu_si128((const __m128i *)p); }
-TL_INLINE void v4_store(int32_t *p, v4 a) { _mm_storeu_si128((__m128i *)p, a); }
-TL_INLINE v4 v4_add(v4 a, v4 b) { return _mm_add_epi32(a, b); }
-TL_INLINE v4 v4_or(v4 a, v4 b) { return _mm_or_si128(a, b); }
-/* the 4x4 transposes within each 128 bits, their own inverse */
-TL_INLINE void transpose_quads(const vi *a, vi *b)
-{
-    const vi low01 = _mm256_unpacklo_epi32(a[0], a[1]), high01 = _mm256_unpackhi_epi32(a[0], a[1]);
-    const vi low23 = _mm256_unpacklo_epi32(a[2], a[3]), high23 = _mm256_unpackhi_epi32(a[2], a[3]);
-    b[0] = _mm256_unpacklo_epi64(low01, low23);
-    b[1] = _mm256_unpackhi_epi64(low01, low23);
-    b[2] = _mm256_unpacklo_epi64(high01, high23);
-    b[3] = _mm256_unpackhi_epi64(high01, high23);
-}
-TL_INLINE void vi_load_quads(const int32_t *p, vi *c)
-{
-    const vi rows[4] = {vi_load(p), vi_load(p + 8), vi_load(p + 16), vi_load(p + 24)};
-    transpose_quads(rows, c);
-}
-TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
-{
-    vi rows[4];
-    transpose_quads(c, rows);
-    for (int k = 0; k < 4; k++)
-        vi_store(p + 8 * k, rows[k]);
-}
 TL_INLINE vi vi_prefix_sum(vi a)
 {
     a = _mm256_add_epi32(a, _mm256_slli_si256(a, 4));
@@ -143,7 +98,6 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
 typedef struct {
     __m256i lo, hi;
 } vw;
-TL_INLINE vw vw_zero(void) { return (vw){_mm256_setzero_si256(), _mm256_setzero_si256()}; }
 TL_INLINE vw vw_load(const uint64_t *p)
 {
     return (vw){_mm256_loadu_si256((const __m256i *)p), _mm256_loadu_si256((const __m256i *)(p + 4))};
@@ -166,13 +120,6 @@ TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
     return (vw){_mm256_or_si256(a.lo, _mm256_and_si256(lo, every)), _mm256_or_si256(a.hi, _mm256_and_si256(hi, every))};
 }
 
-/* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
-TL_INLINE vi vi_bit_ranges(vi begin, vi end)
-{
-    const vi ones = _mm256_set1_epi32(-1);
-    return _mm256_andnot_si256(_mm256_sllv_epi32(ones, end), _mm256_sllv_epi32(ones, begin));
-}
-
 /* The order that moves the lanes in `bits` to the front: byte k of the packed list is the k-th lane set. */
 TL_INLINE vi compress_order(unsigned bits)
 {
@@ -184,18 +131,8 @@ TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
     vi_store(p, _mm256_permutevar8x32_epi32(a, compress_order(vm_bits(m))));
 }
 
-TL_INLINE vf vf_set1(float a) { return _mm256_set1_ps(a); }
-TL_INLINE vf vf_add(vf a, vf b) { return _mm256_add_ps(a, b); }
-TL_INLINE vf vf_sub(vf a, vf b) { return _mm256_sub_ps(a, b); }
-TL_INLINE vf vf_mul(vf a, vf b) { return _mm256_mul_ps(a, b); }
-TL_INLINE vf vf_div(vf a, vf b) { return _mm256_div_ps(a, b); }
-TL_INLINE vf vf_sqrt(vf a) { return _mm256_sqrt_ps(a); }
-TL_INLINE vf vf_from_vi(vi a) { return _mm256_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
-TL_INLINE void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm256_cvtps_epi32(_mm256_floor_ps(a)); }
-TL_INLINE vi vi_nearest(vf a) { return _mm256_cvtps_epi32(a); }
-TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? _mm256_permute_ps(a, 0xff) : _mm256_movehdup_ps(a); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm256_maskload_ps(p, m); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm256_maskstore_ps(p, m, a); }
 TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
@@ -205,13 +142,7 @@ TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
 TL_INLINE vm vf_lt(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
 TL_INLINE vm vf_ge(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_GE_OQ)); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_EQ_OQ)); }
-TL_INLINE vi vi_bits_of_vf(vf a) { return _mm256_castps_si256(a); }
 
-TL_INLINE vd vd_set1(double a) { return (vd){_mm256_set1_pd(a), _mm256_set1_pd(a)}; }
-TL_INLINE vd vd_add(vd a, vd b) { return (vd){_mm256_add_pd(a.lo, b.lo), _mm256_add_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_sub(vd a, vd b) { return (vd){_mm256_sub_pd(a.lo, b.lo), _mm256_sub_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_mul(vd a, vd b) { return (vd){_mm256_mul_pd(a.lo, b.lo), _mm256_mul_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_div(vd a, vd b) { return (vd){_mm256_div_pd(a.lo, b.lo), _mm256_div_pd(a.hi, b.hi)}; }
 TL_INLINE vd vd_from_vi(vi a)
 {
     return (vd){_mm256_cvtepi32_pd(_mm256_castsi256_si128(a)), _mm256_cvtepi32_pd(_mm256_extracti128_si256(a, 1))};
@@ -220,31 +151,12 @@ TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(a.lo)), _mm256_cvtpd_ps(a.hi), 1);
 }
-/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes
- * the quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the
- * quotient, which is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of
- * elementary functions on the IBM RISC System/6000 processor, 1990. */
-TL_INLINE __m256d one_quotient(__m256d a, __m256d b, __m256d inverse, int are_f32)
-{
-    __m256d q = _mm256_mul_pd(a, inverse);
-    if (!are_f32)
-        q = _mm256_fmadd_pd(_mm256_fnmadd_pd(q, b, a), inverse, q);
-    return _mm256_fmadd_pd(_mm256_fnmadd_pd(q, b, a), inverse, q);
-}
-TL_INLINE void vd_quotients(const vd *a, vd b, vd *q, int are_f32)
-{
-    const vd inverse = vd_div(vd_set1(1.0), b);
-    for (int k = 0; k < 3; k++)
-        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo, are_f32), one_quotient(a[k].hi, b.hi, inverse.hi, are_f32)};
-}
 TL_INLINE vd vd_abs(vd a)
 {
     const __m256d sign = _mm256_set1_pd(-0.0);
     return (vd){_mm256_andnot_pd(sign, a.lo), _mm256_andnot_pd(sign, a.hi)};
 }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm256_floor_pd(a.lo), _mm256_floor_pd(a.hi)}; }
-TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm256_min_pd(a.lo, b.lo), _mm256_min_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm256_max_pd(a.lo, b.lo), _mm256_max_pd(a.hi, b.hi)}; }
 TL_INLINE vi vi_low_bits(vd a)
 {
     const __m256 lo = _mm256_castpd_ps(a.lo), hi = _mm256_castpd_ps(a.hi);
@@ -275,25 +187,11 @@ TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_sto
 typedef struct {
     __m256d even, odd;
 } vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
-TL_INLINE __m256i load_two(int step, const tl_vertex *v, const int32_t *first)
+TL_INLINE __m256i load_quarter(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
     return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])),
                                    _mm_loadu_si128(a + first[4 * step]), 1);
-}
-TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
-{
-    const __m256i a = load_two(step, v, first), b = load_two(step, v, first + step);
-    const __m256i c = load_two(step, v, first + 2 * step), d = load_two(step, v, first + 3 * step);
-    const __m256i ab = _mm256_unpacklo_epi32(a, b), cd = _mm256_unpacklo_epi32(c, d);
-    *x = _mm256_unpacklo_epi64(ab, cd);
-    *y = _mm256_unpackhi_epi64(ab, cd);
-    z->even = _mm256_castsi256_pd(_mm256_unpackhi_epi64(a, b));
-    z->odd = _mm256_castsi256_pd(_mm256_unpackhi_epi64(c, d));
-}
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
-{
-    load_vertices_by(3, v, first, x, y, z);
 }
 TL_INLINE vd vd_from_vz(vz z)
 {
@@ -316,24 +214,21 @@ TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
     columns[2] = _mm256_castpd_ps(_mm256_unpacklo_pd(ab2, cd2));
     columns[3] = _mm256_castpd_ps(_mm256_unpackhi_pd(ab2, cd2));
 }
-TL_INLINE void four_columns_f64(const double *p, int stride, __m256d *columns)
+/* Turns four rows of four into columns, or back. */
+TL_INLINE void transpose_four(const __m256d *row, __m256d *c)
 {
-    const __m256d a = _mm256_loadu_pd(p), b = _mm256_loadu_pd(p + stride), c = _mm256_loadu_pd(p + 2 * stride),
-                  d = _mm256_loadu_pd(p + 3 * stride);
-    const __m256d x = _mm256_unpacklo_pd(a, b), y = _mm256_unpackhi_pd(a, b), x2 = _mm256_unpacklo_pd(c, d);
-    const __m256d y2 = _mm256_unpackhi_pd(c, d);
-    columns[0] = _mm256_permute2f128_pd(x, x2, 0x20);
-    columns[1] = _mm256_permute2f128_pd(y, y2, 0x20);
-    columns[2] = _mm256_permute2f128_pd(x, x2, 0x31);
-    columns[3] = _mm256_permute2f128_pd(y, y2, 0x31);
+    const __m256d even[2] = {_mm256_unpacklo_pd(row[0], row[1]), _mm256_unpackhi_pd(row[0], row[1])};
+    const __m256d odd[2] = {_mm256_unpacklo_pd(row[2], row[3]), _mm256_unpackhi_pd(row[2], row[3])};
+    for (int k = 0; k < 2; k++) {
+        c[k] = _mm256_permute2f128_pd(even[k], odd[k], 0x20);
+        c[k + 2] = _mm256_permute2f128_pd(even[k], odd[k], 0x31);
+    }
 }
-TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
+TL_INLINE void half_columns_f64(const double *p, int stride, __m256d *columns)
 {
-    __m256d low[4], high[4];
-    four_columns_f64(p, stride, low);
-    four_columns_f64(p + 4 * stride, stride, high);
-    for (int k = 0; k < 4; k++)
-        columns[k] = (vd){low[k], high[k]};
+    const __m256d rows[4] = {_mm256_loadu_pd(p), _mm256_loadu_pd(p + stride), _mm256_loadu_pd(p + 2 * stride),
+                             _mm256_loadu_pd(p + 3 * stride)};
+    transpose_four(rows, columns);
 }
 
 TL_INLINE void store_four(tl_vertex *v, __m128i x, __m128i y, __m256d z)
@@ -350,13 +245,7 @@ TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
     store_four(v + 4, _mm256_extracti128_si256(x, 1), _mm256_extracti128_si256(y, 1), z.hi);
 }
 
-/* What shading needs besides. */
-TL_INLINE vf vf_load(const float *p) { return _mm256_loadu_ps(p); }
-TL_INLINE vf vf_fma(vf a, vf b, vf c) { return _mm256_fmadd_ps(a, b, c); }
-TL_INLINE vf vf_min(vf a, vf b) { return _mm256_min_ps(a, b); }
-TL_INLINE vf vf_max(vf a, vf b) { return _mm256_max_ps(a, b); }
 TL_INLINE vf vf_min_size(vf a, vf b) { return _mm256_min_ps(a, _mm256_andnot_ps(_mm256_set1_ps(-0.0f), b)); }
-TL_INLINE vi vi_rint(vf a) { return _mm256_cvtps_epi32(a); }
 TL_INLINE vf vf_of_bits(vi a) { return _mm256_castsi256_ps(a); }
 TL_INLINE vi vi_low_half(vi a) { return _mm256_blend_epi16(a, _mm256_setzero_si256(), 0xaa); }
 TL_INLINE vi vi_high_half(vi a) { return _mm256_srli_epi32(a, 16); }
@@ -375,10 +264,6 @@ TL_INLINE __m256d bits_minus(__m256d a, uint64_t sum, uint64_t mask)
     const __m256i b = _mm256_and_si256(_mm256_castpd_si256(a), _mm256_set1_epi64x((long long)mask));
     return _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x((long long)sum), b));
 }
-TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
-{
-    return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)};
-}
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
     return (vd){_mm256_i32gather_pd(p, _mm256_castsi256_si128(i), 8),
@@ -394,29 +279,17 @@ TL_INLINE vi vi_prefix_count(unsigned bits)
     return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)(_pdep_u64(bits, ones) * ones)));
 }
 
-TL_INLINE __m256i load_two_records(const char *base, int scale, const int32_t *i)
+TL_INLINE __m256i load_part_of_records(const char *base, int scale, const int32_t *i)
 {
     const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale));
     const __m128i b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
     return _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
 }
-TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
-{
-    const vi rows[4] = {load_two_records(base, scale, i), load_two_records(base, scale, i + 1),
-                        load_two_records(base, scale, i + 2), load_two_records(base, scale, i + 3)};
-    transpose_quads(rows, c);
-}
-TL_INLINE __m256i load_two_rows(const char *base, const int32_t *i)
+TL_INLINE __m256i load_part_of_rows(const char *base, const int32_t *i)
 {
     const __m128i a = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[0]));
     const __m128i b = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[4]));
     return _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
-}
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
-{
-    const vi rows[4] = {load_two_rows(base, i), load_two_rows(base, i + 1), load_two_rows(base, i + 2),
-                        load_two_rows(base, i + 3)};
-    transpose_quads(rows, c);
 }
 TL_INLINE __m256i load_four_pairs(const char *base, const int32_t *i)
 {
@@ -472,12 +345,7 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
         __m256d row[4];
         for (int k = 0; k < 4; k++)
             row[k] = _mm256_loadu_pd(base + (int64_t)i[4 * part + k] * stride);
-        const __m256d even[2] = {_mm256_unpacklo_pd(row[0], row[1]), _mm256_unpackhi_pd(row[0], row[1])};
-        const __m256d odd[2] = {_mm256_unpacklo_pd(row[2], row[3]), _mm256_unpackhi_pd(row[2], row[3])};
-        for (int k = 0; k < 2; k++) {
-            half[part][k] = _mm256_permute2f128_pd(even[k], odd[k], 0x20);
-            half[part][k + 2] = _mm256_permute2f128_pd(even[k], odd[k], 0x31);
-        }
+        transpose_four(row, half[part]);
     }
     for (int k = 0; k < 4; k++)
         c[k] = (vd){half[0][k], half[1][k]};
@@ -511,16 +379,6 @@ TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, 
     vd_load_pairs(base, 3, first, x, y);
     *z = (vd){load_four_thirds(base, first), load_four_thirds(base, first + 12)};
 }
-/* Turns four rows of four into columns, or back. */
-TL_INLINE void transpose_four(const __m256d *row, __m256d *c)
-{
-    const __m256d even[2] = {_mm256_unpacklo_pd(row[0], row[1]), _mm256_unpackhi_pd(row[0], row[1])};
-    const __m256d odd[2] = {_mm256_unpacklo_pd(row[2], row[3]), _mm256_unpackhi_pd(row[2], row[3])};
-    for (int k = 0; k < 2; k++) {
-        c[k] = _mm256_permute2f128_pd(even[k], odd[k], 0x20);
-        c[k + 2] = _mm256_permute2f128_pd(even[k], odd[k], 0x31);
-    }
-}
 TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, vd *y, vd *z, vi *a, vi *b)
 {
     __m256d half[2][4];
@@ -550,6 +408,8 @@ TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
     store_four_places(p + 16, x.hi, y.hi, z.hi, _mm256_extracti128_si256(a, 1), _mm256_extracti128_si256(b, 1));
 }
 TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
+#include "lanes/lanes_x86.h"
+
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a)
 {
@@ -565,6 +425,5 @@ TL_INLINE vd vd_off_256th(vd a)
     const vd shift = vd_set1(0x1.8p44); /* next to it are the multiples of 2^-8 */
     return vd_sub(a, vd_sub(vd_add(a, shift), shift));
 }
-TL_INLINE vd vd_or(vd a, vd b) { return (vd){_mm256_or_pd(a.lo, b.lo), _mm256_or_pd(a.hi, b.hi)}; }
 
 #endif

@@ -10,38 +10,22 @@
 #include "lanes/inline.h"
 
 #define TL_LANES 16
+#define TL_MM(name) _mm512_##name
+#define TL_SI(name) _mm512_##name##_si512
+#define TL_FROM_SI(type) _mm512_castsi512_##type
 #define TL_HALF_LANES 8
 
 typedef __m512i vi;
 typedef __m512 vf;
+typedef __m512d wd;
 typedef struct {
-    __m512d lo, hi;
+    wd lo, hi;
 } vd;
 typedef __mmask16 vm;
 
-TL_INLINE vi vi_set1(int32_t a) { return _mm512_set1_epi32(a); }
 TL_INLINE vi vi_load(const int32_t *p) { return _mm512_loadu_si512(p); }
 TL_INLINE void vi_store(int32_t *p, vi a) { _mm512_storeu_si512(p, a); }
 TL_INLINE vi vi_iota(void) { return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
-TL_INLINE vi vi_add(vi a, vi b) { return _mm512_add_epi32(a, b); }
-TL_INLINE vi vi_sub(vi a, vi b) { return _mm512_sub_epi32(a, b); }
-TL_INLINE vi vi_mul(vi a, vi b) { return _mm512_mullo_epi32(a, b); }
-TL_INLINE vi vi_min(vi a, vi b) { return _mm512_min_epi32(a, b); }
-TL_INLINE vi vi_max(vi a, vi b) { return _mm512_max_epi32(a, b); }
-TL_INLINE vi vi_or(vi a, vi b) { return _mm512_or_si512(a, b); }
-TL_INLINE vi vi_xor(vi a, vi b) { return _mm512_xor_si512(a, b); }
-TL_INLINE vi vi_and(vi a, vi b) { return _mm512_and_si512(a, b); }
-TL_INLINE vi vi_shift_left(vi a, int n) { return _mm512_sll_epi32(a, _mm_cvtsi32_si128(n)); }
-TL_INLINE vi vi_shift_right(vi a, int n) { return _mm512_sra_epi32(a, _mm_cvtsi32_si128(n)); }
-TL_INLINE vi vi_mul_halves(vi a, vi b) { return _mm512_mullo_epi16(a, b); }
-TL_INLINE vi vi_mul_high_halves(vi a, vi b) { return _mm512_mulhi_epu16(a, b); }
-TL_INLINE vi vi_scale_halves(vi a, vi b) { return _mm512_mulhrs_epi16(a, b); }
-TL_INLINE vi vi_add_halves(vi a, vi b) { return _mm512_add_epi16(a, b); }
-TL_INLINE vi vi_sub_halves(vi a, vi b) { return _mm512_sub_epi16(a, b); }
-TL_INLINE vi vi_upper_bytes(vi a) { return _mm512_srli_epi16(a, 8); }
-TL_INLINE vi vi_add_bytes(vi a, vi b) { return _mm512_adds_epu8(a, b); }
-TL_INLINE vi vi_max_bytes(vi a, vi b) { return _mm512_max_epu8(a, b); }
-TL_INLINE vi vi_min_bytes(vi a, vi b) { return _mm512_min_epu8(a, b); }
 TL_INLINE vm vi_gt(vi a, vi b) { return _mm512_cmpgt_epi32_mask(a, b); }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return _mm512_cmpgt_epu32_mask(a, b); }
 TL_INLINE vm vi_eq(vi a, vi b) { return _mm512_cmpeq_epi32_mask(a, b); }
@@ -56,35 +40,6 @@ TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
     vi_store_masked(p, m, a);
 }
 
-/* Four int32. */
-typedef __m128i v4;
-TL_INLINE v4 v4_zero(void) { return _mm_setzero_si128(); }
-TL_INLINE v4 v4_load(const int32_t *p) { return _mm_loadu_si128((const __m128i *)p); }
-TL_INLINE void v4_store(int32_t *p, v4 a) { _mm_storeu_si128((__m128i *)p, a); }
-TL_INLINE v4 v4_add(v4 a, v4 b) { return _mm_add_epi32(a, b); }
-TL_INLINE v4 v4_or(v4 a, v4 b) { return _mm_or_si128(a, b); }
-/* the 4x4 transposes within each 128 bits, their own inverse */
-TL_INLINE void transpose_quads(const vi *a, vi *b)
-{
-    const vi low01 = _mm512_unpacklo_epi32(a[0], a[1]), high01 = _mm512_unpackhi_epi32(a[0], a[1]);
-    const vi low23 = _mm512_unpacklo_epi32(a[2], a[3]), high23 = _mm512_unpackhi_epi32(a[2], a[3]);
-    b[0] = _mm512_unpacklo_epi64(low01, low23);
-    b[1] = _mm512_unpackhi_epi64(low01, low23);
-    b[2] = _mm512_unpacklo_epi64(high01, high23);
-    b[3] = _mm512_unpackhi_epi64(high01, high23);
-}
-TL_INLINE void vi_load_quads(const int32_t *p, vi *c)
-{
-    const vi rows[4] = {vi_load(p), vi_load(p + 16), vi_load(p + 32), vi_load(p + 48)};
-    transpose_quads(rows, c);
-}
-TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
-{
-    vi rows[4];
-    transpose_quads(c, rows);
-    for (int k = 0; k < 4; k++)
-        vi_store(p + 16 * k, rows[k]);
-}
 TL_INLINE vi vi_prefix_sum(vi a)
 {
     const vi zero = _mm512_setzero_si512();
@@ -115,7 +70,6 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits) { _mm512_storeu_si512(
 typedef struct {
     __m512i lo, hi;
 } vw;
-TL_INLINE vw vw_zero(void) { return (vw){_mm512_setzero_si512(), _mm512_setzero_si512()}; }
 TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm512_loadu_si512(p), _mm512_loadu_si512(p + 8)}; }
 TL_INLINE void vw_store(uint64_t *p, vw a) { _mm512_storeu_si512(p, a.lo), _mm512_storeu_si512(p + 8, a.hi); }
 TL_INLINE __m512i bit_range_64(__m256i begin, __m256i end)
@@ -132,25 +86,8 @@ TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
     return (vw){_mm512_or_si512(a.lo, _mm512_and_si512(lo, every)), _mm512_or_si512(a.hi, _mm512_and_si512(hi, every))};
 }
 
-/* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
-TL_INLINE vi vi_bit_ranges(vi begin, vi end)
-{
-    const vi ones = _mm512_set1_epi32(-1);
-    return _mm512_andnot_si512(_mm512_sllv_epi32(ones, end), _mm512_sllv_epi32(ones, begin));
-}
-
-TL_INLINE vf vf_set1(float a) { return _mm512_set1_ps(a); }
-TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
-TL_INLINE vf vf_sub(vf a, vf b) { return _mm512_sub_ps(a, b); }
-TL_INLINE vf vf_mul(vf a, vf b) { return _mm512_mul_ps(a, b); }
-TL_INLINE vf vf_div(vf a, vf b) { return _mm512_div_ps(a, b); }
-TL_INLINE vf vf_sqrt(vf a) { return _mm512_sqrt_ps(a); }
-TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
-TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
-TL_INLINE vi vi_nearest(vf a) { return _mm512_cvtps_epi32(a); }
-TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? _mm512_permute_ps(a, 0xff) : _mm512_movehdup_ps(a); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm512_mask_storeu_ps(p, m, a); }
 TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
@@ -161,13 +98,7 @@ TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
 TL_INLINE vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE vm vf_ge(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
-TL_INLINE vi vi_bits_of_vf(vf a) { return _mm512_castps_si512(a); }
 
-TL_INLINE vd vd_set1(double a) { return (vd){_mm512_set1_pd(a), _mm512_set1_pd(a)}; }
-TL_INLINE vd vd_add(vd a, vd b) { return (vd){_mm512_add_pd(a.lo, b.lo), _mm512_add_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_sub(vd a, vd b) { return (vd){_mm512_sub_pd(a.lo, b.lo), _mm512_sub_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_mul(vd a, vd b) { return (vd){_mm512_mul_pd(a.lo, b.lo), _mm512_mul_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_div(vd a, vd b) { return (vd){_mm512_div_pd(a.lo, b.lo), _mm512_div_pd(a.hi, b.hi)}; }
 TL_INLINE vd vd_from_vi(vi a)
 {
     return (vd){_mm512_cvtepi32_pd(_mm512_castsi512_si256(a)), _mm512_cvtepi32_pd(_mm512_extracti64x4_epi64(a, 1))};
@@ -176,27 +107,8 @@ TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(a.lo)), _mm512_cvtpd_ps(a.hi), 1);
 }
-/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes
- * the quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the
- * quotient, which is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of
- * elementary functions on the IBM RISC System/6000 processor, 1990. */
-TL_INLINE __m512d one_quotient(__m512d a, __m512d b, __m512d inverse, int are_f32)
-{
-    __m512d q = _mm512_mul_pd(a, inverse);
-    if (!are_f32)
-        q = _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
-    return _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
-}
-TL_INLINE void vd_quotients(const vd *a, vd b, vd *q, int are_f32)
-{
-    const vd inverse = vd_div(vd_set1(1.0), b);
-    for (int k = 0; k < 3; k++)
-        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo, are_f32), one_quotient(a[k].hi, b.hi, inverse.hi, are_f32)};
-}
 TL_INLINE vd vd_abs(vd a) { return (vd){_mm512_abs_pd(a.lo), _mm512_abs_pd(a.hi)}; }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm512_roundscale_pd(a.lo, 1), _mm512_roundscale_pd(a.hi, 1)}; }
-TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm512_min_pd(a.lo, b.lo), _mm512_min_pd(a.hi, b.hi)}; }
-TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm512_max_pd(a.lo, b.lo), _mm512_max_pd(a.hi, b.hi)}; }
 TL_INLINE vm vd_ge(vd a, vd b)
 {
     return (vm)(_mm512_cmp_pd_mask(a.lo, b.lo, _CMP_GE_OQ) | _mm512_cmp_pd_mask(a.hi, b.hi, _CMP_GE_OQ) << 8);
@@ -224,7 +136,7 @@ TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_sto
 typedef struct {
     __m512d even, odd;
 } vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
-TL_INLINE __m512i load_four(int step, const tl_vertex *v, const int32_t *first)
+TL_INLINE __m512i load_quarter(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
     const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])),
@@ -232,20 +144,6 @@ TL_INLINE __m512i load_four(int step, const tl_vertex *v, const int32_t *first)
     const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[8 * step])),
                                                  _mm_loadu_si128(a + first[12 * step]), 1);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
-}
-TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
-{
-    const __m512i a = load_four(step, v, first), b = load_four(step, v, first + step);
-    const __m512i c = load_four(step, v, first + 2 * step), d = load_four(step, v, first + 3 * step);
-    const __m512i ab = _mm512_unpacklo_epi32(a, b), cd = _mm512_unpacklo_epi32(c, d);
-    *x = _mm512_unpacklo_epi64(ab, cd);
-    *y = _mm512_unpackhi_epi64(ab, cd);
-    z->even = _mm512_castsi512_pd(_mm512_unpackhi_epi64(a, b));
-    z->odd = _mm512_castsi512_pd(_mm512_unpackhi_epi64(c, d));
-}
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
-{
-    load_vertices_by(3, v, first, x, y, z);
 }
 TL_INLINE vd vd_from_vz(vz z)
 {
@@ -292,7 +190,7 @@ TL_INLINE __m512d rows_f64(const double *p, int stride)
 {
     return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p)), _mm256_loadu_pd(p + 4 * stride), 1);
 }
-TL_INLINE void eight_columns_f64(const double *p, int stride, __m512d *columns)
+TL_INLINE void half_columns_f64(const double *p, int stride, __m512d *columns)
 {
     const __m512d a = rows_f64(p, stride), b = rows_f64(p + stride, stride), c = rows_f64(p + 2 * stride, stride),
                   d = rows_f64(p + 3 * stride, stride);
@@ -304,14 +202,6 @@ TL_INLINE void eight_columns_f64(const double *p, int stride, __m512d *columns)
     columns[1] = _mm512_permutex2var_pd(y, front, y2);
     columns[2] = _mm512_permutex2var_pd(x, back, x2);
     columns[3] = _mm512_permutex2var_pd(y, back, y2);
-}
-TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
-{
-    __m512d low[4], high[4];
-    eight_columns_f64(p, stride, low);
-    eight_columns_f64(p + 8 * stride, stride, high);
-    for (int k = 0; k < 4; k++)
-        columns[k] = (vd){low[k], high[k]};
 }
 
 TL_INLINE void store_eight(tl_vertex *v, __m512i xy, __m512d z)
@@ -362,12 +252,6 @@ TL_INLINE hf hf_sum_depth(double row, hd col)
     return _mm256_add_ps(_mm512_cvtpd_ps(_mm512_add_pd(_mm512_set1_pd(row), col)), _mm256_setzero_ps());
 }
 
-/* What shading needs besides. */
-TL_INLINE vf vf_load(const float *p) { return _mm512_loadu_ps(p); }
-TL_INLINE vf vf_fma(vf a, vf b, vf c) { return _mm512_fmadd_ps(a, b, c); }
-TL_INLINE vf vf_min(vf a, vf b) { return _mm512_min_ps(a, b); }
-TL_INLINE vf vf_max(vf a, vf b) { return _mm512_max_ps(a, b); }
-TL_INLINE vi vi_rint(vf a) { return _mm512_cvtps_epi32(a); }
 TL_INLINE vf vf_min_size(vf a, vf b) { return _mm512_range_ps(a, b, 10); } /* the lesser, without its sign */
 TL_INLINE vf vf_of_bits(vi a) { return _mm512_castsi512_ps(a); }
 TL_INLINE vi vi_low_half(vi a) { return _mm512_and_si512(a, _mm512_set1_epi32(0xffff)); }
@@ -381,10 +265,6 @@ TL_INLINE __m512d bits_minus(__m512d a, uint64_t sum, uint64_t mask)
 {
     const __m512i b = _mm512_and_si512(_mm512_castpd_si512(a), _mm512_set1_epi64((long long)mask));
     return _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64((long long)sum), b));
-}
-TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
-{
-    return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)};
 }
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
@@ -400,7 +280,7 @@ TL_INLINE vi vi_prefix_count(unsigned bits)
     return _mm512_cvtepu8_epi32(_mm_set_epi64x((long long)high, (long long)low));
 }
 
-TL_INLINE __m512i load_four_records(const char *base, int scale, const int32_t *i)
+TL_INLINE __m512i load_part_of_records(const char *base, int scale, const int32_t *i)
 {
     const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale));
     const __m128i b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
@@ -410,13 +290,7 @@ TL_INLINE __m512i load_four_records(const char *base, int scale, const int32_t *
     const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
-TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
-{
-    const vi rows[4] = {load_four_records(base, scale, i), load_four_records(base, scale, i + 1),
-                        load_four_records(base, scale, i + 2), load_four_records(base, scale, i + 3)};
-    transpose_quads(rows, c);
-}
-TL_INLINE vi load_four_rows(const char *base, const int32_t *i)
+TL_INLINE vi load_part_of_rows(const char *base, const int32_t *i)
 {
     const __m128i a = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[0]));
     const __m128i b = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[4]));
@@ -425,12 +299,6 @@ TL_INLINE vi load_four_rows(const char *base, const int32_t *i)
     const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
     const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
-}
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
-{
-    const vi rows[4] = {load_four_rows(base, i), load_four_rows(base, i + 1), load_four_rows(base, i + 2),
-                        load_four_rows(base, i + 3)};
-    transpose_quads(rows, c);
 }
 TL_INLINE vi load_eight_pairs(const char *base, const int32_t *i)
 {
@@ -616,6 +484,7 @@ TL_INLINE vd vd_off_256th(vd a)
     enum { nearest = 8 << 4 | _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC };
     return (vd){_mm512_reduce_pd(a.lo, nearest), _mm512_reduce_pd(a.hi, nearest)};
 }
-TL_INLINE vd vd_or(vd a, vd b) { return (vd){_mm512_or_pd(a.lo, b.lo), _mm512_or_pd(a.hi, b.hi)}; }
+
+#include "lanes/lanes_x86.h"
 
 #endif

@@ -9,6 +9,7 @@
 
 #include "lanes/halves.h"
 #include "lanes/lanes.h"
+#include "raster/row_edges.h"
 #include "meshlets/batch.h"
 #include "meshlets/plane.c"
 #include "meshlets/queues.c"
@@ -88,44 +89,6 @@ static __attribute__((noinline)) void flush_small_boxes(meshlet_batch *s, meshle
     q->n = 0;
 }
 
-/* Where rows begin and end, as rows.c: the quotient (e + 1/2) / |dy| rounded down, of a left, a right and a middle
- * edge, which is one of either. */
-typedef struct {
-    vf start[3], dx[3], inverse[3];
-    vm middle_is_left, middle_is_right;
-} row_sides;
-
-TL_INLINE vf pick_edge(const vf *edges, vm is_first, vm is_second)
-{
-    return vf_select(is_first, edges[0], vf_select(is_second, edges[1], edges[2]));
-}
-
-TL_INLINE row_sides find_sides(const queued_lanes *t)
-{
-    const vi zero = vi_set1(0);
-    vm left[3], right[3];
-    vf start[3], dx[3], inverse[3];
-    for (int k = 0; k < 3; k++) {
-        left[k] = vi_gt(zero, t->dy[k]), right[k] = vi_gt(t->dy[k], zero);
-        start[k] = vf_add(vf_from_vi(t->e[k]), vf_set1(0.5f));
-        dx[k] = vf_from_vi(t->dx[k]);
-        inverse[k] = vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_abs(t->dy[k]), vi_set1(1))));
-    }
-    const vm middle0 = (vm) ~(left[0] | right[0]);
-    const vm middle1 = (vm) ~((left[1] & ~left[0]) | (right[1] & ~right[0]) | middle0);
-    const vm middle2 = (vm) ~(middle0 | middle1);
-    const vm first[3] = {left[0], right[0], middle0}, second[3] = {left[1], right[1], middle1};
-    row_sides r;
-    for (int k = 0; k < 3; k++) {
-        r.start[k] = pick_edge(start, first[k], second[k]);
-        r.dx[k] = pick_edge(dx, first[k], second[k]);
-        r.inverse[k] = pick_edge(inverse, first[k], second[k]);
-    }
-    r.middle_is_left = (vm)((middle0 & left[0]) | (middle1 & left[1]) | (middle2 & left[2]));
-    r.middle_is_right = (vm)((middle0 & right[0]) | (middle1 & right[1]) | (middle2 & right[2]));
-    return r;
-}
-
 /* The rows of sixteen triangles with boxes up to 16x16. */
 typedef struct {
     int32_t bits[TL_MIDDLE_PX][TL_LANES] __attribute__((aligned(64)));
@@ -137,19 +100,13 @@ TL_INLINE void find_rows(queued_lanes *t, vi size, middle_rows *out)
     const vi zero = vi_set1(0), byte = vi_set1(0xff), n_cols = vi_and(size, byte);
     const vi own0 = vi_and(vi_high_half(size), byte), own1 = vi_shift_right_unsigned(size, 24);
     const int n_rows = vi_most(vi_and(vi_shift_right_unsigned(size, 8), byte));
-    row_sides r = find_sides(t);
+    lane_edges r;
+    sort_fixed_edges(t->e, t->dx, t->dy, &r);
     for (int row = 0; row < n_rows; row++) {
-        vi end[3];
-        for (int k = 0; k < 3; k++) {
-            end[k] = vi_floor(vf_mul(r.start[k], r.inverse[k]));
-            r.start[k] = vf_add(r.start[k], r.dx[k]);
-        }
-        const vi left = vi_select(r.middle_is_left, vi_min(end[0], end[2]), end[0]);
-        const vi right = vi_select(r.middle_is_right, vi_min(end[1], end[2]), end[1]);
+        vi begin, end;
+        next_row(TL_FIXED, &r, n_cols, &begin, &end, NULL);
         const vm in = vm_and_not(vi_gt(own1, vi_set1(row)), vi_gt(own0, vi_set1(row)));
-        const vi begin = vi_max(vi_sub(zero, left), zero);
-        const vi stop = vi_select(in, vi_max(vi_min(vi_add(right, vi_set1(1)), n_cols), zero), zero);
-        vi_store_aligned(out->bits[row], vi_bit_ranges(begin, stop));
+        vi_store_aligned(out->bits[row], vi_bit_ranges(begin, vi_select(in, vi_max(end, zero), zero)));
         vd_store(out->z[row], vd_add(t->plane.z0, vd_mul(t->plane.slope_y, t->plane.y)));
         t->plane.y = vd_sub(t->plane.y, vd_set1(TL_PX));
     }
@@ -200,8 +157,8 @@ TL_DEPTH_COPIES(flush_middle_boxes, (meshlet_batch * s, meshlet_slot *slot), s, 
 
 /* What one triangle of a pair needs for its rows, of sixteen triangles. */
 typedef struct {
-    row_sides sides;
-    float start[3][TL_LANES], dx[3][TL_LANES], inverse[3][TL_LANES];
+    lane_edges edges;
+    float start[3][TL_LANES], step[3][TL_LANES], inverse[3][TL_LANES];
     double z0[TL_LANES], slope_x[TL_LANES], slope_y[TL_LANES], x[TL_LANES], y[TL_LANES];
     int32_t sizes[TL_LANES];
 } long_rows;
@@ -216,10 +173,10 @@ TL_INLINE void find_long_rows(const long_rows *r, int k, int first, vi *begin, v
     vi end[3];
     for (int j = 0; j < 3; j++)
         end[j] = vi_floor(
-            vf_mul(vf_add(vf_set1(r->start[j][k]), vf_mul(vf_set1(r->dx[j][k]), row)), vf_set1(r->inverse[j][k])));
-    if (vm_bits(r->sides.middle_is_left) >> k & 1)
+            vf_mul(vf_add(vf_set1(r->start[j][k]), vf_mul(vf_set1(r->step[j][k]), row)), vf_set1(r->inverse[j][k])));
+    if (vm_bits(r->edges.third_is_left) >> k & 1)
         end[0] = vi_min(end[0], end[2]);
-    if (vm_bits(r->sides.middle_is_right) >> k & 1)
+    if (vm_bits(r->edges.third_is_right) >> k & 1)
         end[1] = vi_min(end[1], end[2]);
     const vm in = vm_and_not(vm_first(own1), vm_first(own0));
     *begin = vi_max(vi_sub(zero, end[0]), zero);
@@ -278,11 +235,12 @@ TL_INLINE void flush_long_boxes(meshlet_batch *s, meshlet_slot *slot, int is_far
     lane_queue *q = &s->rows;
     for (int i = 0; i < q->n; i += TL_LANES) {
         const queued_lanes t = load_queued(slot, q, i);
-        long_rows r = {.sides = find_sides(&t)};
+        long_rows r;
+        sort_fixed_edges(t.e, t.dx, t.dy, &r.edges);
         for (int j = 0; j < 3; j++) {
-            vf_store(r.start[j], r.sides.start[j]);
-            vf_store(r.dx[j], r.sides.dx[j]);
-            vf_store(r.inverse[j], r.sides.inverse[j]);
+            vf_store(r.start[j], r.edges.start[j]);
+            vf_store(r.step[j], r.edges.step[j]);
+            vf_store(r.inverse[j], r.edges.inverse[j]);
         }
         vd_store(r.z0, t.plane.z0), vd_store(r.slope_x, t.plane.slope_x), vd_store(r.slope_y, t.plane.slope_y);
         vd_store(r.x, t.plane.x), vd_store(r.y, t.plane.y);

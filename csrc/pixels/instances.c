@@ -50,7 +50,7 @@ static void find_instances(const int32_t *ids, int64_t n_rows, int64_t width, co
             box[0] = begin < box[0] ? (int32_t)begin : box[0];
             box[1] = row < box[1] ? (int32_t)row : box[1];
             box[2] = col > box[2] ? (int32_t)col : box[2];
-            box[3] = (int32_t)row + 1; /* rows ascend */
+            box[3] = row + 1 > box[3] ? (int32_t)row + 1 : box[3];
         }
 }
 

@@ -71,6 +71,7 @@ typedef struct {
     const tl_window *window;
     const tl_shading *shading;
     const tl_view *view;
+    int32_t first_id;                                               /* what triangle 0 is called in the ids */
     int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
     int needs_alpha, needs_uv1, needs_tangents[2];                  /* the same; tangents of each set of uv */
     int needs_more;                                                 /* any of these */
@@ -90,17 +91,19 @@ typedef struct {
 } shade_runs;
 
 /* Lists the runs of n ids from `column` on; run r stands in slot TL_LANES + r.  Ids outside the mesh count as
- * background.  Runs of the unsnapped end with a block of columns, and know where they begin. */
+ * background; runs have those of its triangles.  Runs of the unsnapped end with a block of columns, and know where they
+ * begin. */
 TL_INLINE void list_runs(shade_runs *s, const int32_t *ids, int n, int64_t column, int is_exact)
 {
     const vi first_column = vi_add(vi_iota(), vi_set1((int32_t)column));
     const vi in_block = vi_set1((int32_t)(s->window->x_px & (TL_RUN_BLOCK - 1))), last = vi_set1(TL_RUN_BLOCK - 1);
-    const vi none = vi_set1(-1), end = vi_set1((int32_t)s->snapped->n_triangles);
+    const vi none = vi_set1(-1), end = vi_set1((int32_t)s->snapped->n_triangles), first = vi_set1(s->first_id);
     vi before = none;
     int slot = TL_LANES;
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         const vm inside = vm_first(n - x);
-        const vi id = n - x >= TL_LANES ? vi_load(ids + x) : vi_select(inside, vi_load_masked(inside, ids + x), none);
+        const vi name = n - x >= TL_LANES ? vi_load(ids + x) : vi_select(inside, vi_load_masked(inside, ids + x), none);
+        const vi id = vi_sub(name, first);
         const vm visible = vm_and(vi_gt(id, none), vi_gt(end, id));
         vm same = vi_eq(id, vi_shift_in(id, before));
         if (is_exact) {

@@ -39,7 +39,7 @@ static void start_weights(weighed_span *r, const tl_snapped *snapped, const tl_w
 {
     const tl_source *source = snapped->mesh.source;
     shade_runs *s = &r->runs;
-    s->snapped = snapped, s->window = window, s->shading = NULL;
+    s->snapped = snapped, s->window = window, s->shading = NULL, s->first_id = 0;
     memset(s->ints, 0, sizeof s->ints);
     memset(r->q, 0, sizeof r->q);
     memset(r->corners, 0, sizeof r->corners);

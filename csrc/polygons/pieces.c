@@ -1,13 +1,9 @@
 /* Pieces: the exact share of each pixel that lies in a polygon whose rings may cross, touch or cover each other.
  * In: rings.  Out: a row of shares, float64, at a time.
  *
- * Edges are cut at the rows.  Between the heights at which pieces end, leave the pixel or cross, their order from
- * left to right does not change, and what lies between two of them is inside or not: trapezoids, whose areas are
- * added up.  What lies left of a pixel comes in as winding numbers alone.  A pixel's share depends on the edges, not
- * on the window: heights and ends are quotients of integers, each rounded once, and counted from the pixel.
- *
- * Error: heights are off by 2^-50 px where edges cross at all steeply; what is thinner than TL_THIN counts as
- * nothing, and so does what a crossing of nearly parallel edges is off by, which is as thin. */
+ * Edges are cut at the rows, and each pixel takes the pieces that reach into it (slabs.c).  What lies left of it comes
+ * in as winding numbers alone.  A pixel's share depends on the edges, not on the window: ends of pieces are quotients
+ * of integers, each rounded once, and counted from the pixel. */
 #ifndef TL_POLYGON_PIECES_C
 #define TL_POLYGON_PIECES_C
 
@@ -16,12 +12,11 @@
 #include <string.h>
 
 #include "polygons.h"
+#include "base/sort_pairs.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "polygons/points.c"
-#include "polygons/sort_pairs.c"
-
-#define TL_THIN 0x1p-44 /* px of height */
+#include "polygons/slabs.c"
 
 /* Counts the rows [top, bottom) that edges pass, or cuts the edges there. */
 TL_INLINE void cut_edges(const tl_polygons *p, int is_wide, int64_t polygon, int64_t top, int64_t bottom, int64_t *next,
@@ -73,17 +68,7 @@ TL_INLINE void cut_edges(const tl_polygons *p, int is_wide, int64_t polygon, int
     }
 }
 
-/* The pieces of one row, from left to right, and what is known of it. */
-typedef struct {
-    const tl_edge_piece *pieces;
-    int32_t *active, *sorted; /* pieces that reach into the pixel; those of a slab by x */
-    double *x;                /* of these */
-    int32_t *at,
-        *change; /* winding numbers left of the pixel: by how much they change at which height, in sub-pixels */
-    int n_active, n_changes;
-    double pixel; /* a sub-pixel */
-} piece_row;
-
+/* Winding numbers left of the pixel change at height t. */
 static void note_change(piece_row *w, int32_t t, int32_t change)
 {
     int k = w->n_changes;
@@ -110,112 +95,27 @@ static void note_left(piece_row *w, const tl_edge_piece *e)
     note_change(w, e->tb, -e->sign);
 }
 
-static inline double piece_x(const tl_edge_piece *e, int64_t col, double y)
-{
-    return e->x + (double)(e->col - col) + (y - e->ya) * e->slope;
-}
-
-static inline double nearer_height(double height, double y, double next)
-{
-    return height > y + TL_THIN && height < next ? height : next;
-}
-
-/* Where the slab that begins at y ends, but for crossings. */
-static double end_of_slab(const piece_row *w, int64_t col, double y)
-{
-    double next = 1.0;
-    for (int k = 0; k < w->n_changes; k++)
-        next = nearer_height((double)w->at[k] * w->pixel, y, next);
-    for (int k = 0; k < w->n_active; k++) {
-        const tl_edge_piece *e = w->pieces + w->active[k];
-        next = nearer_height(e->ya, y, next);
-        next = nearer_height(e->yb, y, next);
-        if (e->slope != 0.0) {
-            const double left = (double)(col - e->col) - e->x; /* px from the piece's upper end to the pixel */
-            next = nearer_height(e->ya + left / e->slope, y, next);
-            next = nearer_height(e->ya + (left + 1.0) / e->slope, y, next);
-        }
-    }
-    return next;
-}
-
-/* Sorts the pieces that pass height y within the pixel; returns how many there are, and the winding number left of
- * them. */
-static int sort_slab(piece_row *w, int64_t col, double y, int *winding)
-{
-    int n = 0;
-    for (int k = 0; k < w->n_changes && (double)w->at[k] * w->pixel < y; k++)
-        *winding += w->change[k];
-    for (int k = 0; k < w->n_active; k++) {
-        const tl_edge_piece *e = w->pieces + w->active[k];
-        if (!(e->ya < y && y < e->yb))
-            continue;
-        const double x = piece_x(e, col, y);
-        if (x <= 0.0) {
-            *winding += e->sign;
-        } else if (x < 1.0) {
-            int j = n++;
-            for (; j > 0 && w->x[j - 1] > x; j--)
-                w->x[j] = w->x[j - 1], w->sorted[j] = w->sorted[j - 1];
-            w->x[j] = x, w->sorted[j] = w->active[k];
-        }
-    }
-    return n;
-}
-
-/* The share of one pixel. */
-static double resolve_pixel(piece_row *w, int64_t col, int is_nonzero)
-{
-    double area = 0.0, y = 0.0;
-    while (y < 1.0 - TL_THIN) {
-        double next = end_of_slab(w, col, y);
-        int n, winding;
-        for (int is_crossed = 1; is_crossed;) { /* neighbours at mid height cross in the slab if any do */
-            winding = 0, is_crossed = 0;
-            n = sort_slab(w, col, 0.5 * (y + next), &winding);
-            for (int k = 0; k + 1 < n; k++) {
-                const tl_edge_piece *a = w->pieces + w->sorted[k], *b = w->pieces + w->sorted[k + 1];
-                const double closing = a->slope - b->slope;
-                if (closing == 0.0)
-                    continue;
-                const double middle = 0.5 * (y + next), height = middle + (w->x[k + 1] - w->x[k]) / closing;
-                if (height > y + TL_THIN && height < next - TL_THIN)
-                    next = height, is_crossed = 1;
-            }
-        }
-        double inside = 0.0, before = 0.0;
-        for (int k = 0; k <= n; k++) {
-            const double x = k < n ? w->x[k] : 1.0;
-            if (is_nonzero ? winding != 0 : winding & 1)
-                inside += x - before;
-            before = x;
-            if (k < n)
-                winding += w->pieces[w->sorted[k]].sign;
-        }
-        area += inside * (next - y);
-        y = next;
-    }
-    return area;
-}
-
 /* The shares of the columns [left, right) of the row whose n pieces these are: shares[column - left]. */
 static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64_t n, int64_t left, int64_t right,
                         const tl_piece_scratch *scratch, double *shares)
 {
     int64_t *room = scratch->room;
-    keyed *pairs = (keyed *)room, *other = pairs + scratch->n_pieces;
-    piece_row w = {.pieces = pieces, .n_active = 0, .n_changes = 0, .pixel = 1.0 / (double)((int64_t)1 << p->bits)};
-    room += 4 * scratch->n_pieces;
-    w.x = (double *)room, room += scratch->n_pieces;
-    w.active = (int32_t *)room, w.sorted = w.active + scratch->n_pieces, room += scratch->n_pieces;
-    w.at = (int32_t *)room, w.change = w.at + 2 * scratch->n_pieces;
+    const int64_t n_room = scratch->n_pieces;
+    keyed *pairs = (keyed *)room, *other = pairs + n_room;
+    piece_row w = {.p = p, .pieces = pieces, .pixel = 1.0 / (double)((int64_t)1 << p->bits)};
+    room += 4 * n_room;
+    w.events = (keyed *)room, w.spare = w.events + 3 * n_room, room += 12 * n_room;
+    w.edges = (slab_edge *)room, w.moved = w.edges + n_room, room += 8 * n_room;
+    w.crossings = (double *)room, room += 4 * n_room;
+    w.at = (int32_t *)room, w.change = w.at + 2 * n_room, room += 2 * n_room;
+    w.active = (int32_t *)room;
     for (int64_t k = 0; k < n; k++) {
         const double low = pieces[k].length < 0 ? pieces[k].x + pieces[k].length : pieces[k].x;
         pairs[k] = (keyed){pieces[k].col + (int64_t)floor(low), k};
     }
     pairs = sort_pairs(pairs, other, n);
     int64_t taken = 0;
-    for (int64_t col = left; col < right;) {
+    for (int64_t col = left; col < right && !w.is_given_up;) {
         int n_kept = 0;
         for (; taken < n && pairs[taken].key <= col; taken++)
             w.active[w.n_active++] = (int32_t)pairs[taken].i;
@@ -229,16 +129,17 @@ static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64
         }
         w.n_active = n_kept;
         if (w.n_active) {
-            shares[col - left] = resolve_pixel(&w, col, p->is_nonzero);
+            shares[col - left] = resolve_pixel(&w, col);
             col++;
             continue;
         }
         /* nothing but level edges until the next piece begins: what is left of here tells */
         const int64_t end = taken < n && pairs[taken].key < right ? pairs[taken].key : right;
-        const double share = resolve_pixel(&w, col, p->is_nonzero);
+        const double share = resolve_pixel(&w, col);
         for (; col < end; col++)
             shares[col - left] = share;
     }
+    count_crossings(&w);
 }
 
 /* What takes a row of shares of the columns [left, right). */
@@ -270,7 +171,7 @@ static void resolve_polygon(const tl_polygons *p, int64_t polygon, const tl_poly
         int64_t begin = 0;
         for (int64_t row = first; row < end; row++) {
             const int64_t row_end = starts[row - top];
-            if (is_polygon_given_up(p, 256 * (row_end - begin) + box->right - box->left))
+            if (is_polygon_given_up(p, 16 * (row_end - begin) + box->right - box->left) || cross_too_often(p))
                 return;
             resolve_row(p, scratch->pieces + begin, row_end - begin, box->left, box->right, scratch, scratch->shares);
             take(to, row, box->left, box->right, scratch->shares);

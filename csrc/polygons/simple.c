@@ -19,11 +19,11 @@
 #include <stdint.h>
 
 #include "polygons.h"
+#include "base/sort_pairs.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "polygons/crossings.c"
 #include "polygons/points.c"
-#include "polygons/sort_pairs.c"
 
 /* Edges of a leaf, as tl_certify_words has it: 32 take a fifth off rings of noise, and add a third to contours. */
 #define TL_CHAIN_EDGES 16
@@ -242,14 +242,6 @@ static int32_t make_rings(simple_search *s, const keyed *rings, int64_t n)
         return (int32_t)rings[0].i;
     const int32_t left = make_rings(s, rings, n / 2), right = make_rings(s, rings + n / 2, n - n / 2);
     return join_nodes(s, left, right);
-}
-
-/* A number below 2^16 with a zero between its bits. */
-TL_INLINE int64_t interleave_zeros(int64_t a)
-{
-    a = (a | a << 8) & 0x00ff00ff, a = (a | a << 4) & 0x0f0f0f0f;
-    a = (a | a << 2) & 0x33333333, a = (a | a << 1) & 0x55555555;
-    return a;
 }
 
 /* The whole tree; `pairs` has room for two for each ring.  Sets *sorted to their roots in order of place. */

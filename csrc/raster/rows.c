@@ -1,16 +1,7 @@
 /* Rows: triangles with boxes of 5 to 62 samples a side, by the ends of TL_LANES rows at a time.
  * In: queues of boxes.  Out: rows of samples to the sink.
  *
- * An edge ends a row at floor(q), q = v / d, d = |dy|: samples up to floor(q) lie inside a right edge, samples from
- * -floor(q) on inside a left one.
- *
- * TL_FIXED: v = E' at the row's first sample.  It is computed in float32 as floor((v + 0.5) * (1 / d)), exactly:
- * v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than 64 * 2^-22 = 2^-16, while
- * (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to the box swallows the error.
- * Squares (triangles_fixed.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included.
- *
- * TL_FLOAT: v = E there, rounded.  Where q is nearer to an integer than the band says (triangles_float.c), that one
- * column is in doubt, and refine.c decides. */
+ * How an edge ends a row, and why that is exact or in doubt, stands in row_edges.h. */
 #ifndef TL_ROWS_C
 #define TL_ROWS_C
 
@@ -22,23 +13,10 @@
 #include "sink/sink.c"
 #include "raster/alone.c"
 #include "raster/refine.c"
+#include "raster/row_edges.h"
 #include "raster/state.h"
 #include "raster/triangles_fixed.c"
 #include "raster/triangles_float.c"
-
-/* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on
- * either side or horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
-typedef struct {
-    vm is0[3], is1[3];
-    vm third_is_left, third_is_right;
-} lane_sides;
-
-/* These edges. */
-typedef struct {
-    vf start[3], step[3], inverse[3]; /* left, right, third */
-    vf band[3], row;                  /* TL_FLOAT: in columns; the row that is next */
-    vm third_is_left, third_is_right;
-} lane_edges;
 
 /* TL_LANES triangles of a queue. */
 typedef struct {
@@ -59,60 +37,6 @@ typedef struct {
 } row_edges;
 
 /* ---- edges ----------------------------------------------------------------------------------------------- */
-
-TL_INLINE lane_sides sides_of(const vm *left, const vm *right)
-{
-    const vm third0 = vm_and_not(vm_and_not(vm_all(), left[0]), right[0]);
-    const vm taken1 = vm_or(vm_and_not(left[1], left[0]), vm_and_not(right[1], right[0]));
-    const vm third1 = vm_and_not(vm_and_not(vm_all(), taken1), third0);
-    const vm third2 = vm_and_not(vm_and_not(vm_all(), third0), third1);
-    return (lane_sides){
-        {left[0], right[0], third0},
-        {left[1], right[1], third1},
-        vm_or(vm_and(third1, left[1]), vm_and(third2, left[2])),
-        vm_or(vm_and(third1, right[1]), vm_and(third2, right[2])),
-    };
-}
-
-TL_INLINE lane_sides find_sides(const lane_triangles *t)
-{
-    vm left[3], right[3];
-    for (int k = 0; k < 3; k++) {
-        left[k] = vi_gt(vi_set1(0), t->dy[k]);
-        right[k] = vi_gt(t->dy[k], vi_set1(0));
-    }
-    return sides_of(left, right);
-}
-
-TL_INLINE void pick_edges(const lane_sides *sides, const vf *edges, vf *picked)
-{
-    for (int side = 0; side < 3; side++)
-        picked[side] = vf_select(sides->is0[side], edges[0], vf_select(sides->is1[side], edges[1], edges[2]));
-}
-
-/* band: of TL_FLOAT */
-TL_INLINE void sort_edges(tl_geometry g, const lane_sides *sides, const vf *start, const vf *step, const vf *inverse,
-                          const vf *band, lane_edges *r)
-{
-    pick_edges(sides, start, r->start), pick_edges(sides, step, r->step), pick_edges(sides, inverse, r->inverse);
-    r->third_is_left = sides->third_is_left, r->third_is_right = sides->third_is_right;
-    if (g == TL_FLOAT)
-        pick_edges(sides, band, r->band), r->row = vf_set1(0.0f);
-}
-
-TL_INLINE void sort_fixed_edges(const lane_triangles *t, lane_edges *r)
-{
-    const lane_sides sides = find_sides(t);
-    vf start[3], step[3], inverse[3];
-    for (int k = 0; k < 3; k++) {
-        start[k] = vf_add(vf_from_vi(t->e[k]), vf_set1(0.5f));
-        step[k] = vf_from_vi(t->dx[k]);
-        /* a horizontal edge is never asked: 1 keeps infinities away */
-        inverse[k] =
-            vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_max(t->dy[k], vi_sub(vi_set1(0), t->dy[k])), vi_set1(1))));
-    }
-    sort_edges(TL_FIXED, &sides, start, step, inverse, NULL, r);
-}
 
 TL_INLINE void sort_float_edges(const walk_state *s, const lane_exact *t, float far, lane_edges *r)
 {
@@ -135,7 +59,7 @@ TL_INLINE void load_rows(walk_state *s, tl_geometry g, tl_sink sink, const box_q
         lane_triangles own;
         vd z[3];
         pop_fixed(s, sink, q, i, n, &own, z);
-        sort_fixed_edges(&own, &r->edges);
+        sort_fixed_edges(own.e, own.dx, own.dy, &r->edges);
         r->sample = own.sample, r->live = (1u << lanes_at(i, n)) - 1;
         if (sink_has_depth(sink))
             r->planes = plane_lanes(&own, z);
@@ -173,43 +97,6 @@ TL_INLINE void store_edges(tl_geometry g, tl_sink sink, const row_lanes *lanes, 
 }
 
 /* ---- row ends -------------------------------------------------------------------------------------------- */
-
-/* Whether the end of a row lies in the band. */
-TL_INLINE vm is_near_integer(vf q, vf band)
-{
-    const vf off = vf_off_integer(q);
-    return vf_ge(band, vf_max(off, vf_sub(vf_set1(0.0f), off)));
-}
-
-/* The last samples inside left edges, counted to the left, and inside right ones, from quotients of three edges. */
-TL_INLINE void meet_third(const vi *quotient, vm third_is_left, vm third_is_right, vi *left, vi *right)
-{
-    /* no branch: which side the third edge is on cannot be predicted */
-    *left = vi_select(third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-    *right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-}
-
-/* The samples from `begin` on, up to `end`, of the row of each triangle that its edges are at; goes on to the next
- * row.  Adds to *doubted the lanes with an end in doubt. */
-TL_INLINE void next_row(tl_geometry g, lane_edges *e, vi n_cols, vi *begin, vi *end, vm *doubted)
-{
-    const vi zero = vi_set1(0), one = vi_set1(1);
-    vi quotient[3], left, right;
-    for (int side = 0; side < 3; side++) {
-        if (g == TL_FIXED) {
-            quotient[side] = vi_floor(vf_mul(e->start[side], e->inverse[side]));
-            e->start[side] = vf_add(e->start[side], e->step[side]);
-            continue;
-        }
-        const vf q = vf_mul(vf_fma(e->step[side], e->row, e->start[side]), e->inverse[side]);
-        quotient[side] = vi_floor(q);
-        *doubted = vm_or(*doubted, is_near_integer(q, e->band[side]));
-    }
-    if (g == TL_FLOAT)
-        e->row = vf_add(e->row, vf_set1(1.0f));
-    meet_third(quotient, e->third_is_left, e->third_is_right, &left, &right);
-    *begin = vi_max(vi_sub(zero, left), zero), *end = vi_min(vi_add(right, one), n_cols);
-}
 
 /* The same of TL_LANES rows of triangle k, from row0 on. */
 TL_INLINE void find_rows_of_one(tl_geometry g, const row_edges *r, int k, vm third_is_left, vm third_is_right, int row0,

@@ -13,6 +13,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "sink/covered.c"
+#include "raster/row_edges.h"
 #include "raster/rows.c"
 #include "raster/state.h"
 #include "raster/triangles_fixed.c"
@@ -92,7 +93,7 @@ typedef struct {
 
 TL_INLINE void setup_sampled(const lane_triangles *t, sampled_edges *r)
 {
-    r->sides = find_sides(t);
+    r->sides = find_sides(t->dy);
     for (int side = 0; side < 3; side++) {
         const vm is0 = r->sides.is0[side], is1 = r->sides.is1[side];
         r->doubled[side] = vi_select(is0, t->e[0], vi_select(is1, t->e[1], t->e[2]));
@@ -151,15 +152,13 @@ static __attribute__((noinline)) void flush_middle_of_samples(walk_state *s)
         uint64_t words[TL_MIDDLE_BOX][TL_MAX_WORDS][TL_MAX_LANES];
         int32_t first[TL_MAX_LANES];
         vd z[3];
-        const int end = n - i < TL_LANES ? n - i : TL_LANES;
-        int max_rows = 0, max_cols = 0;
+        const int end = lanes_at(i, n), max_rows = most_rows(q, i, n);
+        int max_cols = 0;
         pop_fixed(s, TL_SINK_SAMPLES, q, i, n, &t, z);
         vi_store(first, t.sample);
         setup_sampled(&t, &e);
-        for (int k = 0; k < end; k++) {
-            max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
+        for (int k = 0; k < end; k++)
             max_cols = (q->size[i + k] & 0xffff) > max_cols ? q->size[i + k] & 0xffff : max_cols;
-        }
         const int n_words = (max_cols + per_word - 1) / per_word;
         const vi n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
         for (int sample = 0; sample < 1 << sample_bits; sample++) {
@@ -245,7 +244,7 @@ static __attribute__((noinline)) void flush_rows_of_samples(walk_state *s)
                 vf_store(starts[sample][side], sampled_start(&e, side, target.samples_fx + 2 * sample, bits));
         }
         const unsigned lefts = vm_bits(e.sides.third_is_left), rights = vm_bits(e.sides.third_is_right);
-        const int end = n - i < TL_LANES ? n - i : TL_LANES;
+        const int end = lanes_at(i, n);
         for (int k = 0; k < end; k++) {
             const vm third_is_left = vm_first(lefts >> k & 1 ? TL_LANES : 0);
             const vm third_is_right = vm_first(rights >> k & 1 ? TL_LANES : 0);

@@ -15,8 +15,7 @@
 #include "sink/fragments.h"
 #include "sink/sink.c"
 #include "raster/alone.c"
-
-typedef enum { TL_FIXED, TL_FLOAT } tl_geometry;
+#include "raster/row_edges.h"
 
 #define TL_SMALL_BOX 4
 #define TL_MIDDLE_BOX 16

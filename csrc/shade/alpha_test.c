@@ -21,8 +21,8 @@
 #include "raster/raster.c"
 #include "pixels/runs.c"
 #include "shade/full.c"
-#include "shade/shade.c"
 #include "shade/shade_pixels.c"
+#include "shade/span_list.c"
 #include "shade/texture.c"
 
 #define TL_CUTOUT_TILE 64
@@ -167,7 +167,8 @@ static void cut_out(const tl_snapped *snapped, const tl_window *window, const tl
     cutout c;
     c.target = target, c.snapped = *snapped, c.first_id = snapped->first_id;
     c.snapped.first_id = 0;
-    start_runs(&s, &c.snapped, window, view, shading);
+    start_runs(&s, window, view);
+    set_mesh(&s, &c.snapped, shading);
     s.needs_normal = s.needs_colors = s.needs_point = 0;
     s.needs_tangents[0] = s.needs_tangents[1] = 0;
     s.needs_alpha = shading->colors && shading->has_alpha;

@@ -1,7 +1,7 @@
 /* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each
  * pixel that it shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its
- * samples.
- * In: planes of ids, or one plane and the pixels that show several triangles; the mesh.  Out: red, green, blue and
+ * samples, each at most white, as a display and the buffers of graphics hardware have it.
+ * In: planes of ids, or one plane and the pixels that show several triangles; the instances.  Out: red, green, blue and
  * opacity, uint8. */
 #ifndef TL_SHADE_SAMPLES_C
 #define TL_SHADE_SAMPLES_C
@@ -16,7 +16,7 @@
 #include "pixels/runs.c"
 #include "shade/prefetch.c"
 #include "shade/shade.c"
-#include "shade/shade_pixels.c"
+#include "shade/span_list.c"
 #include "shade/srgb.c"
 
 /* The light of a span of pixels, added up, and how many samples it comes from. */
@@ -50,25 +50,41 @@ TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t str
     return any;
 }
 
-/* Shades what sums->ids names and adds it, times the samples that see it. */
-TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, int64_t row, int64_t column, int n, const float *depth)
+/* Shades n pixels of a span from place `first` on, whose runs are set, and adds their light, as a display shows it,
+ * times the samples that see it. */
+TL_INLINE void add_samples(sample_sums *sums, const shade_runs *s, int first, int n, int64_t column, int64_t row,
+                           const float *depth)
 {
+    const vf zero = vf_set1(0.0f), most = vf_set1(s->shading->show == TL_SHOW_NORMALS ? 255.0f : 1.0f);
     started_span span;
     span.next = 0;
-    find_runs(s, sums->ids, n, column);
-    set_runs(s, row);
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         if (!s->visible[i])
             continue;
         const vm visible = vm_from_bits(s->visible[i]);
+        const int at = first + x;
         vf rgba[4];
         light_pixels(&span, s, i, (n + TL_LANES - 1) / TL_LANES, column, row, depth + x, rgba);
-        const vf weight = vf_select(visible, vf_load(sums->n_seen + x), vf_set1(0.0f)), zero = vf_set1(0.0f);
+        const vf weight = vf_select(visible, vf_load(sums->n_seen + at), zero);
         for (int c = 0; c < 3; c++) {
-            const vf sum = vf_fma(weight, vf_select(visible, rgba[c], zero), vf_load(sums->light[c] + x));
-            vf_store(sums->light[c] + x, sum);
+            const vf shown = vf_select(visible, vf_min(vf_max(rgba[c], zero), most), zero);
+            vf_store(sums->light[c] + at, vf_fma(weight, shown, vf_load(sums->light[c] + at)));
         }
-        vf_store(sums->n_lit + x, vf_add(weight, vf_load(sums->n_lit + x)));
+        vf_store(sums->n_lit + at, vf_add(weight, vf_load(sums->n_lit + at)));
+    }
+}
+
+/* Shades what sums->ids names in n pixels, instance by instance. */
+TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, span_list *list, const int32_t *at_fx, int64_t row,
+                          int64_t column, int n, const float *depth)
+{
+    list_instances(list, sums->ids, n);
+    for (int k = 0; k < list->n; k++) {
+        const int first = list->parts[k].first, n_own = list->parts[k].end - first;
+        set_part(s, list, k, at_fx);
+        find_runs(s, sums->ids + first, n_own, column + first);
+        set_runs(s, row);
+        add_samples(sums, s, first, n_own, column + first, row, depth + first);
     }
 }
 
@@ -134,15 +150,17 @@ TL_INLINE int find_whole(sample_sums *sums, const int32_t *ids, int sample_bits,
 
 /* The picture of planes of ids (and depth), `stride` pixels apart, for 2^sample_bits samples at (x, y) sub-pixels from
  * the centre; with `split` of one plane. */
-static void shade_samples(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
-                          const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
-                          const int32_t *ids, const float *depth, const tl_split *split, uint8_t *pixels)
+static void shade_samples(const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
+                          int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
+                          const tl_split *split, uint8_t *pixels)
 {
+    const tl_shading *shading = scene->instances->shading;
     shade_runs s;
+    span_list list;
     sample_sums sums;
     span_samples span;
-    tl_snapped seen = *snapped;
-    start_runs(&s, &seen, window, view, shading);
+    start_runs(&s, window, scene->view);
+    start_list(&list, scene);
     for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
         const int64_t end = split ? split->rows[2 * row + 1] : 0;
         int64_t next = split ? split->rows[2 * row] : 0;
@@ -159,13 +177,10 @@ static void shade_samples(const tl_snapped *snapped, const tl_window *window, co
                 next = unpack_span(split, next, end, column, n, sample_bits, own, own_depth, &span);
                 own = span.ids[0], own_depth = span.depth[0], own_stride = TL_SPAN_ROOM;
             }
-            for (int k = 0; k < (is_whole ? 1 : 1 << sample_bits); k++) {
-                if (!(is_whole ? find_whole(&sums, own, sample_bits, n)
-                               : find_first_seen(&sums, own, own_stride, sample_bits, k, n)))
-                    continue;
-                seen.mesh.sample_x_fx = samples_fx[2 * k], seen.mesh.sample_y_fx = samples_fx[2 * k + 1];
-                add_shaded(&sums, &s, row, column, n, own_depth + k * own_stride);
-            }
+            for (int k = 0; k < (is_whole ? 1 : 1 << sample_bits); k++)
+                if (is_whole ? find_whole(&sums, own, sample_bits, n)
+                             : find_first_seen(&sums, own, own_stride, sample_bits, k, n))
+                    add_shaded(&sums, &s, &list, samples_fx + 2 * k, row, column, n, own_depth + k * own_stride);
             for (int x = 0; x < n; x += TL_LANES)
                 vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x),
                                 finish_lanes(&sums, shading, sample_bits, x));

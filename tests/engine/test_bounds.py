@@ -49,9 +49,9 @@ def scene(rng, n, size):
     return points, np.arange(3 * n, dtype=np.int32).reshape(-1, 3)
 
 
-def draw(points, triangles, size, *, bounded, monkeypatch, test="less", out=None, **view):
+def draw(points, triangles, size, *, bounded, force, test="less", out=None, **view):
     pays = []
-    monkeypatch.setattr(choices, "pays_to_bound", lambda *_: pays.append(1) or bounded)
+    force(pays_to_bound=lambda *_: pays.append(1) or bounded)
     frags = draw_fragments(FreshMemory(), points, triangles, View.parse(size, view), test, None, out)
     assert pays
     return frags
@@ -64,7 +64,7 @@ def assert_same_fragments(got, expected):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("seed", range(4))
-def test_picture_has_the_same_bits(isa, seed, monkeypatch):
+def test_picture_has_the_same_bits(isa, seed, force):
     rng = np.random.default_rng(seed)
     with on(isa):
         for i in range(30):
@@ -77,45 +77,45 @@ def test_picture_has_the_same_bits(isa, seed, monkeypatch):
                 "cull": str(rng.choice(["none", "back"])),
                 "method": str(rng.choice(["auto", "auto", "scanline", "edge"])),
             }
-            expected = draw(*mesh, size, bounded=False, monkeypatch=monkeypatch, threads=1, **options)
+            expected = draw(*mesh, size, bounded=False, force=force, threads=1, **options)
             place = before_a_page if i % 2 else behind_a_page
             out = place(np.zeros(size[::-1], np.int32)), place(np.zeros(size[::-1], np.float32))
             threads = THREADS[i % len(THREADS)]
-            got = draw(*mesh, size, bounded=True, monkeypatch=monkeypatch, threads=threads, out=out, **options)
+            got = draw(*mesh, size, bounded=True, force=force, threads=threads, out=out, **options)
             assert_same_fragments(got, expected)
 
 
 @ON_EACH_ISA
-def test_all_instruction_sets_agree_with_the_scalar_one(isa, monkeypatch):
+def test_all_instruction_sets_agree_with_the_scalar_one(isa, force):
     rng = np.random.default_rng(9)
     for size in SIZES:
         mesh = scene(rng, 30, size)
         with on("scalar"):
-            expected = draw(*mesh, size, bounded=False, monkeypatch=monkeypatch)
+            expected = draw(*mesh, size, bounded=False, force=force)
         with on(isa):
-            assert_same_fragments(draw(*mesh, size, bounded=True, monkeypatch=monkeypatch), expected)
+            assert_same_fragments(draw(*mesh, size, bounded=True, force=force), expected)
 
 
 @ON_EACH_ISA
-def test_shares_of_triangles_keep_the_bounds_of_their_rows(isa, monkeypatch):
-    monkeypatch.setattr(choices, "is_shared", lambda *_: True)
+def test_shares_of_triangles_keep_the_bounds_of_their_rows(isa, force):
+    force(is_shared=True)
     size, rng = (600, 80), np.random.default_rng(3)
     with on(isa):
         for _ in range(10):
             mesh = scene(rng, 50, size)
-            expected = draw(*mesh, size, bounded=False, monkeypatch=monkeypatch, threads=1)
-            assert_same_fragments(draw(*mesh, size, bounded=True, monkeypatch=monkeypatch, threads=3), expected)
+            expected = draw(*mesh, size, bounded=False, force=force, threads=1)
+            assert_same_fragments(draw(*mesh, size, bounded=True, force=force, threads=3), expected)
 
 
 @ON_EACH_ISA
-def test_equal_depth_behind_a_bound_goes_to_the_lower_index(isa, monkeypatch):
+def test_equal_depth_behind_a_bound_goes_to_the_lower_index(isa, force):
     whole = np.array([[-10, -10, 0.5], [2000, -10, 0.5], [-10, 2000, 0.5]], np.float32)
     points = np.concatenate([whole, whole, whole + [0, 0, 0.25]]).astype(np.float32)
     triangles = np.array([[6, 7, 8], [3, 4, 5], [0, 1, 2]], np.int32)
     with on(isa):
-        frags = draw(points, triangles, (300, 8), bounded=True, monkeypatch=monkeypatch)
+        frags = draw(points, triangles, (300, 8), bounded=True, force=force)
         assert (frags.triangle == 1).all()
-        frags = draw(points, triangles[::-1], (300, 8), bounded=True, monkeypatch=monkeypatch)
+        frags = draw(points, triangles[::-1], (300, 8), bounded=True, force=force)
         assert (frags.triangle == 0).all()
 
 

@@ -1,13 +1,11 @@
-"""The engine against a plain int64 loop, on every instruction set: counts, ids, and depth to the last bit."""
+"""The engine against the exact picture, on every instruction set: counts, ids, and depth to the last bit."""
 
 from math import gcd
 
-import int64_loop
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, cases, check_all, mixed, on
-from int64_loop import DEPTH_TESTS
+from engine_cases import DEPTH_TESTS, ON_EACH_ISA, THREADS, cases, check_all, exact_picture, mixed, on
 from strategies import Scene, needles, perspective, soup
 
 import topleft as tl
@@ -42,18 +40,18 @@ def one_large():
 @pytest.mark.parametrize("cull", ["back", "none"])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("n", [10_000, 100_000])
-def test_engine_blob_equals_loop(n, dtype, cull, isa):
+def test_engine_blob_equals_exact_picture(n, dtype, cull, isa):
     check_all(isa, cases(blob, n, dtype, cull), THREADS)
 
 
 @ON_EACH_ISA
 @pytest.mark.parametrize(("n", "size_px"), [(1000, 400), (10_000, 100), (100_000, 10), (100_000, 4)])
-def test_engine_strewn_triangles_equal_loop(n, size_px, isa):
+def test_engine_strewn_triangles_equal_exact_picture(n, size_px, isa):
     check_all(isa, cases(strewn, n, size_px), THREADS)
 
 
 @ON_EACH_ISA
-def test_engine_large_triangle_equals_loop(isa):
+def test_engine_large_triangle_equals_exact_picture(isa):
     check_all(isa, cases(one_large), THREADS)
 
 
@@ -72,7 +70,7 @@ def quarter_million(seed):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("seed", MIXED)
-def test_engine_two_million_mixed_triangles_equal_loop(seed, isa):
+def test_engine_two_million_mixed_triangles_equal_exact_picture(seed, isa):
     check_all(isa, cases(quarter_million, seed), (1, 3))
 
 
@@ -87,7 +85,7 @@ def piles(n=12_000):
 
 
 @ON_EACH_ISA
-def test_engine_piles_of_mixed_triangles_equal_loop(isa):
+def test_engine_piles_of_mixed_triangles_equal_exact_picture(isa):
     check_all(isa, cases(piles), THREADS)
 
 
@@ -118,7 +116,7 @@ def boxes(column):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("column", range(16))
-def test_engine_boxes_of_each_size_equal_loop(column, isa):
+def test_engine_boxes_of_each_size_equal_exact_picture(column, isa):
     check_all(isa, cases(boxes, column), THREADS[column % 4 :][:1])
 
 
@@ -132,7 +130,7 @@ def quarters(n=20_000):
 
 
 @ON_EACH_ISA
-def test_engine_fullest_small_boxes_equal_loop(isa):
+def test_engine_fullest_small_boxes_equal_exact_picture(isa):
     check_all(isa, cases(quarters))
 
 
@@ -144,7 +142,7 @@ def frames():
 
 
 @ON_EACH_ISA
-def test_engine_frames_of_each_width_equal_loop(isa):
+def test_engine_frames_of_each_width_equal_exact_picture(isa):
     check_all(isa, cases(frames), (1, 3))
 
 
@@ -180,7 +178,7 @@ def limits_of(bits):
 
 @ON_EACH_ISA
 @BITS
-def test_engine_extents_at_limits_equal_loop(bits, isa):
+def test_engine_extents_at_limits_equal_exact_picture(bits, isa):
     check_all(isa, cases(limits_of, bits), (1, 8))
 
 
@@ -197,7 +195,7 @@ def cut_by_windows(bits):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("bits", [0, 7, 8, 9, 16])
-def test_engine_largest_boxes_cut_by_windows_equal_loop(bits, isa):
+def test_engine_largest_boxes_cut_by_windows_equal_exact_picture(bits, isa):
     check_all(isa, cases(cut_by_windows, bits))
 
 
@@ -220,14 +218,14 @@ def windows_at(edge_px, bits):
 
 @ON_EACH_ISA
 @BITS
-def test_engine_vertices_at_the_end_of_64_bits_equal_loop(bits, isa):
+def test_engine_vertices_at_the_end_of_64_bits_equal_exact_picture(bits, isa):
     check_all(isa, cases(windows_at, 2**30 >> bits, bits))
 
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("bits", [0, 8, 16])
 @pytest.mark.parametrize("edge_px", [2**15, 2**22, 2**30, 2**31])
-def test_engine_windows_at_limits_equal_loop(edge_px, bits, isa):
+def test_engine_windows_at_limits_equal_exact_picture(edge_px, bits, isa):
     check_all(isa, cases(windows_at, edge_px, bits))
 
 
@@ -275,7 +273,7 @@ def at_sliver_limit():
     xy = np.array(list(boxes_at_sliver_limit(rng)))
     xy += rng.integers(0, 600 * 256, (len(xy), 1, 2))
     size = (660, 660)
-    ids = int64_loop.draw_scene(soup(xy.reshape(-1, 2) / 256, size), (None,)).ids[None]
+    ids = exact_picture(soup(xy.reshape(-1, 2) / 256, size), (None,)).triangle
     seen, pixel = np.unique(ids, return_index=True)
     xy, pixel = xy[seen[1:]], pixel[1:]
     sample = np.stack([pixel % size[0], pixel // size[0]], -1) * 256 + 128
@@ -317,7 +315,7 @@ def special_depths():
 
 
 @ON_EACH_ISA
-def test_engine_special_depths_equal_loop(isa):
+def test_engine_special_depths_equal_exact_picture(isa):
     check_all(isa, cases(special_depths))
 
 
@@ -406,7 +404,7 @@ def both_turns(cull):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("cull", ["none", "back", "front"])
-def test_engine_both_turns_equal_loop(cull, isa):
+def test_engine_both_turns_equal_exact_picture(cull, isa):
     check_all(isa, cases(both_turns, cull))
 
 
@@ -430,5 +428,5 @@ def windows():
 
 
 @ON_EACH_ISA
-def test_engine_windows_anywhere_equal_loop(isa):
+def test_engine_windows_anywhere_equal_exact_picture(isa):
     check_all(isa, cases(windows), (1, 2))

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, Expected, cases, check, check_all, mixed, on, plain
-from int64_loop import DEPTH_TESTS
+from engine_cases import DEPTH_TESTS, ON_EACH_ISA, THREADS, Expected, cases, check, check_all, mixed, on, plain
 from pages import before_a_page, behind_a_page
 from strategies import Scene, perspective, soup
 
@@ -29,7 +28,7 @@ def first_triangles():
 
 
 @ON_EACH_ISA
-def test_engine_each_number_of_triangles_equals_loop(isa):
+def test_engine_each_number_of_triangles_equals_exact_picture(isa):
     check_all(isa, cases(first_triangles), THREADS)
 
 
@@ -66,7 +65,7 @@ def each_number_of_vertices(kind):
 
 @ON_EACH_ISA
 @EACH_KIND
-def test_engine_each_number_of_vertices_equals_loop(kind, isa):
+def test_engine_each_number_of_vertices_equals_exact_picture(kind, isa):
     check_all(isa, cases(each_number_of_vertices, kind))
 
 

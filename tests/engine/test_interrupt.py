@@ -67,6 +67,7 @@ DRAWS = {
     ),
     "area of a polygon": lambda n: tl.polygons(crossing_star(100_000), SIZE, sampling="area", threads=n),
     "table of a polygon": lambda n: tl.overlap([[crossing_star(100_000)]] * 2, SIZE, threads=n),
+    "crossings in a pixel": lambda n: tl.polygons(chords(12_000) / 2000, 1, sampling="area", threads=n),
     "polygons": lambda n: tl.polygons(POLYGONS, SIZE, values="index", threads=n),
     "polygons by area": lambda n: tl.polygons(POLYGONS, SIZE, sampling="area", threads=n),
     "points": lambda n: tl.points(SMALL[0], SIZE, point_size=400.0, shape="disc", threads=n),

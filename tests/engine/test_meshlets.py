@@ -13,6 +13,7 @@ from topleft._core.base.options import Sink
 from topleft._core.raster import choices, cluster_draw
 from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
 from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.costs import cost_table
 from topleft._core.raster.rasterize import draw_fragments
 from topleft._core.raster.view import View
 
@@ -100,13 +101,11 @@ def cameras(rng, n):
 
 
 @pytest.fixture
-def drawn(monkeypatch):
+def drawn(monkeypatch, force):
     """Views are drawn in meshlets however little it pays; a list that each of these pictures adds to."""
     pictures = []
     draw = ClusteredMesh.draw_meshlets
-    monkeypatch.setattr(choices, "pays_to_grow", lambda *_: True)
-    monkeypatch.setattr(choices, "pays_to_draw_meshlets", lambda *_: True)
-    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
+    force(pays_to_grow=True, pays_to_draw_meshlets=True, pays_to_draw_samples=True)
     monkeypatch.setattr(ClusteredMesh, "draw_meshlets", lambda *a: pictures.append(1) or draw(*a))
     return pictures
 
@@ -269,7 +268,7 @@ def test_mesh_is_grown_when_it_has_been_drawn_often(monkeypatch):
     expected = tl.rasterize_mesh(mesh, size=SIZE, cull="back")
     for i in range(1, 20):
         assert_same_fragments(tl.rasterize_mesh(mesh, size=SIZE, cull="back"), expected)
-        assert bool(pictures) == (i >= choices.MIN_PICTURES_TO_GROW)
+        assert bool(pictures) == (i >= cost_table().grown_pictures)
 
 
 @needs_meshlets

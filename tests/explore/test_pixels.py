@@ -134,7 +134,8 @@ def test_limit_of_a_classic_is_told_beside_the_other_pictures():
 
 
 def test_exact_picture_that_would_take_minutes_is_refused():
-    many = {"triangles": [[0, 1, 2]] * 1000, "size": [256, 256], "exact": True, "sampling": "msaa16"}
+    large = [[-1.0, -1.0], [999.0, -1.0], [999.0, 999.0], [-1.0, 999.0]]
+    many = {"vertices": large, "triangles": [[0, 1, 2]] * 100, "size": [256, 256], "exact": True, "sampling": "msaa16"}
     assert "takes too long" in draw(SQUARE | many).header["panels"][1]["refused"]
     deep = {"vertices": [[0, 0, 0.1], [256, 0, 0.2], [0, 256, 0.3]], "triangles": [[0, 1, 2]] * 9, "size": [256, 256]}
     assert "takes too long" in draw(deep | {"exact": True}).header["panels"][1]["refused"]

@@ -11,6 +11,7 @@ import pytest
 
 import topleft as tl
 from topleft._meshes.io.foreign import simplified
+from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.notes import Notes
 from topleft.errors import MeshError, MeshWarning
 
@@ -40,7 +41,8 @@ def collada(primitives=POLYLIST, positions=CHEVRON, node="<instance_geometry url
 
 def simple(content):
     notes = Notes("a.dae")
-    return ElementTree.fromstring(simplified(content, notes)[0]), [line.partition(": ")[2] for line in notes.lines]
+    content = simplified(content, notes, Budget("a.dae"))[0]
+    return ElementTree.fromstring(content), [line.partition(": ")[2] for line in notes.lines]
 
 
 def area_of(root):
@@ -132,7 +134,7 @@ def test_collada_of_some_materials_of_one_side_is_told():
 )
 def test_collada_that_is_broken_is_told(content, message):
     with pytest.raises(MeshError, match=message):
-        simplified(content, Notes("a.dae"))
+        simplified(content, Notes("a.dae"), Budget("a.dae"))
 
 
 @pytest.mark.parametrize("suffix", [".dae", ".zae"])

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import io
 import json
 import os
 import re
 import socket
+import tarfile
 import threading
 import time
 import warnings
+import zipfile
 
 import numpy as np
 import pytest
@@ -245,24 +250,98 @@ def test_load_does_not_wait_for_a_pipe_that_a_file_names(tmp_path):
 
 def test_load_leaves_out_pictures_with_too_many_pixels(folder):
     Image.new("L", (20_000, 10_000)).save(folder / "a.png")  # 200 million, which Pillow calls a bomb
-    with pytest.warns(MeshWarning, match="textures of more than 67108864 pixels not read: 'a.png'"):
+    with pytest.warns(MeshWarning, match="textures of more pixels than Pillow opens not read: 'a.png'"):
+        tl.load(folder / "a.obj")
+    Image.new("L", (10_000, 10_000)).save(folder / "a.png")
+    with pytest.warns(MeshWarning, match="textures beyond the 67108864 pixels of max_texture_pixels not read: 'a.png'"):
         tl.load(folder / "a.obj")
     Image.new("L", (9, 9)).save(folder / "a.png")
-    with pytest.warns(MeshWarning, match="textures of more than 80 pixels not read"):
+    with pytest.warns(MeshWarning, match="textures beyond the 80 pixels of max_texture_pixels not read"):
         tl.load(folder / "a.obj", max_texture_pixels=80)
 
 
-def test_load_stops_at_max_vertices(folder):
-    with pytest.raises(MeshError, match="has 4 vertices, more than the 3 of max_vertices"):
-        tl.load(folder / "a.obj", max_vertices=3)
+def archive_of(suffix, content):
+    stream = io.BytesIO()
+    if suffix in (".zip", ".3mf", ".zae"):
+        stream.write(b"?")  # it need not begin as an archive does
+        with zipfile.ZipFile(stream, "a", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr({".zip": "a.obj", ".3mf": "3D/3dmodel.model", ".zae": "a.dae"}[suffix], content)
+    elif suffix in (".tar.gz", ".tar.bz2"):
+        with tarfile.open(fileobj=stream, mode="w:" + suffix[5:]) as archive:
+            row = tarfile.TarInfo("a.obj")
+            row.size = len(content)
+            archive.addfile(row, io.BytesIO(content))
+    else:
+        stream.write({".obj.gz": gzip, ".obj.bz2": bz2, ".bz2": bz2}[suffix].compress(content))
+    return stream.getvalue()
 
 
-def test_load_of_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
-    import zipfile
+@pytest.mark.parametrize("suffix", [".zip", ".3mf", ".zae", ".tar.gz", ".tar.bz2", ".obj.gz", ".obj.bz2", ".bz2"])
+def test_load_of_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, suffix):
+    if suffix == ".3mf":
+        pytest.importorskip("trimesh")
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(archive_of(suffix, bytes(1001)))
+    with pytest.raises(MeshError, match=r"has \d+ bytes when it is unpacked, more than the 1000 of max_unpacked_bytes"):
+        tl.load(path, max_unpacked_bytes=1000)
 
-    pytest.importorskip("trimesh")
-    monkeypatch.setattr("topleft._meshes.io.foreign.MAX_UNPACKED_BYTES", 1000)
-    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("a.obj", bytes(1001))
-    with pytest.raises(MeshError, match="its archive holds 1001 bytes, more than 1000"):
+
+@pytest.mark.parametrize("suffix", [".zip", ".tar.gz", ".tar.bz2", ".obj.gz", ".obj.bz2"])
+def test_load_of_an_archive_is_that_of_its_mesh(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_bytes(archive_of(suffix, OBJ))
+    (tmp_path / "a.obj").write_bytes(OBJ)
+    with pytest.warns(MeshWarning, match="libraries not found"):
+        mesh, one = tl.load(tmp_path / f"a{suffix}"), tl.load(tmp_path / "a.obj")
+    assert np.array_equal(mesh.vertices, one.vertices)
+    assert np.array_equal(mesh.triangles, one.triangles)
+
+
+@pytest.mark.parametrize("name", ["../a.obj", "/a.obj", "b/../../a.obj", "C:\\..\\..\\a.obj"])
+def test_load_of_an_archive_writes_nothing_outside_of_its_folder(tmp_path, monkeypatch, name):
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(inside))
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr(name, OBJ)
+        archive.writestr("b.obj", OBJ)
+    with pytest.warns(MeshWarning):
         tl.load(tmp_path / "a.zip")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zip", "inside"]
+    assert list(inside.iterdir()) == []
+
+
+def test_load_of_an_archive_without_a_mesh_or_broken_is_told(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("a.txt", "hello")
+    with pytest.raises(MeshError, match=r"its archive holds no \.gltf"):
+        tl.load(tmp_path / "a.zip")
+    (tmp_path / "a.obj.gz").write_bytes(gzip.compress(OBJ)[:-9])
+    with pytest.raises(MeshError, match="its archive is broken"):
+        tl.load(tmp_path / "a.obj.gz")
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("b/a.obj", "v 0 0\nf 1 1 1\n")
+    with pytest.raises(MeshError, match=r"a.zip/b/a.obj'|vertex 1 has 2 of 3 numbers"):
+        tl.load(tmp_path / "a.zip")
+
+
+LIMITED = {
+    "max_vertices": ("a.obj", 3, "has 4 vertices, more than the 3 of max_vertices"),
+    "max_triangles": ("a.obj", 1, "triangles, more than the 1 of max_triangles"),
+    "max_lines": ("a.obj", 2, "lines and elements, more than the 2 of max_lines"),
+    "max_bytes": ("a.obj", 10, "bytes with the files that it names, more than the 10 of max_bytes"),
+    "max_nodes": ("a.glb", 4, r"has 5 parts .*, more than the 4 of max_nodes"),
+}
+
+
+@pytest.mark.parametrize("option", LIMITED)
+def test_load_stops_at_each_limit_of_its_options(folder, option):
+    name, limit, message = LIMITED[option]
+    file = GltfFile()
+    for _ in range(5):
+        file.shown()
+    (folder / "a.glb").write_bytes(file.glb())
+    with pytest.raises(MeshError, match=message):
+        tl.load(folder / name, **{option: limit})
+    for wrong, error in ((-1, ValueError), (1.5, TypeError), ("9", TypeError), (True, TypeError)):
+        with pytest.raises(error, match=option):
+            tl.load(folder / name, **{option: wrong})

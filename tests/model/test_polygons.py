@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from engine_cases import ON_EACH_ISA, on
+from hypothesis import given
+from hypothesis import strategies as st
 
 import topleft as tl
+from topleft._meshes.model import polygons
 from topleft._meshes.model.polygons import triangulate
 from topleft._meshes.scene.adapt import as_mesh, as_polygons
 
@@ -153,3 +157,99 @@ def test_as_mesh_of_faces_that_end_early_is_refused():
 
     with pytest.raises(ValueError, match=r"faces\[4\] = 4 must be a number of corners that follow"):
         as_mesh(Poly())
+
+
+def first_ears(points):
+    """The same triangles of one flat polygon, by looking at all corners again for each."""
+    (x, y), left = points.T.tolist(), list(range(len(points)))
+    if area_of_polygon(points) < 0:
+        x, y = y, x
+
+    def turn(a, b, c):
+        return (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a])
+
+    def holds(corners, i):
+        sides = zip(corners, corners[1:] + corners[:1], strict=True)
+        others = all((x[i], y[i]) != (x[k], y[k]) for k in corners)
+        return others and all((x[q] - x[p]) * (y[i] - y[p]) >= (y[q] - y[p]) * (x[i] - x[p]) for p, q in sides)
+
+    around = {i: (left[i - 1], i, left[(i + 1) % len(left)]) for i in left}
+    reflex, triangles, at = {i for i in left if turn(*around[i]) < 0}, [], 0
+    while len(left) > 3:
+        for step in range(len(left)):
+            k = (at + step) % len(left)
+            own = [left[k - 1], left[k], left[(k + 1) % len(left)]]
+            if own[1] not in reflex and turn(*own) >= 0 and not any(holds(own, i) for i in reflex):
+                break
+        else:
+            k = (at + 1) % len(left)
+        triangles.append([left[k - 1], left[k], left[(k + 1) % len(left)]])
+        reflex.discard(left.pop(k))
+        at = k % len(left)
+        for j in (at - 1, at):
+            if left[j] in reflex and turn(left[j - 1], left[j], left[(j + 1) % len(left)]) >= 0:
+                reflex.discard(left[j])
+    return [*triangles, [left[at - 1], left[at], left[(at + 1) % 3]]]
+
+
+@ON_EACH_ISA
+@given(st.integers(0, 2**32 - 1))
+def test_triangulate_takes_the_first_ear_of_any_polygon(isa, seed):
+    """Of those that cross and touch themselves, and whose corners repeat and lie on lines."""
+    rng = np.random.default_rng(seed)
+    points = rng.integers(0, rng.choice([3, 6, 40]), (int(rng.integers(5, 90)), 2)).astype(float)
+    points[0], points[2, 0] = 0, 64  # the size, which all are divided by: no rounding
+    expected = first_ears(points)
+    with on(isa):
+        triangles, _ = triangulate(points, np.arange(len(points)), np.array([len(points)]))
+    if len({*map(tuple, points)}) > 2 and area_of_polygon(points):
+        assert triangles.tolist() == expected or not has_reflex(points)
+
+
+def has_reflex(points):
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return (turns * area_of_polygon(points) < 0).any()
+
+
+def around(n, radius):
+    angle = np.arange(n) * 2 * np.pi / n
+    return radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def square_spiral(n):
+    """A corridor that winds inwards round a point: the triangle of each outer corner holds all inner ones."""
+    steps = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    k = np.arange(n // 2)
+    path = np.concatenate([[[0, 0]], np.cumsum(steps[k % 4] * (2 + k)[:, None], axis=0)[:-1]]).astype(float)
+    inner = path + 0.3 * (np.roll(steps, -1, axis=0)[(k - 1) % 4] + np.roll(steps, -1, axis=0)[k % 4])
+    return np.concatenate([path, inner[::-1]])
+
+
+@pytest.mark.parametrize(
+    "points", [around(100_000, 1 - 0.9 * np.random.default_rng(1).random(100_000)), square_spiral(100_000)]
+)
+def test_triangulate_polygon_of_100_000_corners_covers_itself(points):
+    triangles, _ = triangulate(points, np.arange(len(points)), np.array([len(points)]))
+    turned = areas(points, triangles) * np.sign(area_of_polygon(points))
+    assert (turned > -1e-12 * abs(points).max() ** 2).all()
+    assert turned.sum() == pytest.approx(abs(area_of_polygon(points)))
+    assert len(triangles) == len(points) - 2
+
+
+def test_triangulate_polygon_of_100_000_corners_at_random_ends():
+    points = np.random.default_rng(1).random((100_000, 2))
+    triangles, _ = triangulate(points, np.arange(100_000), np.array([100_000]))
+    assert (np.bincount(triangles.reshape(-1), minlength=100_000) > 0).all()
+
+
+def test_triangulate_faces_that_take_too_long_are_refused(monkeypatch):
+    monkeypatch.setattr(polygons, "MAX_STEPS", 1000)
+    points = around(9000, 1 - 0.9 * np.random.default_rng(1).random(9000))
+    with pytest.raises(ValueError, match=r"within 1,000 comparisons, polygon 1 of 9,000 corners takes more"):
+        triangulate(points, np.concatenate([np.arange(5), np.arange(9000)]), np.array([5, 9000]))
+
+
+def test_triangulate_more_corners_than_there_are_is_refused():
+    with pytest.raises(ValueError, match="must have 5 corners together, got 7"):
+        triangulate(ARROW, np.arange(5), np.array([4, 3]))

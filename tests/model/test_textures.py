@@ -56,9 +56,9 @@ def test_levels_of_a_cutout_let_through_what_the_picture_does(wrap, cutoff):
 
 def test_opaque_textures_and_those_without_halvings_are_cut_as_they_are():
     for texture in (tl.Texture(np.full((4, 4), 9, np.uint8)), tl.Texture(np.zeros((4, 4, 4), np.uint8), "bilinear")):
-        assert texture.engine_cut_at(0.5) is texture.engine
+        assert texture.compiled_cut_at(0.5) is texture.compiled
     clear = tl.Texture(np.zeros((4, 4, 4), np.uint8))
-    assert clear.engine_cut_at(0.5) is clear.engine_cut_at(0.5) is not clear.engine
+    assert clear.compiled_cut_at(0.5) is clear.compiled_cut_at(0.5) is not clear.compiled
 
 
 def test_a_texture_without_halvings_has_one_level():

@@ -1,5 +1,7 @@
 """Each choice is enough: thousands of random scenes, drawn with the choice forced on and off, have the same bits."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import topleft as tl
 from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import DepthTest, Sink
 from topleft._core.raster import choices, sampling
+from topleft._core.raster.costs import Costs, cost_table
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 
@@ -32,16 +35,15 @@ def bits_of(frags):
     return np.stack([frags.triangle, frags.depth.view(np.int32)])
 
 
-def both_ways(monkeypatch, name, forced, draw):
+def both_ways(draw, **forced):
     """What is drawn with a choice as it is made, and with it forced."""
     chosen = draw()
-    with monkeypatch.context() as patch:
-        patch.setattr(choices, name, forced)
+    with choices.forced(**forced):
         return chosen, draw()
 
 
 @pytest.mark.parametrize("depth_test", ["less", "greater", None])
-def test_flat_depth_left_out_gives_the_same_bits(monkeypatch, depth_test):
+def test_flat_depth_left_out_gives_the_same_bits(depth_test):
     rng = np.random.default_rng(1)
     n_flat = 0
     for _ in range(2000):
@@ -58,7 +60,7 @@ def test_flat_depth_left_out_gives_the_same_bits(monkeypatch, depth_test):
         def draw(arrays=(vertices, triangles), options=options):
             return tl.rasterize(*arrays, SIZE, **options)
 
-        never, always = both_ways(monkeypatch, "pays_without_depth", lambda *_: True, draw)
+        never, always = both_ways(draw, pays_without_depth=True)
         assert (bits_of(never) == bits_of(always)).all()
         assert (never.barycentric() == always.barycentric()).all()
         n_flat += never.mask.any()
@@ -75,7 +77,7 @@ def random_affine(rng):
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_divide_left_out_gives_the_same_bits(monkeypatch, dtype):
+def test_divide_left_out_gives_the_same_bits(dtype):
     rng = np.random.default_rng(2)
     for _ in range(2500):
         n = int(rng.integers(1, 40))
@@ -96,12 +98,12 @@ def test_divide_left_out_gives_the_same_bits(monkeypatch, dtype):
             except ValueError as error:
                 return str(error)
 
-        chosen, forced = both_ways(monkeypatch, "is_affine", lambda _: False, draw)
+        chosen, forced = both_ways(draw, is_affine=False)
         assert np.array_equal(chosen, forced)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_divide_left_out_refuses_the_same_vertices(monkeypatch, bad):
+def test_divide_left_out_refuses_the_same_vertices(bad):
     for at in range(3):
         vertices = np.zeros((30, 3))
         vertices[17, at] = bad
@@ -112,7 +114,7 @@ def test_divide_left_out_refuses_the_same_vertices(monkeypatch, bad):
                 tl.rasterize(vertices, np.arange(30).reshape(10, 3), SIZE, transform=matrix, far_clip=False)
             return str(caught.value)
 
-        chosen, forced = both_ways(monkeypatch, "is_affine", lambda _: False, draw)
+        chosen, forced = both_ways(draw, is_affine=False)
         assert chosen == forced
 
 
@@ -123,7 +125,7 @@ def test_divide_stays_unless_every_w_is_one(row):
     assert not choices.is_affine(matrix)
 
 
-def test_shares_and_bands_give_the_same_bits(monkeypatch):
+def test_shares_and_bands_give_the_same_bits():
     rng = np.random.default_rng(3)
 
     def forced(view, n_triangles, n_parts, sink):
@@ -137,12 +139,12 @@ def test_shares_and_bands_give_the_same_bits(monkeypatch):
         def draw(arrays=(vertices, triangles), threads=threads):
             return bits_of(tl.rasterize(*arrays, SIZE, threads=threads))
 
-        chosen, shared = both_ways(monkeypatch, "is_shared", forced, draw)
+        chosen, shared = both_ways(draw, is_shared=forced)
         assert (chosen == one).all()
         assert (shared == one).all()
 
 
-def test_threads_over_arrays_give_the_same_bits(monkeypatch):
+def test_threads_over_arrays_give_the_same_bits():
     rng = np.random.default_rng(4)
     for _ in range(500):
         vertices, triangles = random_triangles(rng, 3)
@@ -151,7 +153,7 @@ def test_threads_over_arrays_give_the_same_bits(monkeypatch):
         def draw(arrays=(vertices, triangles)):
             return bits_of(tl.rasterize(*arrays, SIZE, threads=3))
 
-        chosen, forced = both_ways(monkeypatch, "MIN_TO_SHARE_ARRAYS", 0, draw)
+        chosen, forced = both_ways(draw, pays_to_share=True)
         assert (chosen == forced).all()
 
 
@@ -235,9 +237,9 @@ def random_clip_space(rng):
 
 
 @pytest.mark.parametrize("n_components", [3, 4])
-def test_samples_in_bands_and_whole_give_the_same_bits(monkeypatch, n_components):
+def test_samples_in_bands_and_whole_give_the_same_bits(force, n_components):
     rng = np.random.default_rng(7)
-    monkeypatch.setattr(sampling, "BAND_BYTES", 8 * SIZE[0] * 4)  # bands of four rows
+    force(plane_bytes=8 * SIZE[0] * 4)  # bands of four rows
     for _ in range(700):
         vertices, triangles = random_clip_space(rng) if n_components == 4 else random_triangles(rng, 3)
         options = {"sampling": "msaa4", "cull": str(rng.choice(["none", "back", "front"])), "threads": 1}
@@ -246,11 +248,11 @@ def test_samples_in_bands_and_whole_give_the_same_bits(monkeypatch, n_components
             frags = tl.rasterize(*arrays, SIZE, **options)
             return np.stack([frags.samples_triangle, frags.samples_depth.view(np.int32)])
 
-        chosen, whole = both_ways(monkeypatch, "can_share", lambda _: False, draw)
+        chosen, whole = both_ways(draw, can_share=False)
         assert (chosen == whole).all()
 
 
-def test_search_for_cut_triangles_gives_the_same_bits(monkeypatch):
+def test_search_for_cut_triangles_gives_the_same_bits():
     rng = np.random.default_rng(8)
     for _ in range(700):
         vertices, triangles = random_clip_space(rng)
@@ -260,11 +262,11 @@ def test_search_for_cut_triangles_gives_the_same_bits(monkeypatch):
         def draw(arrays=(vertices, triangles)):
             return bits_of(tl.rasterize(*arrays, SIZE))
 
-        chosen, searched = both_ways(monkeypatch, "must_cut", lambda _: True, draw)
+        chosen, searched = both_ways(draw, must_cut=True)
         assert (chosen == searched).all()
 
 
-def test_colours_with_labels_and_without_are_the_same(monkeypatch):
+def test_colours_with_labels_and_without_are_the_same():
     rng = np.random.default_rng(9)
     for _ in range(700):
         vertices, triangles = random_triangles(rng)
@@ -273,7 +275,7 @@ def test_colours_with_labels_and_without_are_the_same(monkeypatch):
         def draw(arrays=(vertices, triangles, colors)):
             return tl.fill(*arrays, SIZE, per="triangle")
 
-        labels, direct = (both_ways(monkeypatch, "is_direct", lambda *_, v=v, **__: v, draw)[1] for v in (False, True))
+        labels, direct = (both_ways(draw, is_direct=v)[1] for v in (False, True))
         assert (labels == direct).all()
 
 
@@ -349,16 +351,16 @@ def test_colours_are_stored_as_they_come_where_few_are_seen():
 @pytest.mark.parametrize(
     ("n", "size_px", "size", "expected"), [(50, 60, (1920, 1080), 4), (1, 60, (300, 300), 1), (200, 900, (300, 300), 4)]
 )
-def test_threads_are_as_many_as_the_work_is_worth(monkeypatch, n, size_px, size, expected):
-    monkeypatch.setattr(choices, "available_threads", lambda: 4)
+def test_threads_are_as_many_as_the_work_is_worth(force, n, size_px, size, expected):
+    force(available_threads=4)
     vertices, triangles, _ = tl.scenes.random_triangles(n, size_px, *size)
     plan = tl.plan(vertices, triangles, size)
     assert plan.threads == expected
     assert tl.plan(vertices, triangles, size, threads=3).threads == 3
 
 
-def test_threads_are_no_more_than_rows(monkeypatch):
-    monkeypatch.setattr(choices, "available_threads", lambda: 4)
+def test_threads_are_no_more_than_rows(force):
+    force(available_threads=4)
     vertices, triangles, _ = tl.scenes.random_triangles(2000, 900, 4000, 2)
     assert tl.plan(vertices, triangles, (4000, 2)).threads == 2
 
@@ -375,3 +377,56 @@ def test_work_grows_with_what_is_seen_and_asked():
     assert few > work(1000, 40, Sink.COUNT) > work(1000, 40, Sink.MASK)
     assert work(1000, 40, Sink.NEAREST, origin=(5000, 0)) == 5 * 1000 + 0.6 * 1920 * 1080
     assert work(1000, 40, Sink.NEAREST, sampling="msaa4") > 3.9 * few
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_table_of_costs_changes_a_bit(seed):
+    """Every row is up to a hundred times more or less: the furthest that a file may say."""
+    rng = np.random.default_rng(seed)
+    wild = {
+        row.name: tuple(one * 100 ** rng.uniform(-1, 1) for one in row.default)
+        if isinstance(row.default, tuple)
+        else row.default * 100 ** rng.uniform(-1, 1)
+        for row in fields(Costs)
+        if not isinstance(row.default, str)
+    }
+    mesh = tl.Mesh(*tl.scenes.blob(3000))
+    scene = tl.Scene([mesh, (mesh, np.diag([0.5, 0.5, 0.5, 1.0]))])
+    vertices, triangles = random_triangles(rng, 3)
+    colors = rng.integers(0, 256, (len(triangles), 4), np.uint8)
+
+    def draw():
+        several = tl.rasterize(vertices, triangles, SIZE, sampling="msaa4", threads=2)
+        found = [bits_of(tl.rasterize(vertices, triangles, SIZE)), several.samples_triangle, several.samples_depth]
+        found += [tl.fill(vertices, triangles, colors, SIZE, sampling=name) for name in ("center", "msaa2", "area")]
+        found += [tl.coverage(vertices, triangles, SIZE, sampling="area"), tl.overdraw(vertices, triangles, SIZE)]
+        for _ in range(3):  # the third picture may be of clusters, or of meshlets
+            found += [tl.render(one, size=SIZE, sampling="msaa4", threads=2) for one in (mesh, scene)]
+            found += [bits_of(tl.rasterize_mesh(mesh, size=SIZE, cull="back"))]
+        return found
+
+    for chosen, other in zip(*both_ways(draw, **wild), strict=True):
+        assert chosen.tobytes() == other.tobytes()
+
+
+def test_forced_choices_are_put_back():
+    def fail():
+        with choices.forced(is_flat=7, route=len, near_pixels=3):
+            found.append((choices.is_flat(), choices.is_flat(1, x=2), choices.route, cost_table().near_pixels))
+            with choices.forced(is_flat=8):
+                found.append((choices.is_flat(), cost_table().near_pixels))
+            found.append(choices.is_flat())
+            raise ZeroDivisionError
+
+    found = []
+    asked, costs = choices.is_flat, cost_table()
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert found == [(7, 7, len, 3), (8, 3), 7]
+    assert (choices.is_flat, cost_table()) == (asked, costs)
+
+
+@pytest.mark.parametrize("name", ["is_flatt", "np", "Route", "forced", "ORDER_FREE"])
+def test_forced_refuses_what_is_no_choice(name):
+    with pytest.raises(ValueError, match=f"forced must name functions of choices or rows of Costs, got '{name}'"):
+        choices.forced(**{name: 1}).__enter__()

@@ -1,6 +1,7 @@
 """`topleft mask`: masks of GeoJSON and of COCO annotations, as files."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -116,8 +117,8 @@ def test_run_lengths_are_masks(files, run, counts, sampling):
 def test_run_lengths_over_whole_columns_are_few_rectangles(files):
     annotated(files, {"size": [3, 5], "counts": [3, 10, 2]}, {"size": [3, 5], "counts": [0, 15]})
     (found,) = load_polygons(files / "runs.json")
-    assert found.owners == [0, 0, 1]
-    assert found.polygons[2] == [[(0, 0), (5, 0), (5, 3), (0, 3)]]
+    assert found.owners.tolist() == [0, 0, 1]
+    assert found.polygons[0][8:].tolist() == [[0, 0], [5, 0], [5, 3], [0, 3]]
 
 
 def test_crowds_are_drawn_unless_left_out(files, run):
@@ -155,3 +156,134 @@ def test_broken_files_are_refused_in_one_line(files, run, text):
     assert status == 2
     assert len(lines) == 1
     assert "bad.json" in lines[0]
+
+
+def test_run_lengths_of_many_pixels_are_masks(files, run):
+    """A rectangle for each of a million pixels."""
+    content = {"images": [{"id": 1, "width": 1000, "height": 2000}], "annotations": []}
+    board = np.indices((2000, 1000)).sum(axis=0) % 2 == 1
+    counts = np.diff(np.flatnonzero(np.diff(board.T.reshape(-1), prepend=False, append=False)), prepend=0)
+    counts = [*counts.tolist(), 2_000_000 - int(counts.sum())]
+    content["annotations"] = [{"id": 1, "image_id": 1, "segmentation": {"size": [2000, 1000], "counts": counts}}]
+    files.joinpath("board.json").write_text(json.dumps(content))
+    assert run("mask", "board.json", "-o", "m.png") == (0, [])
+    assert (picture("m.png") == 255 * board).all()
+
+
+def images(files, *names):
+    """Write a file of images of these file names, with a pixel each."""
+    content = {
+        "images": [{"id": i, "file_name": name, "width": 2, "height": 1} for i, name in enumerate(names)],
+        "annotations": [
+            {"id": i, "image_id": i, "segmentation": {"size": [1, 2], "counts": [i % 2, 1, 1 - i % 2]}}
+            for i, _ in enumerate(names)
+        ],
+    }
+    files.joinpath("images.json").write_text(json.dumps(content))
+
+
+def test_images_of_one_name_in_two_folders_go_to_two_files(files, run):
+    images(files, "a/1.jpg", "b/1.jpg")
+    status, lines = run("mask", "images.json", "-o", "e/{name}.png")
+    assert (status, len(lines)) == (2, 1)
+    assert "images a/1 and b/1 would both go to e/1.png; {folder} or {index} parts them" in lines[0]
+    assert not files.joinpath("e").exists()
+    assert run("mask", "images.json", "-o", "e/{folder}/{name}.png") == (0, [])
+    assert [picture(f"e/{name}/1.png").tolist() for name in "ab"] == [[[255, 0]], [[0, 255]]]
+    assert run("mask", "images.json", "-o", "{index}.png") == (0, [])
+    assert picture("001.png").tolist() == [[0, 255]]
+    assert run("mask", "images.json", "-o", "one.png", "--image", "b/1") == (0, [])
+    assert picture("one.png").tolist() == [[0, 255]]
+
+
+def test_images_of_one_id_are_refused(files, run):
+    content = {**COCO, "images": [COCO["images"][0]] * 2}
+    files.joinpath("twice.json").write_text(json.dumps(content))
+    status, lines = run("mask", "twice.json", "-o", "{name}.png")
+    assert (status, "1 ids of images stand more than once" in lines[0]) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["..", "a/..", "../../x.jpg", "/", "a\0b"])
+def test_images_outside_of_a_folder_are_refused(files, run, name):
+    images(files, name)
+    status, lines = run("mask", "images.json", "-o", "masks/{name}/{folder}/mask.png")
+    assert (status, len(lines)) == (2, 1)
+    assert f"image 0 has the file name {name!r}, which is none within a folder" in lines[0]
+
+
+def test_folder_of_an_image_with_a_whole_path_is_refused(files, run):
+    images(files, "/data/1.jpg")
+    status, lines = run("mask", "images.json", "-o", "{folder}/{name}.png")
+    assert (status, "image 1 lies in /data, no folder within another" in lines[0]) == (2, True)
+    assert run("mask", "images.json", "-o", "{name}.png") == (0, [])
+
+
+def test_image_without_a_name_is_its_number(files, run):
+    images(files, "", "b.jpg")
+    assert run("mask", "images.json", "-o", "{name}.png") == (0, [])
+    assert picture("0.png").tolist() == [[255, 0]]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_pipes_folders_and_devices_are_refused(files, run):
+    os.mkfifo("pipe.json")
+    files.joinpath("folder.json").mkdir()
+    for name, kind in (
+        ("pipe.json", "a pipe or a device"),
+        ("/dev/zero", "a pipe or a device"),
+        ("folder.json", "a folder"),
+    ):
+        status, lines = run("mask", name, "-o", "m.png")
+        assert (status, len(lines), f"{kind}, not a file" in lines[0]) == (2, 1, True)
+
+
+def plane(files, points, **properties):
+    feature = {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [points]}}
+    files.joinpath("plane.json").write_text(json.dumps(feature))
+
+
+@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e300, 10**400, -1, 1.5, 2**31, True, None, "3"])
+def test_labels_that_are_no_whole_numbers_are_refused(files, run, value):
+    plane(files, SQUARE, a=value)
+    status, lines = run("mask", "plane.json", "-o", "m.png", "--labels", "a")
+    if value is True:
+        assert (status, lines) == (0, [])
+    else:
+        assert (status, len(lines), "not a whole number from 0 on" in lines[0]) == (2, 1, True)
+
+
+@pytest.mark.parametrize(
+    ("far", "said"),
+    [
+        (float("inf"), "feature 0 has a coordinate of inf"),
+        (float("nan"), "feature 0 has a coordinate of nan"),
+        (10**400, "something is missing or of a wrong kind"),
+        (5e-324, "reaches over 5e-324 x 5e-324: --extent must say what is shown"),
+    ],
+)
+def test_planes_of_no_size_are_refused_in_one_line(files, run, far, said):
+    plane(files, [[0, 0], [far, 0], [far, far]])
+    status, lines = run("mask", "plane.json", "-o", "m.png")
+    assert (status, len(lines)) == (2, 1)
+    assert said in lines[0]
+
+
+def test_plane_that_is_too_large_for_numbers_is_refused_in_one_line(files, run):
+    plane(files, [[-1.7e308, 0], [1.7e308, 0], [0, 1]])
+    status, lines = run("mask", "plane.json", "-o", "m.png")
+    assert (status, len(lines)) == (2, 1)
+    assert "reaches over inf x 1.0" in lines[0]
+
+
+def test_rings_that_cross_too_often_are_refused_with_the_option(files, run):
+    turns = 2.4 * np.arange(101)
+    plane(files, np.stack([np.cos(turns), np.sin(turns)], axis=1).tolist())
+    assert run("mask", "plane.json", "-o", "m.png", "--sampling", "area") == (0, [])
+    status, lines = run("mask", "plane.json", "-o", "m.png", "--sampling", "area", "--max-crossings", "3000")
+    assert (status, len(lines), "at most 3,000 times" in lines[0]) == (2, 1, True)
+
+
+def test_extent_without_polygons_is_told(files, run):
+    status, lines = run("mask", "map.geojson", "-o", "m.png", "--size", "7x4", "--extent", 1000, 1001, 0, 1)
+    assert (status, len(lines)) == (0, 1)
+    assert "map: no polygon meets a pixel of the grid" in lines[0]

@@ -47,6 +47,20 @@ def test_squares_of_wild_rings_equal_reference(isa, rule, seed):
 
 
 @ON_EACH_ISA
+@pytest.mark.parametrize("left", [0, 1, 63, 64, 65])
+@pytest.mark.parametrize("right", [63, 64, 65, 128, 129])
+def test_squares_of_runs_that_end_near_whole_words_equal_reference(isa, left, right):
+    """Bits of a row stand in words of 64."""
+    size = 131, 3
+    for ring in ([(left, 0), (right, 0), (right, 3)], [(left, 0), (right, 1), (right, 2), (left, 2)]):
+        if left < right:
+            exact = squares([np.array(ring, float)], size, "evenodd")
+            with on(isa):
+                for sampling, expected in exact.items():
+                    assert (tl.polygons(ring, size, sampling=sampling) == expected).all()
+
+
+@ON_EACH_ISA
 @ON_EACH_RULE
 @given(wild_seeds)
 def test_labels_of_wild_polygons_are_the_last_masks(isa, rule, seed):

@@ -1,6 +1,7 @@
 """Areas of polygons and the table of overlaps: near fractions, and to the last bit where they must be."""
 
 import tracemalloc
+import warnings
 
 import numpy as np
 import pytest
@@ -69,6 +70,72 @@ def test_area_of_a_ring_that_crosses_itself_is_that_of_the_rule():
         assert tl.polygons(ring, (40, 40), rule=rule, sampling="area").sum(dtype=float) == pytest.approx(
             exact, abs=1e-5
         )
+
+
+def chords(n, size):
+    """A ring of n points, of which each edge crosses three of four others."""
+    turns = 2.4 * np.arange(n)
+    return np.round((np.stack([np.cos(turns), np.sin(turns)], 1) * 0.45 + 0.5) * size * 256) / 256
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("rule", ["evenodd", "nonzero"])
+@pytest.mark.parametrize(("n", "size"), [(40, (5, 4)), (50, (2, 3)), (60, (1, 1))])
+def test_areas_of_rings_that_cross_in_each_pixel_are_within_bound(isa, rule, n, size):
+    """Up to 1,300 crossings a pixel."""
+    ring = chords(n, np.array(size))
+    exact = np.array([[float(a) for a in row] for row in ref.polygon_areas([ring], size, rule)])
+    with on(isa):
+        assert abs(tl.polygons(ring, size, rule=rule, sampling="area") - exact).max() <= UNIT
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("sampling", ["area", "outer", "inner"])
+def test_rings_that_cross_too_often_are_refused(sampling, threads):
+    ring, how = chords(101, 40), {"sampling": sampling, "threads": threads}
+    drawn, n = [[ring], [ring]], 2 * n_crossings(ring)
+    picture = tl.polygons(drawn, (40, 40), max_crossings=n + 2 * len(ring), **how)
+    assert (picture == tl.polygons(drawn, (40, 40), **how)).all()
+    with pytest.raises(ValueError, match=f"rings must cross at most {n - 1:,} times .* max_crossings= allows more"):
+        tl.polygons(drawn, (40, 40), max_crossings=n - 1, **how)
+
+
+def n_crossings(ring):
+    a, b = ring, np.roll(ring, -1, axis=0)
+
+    def sides(p, q, r):
+        d, e = q - p, r - p
+        return np.sign(d[..., 0] * e[..., 1] - d[..., 1] * e[..., 0])
+
+    of_starts, of_ends = sides(a[:, None], b[:, None], a[None]), sides(a[:, None], b[:, None], b[None])
+    return int(((of_starts * of_ends < 0) & (of_starts * of_ends < 0).T).sum()) // 2
+
+
+def test_crossings_outside_of_the_window_are_not_counted():
+    ring = chords(101, 40)
+    n = n_crossings(ring) // 2
+    with pytest.raises(ValueError, match=f"at most {n:,} times"):
+        tl.overlap([[ring]], (40, 40), max_crossings=n)
+    assert len(tl.overlap([[ring]], (3, 3), max_crossings=n, origin=(28, 18)).areas) > 0
+
+
+def test_edges_that_crowd_a_pixel_count_as_crossings():
+    """A zigzag of parallel edges, each of which enters and leaves the pixel by itself."""
+    n = 2000
+    at = np.arange(n)
+    middle = np.stack([0.5 + at / n, 1.5 - at / n], axis=1)
+    zigzag = np.where(at[:, None] % 2, middle + 3, middle - 3)
+    ring = np.concatenate([zigzag, [(5, 5), (6, 6), (6, 5), (5, 6), (5, -9)]])
+    how = {"subpixel_bits": 12, "sampling": "area"}
+    assert tl.polygons(ring, 2, max_crossings=10**9, **how).shape == (2, 2)
+    with pytest.raises(ValueError, match="cross or crowd a pixel more often"):
+        tl.polygons(ring, 2, max_crossings=10_000, **how)
+
+
+@pytest.mark.parametrize(("value", "error"), [(0, "at least 1, got 0"), (1.5, "must be an integer")])
+def test_max_crossings_is_a_number(value, error):
+    with pytest.raises((TypeError, ValueError), match=error):
+        tl.polygons([(0, 0), (4, 0), (4, 4)], (5, 5), max_crossings=value)
 
 
 def test_assumed_valid_polygons_are_the_same_to_the_bit():
@@ -205,6 +272,84 @@ def test_table_sums_means_and_spreads():
     assert table.means(raster)[:2].tolist() == [1.5, 12.5 / 3]
     assert np.isnan(table.means(raster)[2])
     assert table.spread([2, 10, 1]).tolist() == [[2, 7, 10], [0, 5, 10]]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int16, np.int64])
+def test_pixels_without_data_do_not_count(dtype):
+    table = tl.overlap([[square(0, 0, 2, 1)], [square(1.5, 0, 3, 2)], [square(2, 1, 3, 2)]], (3, 2))
+    raster = np.array([[1, 2, -9999], [5, -9999, -9999]], dtype)
+    assert table.means(raster, nodata=-9999).tolist()[:2] == [1.5, 2]
+    assert np.isnan(table.means(raster, nodata=-9999.0)[2])
+    assert table.sums(raster, nodata=np.float64(-9999)).tolist() == [3, 1, 0]
+    masked = np.ma.masked_equal(raster, -9999)
+    assert table.means(masked).tolist()[:2] == [1.5, 2]
+    assert table.sums(masked, nodata=1).tolist() == [2, 1, 0]
+    assert (
+        table.sums(np.ma.array(raster)).tolist() == table.sums(raster).tolist() == [3, 1 - 4 * 4999.5 - 4999.5, -9999]
+    )
+
+
+@pytest.mark.parametrize("nodata", [0.1, -3.4028234663852886e38, float("nan"), float("inf")])
+def test_no_data_is_told_in_the_dtype_of_the_raster(nodata):
+    table = tl.overlap([[square(0, 0, 2, 1)]], (2, 1))
+    assert table.means(np.array([[4, nodata]], np.float32), nodata=nodata).tolist() == [4]
+    assert table.means(np.array([[4, 8]], np.uint8), nodata=nodata).tolist() == [6]
+
+
+def test_no_data_that_a_raster_names_itself_does_not_count():
+    table = tl.overlap([[square(0, 0, 2, 1)]], (2, 1))
+
+    class Raster:
+        def __init__(self, **attrs):
+            self.attrs = attrs
+
+        def __array__(self, dtype=None, copy=None):
+            return np.array([[4, -1]], np.float32)
+
+    for said in ({"_FillValue": -1}, {"nodatavals": (-1.0,)}, {"missing_value": np.float32(-1)}, {"nodata": -1}):
+        assert table.means(Raster(**said)).tolist() == [4]
+    for said in ({}, {"nodata": None}, {"_FillValue": "none"}, {"nodatavals": ()}):
+        assert table.means(Raster(**said)).tolist() == [1.5]
+
+    class Dataset:
+        count = 1
+
+        def read(self, band, masked):
+            assert (band, masked) == (1, True)
+            return np.ma.masked_equal([[4, -1]], -1)
+
+    assert table.means(Dataset()).tolist() == [4]
+    Dataset.count = 3
+    with pytest.raises(ValueError, match=r"raster must have one band, got 3: pass raster.read\(1, masked=True\)"):
+        table.means(Dataset())
+
+
+@pytest.mark.parametrize("nodata", ["x", [1, 2], 1j])
+def test_no_data_that_is_no_number_is_refused(nodata):
+    with pytest.raises(TypeError, match="nodata must be a number"):
+        tl.overlap([[square(0, 0, 2, 1)]], (2, 1)).means([[1, 2]], nodata=nodata)
+
+
+def test_polygons_of_another_crs_are_told():
+    utm, degrees = tl.Grid((4, 4), (5e5, 6e5, 5e6, 6e6)), tl.Grid((4, 4), (10, 11, 45, 46))
+    lonlat, metres = [[square(10, 45, 11, 46)]], [[square(5e5, 5e6, 6e5, 6e6)]]
+    said = "no polygon meets a pixel of the grid: the polygons lie in x 10 to 11, y 45 to 46, the grid in x 500000 to "
+    with pytest.warns(UserWarning, match=f"^{said}.*the polygons may be degrees, the grid cannot: transform"):
+        assert not len(tl.overlap(lonlat, utm).areas)
+    with pytest.warns(UserWarning, match="the grid may be degrees, the polygons cannot"):
+        assert not tl.polygons(metres, degrees).any()
+    with pytest.warns(UserWarning, match="are they of another CRS than the grid"):
+        assert (tl.polygons([[square(5, 5, 6, 6)]], degrees, values="index") == -1).all()
+
+
+def test_polygons_of_which_one_meets_the_grid_are_not_told():
+    grid = tl.Grid((4, 4), (10, 11, 45, 46))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tl.overlap([[square(0, 0, 1, 1)], [square(10, 45, 10.1, 45.1)]], grid)
+        tl.overlap([], grid)
+        tl.overlap([[square(9, 9, 10, 10)]], (4, 4))
+        tl.overlap([[square(10, 45, 10.1, 45.1)]], grid, origin=(50, 50))
 
 
 def test_table_is_a_sparse_matrix():

@@ -11,7 +11,6 @@ import topleft as tl
 from topleft._core import engine
 from topleft._core.base.memory import FreshMemory
 from topleft._core.base.options import Sink
-from topleft._core.raster import choices
 from topleft._core.raster.choices import ClusterRoute
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
@@ -22,11 +21,9 @@ SIZE = (160, 120)
 
 
 @pytest.fixture(autouse=True)
-def however_little_it_pays(monkeypatch):
+def however_little_it_pays(force):
     """Views are drawn in clusters even where that does not pay."""
-    monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: True)
-    monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
-    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
+    force(pays_to_draw_clusters=True, pays_to_draw_instances=True, pays_to_draw_samples=True)
 
 
 def meshes():
@@ -347,13 +344,13 @@ def test_mesh_of_nothing():
 
 
 @pytest.fixture
-def always(monkeypatch):
+def always(force):
     """Meshes are sorted before their first picture."""
-    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: True)
+    force(pays_to_cluster=True)
 
 
 def test_mesh_is_sorted_for_its_second_picture():
-    mesh = tl.Mesh(*tl.scenes.blob(choices.MIN_TRIANGLES_TO_CLUSTER + 1000))
+    mesh = tl.Mesh(*tl.scenes.blob(21_000))
     small = tl.Mesh(*tl.scenes.shape("cube"))
     first = tl.rasterize_mesh(mesh, size=SIZE)
     assert "clusters" not in mesh.__dict__
@@ -366,10 +363,10 @@ def test_mesh_is_sorted_for_its_second_picture():
 
 @pytest.mark.parametrize("shading", ["smooth", "flat", "normals", "depth", "ids"])
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
-def test_pictures_are_the_same(shading, sampling, monkeypatch):
+def test_pictures_are_the_same(shading, sampling, force):
     arrays = MESHES["blob"]
     expected = tl.render(tl.Mesh(*arrays), size=SIZE, shading=shading, sampling=sampling)
-    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: True)
+    force(pays_to_cluster=True)
     assert_same(tl.render(tl.Mesh(*arrays), size=SIZE, shading=shading, sampling=sampling), expected)
 
 
@@ -387,7 +384,7 @@ def scenes(rng, n):
 
 
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
-def test_scenes_have_the_same_bits(sampling, monkeypatch):
+def test_scenes_have_the_same_bits(sampling, force):
     rng = np.random.default_rng(31)
     n_shown = 0
     for i, scene in enumerate(scenes(rng, 25)):
@@ -396,7 +393,7 @@ def test_scenes_have_the_same_bits(sampling, monkeypatch):
         options |= {"sampling": sampling, "threads": THREADS[i % len(THREADS)]}
         pictures = []
         for pays in (False, True):
-            monkeypatch.setattr(choices, "pays_to_cluster", lambda *_, pays=pays: pays)
+            force(pays_to_cluster=pays)
             frags = tl.rasterize_mesh(scene, camera, SIZE, **options)
             pictures.append((frags.samples_id, frags.samples_depth, tl.render(scene, camera, SIZE, sampling=sampling)))
         for got, expected in zip(*pictures, strict=True):
@@ -407,7 +404,7 @@ def test_scenes_have_the_same_bits(sampling, monkeypatch):
 
 @pytest.mark.parametrize("sampling", ["center", "msaa4", "outer", "area"])
 @ON_EACH_ISA
-def test_instances_between_samples_are_left_out(isa, sampling, monkeypatch):
+def test_instances_between_samples_are_left_out(isa, sampling, monkeypatch, force):
     """And nobody misses them: most of these are a third of a pixel wide."""
     rng = np.random.default_rng(41)
     meshes = [tl.Mesh(*tl.scenes.shape("cube")), tl.Mesh(np.float32(flat_grid(9)[0]), flat_grid(9)[1])]
@@ -422,7 +419,7 @@ def test_instances_between_samples_are_left_out(isa, sampling, monkeypatch):
         view = {"cull": ("none", "back")[trial % 2], "sampling": sampling}
         found = []
         for pays in (False, True):
-            monkeypatch.setattr(choices, "pays_to_cluster", lambda *_, pays=pays: pays)
+            force(pays_to_cluster=pays)
             with on(isa):
                 found.append([tl.silhouette(scene, camera, SIZE, sampling=sampling)])
                 if sampling in ("center", "msaa4"):
@@ -442,7 +439,7 @@ def test_scene_that_does_not_fit_is_refused_as_without(always):
         tl.rasterize_mesh(scene, tl.Camera.look_at((0, 0, 3), near=0.1, far=100.0), SIZE)
 
 
-def test_holes_are_cut_out_of_clusters(always, monkeypatch):
+def test_holes_are_cut_out_of_clusters(always, force):
     vertices, triangles = MESHES["blob"]
     texels = np.zeros((8, 8, 4), np.uint8)
     texels[...] = 255
@@ -451,12 +448,12 @@ def test_holes_are_cut_out_of_clusters(always, monkeypatch):
     uv = (vertices[:, :2] * 3).astype(np.float32)
     mesh = tl.Mesh(vertices, triangles, uv=uv, materials=[material])
     got = tl.render(mesh, size=SIZE)
-    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: False)
+    force(pays_to_cluster=False)
     assert_same(got, tl.render(mesh, size=SIZE))
 
 
 @pytest.mark.parametrize("cut", [False, True])
-def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatch):
+def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatch, force):
     mesh = as_arrays("blob")
     camera = tl.Camera.look_at((0, 0, 1.0 if cut else 3.0), near=0.3, far=100.0)
     view = {"transform": camera.clip_from_world(SIZE), "threads": 1}
@@ -465,7 +462,7 @@ def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatc
     marked = engine.mark_vertices
     monkeypatch.setattr(engine, "mark_vertices", lambda *arrays: listed.append(1) or marked(*arrays))
     for pays in (False, True):
-        monkeypatch.setattr(choices, "pays_to_snap_all", lambda *_, pays=pays: pays)
+        force(pays_to_snap_all=pays)
         got = draw(mesh, Clusters(*mesh), "less", **view)
         listed.clear()
         assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))

@@ -167,7 +167,7 @@ def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outsid
     assert choices.pays_to_draw_instances(View.parse(SIZE, view), 70_000, seen, lambda: layers) == pays
 
 
-def test_scene_asks_before_it_draws_clusters(monkeypatch):
+def test_scene_asks_before_it_draws_clusters(monkeypatch, force):
     scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
     drawn = []
     draw = instances.draw_round
@@ -175,7 +175,7 @@ def test_scene_asks_before_it_draws_clusters(monkeypatch):
     camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
     for layers, n_drawn in ((3.0, 1), (100.0, 0)):
         drawn.clear()
-        monkeypatch.setattr(choices, "MIN_LAYERS_TO_CLUSTER", layers)
+        force(cluster_layers=layers)
         tl.rasterize_mesh(scene, camera, SIZE, cull="back", threads=1)
         assert len(drawn) == n_drawn
 
@@ -189,10 +189,10 @@ def test_backoff_doubles_and_ends_when_clusters_pay():
     assert asked == [0, 3, 8, 17, 26, *range(27, 40)]
 
 
-def test_mesh_drawn_whole_is_not_surveyed_for_each_picture(monkeypatch):
-    mesh = tl.Mesh(*tl.scenes.blob(choices.MIN_TRIANGLES_TO_CLUSTER + 1000))
+def test_mesh_drawn_whole_is_not_surveyed_for_each_picture(force):
+    mesh = tl.Mesh(*tl.scenes.blob(21_000))
     surveyed = []
-    monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: surveyed.append(1) is not None)
+    force(pays_to_draw_clusters=lambda *_: surveyed.append(1) is not None)
     expected = tl.rasterize_mesh(mesh, size=SIZE).triangle
     for _ in range(9):
         assert (tl.rasterize_mesh(mesh, size=SIZE).triangle == expected).all()

@@ -106,8 +106,8 @@ def test_cutout_keeps_what_has_no_holes_and_is_cut_by_the_near_plane(sampling, b
     frags = tl.rasterize_mesh(mesh, camera, SIZE, **options)
     alone = [replace(mesh, triangles=mesh.triangles[k : k + 1], material_of_triangle=[1 - k]) for k in range(2)]
     floor, leaf = (tl.rasterize_mesh(one, camera, SIZE, **options) for one in alone)
-    for one in (frags, leaf):
-        cut_out(one, mesh, camera, cut_of(mesh if one is frags else alone[1]))
+    for drawn, own in ((frags, mesh), (leaf, alone[1])):
+        cut_out(drawn, own, camera, cut_of(own))
     shows_floor, shows_leaf = floor.samples_triangle == 0, leaf.samples_triangle == 0
     assert (shows_floor & ~shows_leaf).sum() > 1000
     assert shows_leaf.sum() > 1000

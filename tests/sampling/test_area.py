@@ -13,7 +13,7 @@ import topleft as tl
 from topleft import scenes
 from topleft._core import engine
 from topleft._core.base.memory import KeptMemory
-from topleft._core.raster import sampling
+from topleft._core.raster import choices, sampling
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft.methods.reference import area as ref
@@ -347,10 +347,10 @@ def areas_of_large_shapes():
 @ON_EACH_ISA
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("verb", [tl.coverage, tl.overdraw])
-def test_large_shapes_have_the_same_areas_in_bands_of_any_height(isa, threads, verb, monkeypatch):
+def test_large_shapes_have_the_same_areas_in_bands_of_any_height(isa, threads, verb):
     def draw_in(n_bytes):
-        monkeypatch.setattr(sampling, "AREA_BAND_BYTES", n_bytes)
-        return verb(LARGE, LARGE_TRIANGLES, (411, 97), sampling="area", threads=threads)
+        with choices.forced(area_bytes=n_bytes):
+            return verb(LARGE, LARGE_TRIANGLES, (411, 97), sampling="area", threads=threads)
 
     with on(isa):
         whole = draw_in(1 << 30)

@@ -9,21 +9,17 @@ import pytest
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
-from topleft._core.raster import choices, sampling
+from topleft._core.raster import choices
 
 SIZE = (333, 301)
 TESTS = [None, "less", "greater"]
 
 
 @contextmanager
-def bands(monkeypatch, *, are_drawn):
+def bands(*, are_drawn):
     """Draw in bands of few rows wherever that is possible, or nowhere."""
-    with monkeypatch.context() as m:
-        m.setattr(choices, "NEAR_PIXELS", 0 if are_drawn else 1 << 40)
-        m.setattr(choices, "CLEARED_PIXEL_NS", 1e6)
-        m.setattr(sampling, "BAND_BYTES", 8 * 333 * 20)
-        m.setattr(choices, "BLEND_BAND_BYTES", 4 * 333 * 20)
-        m.setattr(choices, "rows_to_blend", lambda view, *_, **__: 13 if are_drawn else view.size[1])
+    rows = {"near_pixels": 0 if are_drawn else 1 << 40, "cleared_pixel": 1e6, "plane_bytes": 8 * 333 * 20}
+    with choices.forced(rows_to_blend=lambda view, *_, **__: 13 if are_drawn else view.size[1], **rows):
         yield
 
 
@@ -37,18 +33,18 @@ def strewn(seed, n=300, size_px=60.0):
     return corners.reshape(-1, 3), np.arange(3 * n, dtype=np.int32).reshape(n, 3)
 
 
-def as_drawn(monkeypatch, draw):
+def as_drawn(draw):
     """What is drawn at once, and in bands."""
-    with bands(monkeypatch, are_drawn=False):
+    with bands(are_drawn=False):
         whole = draw()
-    with bands(monkeypatch, are_drawn=True):
+    with bands(are_drawn=True):
         return whole, draw()
 
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("test", TESTS)
-def test_ids_and_depth(monkeypatch, isa, test, threads):
+def test_ids_and_depth(isa, test, threads):
     vertices, triangles = strewn(1)
     for cull in ("none", "back", "front"):
 
@@ -57,25 +53,24 @@ def test_ids_and_depth(monkeypatch, isa, test, threads):
             return found.triangle, found.depth
 
         with on(isa):
-            (ids, depth), (banded_ids, banded_depth) = as_drawn(monkeypatch, draw)
+            (ids, depth), (banded_ids, banded_depth) = as_drawn(draw)
         assert (ids >= 0).any()
         assert (banded_ids == ids).all()
         assert banded_depth.tobytes() == depth.tobytes()
 
 
 @ON_EACH_ISA
-def test_counts_and_labels(monkeypatch, isa):
+def test_counts_and_labels(force, isa):
     vertices, triangles = strewn(2)
     colors = np.random.default_rng(0).random((len(triangles), 2), np.float32)
-    monkeypatch.setattr(choices, "MIN_ROWS_TO_SORT", 0.0)
-    monkeypatch.setattr(choices, "SAVED_STORE_NS", 1e6)
+    force(saved_rows=0.0, saved_store=1e6)
     with on(isa):
         for draw in (
             lambda: tl.overdraw(vertices, triangles, SIZE),
             lambda: tl.fill(vertices, triangles, colors, SIZE, per="triangle"),
             lambda: tl.fill(vertices[:, :2], triangles, np.repeat(colors, 3, 0), SIZE, per="vertex"),
         ):
-            whole, banded = as_drawn(monkeypatch, draw)
+            whole, banded = as_drawn(draw)
             assert (whole == banded).all()
 
 
@@ -83,21 +78,21 @@ def test_counts_and_labels(monkeypatch, isa):
     {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"subpixel_bits": "exact"}, {"method": "scanline"},
     {"origin": (40, -30)}, {"sampling": "msaa4"}, {"viewport": (500, 400)},
 ])  # fmt: skip
-def test_options(monkeypatch, options):
+def test_options(options):
     vertices, triangles = strewn(3, 120)
 
     def draw():
         found = tl.rasterize(vertices, triangles, SIZE, **options)
         return found.triangle, found.depth
 
-    (ids, depth), (banded_ids, banded_depth) = as_drawn(monkeypatch, draw)
+    (ids, depth), (banded_ids, banded_depth) = as_drawn(draw)
     assert (ids >= 0).any()
     assert (banded_ids == ids).all()
     assert (banded_depth == depth).all()
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_triangles_that_planes_cut(monkeypatch, threads):
+def test_triangles_that_planes_cut(threads):
     rng = np.random.default_rng(4)
     vertices = rng.normal(size=(300, 3)) * [3, 3, 6]
     triangles = np.arange(300).reshape(-1, 3)
@@ -107,7 +102,7 @@ def test_triangles_that_planes_cut(monkeypatch, threads):
         found = tl.rasterize(vertices, triangles, SIZE, transform=camera, threads=threads)
         return found.triangle, found.depth
 
-    (ids, depth), (banded_ids, banded_depth) = as_drawn(monkeypatch, draw)
+    (ids, depth), (banded_ids, banded_depth) = as_drawn(draw)
     assert (ids >= 0).any()
     assert (banded_ids == ids).all()
     assert (banded_depth == depth).all()
@@ -135,24 +130,23 @@ def test_which_are_drawn_so():
         assert in_bands(grid, cells, (wide, tall)) is is_so
 
 
-def test_bad_indices(monkeypatch):
+def test_bad_indices():
     vertices, triangles = strewn(5)
     triangles[17, 1] = len(vertices)
-    with bands(monkeypatch, are_drawn=True), pytest.raises(IndexError, match="17"):
+    with bands(are_drawn=True), pytest.raises(IndexError, match="17"):
         tl.rasterize(vertices, triangles, SIZE)
 
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("sampling_", ["area", "center"])
 @pytest.mark.parametrize(("channels", "blend"), [(4, "over"), (4, "replace"), (3, "replace"), (2, "over"), (1, "add")])
-def test_colours(monkeypatch, isa, sampling_, channels, blend):
+def test_colours(isa, sampling_, channels, blend):
     vertices, triangles = strewn(6)
     colors = np.random.default_rng(1).integers(0, 256, (len(triangles), channels)).astype(np.uint8)
     colors[::2, -1] = 255
     for background, values in ((None, colors), (7, colors), (0.5, colors.astype(np.float32))):
         with on(isa):
             whole, banded = as_drawn(
-                monkeypatch,
                 lambda values=values, background=background: tl.fill(
                     vertices[:, :2], triangles, values, SIZE, per="triangle", sampling=sampling_, blend=blend,
                     background=None if background is None else np.full(channels, background, values.dtype),

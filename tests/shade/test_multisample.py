@@ -13,7 +13,7 @@ import topleft as tl
 from topleft._core.base.color import id_colors, srgb_tables
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh
-from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, colors_of_numbers
+from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
 from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
@@ -31,7 +31,8 @@ def test_alpha_is_the_share_of_samples_with_a_triangle(n):
 @ON_EACH_ISA
 @pytest.mark.parametrize("shading", ["smooth", "flat", "normals"])
 @pytest.mark.parametrize("size", [SIZE, (1100, 40)])
-def test_picture_is_the_same_from_planes_of_samples(isa, shading, size):
+def test_picture_is_the_same_from_planes_of_samples(monkeypatch, isa, shading, size):
+    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: False)  # planes of samples
     square = tl.Camera.orthographic(tl.Camera.framing(KNOT).view, near=0.1, far=30, height=3)
     look = {"shading": shading, "fog": tl.Fog(2.0, 9.0), "background": (10, 200, 30, 100)}
     lights = [tl.Light((1, 2, 3), kind="point")]
@@ -47,7 +48,7 @@ def test_picture_is_the_same_from_planes_of_samples(isa, shading, size):
 
 
 @pytest.mark.parametrize("look", [{}, {"shading": "ids"}, {"cutoff": 0.5}, {"edges": True}, {"cull": "back"}])
-def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, look):
+def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, force, look):
     """It is drawn from clusters then, a plane a sample, and what these show is snapped once for all samples."""
     vertices, triangles = tl.scenes.blob(30_000)
     holes = np.full((8, 8, 4), 255, np.uint8)
@@ -57,7 +58,7 @@ def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, lo
     mesh = tl.Mesh(vertices.astype(np.float32), triangles, uv=3 * vertices[:, :2], materials=[leaf])
     near = tl.Camera.look_at((0.2, 0.1, 1.2), near=0.01, far=100)
     n_planes, draw_plane = [], ClusteredMesh.draw
-    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
+    force(pays_to_draw_samples=True)
     monkeypatch.setattr(ClusteredMesh, "draw", lambda *a: n_planes.append(1) or draw_plane(*a))
     first, again = (tl.render(mesh, near, (200, 150), sampling="msaa4", **look) for _ in range(2))
     assert len(n_planes) == 4
@@ -88,11 +89,11 @@ def test_outline_over_nothing_has_the_colour_of_the_surface():
 def test_a_triangle_is_shaded_once_in_a_pixel(monkeypatch):
     shaded = []
 
-    def count(ids, *arguments):
+    def count(ids):
         shaded.append(len(ids))
-        return colors_of_numbers(ids, *arguments)
+        return id_colors(ids)
 
-    monkeypatch.setattr(sys.modules["topleft._meshes.picture.shade"], "colors_of_numbers", count)
+    monkeypatch.setattr(sys.modules["topleft._meshes.picture.shade"], "id_colors", count)
     tl.render(KNOT, size=SIZE, sampling="msaa8", shading="ids")
     ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa8").samples_triangle
     pairs = sum(len(set(pixel) - {-1}) for row in ids.tolist() for pixel in row)

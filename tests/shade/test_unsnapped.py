@@ -9,7 +9,7 @@ from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
 from topleft._meshes.picture.scene_shade import shade
-from topleft._meshes.picture.shade import shade_normals
+from topleft._meshes.picture.shade import ShownInstance, shade_normals
 
 SIZE = (150, 70)
 CAMERA = tl.Camera.look_at((0, 0, 4), ortho_height=2.0, near=1.0, far=9.0)
@@ -43,7 +43,8 @@ def exact_weights(corners_px, x, y):
 
 def found_weights(frags, mesh, camera, step=1):
     """Of some pixels (row, column) the weights by which the normals of their corners, three axes, are mixed."""
-    normals = shade_normals(frags, mesh, camera, np.eye(3))  # the camera looks along -z, x to the right
+    shown = [ShownInstance(frags._snapped, mesh)]
+    normals = shade_normals(shown, frags.triangle, camera, np.eye(3))  # the camera looks along -z, x to the right
     for y, x in np.argwhere(frags.mask)[::step].tolist():
         mixed = np.abs(normals[y, x].astype(np.float64))
         yield y, x, (mixed / mixed.sum()).tolist()

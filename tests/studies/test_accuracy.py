@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +13,11 @@ from benchmarks.accuracy.filling import samplings
 from benchmarks.accuracy.options import Options
 from benchmarks.accuracy.stability import CHANGES, count_flips, touch
 from benchmarks.accuracy.tables import with_no_snap
-from benchmarks.exact.area import draw_area
-from benchmarks.exact.unsnapped import draw_unsnapped, edge_sign, meets_pixel
 from benchmarks.scenes.families import FAMILIES, NO_SNAP, Entry, entries, in_cells
 
 import topleft as tl
 from topleft import scenes
-from topleft.methods import reference
-from topleft.methods.reference import area as reference_area
+from topleft.methods.reference.integers import ExactPicture
 
 SIZE = (12, 11)
 METHODS = ["auto", "row_crossing/cull-front", "float_barycentric"]
@@ -29,79 +25,10 @@ CHARTS = [f"accuracy-{name}" for name in ("coverage", "antialiasing", "depth")]
 CHARTS += [f"speed-{name}" for name in ("sizes", "scaling", "tutorial")]
 
 
-def random_scene(bits, seed):
-    """Triangles on a grid of 2**-bits px, degenerate ones among them: a snap to these bits changes nothing."""
-    rng = np.random.default_rng(seed)
-    vertices = np.rint(rng.uniform(-3, 15, (9, 2)) * 2**bits) / 2**bits
-    return vertices, rng.integers(0, 9, (6, 3)).astype(np.int32)
-
-
-@pytest.mark.parametrize("bits", [0, 1, 4, 8])
-@pytest.mark.parametrize("seed", range(5))
-def test_exact_picture_on_the_grid_is_that_of_the_reference(bits, seed):
-    vertices, triangles = random_scene(bits, seed)
-    ids, count = np.full(SIZE[::-1], -1), np.zeros(SIZE[::-1], int)
-    for fragment in reference.fragments(vertices, triangles, SIZE, subpixel_bits=bits):
-        count[fragment.row, fragment.column] += 1
-        ids[fragment.row, fragment.column] = fragment.piece.triangle
-    exact = draw_unsnapped(vertices, triangles, SIZE)
-    assert exact.count.tolist() == count.tolist()
-    assert exact.triangle.tolist() == ids.tolist()
-
-
-@pytest.mark.parametrize("bits", [0, 1, 8])
-@pytest.mark.parametrize("seed", range(3))
-def test_exact_area_on_the_grid_is_that_of_the_reference(bits, seed):
-    vertices, triangles = random_scene(bits, seed)
-    expected = reference_area.area(vertices, triangles, SIZE, subpixel_bits=bits).astype(float)
-    assert np.abs(draw_area(vertices, triangles, SIZE) - expected).max() < 1e-9  # what exact/area.py promises
-
-
-def test_edge_sign_last_bit_decides():
-    p, q = np.array([[0.1, 0.1]]), np.array([[1000.3, 1000.3]])
-    for nudge, sign in ((-np.inf, -1), (0.1, 0), (np.inf, 1)):
-        s = np.array([[0.1, np.nextafter(0.1, nudge)]])
-        assert edge_sign(p, q, s).tolist() == [sign]
-
-
-def test_exact_picture_a_vertex_one_ulp_beyond_a_centre_covers_it():
-    triangles = np.array([[0, 1, 2]], np.int32)
-    for x, is_covered in ((2.5, False), (np.nextafter(2.5, 3), True)):  # the right corner is open
-        vertices = np.array([[0.0, 0.0], [x, 1.5], [0.0, 3.0]])
-        assert draw_unsnapped(vertices, triangles, (4, 4)).count[1, 2] == is_covered
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_meets_pixel_agrees_with_a_segment_cut_by_fractions(seed):
-    p, q = np.random.default_rng(seed).integers(-8, 25, (2, 2)) / 8
-    row, column = np.divmod(np.arange(9), 3)
-    expected = [clipped_segment_is_left(p, q, j, i) for i, j in zip(row.tolist(), column.tolist(), strict=True)]
-    assert meets_pixel(np.tile(p, (9, 1)), np.tile(q, (9, 1)), column, row).tolist() == expected
-
-
-def clipped_segment_is_left(p, q, column, row):
-    """Whether part of p to q lies in the square, by Liang and Barsky's cut."""
-    first, last = Fraction(0), Fraction(1)
-    for start, end, low in zip(map(Fraction, p.tolist()), map(Fraction, q.tolist()), (column, row), strict=True):
-        if start == end:
-            if not low <= start <= low + 1:
-                return False
-            continue
-        cuts = sorted([(low - start) / (end - start), (low + 1 - start) / (end - start)])
-        first, last = max(first, cuts[0]), min(last, cuts[1])
-    return first <= last
-
-
-def test_exact_picture_of_a_mesh_covers_each_pixel_once():
-    exact = draw_unsnapped(*scenes.planar_mesh(200, 64, 48), (64, 48))
-    assert (exact.count == 1).all()
-    assert 0 < exact.is_edge.sum() < exact.is_edge.size
-
-
 @pytest.mark.parametrize("name", FAMILIES)
 def test_family_in_cells_no_triangle_meets_another(name):
     vertices, triangles = in_cells(FAMILIES[name], 1, 700)
-    assert draw_unsnapped(vertices, triangles, (700, 700)).count.max() == 1
+    assert ExactPicture(vertices, triangles, (700, 700)).count.max() == 1
 
 
 def test_entries_every_method_that_fills_at_every_precision():

@@ -10,15 +10,13 @@ import pytest
 from benchmarks import cli
 from benchmarks.atlas import measure as atlas
 from benchmarks.atlas import shrink as atlas_shrink
-from benchmarks.atlas.depth import DEPTH_FAMILIES, DepthScene, Picture, draw, judge_depth
-from benchmarks.exact.clip import draw_clip, pieces_picture
-from benchmarks.exact.unsnapped import draw_unsnapped
+from benchmarks.atlas.depth import DEPTH_FAMILIES, DepthScene, Picture, draw, draw_clip, draw_pieces, judge_depth
 from benchmarks.harness.machine import IMAGES, PAGES, RECORDS, ROOT
 
 from topleft._apps.explore.race import PRODUCTION, Entry, entries
 from topleft.failure_scenes import FAILURE_SCENES, picture
-from topleft.methods import CLASSICS, reference
-from topleft.methods.reference.integers import draw_points, snapped_points, true_points
+from topleft.methods import CLASSICS
+from topleft.methods.reference.integers import ExactPicture
 from topleft.scene_families import FAMILIES
 
 SIZE = (12, 11)
@@ -41,39 +39,6 @@ def record():
 # ---- exact pictures -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("bits", [0, 1, 8, 30])
-def test_exact_integers_are_those_of_fractions(bits):
-    for seed in range(4):
-        vertices, triangles = random_scene(bits, seed)
-        exact, got = draw_unsnapped(vertices, triangles, SIZE), draw_points(true_points(vertices), triangles, SIZE)
-        assert got.triangle.tolist() == exact.triangle.tolist()
-        assert got.count.tolist() == exact.count.tolist()
-        assert got.is_edge.tolist() == exact.is_edge.tolist()
-
-
-@pytest.mark.parametrize("bits", [0, 8])
-def test_exact_integers_after_a_snap_far_away_are_those_of_the_reference(bits):
-    vertices, triangles = random_scene(3, 1)
-    vertices = vertices + 2.0**45
-    origin = (2**45, 2**45)
-    expected = reference.overdraw(vertices, triangles, SIZE, origin=origin, subpixel_bits=bits)
-    assert draw_points(snapped_points(vertices, str(bits)), triangles, SIZE, origin).count.tolist() == expected.tolist()
-
-
-def test_exact_integers_bottom_right_is_top_left_turned_half_round():
-    vertices, triangles = random_scene(1, 2)
-    turned = draw_points(true_points(np.array(SIZE) - vertices), triangles, SIZE).count[::-1, ::-1]
-    assert draw_points(true_points(vertices), triangles, SIZE, rule="bottom-right").count.tolist() == turned.tolist()
-
-
-def test_snapped_points_by_kind():
-    vertices = np.array([[-1.75, 2.5], [1 / 3, 3.0]])
-    assert snapped_points(vertices, "px").xy == [(-1, 5), (1, 7)]
-    assert snapped_points(vertices, "0").xy == [(-4, 4), (0, 6)]
-    assert snapped_points(vertices, "8").xy == [(-896, 1280), (170, 1536)]
-    assert snapped_points(vertices, "float32") == true_points(vertices.astype(np.float32))
-
-
 def test_exact_clip_of_what_lies_before_the_near_plane_is_that_of_pixels():
     vertices, triangles = random_scene(4, 3)
     ndc = vertices / (np.array(SIZE) / 2) * [1, -1] + [-1, 1]
@@ -81,18 +46,18 @@ def test_exact_clip_of_what_lies_before_the_near_plane_is_that_of_pixels():
     clip = np.concatenate([ndc * w, 0 * w, w], axis=-1)
     vertices = (ndc * [1, -1] + 1) * (np.array(SIZE) / 2)  # rounded as the corners of the picture are
     ids, count = draw_clip(clip, triangles, SIZE)
-    exact = draw_unsnapped(vertices, triangles, SIZE)
+    exact = ExactPicture(vertices, triangles, SIZE)
     assert (count != exact.count).sum() + (ids != exact.triangle).sum() == 0
 
 
 def test_exact_clip_near_plane_cuts_a_floor():
     floor = np.array([[-9.0, -1, -5, -4], [9, -1, -5, -4], [0, -1, 7, 9]])  # from behind the eye to w = 9
     ids, count = draw_clip(floor, np.array([[0, 1, 2]]), (8, 8))
-    snapped = pieces_picture(floor, np.array([[0, 1, 2]]), (8, 8), 16)
+    ids_of_pieces, count_of_pieces = draw_pieces(floor, np.array([[0, 1, 2]]), (8, 8), 16)
     assert count.sum() > 0
     assert not count[:4].any()  # below the horizon
-    assert count.tolist() == snapped.count.tolist()
-    assert ids.tolist() == snapped.triangle.tolist()
+    assert count.tolist() == count_of_pieces.tolist()
+    assert ids.tolist() == ids_of_pieces.tolist()
 
 
 def test_judge_depth_sees_a_depth_that_is_off_and_a_triangle_that_hides_a_nearer_one():
@@ -117,7 +82,7 @@ def test_family_first_and_last_scene_cover_the_frame_once(name):
     family = FAMILIES[name]
     for pick in (0, -1):
         scene = family.make(*(list(axis.values.values())[pick] for axis in family.axes), 0)
-        exact = draw_points(true_points(scene.vertices), scene.triangles, scene.size, scene.origin)
+        exact = ExactPicture(scene.vertices, scene.triangles, scene.size, origin=scene.origin)
         assert (exact.count == 1).all()
         assert exact.is_edge.any()
 

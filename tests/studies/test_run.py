@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from benchmarks import cli
-from benchmarks.exact.pictures import compare, draw_exact
+from benchmarks.harness.errors import compare, draw_exact
 from benchmarks.harness.rounds import Options, run_cases
 from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick, YardstickError
 from benchmarks.peers import PEERS, load_peer, why_not

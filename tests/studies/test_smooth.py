@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benchmarks.exact.pictures import area_error, draw_exact
+from benchmarks.harness.errors import area_error, draw_exact
 from benchmarks.harness.rounds import Options, run_cases
 from benchmarks.peers import load_peer
 from benchmarks.run import smooth_tables

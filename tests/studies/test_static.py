@@ -69,11 +69,11 @@ def test_other_bits_are_an_error(monkeypatch):
         static.measure_scene(scene, static.Options(rounds=1, seconds=0.0))
 
 
-def test_ways_draw_as_they_say(monkeypatch):
+def test_ways_draw_as_they_say(force):
     scene = scene_named("blob 10M, inside, cull none")  # 200,000 triangles
     asked = []
     kept = choices.pays_to_draw_clusters
-    monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *a: asked.append(kept(*a)) or asked[-1])
+    force(pays_to_draw_clusters=lambda *a: asked.append(kept(*a)) or asked[-1])
     row = static.measure_scene(scene, static.Options(rounds=1, seconds=0.0))
     assert row["is_clustered"]
     assert row["shares"]["outside"] > 0.5

@@ -8,17 +8,18 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
-import int64_loop
 import numpy as np
 import pytest
 from comparing import assert_same
-from int64_loop import DEPTH_TESTS
 from strategies import soup
 
 import topleft as tl
 from topleft._core import engine
+from topleft._core.raster import choices
+from topleft.methods.reference.integers import ExactPicture, projected, snapped
 
 THREADS = (1, 2, 3, 8)
+DEPTH_TESTS = ("less", "greater", None)
 
 #: Stands above all other marks: pytest then draws a scene on each instruction set before it makes the next.
 ON_EACH_ISA = pytest.mark.parametrize("isa", tl.build_info()["isa_available"])
@@ -94,16 +95,28 @@ class Expected:
     depth: dict
 
 
+def exact_picture(scene, tests=DEPTH_TESTS):
+    """The exact picture of a scene in pixels or in clip space, after the snap."""
+    view = dict(scene.view)
+    bits, transform = view.get("subpixel_bits", 8), view.get("transform")
+    if transform is not None or scene.vertices.shape[1] == 4:
+        vertices = projected(scene.vertices, view.get("viewport", scene.size), bits, transform)
+    else:
+        vertices = snapped(scene.vertices, bits)
+    options = {"origin": view.get("origin", (0, 0)), "cull": view.get("cull", "none"), "depth_tests": tests}
+    return ExactPicture(vertices, scene.triangles, scene.size, **options)
+
+
 def expect(scene, tests=DEPTH_TESTS):
-    """Counts and ids of the loop, and the plain depths, which lie within their bound of the loop's."""
-    loop = int64_loop.draw_scene(scene, tests)
+    """Counts and ids of the exact picture, and the plain depths, which lie within their bound of its own."""
+    picture = exact_picture(scene, tests)
     depth = {test: plain(scene, test).depth for test in tests}
-    for test, ids in loop.ids.items():
-        exact, largest = loop.depth(ids)
+    for test, ids in picture.ids.items():
+        exact, largest = picture.depth(ids)
         with np.errstate(invalid="ignore", over="ignore"):
             half_ulp = np.spacing(abs(depth[test])).astype(np.float64) / 2
             assert not (abs(depth[test] - exact) > half_ulp + 2.0**-35 * largest).any()  # docs/design/rules.md, rule 8
-    return Expected(loop.counts, loop.ids, depth)
+    return Expected(picture.count, picture.ids, depth)
 
 
 def plain(scene, test):
@@ -122,8 +135,7 @@ def cases(make, *arguments):
 @contextmanager
 def sharing(is_shared):
     """Threads share the triangles of any scene, or set up all of them in each."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules["topleft._core.raster.choices"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
+    with choices.forced(shared_setups=0 if is_shared else 2**62):
         yield
 
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 import topleft as tl
 from topleft._apps.cli.targets import read_texture
-from topleft._meshes.plan.costs import Costs, load_costs
+from topleft._core.raster.costs import Costs, load_costs
 from topleft.errors import ImageError, MeshError
 
 N = int(os.environ.get("TOPLEFT_MUTATIONS", str(N_MUTATIONS // 2)))

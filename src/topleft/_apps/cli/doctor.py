@@ -13,7 +13,7 @@ from typing import Any
 
 from topleft._core.base.threads import available_threads
 from topleft._core.engine.isa import build_info
-from topleft._meshes.plan.costs import cache_file, load_costs
+from topleft._core.raster.costs import cache_file, load_costs
 
 #: Extras for those who change the library; their packages are not listed.
 OWN_EXTRAS = frozenset({"all", "bench", "dev", "docs", "test"})

@@ -16,11 +16,11 @@ from topleft._apps.cli.arguments import (
 )
 from topleft._apps.cli.targets import MeshSource, Orbit
 from topleft._core.base.options import Cull, Sampling
+from topleft._core.raster.costs import save_costs
 from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.render import DEFAULT_SIZE
-from topleft._meshes.plan.costs import save_costs
 from topleft._meshes.plan.plan import plan
 
 
@@ -55,11 +55,13 @@ def run_explain(options: argparse.Namespace) -> int:
 
 
 def run_calibrate(_: argparse.Namespace) -> int:
-    """Measure this machine for some ten seconds and keep what estimates are made from."""
+    """Measure this machine for half a minute and keep its costs, which choices and estimates follow from."""
     from topleft._meshes.plan.calibrate import calibrate
 
     costs = calibrate()
-    print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual['worst']:.1f}")
+    before, after, n = costs.tuned
+    print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual[1]:.1f}")
+    print(f"of {n} scenes not fitted, what is chosen takes {before:.3f} -> {after:.3f} times as long as the best")
     return 0
 
 

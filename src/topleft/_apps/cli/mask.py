@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
+import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ from topleft._apps.cli.render import FAILED, complain
 from topleft._core.base.grid import Grid
 from topleft._core.base.options import Sampling
 from topleft._core.polygons.polygons import Rule, polygons
+from topleft._core.polygons.prepared import MAX_CROSSINGS
 from topleft._meshes.io.images import SUFFIXES, save_image
 from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
 
@@ -23,7 +27,8 @@ MASK_HELP = """\
 FILE is GeoJSON (Polygon, MultiPolygon, features and collections of them; y is up) or annotations in the format of COCO
 (a picture for each image, of its size): polygons and run lengths, as lists and as text.
 
-OUT is a file, or for several images a pattern: masks/{name}.png. A mask is 255 inside and 0 outside, with --sampling
+OUT is a file, or for several images a pattern: masks/{name}.png, or masks/{folder}/{name}.png where images of several
+folders have one name; {index} is the number of the image. A mask is 255 inside and 0 outside, with --sampling
 area and msaa2 to msaa16 the share of the pixel in between. --labels writes numbers: index, of the objects in their
 order from 1 on, or a property of the features or annotations, such as category_id; 0 where nothing is. PNG holds
 numbers up to 65535; .npy and TIFF hold all.
@@ -34,28 +39,48 @@ def run_mask(options: argparse.Namespace) -> int:
     """Write masks or labels of the polygons in a file."""
     pictures = load_polygons(options.file, has_crowds=not options.no_crowds)
     if options.image is not None:
-        pictures = [picture for picture in pictures if picture.name == options.image]
+        pictures = [p for p in pictures if options.image in (p.name, f"{p.folder}/{p.name}")]
         if not pictures:
             raise UsageError(f"--image {options.image}: {options.file} has no image of that name")
-    if len(pictures) > 1 and "{name}" not in options.out:
+    if len(pictures) > 1 and "{name}" not in options.out and "{index}" not in options.out:
         raise UsageError(f"{options.file} has {len(pictures)} images: -o needs {{name}}, or --image chooses one")
     if Path(options.out).suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
-    status = 0
-    for picture in pictures:
-        path = Path(options.out.replace("{name}", picture.name))
+    status, paths = 0, paths_of(pictures, options.out)
+    for path, picture in zip(paths, pictures, strict=True):
         path.parent.mkdir(parents=True, exist_ok=True)
-        save_image(path, draw(picture, options))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", UserWarning)
+            drawn = draw(picture, options)
+        save_image(path, drawn)
+        for one in caught:
+            complain(f"{picture.name}: {one.message}")
         if picture.n_skipped:
             complain(f"{picture.name}: {picture.n_skipped} objects are no polygons and were left out")
             status = FAILED
     return status
 
 
+def paths_of(pictures: list[PolygonPicture], out: str) -> list[Path]:
+    """Return where each picture goes."""
+    found: dict[Path, PolygonPicture] = {}
+    for i, picture in enumerate(pictures):
+        words = {"{name}": picture.name, "{folder}": picture.folder, "{index}": f"{i:03d}"}
+        if "{folder}" in out and Path(picture.folder).is_absolute():
+            raise UsageError(f"-o {out}: image {picture.name} lies in {picture.folder}, no folder within another")
+        path = Path("".join(words.get(part, part) for part in re.split(r"(\{name\}|\{folder\}|\{index\})", out)))
+        if path in found:
+            folders = f"{found[path].folder}/{found[path].name} and {picture.folder}/{picture.name}"
+            raise UsageError(f"-o {out}: images {folders} would both go to {path}; {{folder}} or {{index}} parts them")
+        found[path] = picture
+    return list(found)
+
+
 def draw(picture: PolygonPicture, options: argparse.Namespace) -> npt.NDArray[Any]:
     """Return the mask or the labels of a picture."""
     frame = frame_of(picture, options)
     how: dict[str, Any] = {"rule": options.rule, "sampling": options.sampling, "threads": options.threads}
+    how["max_crossings"] = options.max_crossings
     if options.labels is None:
         mask = polygons(picture.polygons, frame, **how)
         return np.rint(mask * np.float32(255)).astype(np.uint8)
@@ -76,7 +101,7 @@ def labels_of(picture: PolygonPicture, name: str) -> npt.NDArray[np.int32]:
     numbers = []
     for i, said in enumerate(picture.objects):
         value = said.get(name)
-        if not isinstance(value, (int, float)) or value != int(value) or not 0 <= value < 2**31:
+        if not isinstance(value, (int, float)) or not 0 <= value < 2**31 or value != int(value):
             raise UsageError(
                 f"--labels {name}: object {i} of {picture.name} has {value!r}, not a whole number from 0 on"
             )
@@ -90,7 +115,7 @@ def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[int,
         if options.extent is not None or options.size is not None:
             raise UsageError("--size and --extent are for GeoJSON: images have a size")
         return picture.size
-    points = np.array([p for rings in picture.polygons for ring in rings for p in ring], float).reshape(-1, 2)
+    points = picture.polygons[0]
     if options.extent is None and not len(points):
         raise UsageError(f"{options.file} has no polygons: --extent must say what is shown")
     if options.extent is None:
@@ -101,7 +126,10 @@ def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[int,
     wide, tall = extent[1] - extent[0], extent[3] - extent[2]
     if options.size is not None or not (wide > 0 and tall > 0):
         return Grid(options.size or (DEFAULT_SIDE, DEFAULT_SIDE), extent)
-    scale = DEFAULT_SIDE / max(wide, tall)
+    with np.errstate(all="ignore"):
+        scale = float(np.float64(DEFAULT_SIDE) / max(wide, tall))
+    if not 0 < scale < math.inf:
+        raise UsageError(f"{options.file} reaches over {wide} x {tall}: --extent must say what is shown")
     return Grid((max(1, round(wide * scale)), max(1, round(tall * scale))), extent)
 
 
@@ -128,4 +156,11 @@ def add_mask_command(commands: Any) -> None:
     )
     mask.add_argument("--no-crowds", action="store_true", help="leave out annotations of COCO that are crowds")
     mask.add_argument("--image", metavar="NAME", help="the one of several images, its file name without the end")
+    mask.add_argument(
+        "--max-crossings",
+        type=positive,
+        default=MAX_CROSSINGS,
+        metavar="N",
+        help=f"refuse rings that cross more often with --sampling area, outer and inner ({MAX_CROSSINGS})",
+    )
     mask.add_argument("--threads", type=positive, metavar="N", help="how many at most")

@@ -24,8 +24,9 @@ from topleft._core.base.whole_file import remove_stale_parts
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.file_cameras import load_cameras
 from topleft._meshes.io.images import SUFFIXES
+from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.load import load
-from topleft._meshes.io.references import decoded
+from topleft._meshes.io.references import opened, rgba_of
 from topleft._meshes.model.environment import Environment
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh
@@ -116,7 +117,12 @@ def read_image(path: str) -> npt.NDArray[np.uint8]:
     if not Path(path).is_file() and Path(path).exists():
         raise ImageError(f"cannot read {path!r}: it is no file")
     try:
-        return decoded(Path(path).read_bytes())
+        budget = Budget(path)
+        budget.read(Path(path).stat().st_size)
+        with opened(Path(path).read_bytes()) as image:
+            if not budget.has("max_texture_pixels", image.width * image.height):
+                raise MeshError(f"of more than {budget.limit('max_texture_pixels')} pixels")
+            return rgba_of(image)
     except MeshError as error:
         raise ImageError(f"cannot read {path!r}: it is {error}") from None
     except (OSError, ValueError, SyntaxError, EOFError) as error:

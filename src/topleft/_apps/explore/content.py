@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import failure_scenes, scenes
 from topleft._apps.explore.session import Content
 from topleft._core.base.arrays import as_checked_triangles, as_size, as_vertices
+from topleft._meshes.io.limits.budget import Budget
+from topleft._meshes.io.limits.npy import arrays_of
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.scene.adapt import as_mesh
 from topleft.errors import MeshError
@@ -68,10 +72,11 @@ def content_of_name(name: str, size: Any = None) -> Content:
 def content_of_arrays(path: Path, size: Any) -> Content:
     """Return what an .npz file with `vertices`, `triangles` and maybe `size` holds: pixels, or a mesh."""
     try:
-        with np.load(path, allow_pickle=False) as found:
-            arrays = {name: found[name] for name in ("vertices", "triangles", "size") if name in found}
-    except (OSError, ValueError, EOFError) as error:
-        if isinstance(error, FileNotFoundError):
+        with arrays_of(path, Budget(str(path))) as array:
+            found = {name: array(name) for name in ("vertices", "triangles", "size")}
+            arrays = {name: own for name, own in found.items() if own is not None}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        if isinstance(error, FileNotFoundError) or repr(str(path)) in str(error):
             raise
         raise MeshError(f"{path}: not an .npz file of arrays") from error
     if missing := [name for name in ("vertices", "triangles") if name not in arrays]:

@@ -242,7 +242,7 @@ def load_bytes(data: bytes | memoryview, name: str) -> tuple[Mesh, list[str]]:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                mesh = load(path, max_vertices=MAX_VERTICES)
+                mesh = load(path, max_vertices=MAX_VERTICES if len(data) > MAX_VERTICES else None)
             except MeshError as error:
                 raise MeshError(str(error).replace(str(path), Path(name).name)) from None
         lacks = [str(one.message).replace(str(path), Path(name).name) for one in caught]

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._apps.explore.content import scene
-from topleft._apps.explore.exact import draw_exact
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._apps.explore.state import PixelState, parse_state
 from topleft._core.raster.verbs import coverage, fill, overdraw, rasterize, wireframe
 from topleft._meshes.plan.plan import plan
 from topleft.methods import CLASSICS, METHODS
 from topleft.methods.reference import area, sampling
+from topleft.methods.reference.integers import ExactPicture
 
 EXACT = "exact"
 """The name of the exact picture where others are those of methods."""
@@ -48,8 +48,8 @@ DIFFERENCES = np.array(
 
 INK = (60, 72, 88, 255)
 
-MAX_EXACT_ROWS, MAX_EXACT_DEPTHS = 1_000_000, 50_000
-"""Rows of triangles, and samples with a depth, of the exact picture: about two seconds."""
+MAX_EXACT_SAMPLES, MAX_EXACT_DEPTHS = 50_000_000, 50_000
+"""Samples in the boxes of triangles, and covered ones with a depth, of the exact picture: two or three seconds."""
 
 MAX_SLOW_TESTS = 6000
 """Pixels times triangles of what the reference alone can draw: areas and conservative coverage, about half a second."""
@@ -148,14 +148,19 @@ def draw_reference(state: PixelState) -> MethodPicture:
     n = int(state.sampling.removeprefix("msaa")) if state.sampling != "center" else 1
     positions = sampling.SAMPLE_POSITIONS[n]
     n_samples = n * int(overdraw(state.vertices, state.triangles, state.size, origin=state.origin).sum())
-    n_rows = n * height * len(state.triangles)
-    if n_rows > MAX_EXACT_ROWS or (state.has_depth and n_samples > MAX_EXACT_DEPTHS):
+    corners = state.vertices[state.triangles, :2] - state.origin
+    low, high = (np.clip(ends, 0, state.size) for ends in (corners.min(axis=1), corners.max(axis=1)))
+    n_in_boxes = n * (high - low + 1).prod(axis=1).sum()
+    if n_in_boxes > MAX_EXACT_SAMPLES or (state.has_depth and n_samples > MAX_EXACT_DEPTHS):
         raise ValueError("the exact picture takes too long here: make the window smaller, or take fewer triangles")
 
     def both() -> NDArray[np.int32]:
-        given = (state.vertices, state.triangles, state.size, state.origin, positions)
-        return np.stack(draw_exact(*given, cull=state.cull, depth_test=state.depth_test))
+        given = (state.vertices, state.triangles, state.size)
+        options: dict[str, Any] = {"origin": state.origin, "cull": state.cull, "depth_tests": (depth_test,)}
+        pictures = [ExactPicture(*given, sample=at, **options) for at in positions]
+        return np.stack([np.stack([one.triangle, one.count]) for one in pictures], axis=-1)
 
+    depth_test = state.depth_test if state.has_depth else None
     (owners, counts), seconds = timed(both)
     return MethodPicture(owners, counts, share_of(owners), seconds)
 

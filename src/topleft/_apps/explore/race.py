@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._core.raster.verbs import fill, overdraw
 from topleft.methods import CLASSICS, find_method
-from topleft.methods.reference.integers import ExactPicture, WidePoints, draw_points, signed_area, snapped_points
+from topleft.methods.reference.integers import ExactPicture, snapped, turns
 from topleft.scene_families import FAMILIES, Axis, PixelScene
 
 NO_SNAP = "exact"
@@ -48,15 +48,15 @@ class Entry:
 
     @property
     def snap(self) -> str:
-        """What the method makes of vertices first, as `snapped_points` calls it."""
+        """What the method makes of vertices first, as `snapped` calls it."""
         method = find_method(self.method)
         if self.bits == NO_SNAP:
-            return "true"
+            return NO_SNAP
         if method.code is not None or method.has_subpixel_bits:
             return str(self.bits)
         if method.claims.integer_vertices:
             return "px"
-        return "true" if self.method.endswith("float64") else "float32"
+        return NO_SNAP if self.method.endswith("float64") else "float32"
 
     @property
     def rule(self) -> str:
@@ -75,8 +75,7 @@ class Entry:
         winding = find_method(self.method).claims.winding
         if winding == "either":
             return scene
-        points = snapped_points(scene.vertices, self.snap)
-        is_clockwise = np.array([signed_area(points, triangle) > 0 for triangle in scene.triangles.tolist()])
+        is_clockwise = turns(snapped(scene.vertices, self.snap)[scene.triangles]) > 0
         is_wrong = is_clockwise != (winding == "clockwise")
         return scene._replace(triangles=np.where(is_wrong[:, None], scene.triangles[:, ::-1], scene.triangles))
 
@@ -113,12 +112,13 @@ class Exact:
         self.scene = scene
         self.pictures: dict[tuple[str, str], ExactPicture] = {}
 
-    def picture(self, snap: str = "true", rule: str = "top-left") -> ExactPicture:
+    def picture(self, snap: str = NO_SNAP, rule: str = "top-left") -> ExactPicture:
         """Return the picture of one copy after a snap."""
         if (snap, rule) not in self.pictures:
-            points: WidePoints = snapped_points(self.scene.vertices, snap)
             scene = self.scene
-            self.pictures[snap, rule] = draw_points(points, scene.triangles, scene.size, scene.origin, rule)
+            vertices = snapped(scene.vertices, snap)
+            picture = ExactPicture(vertices, scene.triangles, scene.size, origin=scene.origin, rule=rule)
+            self.pictures[snap, rule] = picture
         return self.pictures[snap, rule]
 
     def labels(self) -> NDArray[np.int32]:

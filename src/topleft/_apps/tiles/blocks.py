@@ -25,6 +25,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import I32, Array
 from topleft._core.base.arrays import INT32_MAX, as_aligned, as_array, shown
 from topleft._core.base.memory import FRESH, Memory
+from topleft._meshes.io.limits.npy import check_header
 from topleft._meshes.io.load import load
 from topleft._meshes.io.ply import mapped_elements
 from topleft._meshes.io.stl_off import mapped_corners
@@ -238,6 +239,8 @@ def of_arrays(points: Any, triangles: Any, faces: Array | None = None, n_faces: 
 def mapped_npy(path: Path) -> Array:
     """Return the array of a .npy file, mapped."""
     try:
+        with path.open("rb") as file:
+            check_header(file, path.stat().st_size)
         return np.load(path, mmap_mode="r")
     except ValueError as error:
         raise MeshError(f"cannot read {path}: {error}") from None

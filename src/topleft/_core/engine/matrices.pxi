@@ -111,14 +111,17 @@ def determinant(a: ArrayLike) -> float:
     return determinant_of(m)
 
 
-@cython.cdivision(True)  # IEEE: no number where there is none
-def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width,
-                double height) -> tuple[bool, F64, float]:
-    """Return how a camera sees a space whose origin is at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
+cdef struct Rays:
+    # How a camera sees a space: rows of eye, four of rays, three to eye space, origin.
+    bint has_perspective
+    double[9][3] rows
+    double scale
 
-    `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale. The rows: eye,
-    four of rays, three to eye space, origin.
-    """
+
+@cython.cdivision(True)  # IEEE: no number where there is none
+cdef int find_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width, double height,
+                   Rays *out) except -1:
+    """Find how a camera sees a space whose origin is at `center`; `view`: (4, 4), to eye space."""
     cdef double[4][4] clip
     cdef double[3] offset
     cdef double[4][8] rows
@@ -130,8 +133,8 @@ def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const
             for k in range(4):
                 total = total + clip_from_eye[i, k] * view[k, j]
             clip[i][j] = total
-    cdef bint has_perspective = clip[3][0] != 0.0 or clip[3][1] != 0.0 or clip[3][2] != 0.0
-    cdef int[3] own = [0, 1, 3 if has_perspective else 2]
+    out.has_perspective = clip[3][0] != 0.0 or clip[3][1] != 0.0 or clip[3][2] != 0.0
+    cdef int[3] own = [0, 1, 3 if out.has_perspective else 2]
     for i in range(3):
         for j in range(3):
             rows[i][j] = clip[own[i]][j]
@@ -142,32 +145,59 @@ def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const
             total = total + rows[i][3 + k] * clip[own[k]][3]
         offset[i] = total
     # the corner, one column, one row and the whole depth, of clip space
-    cdef double[4][3] ends = [[-1.0, 1.0, 1.0 if has_perspective else -1.0], [2.0 / width, 0.0, 0.0], [0.0, -2.0 / height, 0.0], [0.0, 0.0, 2.0]]
-    result = np.empty((9, 3))
-    cdef double[:, ::1] out = result
+    cdef double[4][3] ends = [[-1.0, 1.0, 1.0 if out.has_perspective else -1.0], [2.0 / width, 0.0, 0.0], [0.0, -2.0 / height, 0.0], [0.0, 0.0, 2.0]]
     for i in range(4):
         for j in range(3):
             total = 0.0
             for k in range(3):
                 total = total + ends[i][k] * rows[j][3 + k]
-            out[1 + i, j] = total
-    if has_perspective:
+            out.rows[1 + i][j] = total
+    if out.has_perspective:
         for j in range(3):
-            out[0, j] = -offset[j] - center[j]
+            out.rows[0][j] = -offset[j] - center[j]
     else:
         for j in range(3):
-            out[1, j] = out[1, j] - (offset[j] + center[j])
-        unit = length(result[4])
+            out.rows[1][j] = out.rows[1][j] - (offset[j] + center[j])
+        unit = sqrt((out.rows[4][0] * out.rows[4][0] + out.rows[4][1] * out.rows[4][1]) + out.rows[4][2] * out.rows[4][2])
         for j in range(3):
-            out[0, j] = -out[4, j] / unit
-    unit = cube_root(determinant_of(view))
+            out.rows[0][j] = -out.rows[4][j] / unit
+    out.scale = cube_root(determinant_of(view))
     for i in range(3):
         total = 0.0
         for k in range(3):
-            out[5 + i, k] = view[i, k] / unit
+            out.rows[5 + i][k] = view[i, k] / out.scale
             total = total + view[i, k] * center[k]
-        out[8, i] = total + view[i, 3]
-    return has_perspective, result, unit
+        out.rows[8][i] = total + view[i, 3]
+    return 0
+
+
+def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width,
+                double height) -> tuple[bool, F64, float]:
+    """Return how a camera sees a space whose origin is at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
+
+    `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale.
+    """
+    cdef Rays rays
+    find_rays(clip_from_eye, view, center, width, height, &rays)
+    result = np.empty((9, 3))
+    cdef double[:, ::1] out = result
+    memcpy(&out[0, 0], rays.rows, sizeof(rays.rows))
+    return rays.has_perspective, result, rays.scale
+
+
+def turns(const double[:, :] view) -> tuple[bool, bool]:
+    """Return whether a matrix (4, 4) keeps angles and does not mirror, and whether it mirrors."""
+    cdef double[3] squares, products
+    cdef double scale, error = 0.0, turn = determinant_of(view)
+    cdef int i, j
+    for i in range(3):
+        j = (i + 1) % 3
+        squares[i] = (view[i, 0] * view[i, 0] + view[i, 1] * view[i, 1]) + view[i, 2] * view[i, 2]
+        products[i] = (view[i, 0] * view[j, 0] + view[i, 1] * view[j, 1]) + view[i, 2] * view[j, 2]
+    scale = ((squares[0] + squares[1]) + squares[2]) / 3
+    for i in range(3):
+        error = max(error, fabs(products[i]), fabs(squares[i] - scale))
+    return error <= 1e-9 * scale and turn > 0.0, not turn > 0.0
 
 
 def row_products(a: ArrayLike, b: ArrayLike) -> F64:

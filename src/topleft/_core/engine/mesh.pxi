@@ -47,6 +47,20 @@ def face_angles(Source source, const int32_t[:, ::1] triangles, int64_t first, i
     return bad
 
 
+def cut_faces(const double[:, ::1] points, const int64_t[::1] corners, const int64_t[::1] n_corners,
+              int64_t most_corners, int64_t most_steps, int64_t[:, ::1] triangles) -> int:
+    """Write the triangles of faces, one after the other, at least one; returns how many are finished."""
+    cdef int64_t[::1] room = np.empty(tl_ear_words(most_corners), np.int64)
+    cdef tl_faces faces
+    cdef int64_t n
+    faces.points, faces.corners, faces.n_corners = &points[0, 0], &corners[0], &n_corners[0]
+    faces.n_faces, faces.most_steps, faces.pause = n_corners.shape[0], most_steps, pause_of_thread()
+    with nogil:
+        n = K.cut_faces(&faces, &triangles[0, 0], &room[0])
+    raise_if_given_up()
+    return n
+
+
 cdef class Fans:
     """The triangles round the vertices of a mesh: `tl_fans`, at least one triangle. The indices have been checked."""
 

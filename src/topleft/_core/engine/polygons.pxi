@@ -49,6 +49,7 @@ cdef class SnappedPolygons:
     cdef int32_t[:, ::1] boxes
     cdef object arrays
     cdef readonly int64_t n_polygons, n_rings, width, height
+    cdef int64_t crossings_left, max_crossings
 
     def __init__(self, int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx or None, const int64_t[::1] rings,
                  const int64_t[::1] polygons, int64_t width, int64_t height, int bits, bint is_nonzero):
@@ -84,10 +85,19 @@ cdef class SnappedPolygons:
             most = K.bound_polygons(&self.set, first, end, self.width, self.height, &self.is_wide[0], boxes)
         return most
 
-    def make_weights(self):
-        """Make room for what `certify` finds."""
+    def make_weights(self, int64_t max_crossings):
+        """Make room for what `certify` finds; rings may cross so often where areas are exact."""
+        self.crossings_left = self.max_crossings = max_crossings
+        self.set.crossings_left = &self.crossings_left
         self.weights, self.is_simple = np.zeros(self.n_rings + 1, np.int8), np.zeros(self.n_polygons + 1, np.uint8)
         self.set.weights, self.set.is_simple = &self.weights[0], &self.is_simple[0]
+
+    cdef int raise_if_given_up(self) except -1:
+        raise_if_given_up()
+        if self.crossings_left < 0:
+            raise ValueError(f"rings must cross at most {self.max_crossings:,} times within the picture where areas are "
+                             "exact, and cross or crowd a pixel more often: max_crossings= allows more")
+        return 0
 
     def certify_words(self) -> int:
         """Return how many int64 of room `certify` needs."""
@@ -163,7 +173,7 @@ cdef class SnappedPolygons:
                 job.first = 0 if job.listed == NULL else starts[band]
                 job.end = self.n_polygons if job.listed == NULL else starts[band + 1]
                 K.label_polygons(&set, &job)
-        raise_if_given_up()
+        self.raise_if_given_up()
 
     def add_shares(self, float[::1] pixels, const float[:, ::1] colors or None, int64_t band_rows,
                    const int64_t[::1] starts, const int32_t[::1] listed, int64_t first_band, int64_t end_band,
@@ -188,7 +198,7 @@ cdef class SnappedPolygons:
                 if is_alone:  # also where it is not
                     job.listed, job.first, job.end = NULL, 0, 1
                 K.share_polygons(&set, &job)
-        raise_if_given_up()
+        self.raise_if_given_up()
 
     def list_shares(self, int64_t first, int64_t end, int64_t[::1] starts, indices: Array, float[::1] areas,
                     int32_t[::1] cells, PieceScratch pieces or None) -> int:
@@ -208,5 +218,5 @@ cdef class SnappedPolygons:
         job.is_long, job.n_room = indices.itemsize == 8, areas.shape[0] - 16
         with nogil:
             n = K.share_polygons(&set, &job)
-        raise_if_given_up()
+        self.raise_if_given_up()
         return n

@@ -64,6 +64,8 @@ cdef class ShadingTable:
     cdef object arrays
     cdef uint8_t[::1] materials
     cdef uint8_t[::1] lights
+    cdef tl_light headlight
+    cdef Rays rays
 
     def __init__(self, const float[:, ::1] normals, bint finds_inverse_w,
                  const int32_t[:, ::1] normal_of_corner or None, const float[:, ::1] corner_normals or None,
@@ -111,6 +113,48 @@ cdef class ShadingTable:
                 m[k].normal_map, m[k].emission_map = texture_of(full[8]), texture_of(full[9])
         self.shading.materials, self.shading.n_materials = m, len(materials)
 
+    def seen(self, const float[:, ::1] normals or None, bint finds_inverse_w, const double[:, :] clip_from_eye,
+             const double[:, :] view, const double[:] center, double width, double height) -> ShadingTable:
+        """Return the same, seen by a camera in a whole picture of this size, in a space whose origin is at `center`.
+
+        `view`: (4, 4), to eye space. `normals`: those of the vertices with 1/w, or None.
+        """
+        cdef ShadingTable own = ShadingTable.__new__(ShadingTable)
+        cdef tl_shading *s = &own.shading
+        cdef int i, k
+        own.shading, own.materials, own.arrays = self.shading, self.materials, (self.arrays, normals)
+        s.finds_inverse_w = finds_inverse_w
+        if normals is not None:
+            s.normals = &normals[0, 0] if normals.shape[0] else NULL
+        find_rays(clip_from_eye, view, center, width, height, &own.rays)
+        s.has_perspective = own.rays.has_perspective
+        for k in range(3):
+            s.eye[k] = <float>own.rays.rows[0][k]
+            for i in range(4):
+                s.ray[i][k] = <float>own.rays.rows[1 + i][k]
+            for i in range(3):
+                s.eye_from[i][k] = <float>own.rays.rows[5 + i][k]
+        return own
+
+    @property
+    def camera_rays(self) -> tuple[bool, F64, float]:
+        """What `camera_rays` returns of the camera that sees it."""
+        return self.rays.has_perspective, np.array([[self.rays.rows[i][k] for k in range(3)] for i in range(9)]), self.rays.scale
+
+    def set_headlight(self, to_light: Any, float color, float ambient):
+        """Take one light in a direction of eye space, which wraps round what it lights, and light from all sides."""
+        cdef double[3] at = to_light
+        cdef double total
+        cdef int i, k
+        for i in range(3):
+            total = 0.0
+            for k in range(3):
+                total = total + self.rays.rows[5 + k][i] * at[k]
+            self.headlight.at[i] = <float>total
+            self.headlight.color[i], self.shading.ambient[i] = color, ambient
+        self.headlight.kind, self.headlight.falloff = <tl_light_kind>2, 0.0
+        self.shading.lights, self.shading.n_lights = &self.headlight, 1
+
     def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]):
         """Take rows (kind, at, color, falloff)."""
         cdef tl_light *light
@@ -133,24 +177,23 @@ cdef class ShadingTable:
         """Have the opacity of the surface in the picture's alpha; the materials are full."""
         self.shading.wants_opacity = True
 
-    def set_view(self, int show, Mipmap matcap or None, eye_from: Sequence[Sequence[float]], bint has_perspective,
-                 eye: Sequence[float], ray: Sequence[Sequence[float]], background: Sequence[float],
-                 background_bytes: Sequence[int]):
-        """Take what the picture tells, where it is seen from, and what is behind it."""
+    def set_picture(self, int show, Mipmap matcap or None, background: Sequence[float], background_bytes: Sequence[int]):
+        """Take what the picture tells, and what is behind it."""
         cdef tl_shading *s = &self.shading
         cdef int k
-        s.show, s.has_perspective = <tl_show>show, has_perspective
+        s.show = <tl_show>show
         s.matcap = &matcap.texture if matcap is not None else NULL
         self.arrays += (matcap,)
-        copy_floats(s.eye, eye, 3)
-        for k in range(3):
-            copy_floats(s.eye_from[k], eye_from[k], 3)
-        for k in range(4):
-            copy_floats(s.ray[k], ray[k], 3)
         copy_floats(s.background, background, 4)
         for k in range(4):
             s.background_bytes[k] = background_bytes[k]
         self.set_fog((0, 0, 0), 0, 0, 0, 0)
+
+    def set_turn(self, eye_from: Sequence[Sequence[float]]):
+        """Take the rows of a matrix (3, 3) that takes normals to the space that they are told in."""
+        cdef int k
+        for k in range(3):
+            copy_floats(self.shading.eye_from[k], eye_from[k], 3)
 
     def set_fog(self, color: Sequence[float], float near, float scale, float distance_start, float distance_scale):
         """Take the depth cue."""
@@ -182,47 +225,69 @@ def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out)
             i = end + 1
 
 
-def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, const float[:, ::1] depth,
-          uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
-    """Write rows of the picture (H, W, 4) of a visibility buffer."""
-    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
-    if n_rows and ids.shape[1]:
-        if n_rows == ids.shape[0] and n_rows * ids.shape[1] <= HELD_PX:
-            K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
-        else:
+cdef class ShadedScene:
+    """The instances of a picture as kernels shade them; keeps what they point to alive."""
+
+    cdef tl_shaded_scene scene
+    cdef SnappedMesh mesh  # the first: all have its window
+    cdef uint8_t[::1] rows
+    cdef object arrays
+
+    def __init__(self, meshes: Sequence[SnappedMesh], tables: Sequence[ShadingTable], first_ids: Sequence[int]):
+        """Take at least one mesh and as many shading tables, and what triangle 0 of each is called in the ids."""
+        cdef int64_t i, n = len(meshes)
+        cdef SnappedMesh mesh
+        cdef ShadingTable table
+        cdef tl_shaded *instances
+        self.arrays, self.mesh = (meshes, tables), meshes[0]
+        self.rows = np.empty(n * sizeof(tl_shaded), np.uint8)
+        instances = <tl_shaded *>&self.rows[0]
+        for i in range(n):
+            mesh, table = meshes[i], tables[i]
+            instances[i].snapped, instances[i].shading, instances[i].first_id = &mesh.snapped, &table.shading, first_ids[i]
+        self.scene.instances, self.scene.n, self.scene.view = instances, n, self.mesh.clip_view()
+
+    def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row,
+              int64_t n_rows, const int32_t[::1] at=None):
+        """Write rows of the picture (H, W, 4) of a visibility buffer, as the sample at (x, y) sub-pixels from the centre sees it.
+
+        Unless given it is that which each mesh is seen from.
+        """
+        cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
+        cdef const int32_t *at_fx = &at[0] if at is not None else NULL
+        if n_rows and ids.shape[1]:
+            if n_rows == ids.shape[0] and n_rows * ids.shape[1] <= HELD_PX:
+                K.shade(&self.scene, &window, at_fx, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+            else:
+                with nogil:
+                    K.shade(&self.scene, &window, at_fx, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+            raise_if_given_up()
+
+    def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth, Split split or None,
+                      uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
+        """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
+
+        `ids` and `depth`: (S, H, W), or with `split` (1, H, W), what the first sample sees.
+        """
+        cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[2])
+        cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
+        cdef int64_t stride = ids.shape[1] * ids.shape[2]
+        cdef tl_split rows
+        if split is not None:
+            rows = split.from_row(first_row)
+        if n_rows and ids.shape[2]:
             with nogil:
-                K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
-        raise_if_given_up()
+                K.shade_samples(&self.scene, &window, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0], &depth[0, first_row, 0],
+                                &rows if split is not None else NULL, &pixels[first_row, 0, 0])
+            raise_if_given_up()
 
-
-def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
-                  const float[:, :, ::1] depth, Split split or None, uint8_t[:, :, ::1] pixels, int64_t first_row,
-                  int64_t n_rows):
-    """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
-
-    `ids` and `depth`: (S, H, W), or with `split` (1, H, W), what the first sample sees.
-    """
-    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[2])
-    cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
-    cdef int64_t stride = ids.shape[1] * ids.shape[2]
-    cdef tl_split rows
-    if split is not None:
-        rows = split.from_row(first_row)
-    if n_rows and ids.shape[2]:
-        with nogil:
-            K.shade_samples(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
-                            &depth[0, first_row, 0], &rows if split is not None else NULL, &pixels[first_row, 0, 0])
-        raise_if_given_up()
-
-
-def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, float[:, :, ::1] out,
-                  int64_t first_row, int64_t n_rows):
-    """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
-    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
-    if n_rows and ids.shape[1]:
-        with nogil:
-            K.shade_normals(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
-        raise_if_given_up()
+    def shade_normals(self, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row, int64_t n_rows):
+        """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
+        cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
+        if n_rows and ids.shape[1]:
+            with nogil:
+                K.shade_normals(&self.scene, &window, &ids[first_row, 0], &out[first_row, 0, 0])
+            raise_if_given_up()
 
 
 def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles,

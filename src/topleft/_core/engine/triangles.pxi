@@ -84,10 +84,11 @@ cdef class SnappedMesh:
         part.y_px += y_px
         return part
 
-    def finds_inverse_w(self, int64_t n_pixels) -> bool:
-        """Whether a picture of so many pixels is shaded sooner with 1/w of the vertices that show than with that of all."""
+    @property
+    def can_find_inverse_w(self) -> bool:
+        """Whether shading finds 1/w of the vertices that show, from their positions."""
         cdef const tl_source *source = self.snapped.mesh.source
-        return source != NULL and source.matrix != NULL and self.snapped.mesh.n_vertices > n_pixels
+        return source != NULL and source.matrix != NULL
 
     def with_inverse_w(self, int64_t n_pixels, empty: Callable[..., Array] = np.empty) -> SnappedMesh:
         """Return the same mesh with 1/w of all vertices at hand, if so many pixels ask for enough of them.

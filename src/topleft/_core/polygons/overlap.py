@@ -6,6 +6,7 @@ Input: rings and a size. Output: `Overlap`.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from threading import Condition, Lock
@@ -15,14 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_real
+from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
 from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.draw import cells_for
-from topleft._core.polygons.polygons import Rule, frame_of
-from topleft._core.polygons.prepared import Prepared, prepare
+from topleft._core.polygons.polygons import Rule, frame_of, warn_if_apart
+from topleft._core.polygons.prepared import MAX_CROSSINGS, Prepared, prepare
 from topleft._core.polygons.rings import as_points, as_rings, rings_of_triangles
 from topleft.typing import RuleOption
 
@@ -94,14 +95,22 @@ class Overlap:
 
         return csr_array((self.areas, self.pixels, self.starts), shape=self.shape)
 
-    def sums(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return the integral (P,) of a raster (H, W) over each polygon; NaN counts as nothing."""
-        values = self._values_of(raster)
+    def sums(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
+        """Return the integral (P,) of a raster (H, W) over each polygon; pixels without data count as nothing.
+
+        Which have none is told in `means`.
+        """
+        values = self._values_of(raster, nodata)
         return self._added(np.where(np.isnan(values), 0.0, values) * self.areas)
 
-    def means(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return the mean (P,) of a raster (H, W) over each polygon; where that is NaN does not count."""
-        values = self._values_of(raster)
+    def means(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
+        """Return the mean (P,) of a raster (H, W) over each polygon; pixels without data do not count.
+
+        Pixels have no data where the raster is NaN or `nodata`, where a masked array is masked, and where a raster of
+        xarray or an open dataset of rasterio, of one band, has the number that it names itself. A polygon over none
+        but such pixels has the mean NaN.
+        """
+        values = self._values_of(raster, nodata)
         is_known = ~np.isnan(values)
         weights = self._added(self.areas * is_known)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -123,11 +132,29 @@ class Overlap:
         picture: npt.NDArray[np.float64] = np.bincount(self.pixels, weights, minlength=self.shape[1])  # type: ignore[assignment]
         return picture.reshape(self.size[::-1])
 
-    def _values_of(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        values = as_array("raster", raster)
-        if values.shape != self.size[::-1]:
-            raise ValueError(f"raster must have shape {self.size[::-1]}, got {values.shape}")
-        return values.reshape(-1)[self.pixels].astype(np.float64)
+    def _values_of(self, raster: Any, nodata: float | None) -> npt.NDArray[np.float64]:
+        """Return the number (E,) of the pixel of each entry, NaN where it has no data."""
+        if nodata is not None:
+            as_number("nodata", nodata)
+            nodata = np.asarray(nodata).item()  # a whole number stays one
+        if hasattr(raster, "read") and hasattr(raster, "count"):  # of rasterio
+            if raster.count != 1:
+                raise ValueError(f"raster must have one band, got {raster.count}: pass raster.read(1, masked=True)")
+            raster = raster.read(1, masked=True)
+        numbers = [nodata, *numbers_without_data(raster)]
+        is_masked = np.ma.getmask(raster) if isinstance(raster, np.ma.MaskedArray) else np.ma.nomask
+        array = as_array("raster", raster)
+        if array.shape != self.size[::-1]:
+            raise ValueError(f"raster must have shape {self.size[::-1]}, got {array.shape}")
+        given = array.reshape(-1)[self.pixels]
+        values = given.astype(np.float64)
+        with np.errstate(all="ignore"):
+            for number in numbers:
+                if number is not None:
+                    values[given == number] = np.nan  # Python's number takes the dtype of the raster
+        if is_masked is not np.ma.nomask:
+            values[is_masked.reshape(-1)[self.pixels]] = np.nan
+        return values
 
     def _added(self, entries: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
         """Return the sum over the entries of each polygon."""
@@ -136,6 +163,16 @@ class Overlap:
         if is_full.any():
             result[is_full] = np.add.reduceat(entries.astype(np.float64), self.starts[:-1][is_full])
         return result
+
+
+def numbers_without_data(raster: Any) -> list[float]:
+    """Return the numbers that a raster of xarray says stand for none."""
+    said = getattr(raster, "attrs", None)
+    if not isinstance(said, Mapping):
+        return []
+    found = [said[name] for name in ("_FillValue", "missing_value", "nodata", "nodatavals") if name in said]
+    numbers = np.concatenate([np.ravel(number) for number in found]) if found else np.empty(0)
+    return numbers.tolist() if numbers.dtype.kind in "iuf" else []
 
 
 def overlap(
@@ -147,6 +184,7 @@ def overlap(
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
     assume_valid: bool = False,
+    max_crossings: int = MAX_CROSSINGS,
     threads: int | None = None,
     out: Overlap | None = None,
 ) -> Overlap:
@@ -154,7 +192,7 @@ def overlap(
 
     Parameters
     ----------
-    rings, size, rule, origin, subpixel_bits, assume_valid, threads
+    rings, size, rule, origin, subpixel_bits, assume_valid, max_crossings, threads
         As in `polygons`.
     triangles : array_like of integers, shape (T, 3), optional
         Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
@@ -194,8 +232,9 @@ def overlap(
     else:
         vertices = as_points(rings, "vertices")
         given = rings_of_triangles(vertices, as_checked_triangles(triangles, len(vertices)))
-    found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1)
+    found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1, max_crossings)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+    warn_if_apart(prepared, given, size)
     prepared.certify(assume_valid=assume_valid)
     if out is not None and not isinstance(out, Overlap):
         raise TypeError(f"out must be an Overlap, got {type(out).__name__}")

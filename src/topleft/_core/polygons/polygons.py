@@ -5,6 +5,7 @@ Input: rings and a size. Output: an array (H, W) or (H, W, C).
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
@@ -12,13 +13,13 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.arrays import apart_from, as_array, as_size, as_subpixel_bits, as_window
+from topleft._core.base.arrays import apart_from, as_array, as_count, as_size, as_subpixel_bits, as_window
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, empty
 from topleft._core.base.options import Sampling, parse
 from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.polygons.draw import add_shares, draw_labels, draw_mask
-from topleft._core.polygons.prepared import Frame, Prepared, prepare
+from topleft._core.polygons.prepared import MAX_CROSSINGS, Frame, Prepared, prepare
 from topleft._core.polygons.rings import RingSet, as_rings
 from topleft._core.raster.rasterize import canvas_of, open_canvas
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, sample_positions
@@ -51,6 +52,7 @@ def polygons(
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
     assume_valid: bool = False,
+    max_crossings: int = MAX_CROSSINGS,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
 ) -> npt.NDArray[Any]:
@@ -87,6 +89,9 @@ def polygons(
         For "area", "outer" and "inner": the rings of a polygon neither cross nor touch, its first one is its border and
         all others are holes in it; they may run either way. Saves the search for crossings. What is drawn of polygons
         of which this is not true is undefined.
+    max_crossings : int
+        For "area", "outer" and "inner": how often rings may cross or touch within the picture; fifty million
+        take some 4 s. Where more than 64 edges pass a pixel side by side, it counts as well.
     threads : int or None
         Never changes a bit.
     out : ndarray of the result's dtype, shape (H, W) or (H, W, C), optional
@@ -101,8 +106,8 @@ def polygons(
     Raises
     ------
     ValueError
-        For a wrong shape, an unknown option, offsets that do not fit, a ring of fewer than three points, or a point
-        that is not finite or lies beyond ``2**60`` sub-pixels.
+        For a wrong shape, an unknown option, offsets that do not fit, a ring of fewer than three points, a point
+        that is not finite or lies beyond ``2**60`` sub-pixels, or rings that cross more than `max_crossings` times.
     TypeError
         For what is no polygon, and a wrong dtype.
 
@@ -135,12 +140,14 @@ def polygons(
     """
     how = parse(Sampling, "sampling", sampling)
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
-    found, frame = frame_of(as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples)
+    given = as_rings(rings).apart_from(out)
+    found, frame = frame_of(given, size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
     shape = frame.size[::-1]
     if values is None:
         if background is not None:
             raise ValueError("background needs values: a mask is False where no polygon is")
         prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+        warn_if_apart(prepared, given, size)
         if how in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER):
             result, canvas = open_canvas(FRESH, "mask", out, shape, np.bool_)  # without a context: that is 2 us of 40
             if canvas.size:
@@ -159,6 +166,7 @@ def polygons(
         return result
     paint = as_paint(apart_from(out, "values", values), background, len(found), how)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+    warn_if_apart(prepared, given, size)
     with canvas_of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
         if canvas.size:
             paint_values(prepared, canvas, paint, how, is_nonzero=is_nonzero, assume_valid=assume_valid)
@@ -172,6 +180,7 @@ def frame_of(
     subpixel_bits: object,
     threads: object,
     n_samples: int,
+    max_crossings: object = MAX_CROSSINGS,
 ) -> tuple[RingSet, Frame]:
     """Return the rings in pixels, and the window that they are drawn in."""
     if isinstance(size, Grid):
@@ -179,7 +188,30 @@ def frame_of(
     bits = as_subpixel_bits(subpixel_bits)
     grid_bits = max(1 if n_samples == 1 else SAMPLE_GRID_BITS, bits)
     corner = as_window(origin, grid_bits + 2)
-    return rings, Frame(as_size(size), corner, bits, grid_bits, parse_threads(threads))
+    most = as_count("max_crossings", max_crossings)
+    return rings, Frame(as_size(size), corner, bits, grid_bits, parse_threads(threads), most)
+
+
+def warn_if_apart(prepared: Prepared, given: RingSet, size: object) -> None:
+    """Warn the caller's caller of polygons of which none meets a pixel of a grid."""
+    if not isinstance(size, Grid) or not len(given.points) or 0 in size.size or prepared.frame.origin != (0, 0):
+        return
+    left, top, right, bottom = prepared.compiled.boxes_px.T
+    if ((left < right) & (top < bottom)).any():
+        return
+    (x_min, y_min), (x_max, y_max) = given.points.min(axis=0).tolist(), given.points.max(axis=0).tolist()
+    own, grid = [x_min, x_max, y_min, y_max], list(size.extent)
+    are_degrees, is_grid_of_degrees = (-180 <= e[0] and e[1] <= 360 and -90 <= e[2] and e[3] <= 90 for e in (own, grid))
+    why = "are they of another CRS than the grid?"
+    if are_degrees != is_grid_of_degrees:
+        degrees, other = ("polygons", "grid") if are_degrees else ("grid", "polygons")
+        why = f"the {degrees} may be degrees, the {other} cannot: transform the polygons to the CRS of the grid"
+    warnings.warn(
+        "no polygon meets a pixel of the grid: the polygons lie in x {:g} to {:g}, y {:g} to {:g}, the grid in x {:g} "
+        "to {:g}, y {:g} to {:g}; ".format(*own, *grid)
+        + why,
+        stacklevel=3,
+    )
 
 
 def draw_binary(

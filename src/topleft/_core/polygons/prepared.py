@@ -17,6 +17,10 @@ MIN_POINTS_PER_THREAD = 50_000
 MIN_PIXELS_PER_THREAD = 1 << 20
 
 
+#: How often rings may cross where areas are exact: 4 s of one core.
+MAX_CROSSINGS = 50_000_000
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """The window that is drawn, and the grid that points snap to."""
@@ -26,6 +30,7 @@ class Frame:
     subpixel_bits: int
     grid_bits: int  # of the grid that holds points and samples
     threads: int | None
+    max_crossings: int = MAX_CROSSINGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +53,7 @@ class Prepared:
     def certify(self, *, assume_valid: bool) -> None:
         """Find out of which polygons the rings do not meet, and what the area of each ring counts."""
         compiled, n = self.compiled, len(self)
-        compiled.make_weights()
+        compiled.make_weights(self.frame.max_crossings)
         n_words = 0 if assume_valid else compiled.certify_words()
 
         def certify_part(first: int, end: int) -> None:

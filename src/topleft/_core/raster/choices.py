@@ -1,13 +1,15 @@
 """What is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by the planner.
 
-None of them changes a bit of a picture; `tests/plan/test_choices.py` draws with each forced on and off. The numbers
-were measured on one and two cores of a Zen 4 with AVX-512; `docs/design/choices.md` has the scenes.
+None of them changes a bit of a picture; `tests/plan/test_choices.py` draws with each forced on and off. Their numbers
+are rows of `costs.py`; `docs/design/choices.md` has the scenes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.options import Cull, DepthTest, Sampling, Sink
 from topleft._core.base.threads import available_threads, count_threads
+from topleft._core.raster.costs import Costs, cost_table, use_costs
 from topleft._core.raster.view import CULL_CODES, View
 from topleft.methods import METHODS
 
@@ -24,171 +27,6 @@ if TYPE_CHECKING:
     from topleft._core.raster.cluster_draw import Survey
     from topleft._core.raster.clusters import Clusters
     from topleft._core.raster.snap import Snapped
-
-#: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
-MIN_TO_SHARE_ARRAYS = 200_000
-
-#: Nanoseconds that decide whether depths are compared where all are equal: ids alone cost a pass over all pixels and a
-#: few calls, comparisons something a covered sample, and, where the picture does not stay in a near cache, a row of a
-#: triangle. Of flat triangles of 8, 40 and 400 px, 0.2 to 2 layers, 64x64 to 1920x1080: wrong by 1.2 times at most.
-FLAT_CALL_NS, FLAT_PIXEL_NS = 12_000, 0.19
-COMPARED_SAMPLE_NS, COMPARED_ROW_NS = 0.35, 12.0
-
-#: Pixels of a row of a triangle, on the mean, from which on bounds of depth are kept, which triangles of 128 columns or
-#: more look at, and columns of a picture. In 1920x1080, times as fast with them: 40 frames, near ones first 7.1, far
-#: ones first 0.88; 30,000 large triangles all round the eye 3.2 to 4.5, 300 of 1,000 px 2.3, 1,000 of 400 px (139 px a
-#: row) 1.4; below, of 33 px a row, 10,000 of 100 px 0.7 to 1.0 and 1,000 of them 0.9.
-MIN_SPAN_TO_BOUND, MIN_COLUMNS_TO_BOUND = 100.0, 256
-
-#: More triangles are small where they show, and only seem large where the guess takes one that a plane cuts for as
-#: large as the picture.
-MAX_TRIANGLES_TO_BOUND = 200_000
-
-#: Pixels of a picture that stay in a near cache while it is drawn; those of a larger one are cold when they are met.
-NEAR_PIXELS = 400_000
-
-#: A thread gets at least so much work: of 132 calls, those of 0.45 ms or more were done sooner by two threads, but for
-#: one that waits for memory (0.9 times), and those of less by one (1.2 times at most).
-MIN_THREAD_NS = 220_000
-
-#: What the guess of work is made of: nanoseconds a triangle; a row of a triangle that is seen, a covered sample and a
-#: pixel of the picture, by what is drawn; a row and a pixel at most where the picture stays in a near cache.
-TRIANGLE_NS = 5.0
-WORK_NS = {
-    "bits": (4.0, 0.018, 0.014),
-    "counts": (6.0, 0.2, 0.3),
-    "ids": (12.0, 0.4, 0.6),
-    "labels": (8.0, 0.1, 0.15),
-    "area": (9.0, 0.0, 0.3),
-}
-NEAR_ROW_NS, NEAR_PIXEL_NS = 4.0, 0.15
-WORK_OF = {Sink.MASK: "bits", Sink.SAMPLES: "bits", Sink.COUNT: "counts", Sink.LABEL: "labels"}
-
-#: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
-MIN_TRIANGLES_TO_SHARE = 1_000_000
-
-#: Triangles from which on a mesh that is drawn again is sorted into clusters; instances from which on one is at once.
-MIN_TRIANGLES_TO_CLUSTER = 20_000
-MIN_INSTANCES_TO_CLUSTER = 16
-
-#: Clusters take 1.2 to 1.5 times as long for a triangle that shows (hills and soup, all of it in view, are 0.65 to 0.9
-#: times as fast), and leave out what is outside, turned away or behind others. A view is drawn from them where no more
-#: of them face it, and as many are outside, as is said here: (below so many triangles, without culling, with it).
-#: Measured on blobs, scans, hills and soup in 512x512 and 1920x1080. Whole and culled, 30,000 to 300,000 triangles are
-#: 0.86 to 0.93 times as fast, 1,000,000 1.09; half in view, 0.85 to 1.05, 0.93 to 1.12, and 1.3.
-#: `docs/measured/static.md`.
-MAX_FRONT_TO_CLUSTER = 0.8
-MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
-
-#: Meshlets take 0.4 to 0.95 of the time of clusters or of the whole mesh, whichever is less, of blobs of 30,000
-#: triangles or more in every view with culled faces, but for 30,000 seen whole (1.14 times). They take longer where all
-#: triangles show (hills, 1.15 times), where triangles share no vertices, of which a cluster then has 85 (soup, 1.4
-#: times), and where much is hidden. Of views that cull nothing they take 0.7 to 1.03 of it from 100,000 triangles on,
-#: but 1.2 where 5 % of a million show; of 30,000 1.1 to 1.2 but for views from inside (0.8), and where more is hidden
-#: than is said here nothing is gained. Of large triangles less may be hidden, for meshlets are drawn from top to
-#: bottom: on a Sapphire Rapids, in 1920x1080, views of a scan of 100,000 triangles beyond these limits take 1.15 to 1.5
-#: times as long, and of blobs of which both sides are drawn 1.1 to 1.3 times.
-#: 30,000 triangles with culled faces in 1920x1080, half or a fifth of them in view, 0.01 a pixel, take 1.25 to 1.9
-#: times as long on a Zen 4 whose last-level cache others use, too; 5 % of them 0.8 to 1.1 times.
-#: Growing takes about three times as long as sorting clusters, which some 100 pictures pay back; a mesh that is drawn
-#: 16 times is likely to be drawn more.
-MIN_PICTURES_TO_GROW = 16
-MIN_TRIANGLES_OF_CLUSTER = 150
-
-
-class MeshletLimits(NamedTuple):
-    """So many triangles at least, or so large a share outside and so many in view a pixel; and no more hidden."""
-
-    triangles: int
-    outside: float
-    density: float
-    hidden: float
-    hidden_of_large: float
-    """Of large triangles, and so much more with each triangle in view a pixel."""
-    hidden_growth: float
-
-
-MIN_OUTSIDE_OF_SPARSE = 0.6
-CULLED_MESHLETS = MeshletLimits(60_000, 0.1, 0.02, 0.6, hidden_of_large=0.17, hidden_growth=0.4)
-MESHLETS_OF_BOTH_SIDES = MeshletLimits(90_000, 0.5, 0.0, 0.7, hidden_of_large=0.35, hidden_growth=1.0)
-
-
-class ClusterRoute(Enum):
-    """How `rasterize` draws a mesh that is sorted into clusters."""
-
-    WHOLE = "as a mesh without clusters"
-    CLUSTERS = "cluster by cluster"
-    MESHLETS = "from meshlets"
-
-
-class SampledLimits(NamedTuple):
-    """So many triangles in view a pixel at least; and so many of all for each sample, or so large a share outside."""
-
-    density: float
-    triangles: int
-    outside: float
-
-
-#: Several samples a pixel are a picture each from clusters or meshlets, with a plane of ids and depth in memory, where
-#: the whole mesh is snapped and sorted into bands of rows once, which are drawn for one sample after the other in a
-#: near cache. So planes pay where triangles are many for the pixels, or many are left out. By route, without culling
-#: and with it, measured on blobs of 30,000 to 10,000,000 triangles with 2 to 16 samples in 512x512 and 1920x1080. By
-#: "msaa4" in 1920x1080, seen whole, both sides of 1,000,000 are 1.5 times as fast from clusters and 1.9 from meshlets,
-#: those of 10,000,000 2.3 and 3.3; with culled faces 0.8 and 1.25, and 1.2 and 2. Each sample takes the whole mesh less
-#: than the first: from clusters 10,000,000 culled by "msaa8" are 0.9 times as fast. Where fewer are in view a pixel,
-#: views of 30,000 to 300,000 triangles in 1920x1080 would be 0.3 to 0.9 times as fast.
-SAMPLED_LIMITS = {
-    ClusterRoute.CLUSTERS: (SampledLimits(0.06, 15_000, 0.1), SampledLimits(0.2, 1_500_000, 0.9)),
-    ClusterRoute.MESHLETS: (SampledLimits(0.04, 0, 0.0), SampledLimits(0.1, 125_000, 0.3)),
-}
-
-#: From inside of a mesh, where so large a share is outside, planes pay up to so many samples of the picture for each
-#: triangle beyond the near or far plane, however few are in view: one of those takes the whole mesh 90 ns, to find out
-#: what the planes cut, and a sample of a plane takes 0.4 to 0.9. Blobs of 300,000 to 10,000,000 triangles are 1.3 to
-#: 180 times as fast; soup of large ones, half of it outside, would be 0.8 times as fast.
-MAX_SAMPLES_A_TRIANGLE, MIN_OUTSIDE_FROM_INSIDE = 100, 0.7
-
-#: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
-#: 4 to 5.5 times as fast. Others are where so large a share is outside, with one sample and with several, for each of
-#: which clusters are snapped anew: small in the picture and side by side, blobs are 0.90 and 0.87 times as fast, scans
-#: 1.5 and 1.4.
-MIN_LAYERS_TO_CLUSTER = 3.0
-MIN_OUTSIDE_OF_INSTANCES = (0.1, 0.33)
-
-#: Triangles and rows of an instance, on the mean, from which on threads draw the clusters of a scene together: with
-#: fewer, most of the time is Python. Two threads, us an instance that shows: 1,000 triangles 41 (one thread 31), 3,000
-#: 75 (45), 10,000 60 (87), 100,000 427 (567); 20,000 instances that are a third of a pixel high take 0.10 s (0.06).
-MIN_TRIANGLES_OF_INSTANCE, MIN_ROWS_OF_INSTANCE = 6_000, 8
-
-#: Pixels for each vertex from which on attributes of a mesh in clusters have all vertices snapped: to find those that
-#: show reads all pixels. `render` of 100,000 triangles seen whole in 1920x1080: 9.5 ms and, of those alone, 11.1; of
-#: 1,000,000 22.7 and 25.1; of 3,000,000, a fifth of them in view, 18.9 and 17.5.
-MIN_PIXELS_A_VERTEX = 4
-
-#: What is saved where triangles are sorted into bands of rows that stay in the second-level cache, ns: a pixel that is
-#: cleared there, of ids and depth; where triangles lie far apart from one to the next, a row and a covered sample of
-#: ids and depth, and a covered sample of four bytes. And what sorting costs: a triangle that is seen, one that is not,
-#: and one more where it lies far from the next. On a Sapphire Rapids, in 1920x1080, ids and depth of a mesh of 10,000
-#: triangles take 0.87 of the time, strewn ones, 1,000 of 300 px, 20,000 of 40 px and 200,000 of 8 px, 0.7, 0.5 and 0.5,
-#: 40 frames with the far ones first 0.5; counts of those of 300 px 0.65. 1,000,000 strewn ones of 3 px would take 1.5
-#: times as long, 1,000,000 of a mesh 1.1 times.
-CLEARED_PIXEL_NS, SAVED_ROW_NS, SAVED_SAMPLE_NS, SAVED_STORE_NS = 0.1, 8.0, 0.1, 0.1
-SORTED_TRIANGLE_NS, OUTSIDE_TRIANGLE_NS, FAR_TRIANGLE_NS = 10.0, 4.0, 20.0
-
-#: Rows of a triangle, on the mean, from which on rows are saved: pixels of smaller boxes are fetched before they are
-#: drawn. 250,000 triangles of 7 px take 0.6 of the time, 300,000 of 6 px 0.93 to 1.2, 400,000 of 5 px 1.2.
-MIN_ROWS_TO_SORT = 4.3
-
-#: Pixels of such a band. Triangles that follow each other more closely find it in the cache anyway.
-BAND_PIXELS = 1 << 17
-
-#: Bytes of a band of colours that stays there; what it saves of each row of a triangle and each pixel that is met
-#: again, ns. And what a band costs: to look at a triangle and at a vertex once more, and by area a triangle that
-#: reaches into it. 1,000 triangles of 300 px take 0.43 of the time by samples, 0.65 by area, 20,000 of 40 px by samples
-#: 0.5, a mesh of 10,000 0.7 to 0.8, one of 100,000 1.0; 200,000 of 8 px that share no vertices would take 1.3 times.
-BLEND_BAND_BYTES = 768 << 10
-BLENDED_ROW_NS, BLENDED_PIXEL_NS, STRIP_NS = 4.0, 0.1, 1000.0
-SEEN_TRIANGLE_NS, SEEN_VERTEX_NS = 0.5, 1.1
 
 #: What it does not matter to in which order triangles are drawn.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
@@ -199,10 +37,71 @@ FEW_OF = {
     Sink.LABEL: engine.FEW_STORED,
 }  # fmt: skip
 
-#: With fewer pixels in the picture for each triangle that is seen, labels take less time than colours stored triangle
-#: by triangle: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms, 200,000 of
-#: 20 px, one in 16 of them in the picture, 5.7 and 3.7 ms.
-MIN_PIXELS_A_TRIANGLE = 45
+WORK_OF = {Sink.MASK: "bits", Sink.SAMPLES: "bits", Sink.COUNT: "counts", Sink.LABEL: "labels"}
+
+
+class ClusterRoute(Enum):
+    """How `rasterize` draws a mesh that is sorted into clusters."""
+
+    WHOLE = "as a mesh without clusters"
+    CLUSTERS = "cluster by cluster"
+    MESHLETS = "from meshlets"
+
+
+class MeshletLimits(NamedTuple):
+    """So many triangles at least, or so large a share outside and so many in view a pixel; and no more hidden."""
+
+    triangles: float
+    outside: float
+    density: float
+    hidden: float
+    hidden_of_large: float
+    """Of large triangles, and so much more with each triangle in view a pixel."""
+    hidden_growth: float
+
+
+class SampledLimits(NamedTuple):
+    """So many triangles in view a pixel at least; and so many of all for each sample, or so large a share outside."""
+
+    density: float
+    triangles: float
+    outside: float
+
+
+@contextmanager
+def forced(**values: Any) -> Iterator[None]:
+    """Force choices, for the whole process, while the context lasts.
+
+    Parameters
+    ----------
+    **values
+        By the name of a function of this module: its answer, or a function that gives it. By the name of a row of
+        `Costs`: its value.
+
+    Raises
+    ------
+    ValueError
+        If a name is neither.
+    """
+    names, table, rows = globals(), cost_table(), Costs.__dataclass_fields__.keys()
+    costs = {name: value for name, value in values.items() if name in rows}
+    answers = {name: value for name, value in values.items() if name not in rows}
+    for name in answers:
+        if name not in FORCEABLE:
+            raise ValueError(f"forced must name functions of choices or rows of Costs, got {name!r}")
+    kept = {name: names[name] for name in answers}
+    try:
+        use_costs(replace(table, **costs))
+        names.update((name, own if callable(own) else constantly(own)) for name, own in answers.items())
+        yield
+    finally:
+        names.update(kept)
+        use_costs(table)
+
+
+def constantly(answer: Any) -> Callable[..., Any]:
+    """Return a function that always gives one answer."""
+    return lambda *_, **__: answer
 
 
 def is_affine(matrix: NDArray[Any] | None) -> bool:
@@ -217,12 +116,18 @@ def must_cut(n_outside: int) -> bool:
 
 def threads_to_convert(threads: int | None, n_triangles: int) -> int:
     """Return how many threads make int32 of other indices."""
-    return count_threads(threads, n_triangles) if n_triangles >= MIN_TO_SHARE_ARRAYS else 1
+    return count_threads(threads, n_triangles) if pays_to_share(n_triangles) else 1
 
 
 def threads_to_snap(threads: int | None, n_vertices: int, n_triangles: int) -> int:
     """Return how many threads transform and snap vertices."""
-    return count_threads(threads, n_triangles) if n_vertices >= MIN_TO_SHARE_ARRAYS else 1
+    return count_threads(threads, n_triangles) if pays_to_share(n_vertices) else 1
+
+
+def pays_to_share(n_items: int) -> bool:
+    """Tell whether so many vertices or triangles of an array are the work of two threads."""
+    costs = cost_table()
+    return n_items * costs.shared_item >= costs.thread_ns
 
 
 def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
@@ -231,20 +136,21 @@ def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
     if n_threads is None:
         n_threads = available_threads()
         if n_threads > 1:
-            n_threads = min(n_threads, max(1, int(work_ns(view, snapped, sink) / MIN_THREAD_NS)))
+            n_threads = min(n_threads, max(1, int(work_ns(view, snapped, sink) / cost_table().thread_ns)))
     return min(view.size[1], n_threads)
 
 
 def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
     """Return about how long one thread draws, from a guess of what is seen."""
+    costs = cost_table()
     kind = "area" if view.sampling is Sampling.AREA else WORK_OF.get(sink, "ids")
-    row_ns, sample_ns, pixel_ns = WORK_NS[kind]
+    row_ns, sample_ns, pixel_ns = getattr(costs, f"work_{kind}")
     n_pixels = view.size[0] * view.size[1]
-    if n_pixels <= NEAR_PIXELS:
-        row_ns, pixel_ns = min(row_ns, NEAR_ROW_NS), min(pixel_ns, NEAR_PIXEL_NS)
+    if n_pixels <= costs.near_pixels:
+        row_ns, pixel_ns = min(row_ns, costs.near_row), min(pixel_ns, costs.near_pixel)
     _, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
     drawn_ns = row_ns * n_rows + n_pixels * (sample_ns * n_layers + pixel_ns)
-    return TRIANGLE_NS * snapped.n_triangles + view.sampling.n_samples * drawn_ns
+    return float(costs.work_triangle * snapped.n_triangles + view.sampling.n_samples * drawn_ns)
 
 
 def can_share(view: View) -> bool:
@@ -262,7 +168,7 @@ def takes_lanes(view: View) -> bool:
 
 def is_shared(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
     """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
-    pays = n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
+    pays = n_triangles * n_parts >= cost_table().shared_setups
     fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
     shares = takes_lanes(view) if view.is_exact else can_share(view)
     return n_parts > 1 and pays and fits_lanes and shares
@@ -298,7 +204,8 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
 
     `n_triangles`: of all that is drawn with it; `n_drawn`: how many pictures of it there have been.
     """
-    return n_triangles >= MIN_TRIANGLES_TO_CLUSTER and (n_drawn > 0 or n_instances >= MIN_INSTANCES_TO_CLUSTER)
+    costs = cost_table()
+    return n_triangles >= costs.cluster_triangles and (n_drawn > 0 or n_instances >= costs.cluster_instances)
 
 
 def cluster_route(
@@ -332,23 +239,28 @@ def pays_to_draw_samples(
     route: ClusterRoute, view: View, n_triangles: int, survey: Survey, find_beyond: Callable[[], float]
 ) -> bool:
     """Tell whether several samples of a mesh are drawn from clusters or meshlets, one after the other."""
-    limits = SAMPLED_LIMITS[route][view.cull != CULL_CODES[Cull.NONE]]
+    costs, is_culled = cost_table(), view.cull != CULL_CODES[Cull.NONE]
+    if route is ClusterRoute.MESHLETS:
+        limits = SampledLimits(*(costs.sampled_meshlet_culled if is_culled else costs.sampled_meshlet))
+    else:
+        limits = SampledLimits(*(costs.sampled_cluster_culled if is_culled else costs.sampled_cluster))
     n_pixels, n_samples = view.size[0] * view.size[1], view.sampling.n_samples
     are_many = n_triangles >= limits.triangles * n_samples or survey.outside >= limits.outside
-    if survey.front > MAX_FRONT_TO_CLUSTER:
+    if survey.front > costs.cluster_front:
         return False
     if are_many and n_triangles * (1.0 - survey.outside) >= limits.density * n_pixels:
         return True
-    if survey.outside < MIN_OUTSIDE_FROM_INSIDE:
+    if survey.outside < costs.inside_outside:
         return False
-    return MAX_SAMPLES_A_TRIANGLE * n_triangles * find_beyond() >= n_samples * n_pixels
+    return costs.inside_samples * n_triangles * find_beyond() >= n_samples * n_pixels
 
 
 def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
     """Tell whether a view of a mesh in clusters is drawn from these; `survey`: what becomes of them in it."""
-    is_culled = view.cull != CULL_CODES[Cull.NONE]
-    least = next(shares[is_culled] for below, *shares in MIN_OUTSIDE_TO_CLUSTER if n_triangles < below)
-    return survey.front <= MAX_FRONT_TO_CLUSTER and survey.outside >= least
+    costs, is_culled = cost_table(), view.cull != CULL_CODES[Cull.NONE]
+    limits = costs.cluster_small, costs.cluster_middle, (math.inf, 0.0, 0.0)
+    least = next(shares[is_culled] for below, *shares in limits if n_triangles < below)
+    return survey.front <= costs.cluster_front and survey.outside >= least
 
 
 def can_draw_meshlets(view: View, sink: Sink, *, is_float32: bool) -> bool:
@@ -370,7 +282,8 @@ def pays_to_grow(n_pictures: int, n_triangles: int, n_clusters: int) -> bool:
 
     Triangles that share no vertices, of which few are in a cluster, never are.
     """
-    return n_pictures >= MIN_PICTURES_TO_GROW and n_triangles >= MIN_TRIANGLES_OF_CLUSTER * n_clusters
+    costs = cost_table()
+    return n_pictures >= costs.grown_pictures and n_triangles >= costs.grown_cluster * n_clusters
 
 
 def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: float) -> bool:
@@ -378,12 +291,13 @@ def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: 
 
     `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom.
     """
-    limits = MESHLETS_OF_BOTH_SIDES if view.cull == CULL_CODES[Cull.NONE] else CULLED_MESHLETS
+    costs = cost_table()
+    limits = MeshletLimits(*(costs.meshlet_both if view.cull == CULL_CODES[Cull.NONE] else costs.meshlet_culled))
     density = n_triangles * (1.0 - survey.outside) / (view.size[0] * view.size[1])
-    are_dense = density >= limits.density or survey.outside >= MIN_OUTSIDE_OF_SPARSE
+    are_dense = density >= limits.density or survey.outside >= costs.meshlet_sparse
     are_many = n_triangles >= limits.triangles or (survey.outside >= limits.outside and are_dense)
     most_hidden = min(limits.hidden, limits.hidden_of_large + limits.hidden_growth * density)
-    return are_many and survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= most_hidden
+    return are_many and survey.front <= costs.cluster_front and hidden <= most_hidden
 
 
 def pays_to_draw_instances(view: View, n_triangles: int, survey: Survey, count_layers: Callable[[], float]) -> bool:
@@ -391,19 +305,21 @@ def pays_to_draw_instances(view: View, n_triangles: int, survey: Survey, count_l
 
     `survey`: as for one mesh; `count_layers`: how many instances lie one behind the other.
     """
-    least = MIN_OUTSIDE_OF_INSTANCES[view.sampling.n_samples > 1]
+    least = cost_table().cluster_scene[view.sampling.n_samples > 1]
     pays = survey.outside >= least and pays_to_draw_clusters(view, n_triangles, survey)
-    return pays or count_layers() >= MIN_LAYERS_TO_CLUSTER
+    return pays or count_layers() >= cost_table().cluster_layers
 
 
 def pays_to_share_instances(n_triangles: int, n_rows: float) -> bool:
     """Tell whether threads share the rows of a scene that is drawn in clusters; of an instance, on the mean."""
-    return n_triangles >= MIN_TRIANGLES_OF_INSTANCE and n_rows >= MIN_ROWS_OF_INSTANCE
+    costs = cost_table()
+    return n_triangles >= costs.scene_triangles and n_rows >= costs.scene_rows
 
 
 def pays_to_snap_all(n_vertices: int, n_pixels: int) -> bool:
     """Tell whether all vertices of a mesh in clusters are snapped for attributes, not only those that show."""
-    return n_vertices * MIN_PIXELS_A_VERTEX <= n_pixels
+    costs = cost_table()
+    return n_vertices * costs.transform[0] <= n_pixels * costs.seen_pixel
 
 
 def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:
@@ -434,12 +350,12 @@ def first_depth(points: NDArray[Any], *, has_depth: bool) -> float:
 
 def pays_without_depth(snapped: Snapped, view: View) -> bool:
     """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are."""
-    n_pixels = view.size[0] * view.size[1]
+    costs, n_pixels = cost_table(), view.size[0] * view.size[1]
     _, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
-    compared_ns = COMPARED_SAMPLE_NS * n_layers * n_pixels
-    if n_pixels > NEAR_PIXELS:
-        compared_ns += COMPARED_ROW_NS * n_rows
-    return compared_ns > FLAT_CALL_NS + FLAT_PIXEL_NS * n_pixels
+    compared_ns = costs.compared_sample * n_layers * n_pixels
+    if n_pixels > costs.near_pixels:
+        compared_ns += costs.compared_row * n_rows
+    return compared_ns > costs.flat_call + costs.flat_pixel * n_pixels
 
 
 def is_flat(snapped: Snapped, view: View) -> bool:
@@ -470,37 +386,39 @@ def drawing(view: View, snapped: Snapped, sink: Sink) -> Drawing:
 
 def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
     """Tell whether triangles are sorted into bands of rows: few of a large picture, or each far from the one before."""
-    n_pixels, n = view.size[0] * view.size[1], snapped.n_triangles
+    costs, n_pixels, n = cost_table(), view.size[0] * view.size[1], snapped.n_triangles
     has_depth = sink in (Sink.NEAREST, Sink.FARTHEST, Sink.PAINT)
     is_stored = has_depth or sink in (Sink.COUNT, Sink.LABEL)
-    if not is_stored or n_pixels <= NEAR_PIXELS or view.sampling is not Sampling.CENTER or not can_share(view):
+    if not is_stored or n_pixels <= costs.near_pixels or view.sampling is not Sampling.CENTER or not can_share(view):
         return False
     n_seen, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
     n_covered = n_layers * n_pixels
-    cleared_ns = CLEARED_PIXEL_NS * n_pixels if has_depth else 0.0
-    met_ns = n_rows * SAVED_ROW_NS + n_covered * SAVED_SAMPLE_NS if has_depth else n_covered * SAVED_STORE_NS
-    if n_rows < MIN_ROWS_TO_SORT * n_seen:
+    cleared_ns = costs.cleared_pixel * n_pixels if has_depth else 0.0
+    met_ns = n_covered * costs.saved_store
+    if has_depth:
+        met_ns = n_rows * costs.saved_row + n_covered * costs.saved_sample
+    if n_rows < costs.saved_rows * n_seen:
         met_ns = 0.0
-    sorted_ns = n_seen * SORTED_TRIANGLE_NS + (n - n_seen) * OUTSIDE_TRIANGLE_NS
+    sorted_ns = n_seen * costs.sorted_triangle + (n - n_seen) * costs.outside_triangle
     if cleared_ns + met_ns <= sorted_ns:
         return False
     scatter = guess_scatter(view, snapped)
-    return cleared_ns + scatter * met_ns > sorted_ns + scatter * n_seen * FAR_TRIANGLE_NS
+    return cleared_ns + scatter * met_ns > sorted_ns + scatter * n_seen * costs.far_triangle
 
 
 def pays_to_bound(view: View, snapped: Snapped, sink: Sink) -> bool:
     """Tell whether to keep, beside depths, a bound of those of each 64 columns of a row: where spans are long."""
-    width, height = view.size
+    costs, (width, height) = cost_table(), view.size
     is_kept = sink in (Sink.NEAREST, Sink.FARTHEST) and view.sampling is Sampling.CENTER and not view.is_exact
-    if not is_kept or width < MIN_COLUMNS_TO_BOUND or snapped.n_triangles > MAX_TRIANGLES_TO_BOUND:
+    if not is_kept or width < costs.bound_columns or snapped.n_triangles > costs.bound_triangles:
         return False
     _, n_layers, n_rows = snapped.mesh.guess_seen(width, height)
-    return n_layers * width * height >= MIN_SPAN_TO_BOUND * max(1.0, n_rows)
+    return n_layers * width * height >= costs.bound_span * max(1.0, n_rows)
 
 
 def guess_scatter(view: View, snapped: Snapped) -> float:
     """Return the share of triangles that are taller than a band of rows, or lie farther from the next."""
-    return snapped.mesh.guess_scatter(max(1, BAND_PIXELS // view.size[0]))
+    return snapped.mesh.guess_scatter(max(1, int(cost_table().far_pixels) // view.size[0]))
 
 
 def rows_to_blend(view: View, snapped: Snapped, row_bytes: int, *, lays_ground: bool) -> int:
@@ -508,17 +426,18 @@ def rows_to_blend(view: View, snapped: Snapped, row_bytes: int, *, lays_ground: 
 
     Each band looks at all triangles.
     """
-    width, height = view.size
-    n_rows = max(1, BLEND_BAND_BYTES // row_bytes)
+    costs, (width, height) = cost_table(), view.size
+    n_rows = max(1, int(costs.blend_bytes) // row_bytes)
     if n_rows >= height:
         return height
     _, n_layers, n_triangle_rows = snapped.mesh.guess_seen(width, height)
     n_covered = n_layers * width * height
-    again_ns = n_triangle_rows * BLENDED_ROW_NS + n_covered * BLENDED_PIXEL_NS
-    ground_ns = min(n_covered, width * height) * BLENDED_PIXEL_NS if lays_ground else 0.0
-    cost_ns = height / n_rows * (snapped.n_triangles * SEEN_TRIANGLE_NS + snapped.n_vertices * SEEN_VERTEX_NS)
+    again_ns = n_triangle_rows * costs.blended_row + n_covered * costs.blended_pixel
+    ground_ns = min(n_covered, width * height) * costs.blended_pixel if lays_ground else 0.0
+    looked_ns = snapped.n_triangles * costs.blended_triangle + snapped.n_vertices * costs.blended_vertex
+    cost_ns = height / n_rows * looked_ns
     if view.sampling is Sampling.AREA:
-        cost_ns += n_triangle_rows / n_rows * STRIP_NS
+        cost_ns += n_triangle_rows / n_rows * costs.blended_strip
     return n_rows if ground_ns + again_ns * guess_scatter(view, snapped) > cost_ns else height
 
 
@@ -590,4 +509,10 @@ def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bo
     if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1 or view.is_exact:
         return False
     n_seen, _, _ = snapped.mesh.guess_seen(*view.size)
-    return n_seen * MIN_PIXELS_A_TRIANGLE <= view.size[0] * view.size[1]
+    costs = cost_table()
+    return n_seen * costs.direct_triangle <= view.size[0] * view.size[1] * costs.paint
+
+
+#: What `forced` forces, beside costs.
+FORCEABLE = {name for name, one in globals().items() if callable(one) and one.__module__ == __name__ and name.islower()}
+FORCEABLE = FORCEABLE - {"forced", "constantly"} | {"available_threads"}

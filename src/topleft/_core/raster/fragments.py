@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple, Protocol, Self, overload
 
 import numpy as np
+import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
@@ -62,6 +63,42 @@ class GivenCorners(NamedTuple):
         steps[..., 2] = corners[..., 2]
         steps[~np.isfinite(steps).all(axis=(1, 2))] = 0  # of triangles without area before the snap
         return steps
+
+
+class SeenSamples(NamedTuple):
+    """What the samples of a picture see, as kernels read it."""
+
+    ids: NDArray[Any]
+    """int32, planes (S, H, W), or (1, H, W) of the first with `split`; int64 where int32 does not count triangles."""
+    depth: NDArray[np.float32]
+    split: engine.Split | None
+    n_samples: int
+
+    @classmethod
+    def of(cls, ids: NDArray[Any], depth: NDArray[Any], split: engine.Split | None = None, n: int = 0) -> Self:
+        """Take planes; those that kernels cannot read are copied."""
+        return cls(as_read(ids, ids.dtype), as_read(depth, np.float32), split, n or len(ids))
+
+    def split_pixels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[Any], NDArray[np.float32]]:
+        """Return rows and columns (P,) of pixels whose samples see several triangles, and ids and depths (S, P)."""
+        ids, depth, split = self.ids, self.depth, self.split
+        if split is None:
+            is_split = np.zeros(ids.shape[1:], np.bool_)
+            for other in ids[1:]:
+                is_split |= other != ids[0]
+            rows, columns = np.nonzero(is_split)
+            return (rows, columns), ids[:, rows, columns], depth[:, rows, columns]
+        counts = split.rows[:, 1] - split.rows[:, 0]
+        rows = np.repeat(np.arange(len(counts)), counts)
+        own = np.arange(counts.sum()) + np.repeat(split.rows[:, 0] - (np.cumsum(counts) - counts), counts)
+        columns = split.columns[own].astype(np.intp)
+        split_ids = np.concatenate([ids[:, rows, columns], split.ids[:, own]])
+        return (rows, columns), split_ids, np.concatenate([depth[:, rows, columns], split.depth[:, own]])
+
+
+def as_read(planes: NDArray[Any], kind: npt.DTypeLike) -> NDArray[Any]:
+    """Planes as kernels read them: as they are, if that is so."""
+    return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
 
 
 class Fragments:
@@ -143,6 +180,17 @@ class Fragments:
         self.id, self._depth = ids[0], depth[0]
         if self.corners is not None:
             self.drawn_from(self.corners)
+
+    def _whole(self, ids: NDArray[Any]) -> NDArray[Any]:
+        """Return what `.id` calls triangles that were drawn: the same, but for parts that a lens makes of them."""
+        return ids
+
+    def _seen(self) -> SeenSamples:
+        """Return what the samples see, as it was drawn."""
+        if self._split is not None:
+            found = self._split
+            return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.positions))
+        return SeenSamples.of(*(self._sampled()[1] or (self.id[None], self.depth[None])))
 
     def __repr__(self) -> str:
         height, width = self.triangle.shape

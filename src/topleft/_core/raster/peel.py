@@ -18,7 +18,7 @@ from topleft._core.base.arrays import shown
 from topleft._core.base.memory import FRESH, SCRATCH, Memory, check_fits
 from topleft._core.base.options import DepthTest, Sampling, parse
 from topleft._core.base.threads import count_threads, run_parts
-from topleft._core.raster.choices import can_share
+from topleft._core.raster import choices
 from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.sampling import bits_of_bands
@@ -206,7 +206,7 @@ def peel_meshes(
         return ids, depth
     n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
-    n_pixels = BAND_BYTES // (8 * n_layers) if can_share(view) else min(height * width, 2**31 - 1)
+    n_pixels = BAND_BYTES // (8 * n_layers) if choices.can_share(view) else min(height * width, 2**31 - 1)
     band_bits = bits_of_bands((height, width), n_pixels, n_threads)
     bins = [bins_of(memory, snapped, view, band_bits, reach_fx) for snapped in meshes]
     n_bands = -(-height >> band_bits)
@@ -225,7 +225,7 @@ def peel_meshes(
 def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int, reach_fx: int) -> engine.Bins | None:
     """Return the triangles of each band of rows; None where every band looks at all of them."""
     width, height = view.size
-    if not (snapped.n_triangles and can_share(view)):
+    if not (snapped.n_triangles and choices.can_share(view)):
         return None
     bins = engine.Bins(
         snapped.mesh, height, width, reach_fx, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)

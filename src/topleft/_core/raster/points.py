@@ -16,7 +16,7 @@ from topleft._core.base.arrays import as_array, as_count, as_number, as_places, 
 from topleft._core.base.memory import FRESH, Memory, check_fits
 from topleft._core.base.options import DepthTest, PointShape, Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
-from topleft._core.raster.choices import threads_to_snap
+from topleft._core.raster import choices
 from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import refuse_many
@@ -253,7 +253,9 @@ def snap_points(memory: Memory, array: NDArray[Any], view: View) -> NDArray[np.u
     """
     source, n = source_of(array, view), len(array)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
-    records, _, n_bad, _ = snap(memory, source, n, threads_to_snap(view.threads, n, 0), view, viewport, with_depth=True)
+    records, _, n_bad, _ = snap(
+        memory, source, n, choices.threads_to_snap(view.threads, n, 0), view, viewport, with_depth=True
+    )
     if n_bad:
         bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
         if len(bad):

@@ -13,6 +13,7 @@ from topleft._core import engine
 from topleft._core.base.memory import FRESH, Memory, check_fits, empty
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts
+from topleft._core.raster.costs import cost_table
 
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
 POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
@@ -29,23 +30,8 @@ POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
 #: Sub-pixel bits of the coarsest grid that all samples lie on.
 SAMPLE_GRID_BITS = 4
 
-#: Ids and depth of one sample in a band of rows: they stay in the second-level cache while the band is drawn.
-BAND_BYTES = 512 << 10
-
-#: The same where a band is drawn for all samples before the next: so that these stay there together, of four.
-SPLIT_BAND_BYTES = 256 << 10
-
-#: Labels of all samples in a band of rows that is resolved at once.
-LABEL_BAND_BYTES = 512 << 10
-
 #: Cells that are held at a time; a larger picture is drawn in several passes over the triangles.
 MAX_CELLS = 1 << 28
-
-#: Cells of a band of rows that stays in the second-level cache: one triangle over 3840x2160 takes 2.3 ms, not 3.2.
-AREA_BAND_BYTES = 512 << 10
-
-#: Pixels that are summed 0.2 ns faster in the nearer cache for each time that a triangle is looked at, 10 ns.
-PIXELS_PER_TRIANGLE = 50
 
 
 def sample_positions(n_samples: int, grid_bits: int) -> NDArray[np.int32]:
@@ -93,7 +79,7 @@ def draw_sorted(
     n_threads: int,
 ) -> bool:
     """Draw each sample into its target, band after band of rows; returns as `draw_planes` does. The mesh is near."""
-    bins = sort_bands(memory, mesh, n_triangles, positions, shape, BAND_BYTES // 8, n_threads)
+    bins = sort_bands(memory, mesh, n_triangles, positions, shape, int(cost_table().plane_bytes) // 8, n_threads)
     if bins.bad_row >= 0:
         return True
     meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
@@ -166,7 +152,9 @@ def draw_split(
     and only in the columns that its triangles may reach.
     """
     (height, width), n_others = shape, len(positions) - 1
-    bins = sort_bands(memory, mesh, n_triangles, positions, shape, SPLIT_BAND_BYTES // 8, n_threads, with_columns=True)
+    bins = sort_bands(
+        memory, mesh, n_triangles, positions, shape, int(cost_table().split_bytes) // 8, n_threads, with_columns=True
+    )
     if bins.bad_row >= 0:
         return None
     ids: NDArray[np.int32] = memory.empty("triangle", shape, np.int32)
@@ -213,7 +201,7 @@ def split_bytes(
 ) -> tuple[dict[str, int], dict[str, int]]:
     """Return the most bytes that `draw_split` needs: of scratch and of what it returns, by name."""
     (height, width), n_others = shape, n_samples - 1
-    band_bits = bits_of_bands(shape, SPLIT_BAND_BYTES // 8, n_threads)
+    band_bits = bits_of_bands(shape, int(cost_table().split_bytes) // 8, n_threads)
     n_bands = -(-height >> band_bits)
     n_rows = min(n_threads, n_bands) << band_bits
     scratch = {
@@ -246,7 +234,9 @@ def draw_means(
     """
     height, width = pixels.shape[:2]
     n = len(positions)
-    bins = sort_bands(memory, mesh, n_triangles, positions, (height, width), LABEL_BAND_BYTES // (4 * n), n_threads)
+    bins = sort_bands(
+        memory, mesh, n_triangles, positions, (height, width), int(cost_table().label_bytes) // (4 * n), n_threads
+    )
     if bins.bad_row >= 0:
         return True
     meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
@@ -338,8 +328,9 @@ def area_band(n_triangles: int, height: int, width: int, n_parts: int) -> int:
     for each pixel.
     """
     stride, largest = engine.area_stride(width), -(-height // n_parts)
-    near = max(1, AREA_BAND_BYTES // (4 * stride))
-    is_near = n_triangles * -(-height // near) * PIXELS_PER_TRIANGLE < height * width
+    costs = cost_table()
+    near = max(1, int(costs.area_bytes) // (4 * stride))
+    is_near = n_triangles * -(-height // near) * costs.area_triangle < height * width * costs.area_pixel
     return min(largest, near if is_near else max(1, MAX_CELLS // (n_parts * stride)))
 
 

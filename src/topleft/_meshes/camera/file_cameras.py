@@ -16,6 +16,7 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_path
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import box_matrix, frustum_matrix, tangent
+from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, reading
 from topleft._meshes.io.references import InputFile
 from topleft.errors import MeshError
@@ -62,7 +63,7 @@ def load_cameras(
     ...     tl.load_cameras(path)
     []
     """
-    source = InputFile(as_path("path", path))
+    source = InputFile(as_path("path", path), Budget(os.fspath(path)))
     source.moment = as_moment(time, clip)
 
     def cameras() -> list[Camera]:

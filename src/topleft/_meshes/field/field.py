@@ -20,7 +20,7 @@ from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
 from topleft._core.base.memory import SCRATCH
 from topleft._core.base.options import Per, Sink, check_choice, parse
 from topleft._core.base.threads import count_threads, run_parts
-from topleft._core.raster.choices import drawing
+from topleft._core.raster import choices
 from topleft._core.raster.rasterize import canvas_of, draw
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
@@ -307,7 +307,7 @@ def visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     snapped = snap_mesh(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
     ids: I32 = SCRATCH.empty("labels", view.size[::-1], np.int32)
     depth = None if sink is Sink.LABEL else SCRATCH.empty("depth of heights", ids.shape, np.float32)
-    draw(SCRATCH, snapped, view, drawing(view, snapped, sink), ids, depth=depth)
+    draw(SCRATCH, snapped, view, choices.drawing(view, snapped, sink), ids, depth=depth)
     return ids
 
 

@@ -12,6 +12,9 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import zipfile
+import zlib
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -24,9 +27,12 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import Array
+from topleft._meshes.io.limits.archives import check_zip
+from topleft._meshes.io.limits.budget import Budget
+from topleft._meshes.io.limits.walks import walks
 from topleft._meshes.io.notes import Notes
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text
-from topleft._meshes.model.from_trimesh import placed
+from topleft._meshes.model.from_trimesh import Textures, placed
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.polygons import triangulate
@@ -39,10 +45,11 @@ NO_TRIANGLES = {
 }
 """What trimesh may read that is no mesh."""
 
-FORMATS_OF_EXTRA = (".3mf", ".dae", ".zae", ".xaml", ".amf")
+FORMATS_OF_EXTRA = (".3mf", ".dae", ".xaml", ".amf")
 BINARY_DXF = b"AutoCAD Binary DXF"
-MAX_UNPACKED_BYTES = 1 << 29
-"""Of all files of an archive."""
+
+NODES_OF_TRIMESH = 4
+"""Nodes of glTF that take as long as one that trimesh reads: 0.2 ms."""
 
 SKINS = "skins and morph targets drawn as they were modelled"
 
@@ -81,8 +88,6 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
             raise MeshError("it is not text") from error
         extra = "pip install 'topleft[formats]'" if suffix in FORMATS_OF_EXTRA else f"another package: {error}"
         raise MissingPackageError(f"reading {source.path.suffix!r} needs {extra}") from error
-    if suffix == ".dae":
-        _note_missing_pictures(source)
     return parts
 
 
@@ -94,22 +99,78 @@ def _check_what_it_is(source: InputFile, suffix: str) -> None:
         raise MeshError(f"cannot read {str(source.path)!r}: it is a binary DXF: save it as text")
     if suffix in (".svg", ".dxf", ".binvox"):
         raise MeshError(f"cannot draw {str(source.path)!r}: {NO_TRIANGLES[suffix]}")
-    if head.startswith(b"PK\3\4"):
-        import zipfile
+    archive = check_zip(source.path, source.budget)
+    if archive is not None:
+        with archive:
+            _check_models(archive, source)
 
+
+def _check_models(archive: zipfile.ZipFile, source: InputFile) -> None:
+    """Count what the models of a 3MF file place, and refuse those whose objects are elsewhere."""
+    models = [row for row in archive.infolist() if row.filename.lower().endswith(".model")]
+    main = next((row for row in models if "3d/3dmodel.model" in row.filename.lower()), None)
+    if main is None:
+        return
+    try:
+        counts = {row.filename: Model3MF(archive.read(row), source.budget) for row in models}
+    except (zipfile.BadZipFile, RuntimeError, zlib.error, EOFError, OSError) as error:
+        raise MeshError(f"its archive is broken ({error})") from error
+    first = counts[main.filename]
+    if len(models) > 1 and not first.has_objects:
+        raise MeshError(f"cannot read {str(source.path)!r}: its objects are in further files of the archive")
+    for object_, path in first.elsewhere:  # trimesh reads all of that file again for each component that names it
+        other = counts.get(path.strip("/"))
+        if other is not None:
+            source.budget.spend("max_lines", other.n_elements)
+            for kind in ("vertex", "triangle"):
+                first.own[kind][object_] += sum(other.own[kind].values())
+    found = walks(first.below, first.items)
+    source.budget.spend("max_nodes", NODES_OF_TRIMESH * sum(n_steps for _, n_steps in found.values()))
+    for kind, option in (("vertex", "max_vertices"), ("triangle", "max_triangles")):
+        source.budget.check(option, sum(found[name][0] * n for name, n in first.own[kind].items() if name in found))
+
+
+class Model3MF:
+    """What a model of a 3MF file declares, counted element by element and not kept.
+
+    Raises
+    ------
+    MeshError
+        If it is no XML, or has more elements than its budget.
+    """
+
+    def __init__(self, content: bytes, budget: Budget) -> None:
+        from xml.parsers import expat
+
+        self.n_elements = content.count(b"<") - content.count(b"</")
+        budget.spend("max_lines", self.n_elements)
+        self.has_objects = False
+        self.own: dict[str, dict[str, int]] = {"vertex": defaultdict(int), "triangle": defaultdict(int)}
+        self.below: dict[str, list[str]] = defaultdict(list)
+        self.items: list[str] = []
+        self.elsewhere: list[tuple[str, str]] = []
+        self._object = ""
+        parser = expat.ParserCreate(namespace_separator="}")
+        parser.StartElementHandler = self._start
         try:
-            with zipfile.ZipFile(source.path) as archive:
-                rows = archive.infolist()
-                n_bytes = sum(row.file_size for row in rows)
-                models = [row for row in rows if row.filename.lower().endswith(".model")]
-                main = [row for row in models if row.filename.lower().endswith("3d/3dmodel.model")]
-                has_objects = not main or n_bytes > MAX_UNPACKED_BYTES or b"<object" in archive.read(main[0])
-        except (zipfile.BadZipFile, NotImplementedError) as error:
-            raise MeshError(f"its archive is broken ({error})") from error
-        if n_bytes > MAX_UNPACKED_BYTES:
-            raise MeshError(f"its archive holds {n_bytes} bytes, more than {MAX_UNPACKED_BYTES}")
-        if len(models) > 1 and not has_objects:
-            raise MeshError(f"cannot read {str(source.path)!r}: its objects are in further files of the archive")
+            parser.Parse(content, True)
+        except expat.ExpatError as error:
+            raise MeshError(f"it is no XML: {error}") from error
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        kind = tag.rpartition("}")[2]
+        if kind in self.own:
+            self.own[kind][self._object] += 1
+        elif kind == "object":
+            self.has_objects, self._object = True, attributes.get("id", "")
+        elif kind == "item":
+            self.items.append(attributes.get("objectid", ""))
+        elif kind == "component":
+            name = attributes.get("objectid", "")
+            self.below[self._object].append(name)
+            path = next((value for key, value in attributes.items() if key.endswith("path")), None)
+            if path is not None:
+                self.elsewhere.append((name, path))
 
 
 def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | None]:
@@ -117,28 +178,21 @@ def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | No
 
     COLLADA is read after its polygons have been cut; of the sides of its materials trimesh reads nothing.
     """
-    if suffix not in (".dae", ".zae"):
+    content = source.content()
+    if suffix != ".dae":
+        del content  # which is counted
         return trimesh.load_scene(str(source.path), process=False), None
 
     class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
         def get(self, name: str) -> bytes:
-            path = source.find(unquote(name), "textures")
-            if path is None:
+            content = source.picture_content(unquote(name))
+            if content is None:
                 raise FileNotFoundError(name)
-            return path.read_bytes()
+            return content
 
-    resolver: Any = Beside(str(source.path))
-    if suffix == ".zae":
-        with source.path.open("rb") as file:
-            archive = trimesh.util.decompress(file, file_type="zip")
-        name = next((name for name in archive if name.lower().endswith(".dae")), None)
-        if name is None:
-            raise MeshError("its archive holds no .dae file")
-        content, resolver = archive[name].read(), trimesh.resolvers.ZipResolver(archive)
-    else:
-        content = source.path.read_bytes()
-    simple, double_sided = simplified(content, source.notes)
-    scene = trimesh.load_scene(io.BytesIO(simple), file_type="dae", resolver=resolver, process=False)
+    simple, double_sided = simplified(content, source.notes, source.budget)
+    _note_missing_pictures(content, source)
+    scene = trimesh.load_scene(io.BytesIO(simple), file_type="dae", resolver=Beside(str(source.path)), process=False)
     return scene, double_sided
 
 
@@ -149,26 +203,26 @@ def _sided(mesh: Mesh, double_sided: bool | None) -> Mesh:
     return replace(mesh, materials=tuple(replace(one, double_sided=double_sided) for one in mesh.materials))
 
 
-def _note_missing_pictures(source: InputFile) -> None:
+def _note_missing_pictures(content: bytes, source: InputFile) -> None:
     """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out without a word."""
-    names = re.findall(rb"<init_from>\s*(?:<ref>)?\s*([^<\s][^<]*\.[A-Za-z]{3,4})\s*<", source.path.read_bytes())
+    names = re.findall(rb"<init_from>\s*(?:<ref>)?\s*([^<\s][^<]*\.[A-Za-z]{3,4})\s*<", content)
     for name in names:
         source.find(unquote(name.decode("utf-8", errors="replace")).removeprefix("file://"), "textures")
 
 
 def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
     """The meshes of a trimesh scene, in its order, placed."""
-    n_vertices = 0
+    textures: Textures = {}
     for transform, name in (scene.graph[node] for node in scene.graph.nodes_geometry):
         geometry = scene.geometry[name]
         if len(getattr(geometry, "faces", ())):
-            n_vertices += len(geometry.vertices)
-            source.check_n_vertices(n_vertices)
-            yield placed(geometry, transform)
+            source.budget.spend("max_vertices", len(geometry.vertices))
+            source.budget.spend("max_triangles", len(geometry.faces))
+            yield placed(geometry, transform, textures)
         elif hasattr(geometry, "colors") and len(getattr(geometry, "vertices", ())):
             source.notes.add("points not drawn")
             points = moved(np.asarray(geometry.vertices), transform)
-            source.check_n_vertices(len(points))
+            source.budget.spend("max_vertices", len(points))
             colors = np.asarray(geometry.colors)
             source.clouds.append(Cloud(points, colors if colors.shape == (len(points), 4) else None))
         elif hasattr(geometry, "entities"):
@@ -191,14 +245,15 @@ def quiet() -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-def simplified(content: bytes, notes: Notes) -> tuple[bytes, bool]:
+def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, bool]:
     """The file with triangles alone, and whether its materials have two sides: unless all say that they have one.
 
     Raises
     ------
     MeshError
-        If it is no XML, or its polygons name what is not there.
+        If it is no XML, its polygons name what is not there, or it has more than its budget.
     """
+    budget.spend("max_lines", content.count(b"<") - content.count(b"</"))
     try:
         root = ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
@@ -208,10 +263,11 @@ def simplified(content: bytes, notes: Notes) -> tuple[bytes, bool]:
     for row in root.iter():
         if row.text and "," in row.text and row.tag[len(space) :] in OF_NUMBERS:  # some programs write decimal commas
             row.text = row.text.replace(",", ".")
+    positions: dict[Element, Array] = {}
     for mesh in root.iter(f"{space}mesh"):
         for kind in ("polylist", "polygons"):
             for row in mesh.findall(f"{space}{kind}"):
-                _cut(row, space, named, notes)
+                _cut(row, space, named, positions, notes)
         if mesh.find(f"{space}lines") is not None or mesh.find(f"{space}linestrips") is not None:
             notes.add("lines not drawn")
     for node in list(root.iter(f"{space}node")):
@@ -224,6 +280,7 @@ def simplified(content: bytes, notes: Notes) -> tuple[bytes, bool]:
                 notes.add("materials that are not there", row.get("target", "")[1:])
     if root.find(f"{space}library_animations/{space}animation") is not None:
         notes.add("animations not played: everything is at rest")
+    _check_walks(root, space, named, budget)
     return ElementTree.tostring(root), _has_two_sides(root, space, notes)
 
 
@@ -236,6 +293,51 @@ def _has_two_sides(root: Element, space: str, notes: Notes) -> bool:
     return n_single == 0 or n_single < len(effects)
 
 
+def _check_walks(root: Element, space: str, named: dict[str | None, Element], budget: Budget) -> None:
+    """Count what the nodes of the scene place, and put those that others name before them, as pycollada likes it."""
+    nodes: dict[str | None, list[Element]] = defaultdict(list)
+    for node in root.iter(f"{space}node"):
+        nodes[node.get("id")].append(node)
+    below: dict[Element, list[Element]] = {}
+    for parent in [*root.iter(f"{space}visual_scene"), *root.iter(f"{space}node")]:
+        below[parent] = [
+            child
+            for row in parent
+            for child in (nodes.get(row.get("url", "")[1:], []) if row.tag == f"{space}instance_node" else [row])
+            if row.tag in (f"{space}instance_node", f"{space}node")
+        ]
+    scene = root.find(f"{space}scene/{space}instance_visual_scene")
+    shown = None if scene is None else named.get(scene.get("url", "")[1:])
+    found = walks(below, [] if shown is None else [shown])
+    own: dict[Element, tuple[int, int]] = {}
+    n_nodes = n_triangles = 0
+    for node, (n, _) in found.items():
+        n_nodes += n
+        for row in node.findall(f"{space}instance_geometry"):
+            geometry = named.get(row.get("url", "")[1:])
+            if geometry is not None:
+                own[geometry] = own[geometry] if geometry in own else _counts(geometry, space)
+                n_nodes += n * (own[geometry][0] + sum(1 for _ in row.iter(f"{space}instance_material")))
+                n_triangles += n * own[geometry][1]
+    budget.spend("max_nodes", NODES_OF_TRIMESH * n_nodes)
+    budget.check("max_triangles", n_triangles)
+    places = {node: i for i, node in enumerate(found)}
+    for library in root.findall(f"{space}library_nodes"):
+        library[:] = sorted((node for node in library if node in places), key=lambda node: -places[node])
+
+
+def _counts(geometry: Element, space: str) -> tuple[int, int]:
+    """How many lists of triangles a geometry has, and how many triangles; no fewer than pycollada makes."""
+    n_lists = n_triangles = 0
+    for kind in ("triangles", "trifans", "tristrips"):
+        for row in geometry.iter(f"{space}{kind}"):
+            n_lists += 1
+            stride = 1 + max((int(one.get("offset", 0)) for one in row.findall(f"{space}input")), default=0)
+            n_corners = sum(len((one.text or "").split()) for one in row.findall(f"{space}p")) // stride
+            n_triangles += n_corners // 3 if kind == "triangles" else n_corners
+    return n_lists, n_triangles
+
+
 def _is_material(target: str, space: str, named: dict[str | None, Element]) -> bool:
     """Whether there is a material with an effect; one of another file may be there."""
     if not target.startswith("#"):
@@ -245,7 +347,7 @@ def _is_material(target: str, space: str, named: dict[str | None, Element]) -> b
     return effect is not None and effect.get("url", "")[1:] in named
 
 
-def _cut(row: Element, space: str, named: dict[str | None, Element], notes: Notes) -> None:
+def _cut(row: Element, space: str, named: dict[str | None, Element], known: dict[Element, Array], notes: Notes) -> None:
     """Make triangles of polygons, in place."""
     inputs = row.findall(f"{space}input")
     stride = 1 + max((int(one.get("offset", 0)) for one in inputs), default=0)
@@ -256,16 +358,16 @@ def _cut(row: Element, space: str, named: dict[str | None, Element], notes: Note
             row.remove(old)
         if vertex is None:
             return
-    lists = [_whole(one.text) for one in row.findall(f"{space}p")]
-    corners = np.concatenate(lists) if lists else np.zeros(0, np.int64)
+    lists = [one.text or "" for one in row.findall(f"{space}p")]
+    corners = _whole(" ".join(lists))
     if row.tag == f"{space}polylist":
         n_corners = _whole(row.findtext(f"{space}vcount"))
     else:
-        n_corners = np.array([len(one) // stride for one in lists], np.int64)
+        n_corners = np.array([len(one.split()) // stride for one in lists], np.int64)
     if (n_corners < 0).any() or int(n_corners.sum()) * stride != len(corners):
         raise MeshError(f"a list of polygons has {len(corners)} numbers for {int(n_corners.sum())} corners")
     corners = corners.reshape(-1, stride)
-    positions = _positions(vertex, space, named)
+    positions = _positions(vertex, space, named, known)
     triangles, _ = triangulate(positions, corners[:, int(vertex.get("offset", 0))], n_corners)
     for old in [*row.findall(f"{space}p"), *row.findall(f"{space}vcount")]:
         row.remove(old)
@@ -274,20 +376,23 @@ def _cut(row: Element, space: str, named: dict[str | None, Element], notes: Note
     ElementTree.SubElement(row, f"{space}p").text = " ".join(map(str, corners[triangles.ravel()].ravel().tolist()))
 
 
-def _positions(vertex: Element, space: str, named: dict[str | None, Element]) -> Array:
-    """The positions (V, 3) that an input of vertices names."""
+def _positions(vertex: Element, space: str, named: dict[str | None, Element], known: dict[Element, Array]) -> Array:
+    """The positions (V, 3) that an input of vertices names; each source is read once."""
     vertices = named.get(vertex.get("source", "")[1:])
     rows = [] if vertices is None else vertices.findall(f"{space}input")
     source = next((named.get(one.get("source", "")[1:]) for one in rows if one.get("semantic") == "POSITION"), None)
     if source is None:
         raise MeshError("polygons name positions that are not there")
+    if source in known:
+        return known[source]
     accessor = source.find(f"{space}technique_common/{space}accessor")
     stride = 3 if accessor is None else int(accessor.get("stride", 1))
     start = 0 if accessor is None else int(accessor.get("offset", 0))
     numbers = numbers_of_text((source.findtext(f"{space}float_array") or "").encode())[start:]
     if not 2 <= stride <= 64:
         raise MeshError(f"positions have {stride} numbers")
-    return numbers[: len(numbers) // stride * stride].reshape(-1, stride)[:, :3]
+    known[source] = numbers[: len(numbers) // stride * stride].reshape(-1, stride)[:, :3]
+    return known[source]
 
 
 def _whole(text: str | None) -> npt.NDArray[np.int64]:

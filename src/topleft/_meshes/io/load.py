@@ -15,8 +15,9 @@ from typing import TypeVar
 import numpy as np
 
 from topleft._core.base.arrays import as_number, as_path, shown
+from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.notes import tell
-from topleft._meshes.io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile, Moment
+from topleft._meshes.io.references import InputFile, Moment
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh, as_crease
 from topleft._meshes.model.points import Points
@@ -25,16 +26,22 @@ from topleft.errors import MeshError, MissingPackageError
 Made = TypeVar("Made")
 
 GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
+ARCHIVE_SUFFIXES = (".zip", ".zae", ".tgz", ".gz", ".bz2")
 
 
 def load(
     path: str | os.PathLike[str],
     *,
     crease: float = DEFAULT_CREASE,
-    max_vertices: int = MAX_VERTICES,
-    max_texture_pixels: int = MAX_TEXTURE_PIXELS,
+    max_vertices: int | None = None,
+    max_texture_pixels: int | None = None,
     time: float | None = None,
     clip: int | str | None = None,
+    max_triangles: int | None = None,
+    max_nodes: int | None = None,
+    max_lines: int | None = None,
+    max_bytes: int | None = None,
+    max_unpacked_bytes: int | None = None,
 ) -> Mesh | Points:
     r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
 
@@ -45,10 +52,21 @@ def load(
     crease : float
         Degrees, 0 to 180: edges at which triangles bend by more are sharp, where the file has no normals; see `Mesh`.
         180: none is, 0: all are.
-    max_vertices : int
-        A file with more, or one that says so, is refused.
-    max_texture_pixels : int
-        Pictures with more are left out.
+    max_vertices, max_triangles, max_nodes : int, optional
+        A file with more, or one that says so, is refused: nodes with a mesh and instances count each time, and so do
+        their vertices and triangles. Unless given 4,194,304 vertices, 4,194,304 triangles and 32,768 nodes, or as many
+        as the file has bytes, and one node for 100 bytes.
+    max_texture_pixels : int, optional
+        Of all pictures together, and of textures that are made of them: those beyond are left out. Unless given
+        67,108,864 (8192 x 8192), or 16 for each byte.
+    max_lines : int, optional
+        Of lines of text, rows of PLY and elements of XML: a file with more is refused. Unless given 524,288, or one for
+        4 bytes.
+    max_bytes : int, optional
+        Of the file and all that it names: more are refused. Unless given 8 GiB.
+    max_unpacked_bytes : int, optional
+        Of what is in an archive, or in the file in a shorter form: more are refused. Unless given 33,554,432, or 8 for
+        each byte.
     time : float, optional
         Seconds, 0 or more: nodes, skins and morph targets of glTF are where an animation has them then; behind its end,
         where it ends. Unless given everything is at rest.
@@ -100,7 +118,12 @@ def load(
     [[0, 1, 2]]
     """
     crease = as_crease(crease)
-    source = InputFile(as_path("path", path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
+    checked = as_path("path", path)
+    budget = Budget(
+        str(checked), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels, max_triangles=max_triangles,
+        max_nodes=max_nodes, max_lines=max_lines, max_bytes=max_bytes, max_unpacked_bytes=max_unpacked_bytes,
+    )  # fmt: skip
+    source = InputFile(checked, budget)
     source.moment = as_moment(time, clip)
     mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
@@ -131,32 +154,8 @@ def as_seconds(time: float) -> float:
 
 
 def _mesh(source: InputFile, crease: float) -> Mesh | Points:
-    """The mesh of the file; a reader is imported when a file needs it."""
-    match source.path.suffix.lower():
-        case suffix if suffix in GLTF_SUFFIXES:
-            from topleft._meshes.io.gltf.reader import read_gltf
-
-            parts = read_gltf(source)
-        case ".obj":
-            from topleft._meshes.io.obj import read_obj
-
-            parts = read_obj(source)
-        case ".ply":
-            from topleft._meshes.io.ply import read_ply
-
-            parts = read_ply(source)
-        case ".stl" | ".stl_ascii":
-            from topleft._meshes.io.stl_off import read_stl
-
-            parts = read_stl(source)
-        case ".off":
-            from topleft._meshes.io.stl_off import read_off
-
-            parts = read_off(source)
-        case _:
-            from topleft._meshes.io.foreign import read_by_trimesh
-
-            parts = read_by_trimesh(source)
+    """The mesh of the file."""
+    parts = _parts(source)
     if not parts and source.clouds:
         return _points(source)
     if not any(len(part.triangles) for part in parts):
@@ -165,6 +164,41 @@ def _mesh(source: InputFile, crease: float) -> Mesh | Points:
         ]
         raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
     return joined(parts, crease)
+
+
+def _parts(source: InputFile) -> list[Mesh]:
+    """What a reader makes of the file; it is imported when a file needs it."""
+    match source.path.suffix.lower():
+        case suffix if suffix in GLTF_SUFFIXES:
+            from topleft._meshes.io.gltf.reader import read_gltf
+
+            return read_gltf(source)
+        case ".obj":
+            from topleft._meshes.io.obj import read_obj
+
+            return read_obj(source)
+        case ".ply":
+            from topleft._meshes.io.ply import read_ply
+
+            return read_ply(source)
+        case ".stl" | ".stl_ascii":
+            from topleft._meshes.io.stl_off import read_stl
+
+            return read_stl(source)
+        case ".off":
+            from topleft._meshes.io.stl_off import read_off
+
+            return read_off(source)
+        case suffix if suffix in ARCHIVE_SUFFIXES:
+            from topleft._meshes.io.limits.archives import unpacked
+
+            with unpacked(source.path, source.budget) as (folder, paths):
+                members = [InputFile(path, source.budget, archive=source, home=folder) for path in paths]
+                return [part for member in members for part in _parts(member)]
+        case _:
+            from topleft._meshes.io.foreign import read_by_trimesh
+
+            return read_by_trimesh(source)
 
 
 def _points(source: InputFile) -> Points:

@@ -18,7 +18,7 @@ import numpy as np
 
 from topleft._core.base.array_types import U8
 from topleft._core.base.color import Color, decode_srgb
-from topleft._meshes.io.references import InputFile
+from topleft._meshes.io.references import ROWS_AT_ONCE, InputFile
 from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.texture import Texture, Wrap
 from topleft.errors import MeshError
@@ -77,7 +77,9 @@ def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[
     """
     entries: dict[str, _Entry] = {}
     own = _Entry()
-    for line in text.replace("\\\n", " ").splitlines():
+    lines = text.replace("\\\n", " ").splitlines()
+    source.budget.spend("max_lines", len(lines))
+    for line in lines:
         words = line.split(maxsplit=1)
         if not words or words[0].startswith("#"):
             continue
@@ -177,7 +179,8 @@ class _Makers:
     def __init__(self, folder: Path, source: InputFile) -> None:
         self._folder = folder
         self._source = source
-        self._textures: dict[tuple[Any, ...], Texture] = {}
+        self._textures: dict[tuple[Any, ...], Texture | None] = {}
+        self._greys: dict[int, bool] = {}  # by the picture, which the source keeps
 
     def material(self, entry: _Entry) -> Material:
         """The material of an entry."""
@@ -193,6 +196,9 @@ class _Makers:
         if "color" in maps:
             picture = self._picture(maps["color"])
             if picture is not None:
+                kind = _opacity_kind(maps)
+                if kind is not None and self._picture(maps[kind]) is not None:
+                    return {}  # `_opacity` makes its texture
                 return {"texture": self._texture(maps["color"], picture, "srgb")}
         return {"color": _rgb(numbers["Kd"]) if numbers.get("Kd") else None}
 
@@ -216,22 +222,26 @@ class _Makers:
         own: dict[str, Any] = {"opacity": opacity}
         if opacity < 1:
             own["alpha_mode"] = AlphaMode.BLEND
-        kind = next((kind for kind in ("opacity", "transparency") if kind in maps), None)
+        kind = _opacity_kind(maps)
         picture = None if kind is None else self._picture(maps[kind])
         if kind is None or picture is None:
             return own
-        alpha = _scalar_of(picture, maps[kind].channel, "a" if (picture[..., 3] < 255).any() else "l")
-        if kind == "transparency":
-            alpha = 255 - alpha
-        laid = maps.get("color", maps[kind])
         color = self._picture(maps["color"]) if "color" in maps else None
-        if color is None:
-            base, laid = np.full((*alpha.shape, 4), 255, np.uint8), maps[kind]
-        else:
-            base, alpha = _same_size(color, alpha)
-        base = np.dstack([base[..., :3], alpha])
-        own["texture"] = Texture(base, **laid.placement)
+        laid = maps[kind] if color is None else maps["color"]
+
+        def base() -> U8:
+            alpha = _scalar_of(picture, maps[kind].channel, "a" if (picture[..., 3] < 255).any() else "l")
+            if kind == "transparency":
+                alpha = 255 - alpha
+            own = np.full((*alpha.shape, 4), 255, np.uint8)
+            if color is not None:
+                own, alpha = _same_size(color, alpha)
+            return np.dstack([own[..., :3], alpha])
+
+        key = kind, maps[kind].name, maps[kind].channel, None if color is None else laid.name
+        own["texture"] = texture = self._made(key, laid, _largest(picture, color), base, "srgb")
         if own.get("alpha_mode") is None:
+            alpha = np.zeros((1, 1), np.uint8) if texture is None else texture.image[..., 3]
             between = (alpha > NEARLY_CLEAR) & (alpha < NEARLY_OPAQUE)
             own["alpha_mode"] = AlphaMode.BLEND if between.mean() > 0.05 else AlphaMode.MASK
         return own
@@ -250,10 +260,16 @@ class _Makers:
         picture = None if laid is None else self._picture(laid)
         if laid is None or picture is None:
             return {}
-        is_grey = bool((np.ptp(picture[..., :3], axis=-1) <= 2).all())
-        if is_grey and "normal" not in maps:
-            normals = normals_of_heights(_scalar_of(picture, laid.channel, "l"), laid.bump)
-            return {"normal_texture": Texture(normals, encoding="linear", **laid.placement)}
+        if id(picture) not in self._greys:
+            self._greys[id(picture)] = _is_grey(picture)
+        if self._greys[id(picture)] and "normal" not in maps:
+            key = "heights", laid.name, laid.channel, laid.bump
+            return {
+                "normal_texture": self._made(
+                    key, laid, picture,
+                    lambda: normals_of_heights(_scalar_of(picture, laid.channel, "l"), laid.bump), "linear",
+                )
+            }  # fmt: skip
         texture = self._texture(laid, picture, "linear")
         return {"normal_texture": texture, "normal_scale": max(laid.bump, 0.0)}
 
@@ -263,30 +279,53 @@ class _Makers:
             "roughness": _share((numbers.get("Pr") or [1.0])[0]),
             "metallic": _share((numbers.get("Pm") or [1.0 if "metallic" in maps else 0.0])[0]),
         }
-        pictures = {kind: self._picture(maps[kind]) for kind in ("roughness", "metallic") if kind in maps}
-        values = {kind: _scalar_of(picture, "", "l") for kind, picture in pictures.items() if picture is not None}
-        if values:
-            first = next(iter(values))
-            packed = np.full((*values[first].shape, 3), 255, np.uint8)
+        found = {kind: self._picture(maps[kind]) for kind in ("roughness", "metallic") if kind in maps}
+        pictures = {kind: picture for kind, picture in found.items() if picture is not None}
+        for kind, name in (("roughness", "Pr"), ("metallic", "Pm")):
+            if kind in pictures and not numbers.get(name):
+                own[kind] = 1.0
+
+        def packed() -> U8:
+            values = {kind: _scalar_of(picture, "", "l") for kind, picture in pictures.items()}
+            own = np.full((*next(iter(values.values())).shape, 3), 255, np.uint8)
             for kind, channel in (("roughness", 1), ("metallic", 2)):
                 if kind in values:
-                    packed, alpha = _same_size(packed, values[kind])
-                    packed = packed.copy()
-                    packed[..., channel] = alpha
-                    if kind not in numbers and not numbers.get({"roughness": "Pr", "metallic": "Pm"}[kind]):
-                        own[kind] = 1.0
-            own["metallic_roughness_texture"] = Texture(packed, encoding="linear", **maps[first].placement)
+                    own, alpha = _same_size(own, values[kind])
+                    own = own.copy()
+                    own[..., channel] = alpha
+            return own
+
+        if pictures:
+            key = tuple((kind, maps[kind].name) for kind in pictures)
+            laid = maps[next(iter(pictures))]
+            own["metallic_roughness_texture"] = self._made(key, laid, _largest(*pictures.values()), packed, "linear")
         return own
 
     def _picture(self, laid: _Map) -> U8 | None:
         return self._source.picture(laid.name, self._folder) if laid.name else None
 
-    def _texture(self, laid: _Map, picture: U8, encoding: EncodingOption) -> Texture:
-        """The texture; materials that use the same share it. The alpha of a picture is not opacity: map_d is."""
-        key = (laid.name, laid.scale, laid.offset, laid.is_clamped, encoding)
+    def _texture(self, laid: _Map, picture: U8, encoding: EncodingOption) -> Texture | None:
+        """The texture of a picture as it is. Its alpha is not opacity: map_d is."""
+        return self._made((laid.name,), laid, picture, lambda: _opaque(picture), encoding)
+
+    def _made(
+        self, key: tuple[Any, ...], laid: _Map, largest: U8, pixels: Callable[[], U8], encoding: EncodingOption
+    ) -> Texture | None:
+        """A texture, which materials that use the same share; None if it is beyond the budget."""
+        key = (*key, laid.scale, laid.offset, laid.is_clamped, encoding)
         if key not in self._textures:
-            self._textures[key] = Texture(picture[..., :3], encoding=encoding, **laid.placement)
+            self._source.budget.spend("max_nodes", 1)
+            may = self._source.may_lay(largest, laid.name)
+            self._textures[key] = Texture(pixels(), encoding=encoding, **laid.placement) if may else None
         return self._textures[key]
+
+
+def _opacity_kind(maps: dict[str, _Map]) -> str | None:
+    return next((kind for kind in ("opacity", "transparency") if kind in maps), None)
+
+
+def _largest(*pictures: U8 | None) -> U8:
+    return max((picture for picture in pictures if picture is not None), key=lambda picture: picture.size)
 
 
 def _scalar_of(picture: U8, channel: str, default: str) -> U8:
@@ -297,7 +336,29 @@ def _scalar_of(picture: U8, channel: str, default: str) -> U8:
         case "m" | "a":
             return picture[..., 3]
         case _:
-            return np.rint((picture[..., :3] * [0.2126, 0.7152, 0.0722]).sum(axis=-1)).astype(np.uint8)
+            made = np.empty(picture.shape[:2], np.uint8)
+            for rows in _blocks(len(picture)):
+                made[rows] = np.rint((picture[rows, :, :3] * [0.2126, 0.7152, 0.0722]).sum(axis=-1))
+            return made
+
+
+def _opaque(picture: U8) -> U8:
+    """The colours; all of a picture that is opaque, which is copied faster."""
+    return picture if int(picture[..., 3].min()) == 255 else picture[..., :3]
+
+
+def _is_grey(picture: U8) -> bool:
+    red, green, blue = (picture[..., channel] for channel in range(3))
+    largest = np.maximum(red, green)
+    smallest = np.minimum(red, green)
+    np.maximum(largest, blue, out=largest)
+    np.minimum(smallest, blue, out=smallest)
+    return int((largest - smallest).max()) <= 2
+
+
+def _blocks(n_rows: int) -> list[slice]:
+    """Rows that are computed together, so that nothing but the result is as large as a picture."""
+    return [slice(top, min(top + ROWS_AT_ONCE, n_rows)) for top in range(0, n_rows, ROWS_AT_ONCE)]
 
 
 def _same_size(color: U8, alpha: U8) -> tuple[U8, U8]:
@@ -315,12 +376,16 @@ def _same_size(color: U8, alpha: U8) -> tuple[U8, U8]:
 
 def normals_of_heights(heights: U8, scale: float) -> U8:
     """A normal map (H, W, 3) of a map of heights (H, W), 0 to 255 for 0 to `scale` texels times two."""
-    values = heights.astype(np.float64) * (scale / 255)
-    slope_u = np.roll(values, -1, axis=1) - np.roll(values, 1, axis=1)
-    slope_v = np.roll(values, 1, axis=0) - np.roll(values, -1, axis=0)
-    normals = np.dstack([-slope_u, -slope_v, np.ones_like(values)])
-    normals /= np.sqrt((normals * normals).sum(axis=2, keepdims=True))
-    return np.rint(127.5 * (normals + 1)).astype(np.uint8)
+    made = np.empty((*heights.shape, 3), np.uint8)
+    for rows in _blocks(len(heights)):
+        at = np.arange(rows.start - 1, rows.stop + 1)
+        values = heights.take(at, axis=0, mode="wrap").astype(np.float64) * (scale / 255)
+        slope_u = np.roll(values, -1, axis=1) - np.roll(values, 1, axis=1)
+        slope_v = values[:-2] - values[2:]
+        normals = np.dstack([-slope_u[1:-1], -slope_v, np.ones_like(slope_v)])
+        normals /= np.sqrt((normals * normals).sum(axis=2, keepdims=True))
+        made[rows] = np.rint(127.5 * (normals + 1))
+    return made
 
 
 def _rgb(values: list[float]) -> Color:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -41,9 +42,11 @@ def read_obj(source: InputFile) -> list[Mesh]:
     MeshError
         If the file is broken.
     """
-    text = _Text(source.path.read_bytes())
+    content = source.content()
+    source.budget.spend("max_lines", content.count(b"\n") + content.count(b"\r"))
+    text = _Text(content)
+    source.budget.spend("max_vertices", len(text.lines_of(b"v")))
     positions, colors = _positions(*text.numbers(b"v"))
-    source.check_n_vertices(len(positions))
     uv, normals = (_columns(*text.numbers(key), n) for key, n in ((b"vt", 2), (b"vn", 3)))
     corners, n_corners = _faces(text, (len(positions), len(uv), len(normals)), source)
     for key, note in UNREAD.items():
@@ -53,6 +56,7 @@ def read_obj(source: InputFile) -> list[Mesh]:
         if len(positions) and not text.lines_of(b"l").size:
             source.clouds.append(Cloud(positions, colors))
         return []
+    source.budget.spend("max_triangles", int(np.maximum(n_corners - 2, 0).sum()))
     materials, row_of_face = _materials(text, source)
     triangles, faces = triangulate(positions, corners[:, 0], n_corners)
     rows = None if row_of_face is None else row_of_face[faces]
@@ -347,29 +351,34 @@ def _materials(text: _Text, source: InputFile) -> tuple[tuple[Material, ...], I6
         return (), None
     materials: list[Material] = []
     place = np.zeros(len(names) + 1, np.int64)
-    order = dict.fromkeys(use_of_face[np.sort(np.unique(use_of_face, return_index=True)[1])].tolist())
+    order = use_of_face[np.sort(np.unique(use_of_face, return_index=True)[1])].tolist()
+    unknown = NONE  # where the one material of all that no library has is
     for row in order:
-        name = names[row] if row != NONE else ""
-        if row != NONE and name not in known:
-            source.notes.add("materials not in its libraries", name)
-        made = known[name]() if name in known and row != NONE else Material()
-        place[row] = len(materials)
-        materials.append(made)
+        if row != NONE and names[row] in known:
+            source.budget.spend("max_nodes", 1)
+            place[row] = len(materials)
+            materials.append(known[names[row]]())
+            continue
+        if row != NONE:
+            source.notes.add("materials not in its libraries", names[row])
+        if unknown == NONE:
+            unknown = len(materials)
+            materials.append(Material())
+        place[row] = unknown
     return tuple(materials), place[use_of_face]
 
 
 def _library(text: _Text, source: InputFile) -> dict[str, Callable[[], Material]]:
     known: dict[str, Callable[[], Material]] = {}
-    for line in text.lines_of(b"mtllib").tolist():
-        rest = text.rest_of(line)
+    read: set[Path] = set()
+    for rest in dict.fromkeys(text.rest_of(line) for line in text.lines_of(b"mtllib").tolist()):
         names = [rest] if rest.lower().endswith(".mtl") and rest.lower().count(".mtl") == 1 else rest.split() or [rest]
-        for name in dict.fromkeys(names):
+        for name in names:
             path = source.find(name, "material libraries")
-            content = (
-                None
-                if path is None
-                else source.read(str(path.relative_to(source.path.parent.resolve())), "material libraries")
-            )
-            if path is not None and content is not None:
+            if path is None:
+                continue
+            if path.resolve() not in read:
+                read.add(path.resolve())
+                content = source.read_at(path, name, "material libraries") or b""
                 known |= read_mtl(content.decode("utf-8", errors="replace"), path.parent, source)
     return known

@@ -73,18 +73,20 @@ def read_ply(source: InputFile) -> list[Mesh]:
     MeshError
         If the file is broken.
     """
-    content = source.path.read_bytes()
+    content = source.content()
     order, elements, textures, start = _header(content)
     for element in elements:
         if element.name == "vertex":
-            source.check_n_vertices(element.n)
+            source.budget.spend("max_vertices", element.n)
         elif element.n and element.name not in ("face", "tristrips", "edge", "camera", "obj_info"):
             source.notes.add("elements not read", element.name)
+        source.budget.spend("max_lines", min(element.n, len(content)))
     found = _found(content, order, elements, start, source)
     vertex = found.get("vertex")
     if vertex is None:
         raise MeshError("it has no vertices")
-    corners, n_corners, faces = _corners(found)
+    corners, n_corners, faces = _corners(found, source)
+    source.budget.spend("max_triangles", int(np.maximum(n_corners - 2, 0).sum()))
     if not len(n_corners):
         positions = _together(vertex, (("x", "y", "z"),))
         if positions is not None and len(positions):
@@ -391,7 +393,7 @@ class _Bytes:
         return made
 
 
-def _corners(found: dict[str, Rows]) -> tuple[I64, I64, Rows]:
+def _corners(found: dict[str, Rows], source: InputFile) -> tuple[I64, I64, Rows]:
     """The corners of all faces, how many each has, and the element that may give them colours."""
     faces = found.get("face", {})
     for name in ("vertex_indices", "vertex_index"):
@@ -401,6 +403,7 @@ def _corners(found: dict[str, Rows]) -> tuple[I64, I64, Rows]:
     strips = found.get("tristrips", {})
     for name in ("vertex_indices", "vertex_index"):
         if isinstance(strips.get(name), _List):
+            source.budget.check("max_triangles", len(strips[name].values))
             triangles = triangles_of_strips(whole_numbers(strips[name].values), strips[name].lengths)
             return triangles.ravel(), np.full(len(triangles), 3), {}
     return np.zeros(0, np.int64), np.zeros(0, np.int64), {}
@@ -447,14 +450,13 @@ def _mesh(
     on_corners = face.get("texcoord")
     color_of_face = _colors(face)
     if isinstance(on_corners, _List) and (on_corners.lengths == 2 * n_corners).all():
-        source.check_n_vertices(3 * len(triangles))
         uv = on_corners.values.reshape(-1, 2)[triangles.ravel()]
     elif color_of_face is None or colors is not None:
         return _textured(Mesh(positions, names, normals, colors, uv), textures, source)
     else:
         uv = None if uv is None else uv[names.ravel()]
     # vertices of their own for each triangle: what a face says ends at its edges
-    source.check_n_vertices(3 * len(triangles))
+    source.budget.spend("max_vertices", 3 * len(triangles))
     if color_of_face is not None and colors is None:
         colors = np.repeat(color_of_face[faces], 3, axis=0)
     elif colors is not None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +20,42 @@ from topleft.errors import MeshError
 
 
 @dataclass(frozen=True)
+class Parts:
+    """Polygons of one object."""
+
+    points: npt.NDArray[np.float64]  # (N, 2)
+    lengths: npt.NDArray[np.int64]  # points of each ring
+    counts: npt.NDArray[np.int64]  # rings of each polygon
+
+
+@dataclass(frozen=True)
 class PolygonPicture:
     """The polygons of one picture."""
 
     name: str
     size: tuple[int, int] | None  # pixels; None: the polygons are on a plane, y up
-    polygons: list[list[Any]] = field(default_factory=list)  # of each its rings
-    owners: list[int] = field(default_factory=list)  # the object that each polygon is of
+    folder: str = ""  # of the image, as the file has it
+    parts: list[Parts] = field(default_factory=list)  # of each object
     objects: list[Mapping[str, Any]] = field(default_factory=list)  # what is said of each
     n_skipped: int = 0  # objects that are no polygons
 
-    def add(self, parts: list[list[Any]], said: Mapping[str, Any]) -> None:
-        """Add an object of several parts."""
-        self.polygons.extend(parts)
-        self.owners.extend([len(self.objects)] * len(parts))
+    def add(self, parts: Parts, said: Mapping[str, Any]) -> None:
+        """Add an object of several polygons."""
+        self.parts.append(parts)
         self.objects.append(said)
+
+    @property
+    def polygons(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """Points, where their rings begin and end, and the polygons of these: what `polygons` takes."""
+        points = np.concatenate([np.empty((0, 2)), *(part.points for part in self.parts)])
+        lengths = np.concatenate([np.zeros(1, np.int64), *(part.lengths for part in self.parts)])
+        counts = np.concatenate([np.zeros(1, np.int64), *(part.counts for part in self.parts)])
+        return points, np.cumsum(lengths), np.cumsum(counts)
+
+    @property
+    def owners(self) -> npt.NDArray[np.int64]:
+        """The object that each polygon is of."""
+        return np.repeat(np.arange(len(self.parts)), [len(part.counts) for part in self.parts])
 
 
 def load_polygons(path: str | os.PathLike[str], *, has_crowds: bool = True) -> list[PolygonPicture]:
@@ -49,6 +71,8 @@ def load_polygons(path: str | os.PathLike[str], *, has_crowds: bool = True) -> l
         If it cannot be read.
     """
     path = Path(path)
+    if path.exists() and not path.is_file():
+        raise MeshError(f"{str(path)!r} is {'a folder' if path.is_dir() else 'a pipe or a device'}, not a file")
     try:
         content = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
@@ -58,7 +82,7 @@ def load_polygons(path: str | os.PathLike[str], *, has_crowds: bool = True) -> l
             return _coco(content, has_crowds=has_crowds)
         if isinstance(content, dict) and isinstance(content.get("type"), str):
             return [_geojson(content, path.stem)]
-    except CountsError as error:
+    except ContentError as error:
         raise MeshError(f"cannot read {str(path)!r}: {error}") from None
     except (KeyError, TypeError, AttributeError, IndexError, ValueError, OverflowError) as error:
         raise MeshError(f"cannot read {str(path)!r}: something is missing or of a wrong kind ({error!r})") from None
@@ -67,6 +91,9 @@ def load_polygons(path: str | os.PathLike[str], *, has_crowds: bool = True) -> l
 
 def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPicture]:
     images = {image["id"]: image for image in content["images"]}
+    if len(images) < len(content["images"]):
+        ids = [image["id"] for image in content["images"]]
+        raise ContentError(f"{sum(ids.count(i) > 1 for i in images)} ids of images stand more than once")
     names = {category["id"]: category.get("name") for category in content.get("categories", [])}
     found: dict[Any, list[Any]] = {key: [] for key in images}
     for annotation in content["annotations"]:
@@ -74,10 +101,13 @@ def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPictur
             found[annotation["image_id"]].append(annotation)
     pictures = []
     for key, image in images.items():
-        name = Path(str(image.get("file_name", key))).stem
+        file_name = str(image.get("file_name") or key)
+        if "\0" in file_name or Path(file_name).stem in ("", "..") or ".." in Path(file_name).parts:
+            raise ContentError(f"image {key!r} has the file name {file_name!r}, which is none within a folder")
         size = int(image["width"]), int(image["height"])
         drawn = [(a, _coco_parts(a.get("segmentation"), size, a.get("id"))) for a in found[key]]
-        picture = PolygonPicture(name, size, n_skipped=sum(parts is None for _, parts in drawn))
+        folder, n_skipped = Path(file_name).parent.as_posix(), sum(parts is None for _, parts in drawn)
+        picture = PolygonPicture(Path(file_name).stem, size, folder, n_skipped=n_skipped)
         for annotation, parts in drawn:
             if parts is not None:
                 picture.add(parts, {**annotation, "category": names.get(annotation.get("category_id"))})
@@ -85,26 +115,26 @@ def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPictur
     return pictures
 
 
-def _coco_parts(segmentation: Any, size: tuple[int, int], name: object) -> list[list[Any]] | None:
+def _coco_parts(segmentation: Any, size: tuple[int, int], name: object) -> Parts | None:
     """Return the polygons of a segmentation: flat rings, or run lengths; None of what is neither."""
     if isinstance(segmentation, list):
-        return [[_pairs(flat)] for flat in segmentation]
+        return _joined([[_pairs(flat)] for flat in segmentation], f"annotation {name}")
     if isinstance(segmentation, dict) and "counts" in segmentation:
         height, width = (int(n) for n in segmentation["size"])
         if (width, height) != size:
-            raise CountsError(f"annotation {name} is of {width}x{height} pixels, its image of {size[0]}x{size[1]}")
+            raise ContentError(f"annotation {name} is of {width}x{height} pixels, its image of {size[0]}x{size[1]}")
         counts = segmentation["counts"]
         lengths = _read_counts(counts, name) if isinstance(counts, str) else np.asarray(counts, np.int64).reshape(-1)
         if (lengths < 0).any():
-            raise CountsError(f"annotation {name} has a run length of {lengths.min()} pixels")
+            raise ContentError(f"annotation {name} has a run length of {lengths.min()} pixels")
         if lengths.sum() != width * height:
-            raise CountsError(f"annotation {name} has run lengths of {lengths.sum()} pixels, not {width * height}")
+            raise ContentError(f"annotation {name} has run lengths of {lengths.sum()} pixels, not {width * height}")
         return _rectangles(lengths, height)
     return None
 
 
-class CountsError(ValueError):
-    """Run lengths that do not fit."""
+class ContentError(ValueError):
+    """What a file says that cannot be."""
 
 
 def _read_counts(text: str, name: object) -> npt.NDArray[np.int64]:
@@ -118,7 +148,7 @@ def _read_counts(text: str, name: object) -> npt.NDArray[np.int64]:
     for character in text:
         bits = ord(character) - 48
         if not 0 <= bits < 64 or shift > 40:
-            raise CountsError(f"annotation {name} has run lengths that are no text of COCO, at {character!r}")
+            raise ContentError(f"annotation {name} has run lengths that are no text of COCO, at {character!r}")
         value |= (bits & 31) << shift
         shift += 5
         if not bits & 32:
@@ -127,49 +157,63 @@ def _read_counts(text: str, name: object) -> npt.NDArray[np.int64]:
             lengths.append(value + (lengths[-2] if len(lengths) > 2 else 0))
             value = shift = 0
     if shift:
-        raise CountsError(f"annotation {name} has run lengths that end within a number")
+        raise ContentError(f"annotation {name} has run lengths that end within a number")
     return np.array(lengths, np.int64)
 
 
-def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> list[list[Any]]:
+def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> Parts:
     """Return the pixels of run lengths as rectangles, a polygon each.
 
     Runs go down columns, the first of pixels outside; neighbours of the same rows become one rectangle.
     """
     ends = np.cumsum(lengths)
-    found: list[list[int]] = []  # left, right, top, bottom
-    for first, end in zip((ends - lengths)[1::2].tolist(), ends[1::2].tolist(), strict=True):
-        at = first
-        while at < end:  # to the end of the column, or whole columns
-            column, top = divmod(at, height)
-            n_columns = max(1, (end - at) // height) if top == 0 else 1
-            bottom = height if n_columns > 1 else min(height, top + end - at)
-            if found and found[-1][1:] == [column, top, bottom]:
-                found[-1][1] = column + n_columns
-            else:
-                found.append([column, column + n_columns, top, bottom])
-            at = (column + n_columns) * height if bottom == height else end
-    return [[[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]] for x0, x1, y0, y1 in found]
+    first, end = (ends - lengths)[1::2], ends[1::2]
+    first, end = first[first < end], end[first < end]
+    (column, top), (last, bottom) = np.divmod(first, height), np.divmod(end, height)
+    is_whole = top == 0
+    begins = np.stack([column, column + ~is_whole, last], axis=1)  # the rest of a column, whole ones, the top of one
+    stops = np.stack([column + ~is_whole, last, last + (bottom > 0)], axis=1)
+    tops = np.stack([top, 0 * top, 0 * top], axis=1)
+    bottoms = np.stack([np.where(column == last, bottom, height), 0 * top + height, bottom], axis=1)
+    stops[:, 2] = np.where((column == last) & ~is_whole, begins[:, 2], stops[:, 2])
+    is_some = (begins < stops).reshape(-1)
+    left, right, y0, y1 = (edge.reshape(-1)[is_some] for edge in (begins, stops, tops, bottoms))
+    is_new = np.ones(len(left), np.bool_)
+    is_new[1:] = (left[1:] != right[:-1]) | (y0[1:] != y0[:-1]) | (y1[1:] != y1[:-1])
+    right = right[np.append(is_new[1:], np.ones(min(1, len(left)), np.bool_))]
+    left, y0, y1 = left[is_new], y0[is_new], y1[is_new]
+    corners = np.stack([left, y0, right, y0, right, y1, left, y1], axis=1).reshape(-1, 2)
+    return Parts(corners.astype(np.float64), np.full(len(left), 4), np.ones(len(left), np.int64))
 
 
 def _pairs(flat: list[float]) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in zip(flat[::2], flat[1::2], strict=True)]
 
 
+def _joined(polygons: list[list[list[tuple[float, float]]]], what: str) -> Parts:
+    """Return polygons, of each its rings."""
+    rings = list(chain.from_iterable(polygons))
+    points = np.array(list(chain.from_iterable(rings)), np.float64).reshape(-1, 2)
+    if not np.isfinite(points).all():
+        raise ContentError(f"{what} has a coordinate of {points[~np.isfinite(points)][0]}")
+    lengths, counts = (np.array([len(one) for one in of], np.int64) for of in (rings, polygons))
+    return Parts(points, lengths, counts)
+
+
 def _geojson(content: Mapping[str, Any], name: str) -> PolygonPicture:
     features = content["features"] if content["type"] == "FeatureCollection" else [content]
     picture = PolygonPicture(name, None)
     n_skipped = 0
-    for feature in features:
+    for i, feature in enumerate(features):
         is_feature = feature["type"] == "Feature"
         geometry = feature["geometry"] if is_feature else feature
         parts = list(_parts(geometry)) if geometry else []
         if parts:
             said = {**(feature.get("properties") or {}), "id": feature.get("id")} if is_feature else {}
-            picture.add(parts, said)
+            picture.add(_joined(parts, f"feature {i}"), said)
         else:
             n_skipped += 1
-    return PolygonPicture(name, None, picture.polygons, picture.owners, picture.objects, n_skipped)
+    return replace(picture, n_skipped=n_skipped)
 
 
 def _parts(geometry: Mapping[str, Any]) -> Iterator[list[Any]]:

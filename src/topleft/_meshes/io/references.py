@@ -9,23 +9,25 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import U8
+from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.notes import Notes
 from topleft._meshes.model.texture import MAX_TEXTURE_SIZE
 from topleft.errors import MeshError
 
-MAX_VERTICES = 200_000_000
-MAX_TEXTURE_PIXELS = 1 << 26
-"""8192 x 8192."""
+if TYPE_CHECKING:
+    from PIL import Image
 
-MAX_FILE_BYTES = 1 << 32
-"""Of a file that is named by a mesh."""
+ROWS_AT_ONCE = 256
+"""Rows of a picture that are made RGBA together."""
 
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "GIF", "TIFF", "PPM", "DDS", "AVIF")
 """Formats of Pillow that are data and nothing else: EPS, say, would run a program."""
@@ -56,63 +58,75 @@ class InputFile:
     ----------
     path : Path
         The mesh file.
-    max_vertices, max_texture_pixels : int
-        What has more is refused, or left out.
+    budget : Budget
+        What it may make.
+    archive : InputFile, optional
+        The archive that it was unpacked from, which gets its notes and its points.
+    home : Path, optional
+        The folder that it may name files of: its own unless given.
     """
 
     def __init__(
-        self, path: Path, *, max_vertices: int = MAX_VERTICES, max_texture_pixels: int = MAX_TEXTURE_PIXELS
+        self, path: Path, budget: Budget, *, archive: InputFile | None = None, home: Path | None = None
     ) -> None:
         self.path = path
-        self.notes = Notes(str(path))
-        self.clouds: list[Cloud] = []
-        self.moment: Moment | None = None
-        self.max_vertices = max_vertices
-        self.max_texture_pixels = max_texture_pixels
-        self._pictures: dict[tuple[Path, str], U8 | None] = {}
+        self.budget = budget
+        self.notes: Notes = Notes(str(path)) if archive is None else archive.notes
+        self.clouds: list[Cloud] = [] if archive is None else archive.clouds
+        self.moment: Moment | None = None if archive is None else archive.moment
+        self._folder = path.parent.resolve()
+        self._home = self._folder if home is None else home
+        self._is_unpacked = archive is not None
+        self._found: dict[tuple[Path, str], Path | None] = {}
+        self._resolved: dict[Path, Path] = {}
+        self._listings: dict[Path, dict[str, Path]] = {}
+        self._pictures: dict[Any, U8 | None] = {}
+        self._not_laid: set[int] = set()
 
-    def check_n_vertices(self, n: int) -> None:
-        """Raise an error if there are more vertices than allowed.
-
-        Raises
-        ------
-        MeshError
-            If so.
-        """
-        if n > self.max_vertices:
-            raise MeshError(f"{str(self.path)!r} has {n} vertices, more than the {self.max_vertices} of max_vertices")
+    def content(self) -> bytes:
+        """The bytes of the mesh file."""
+        return self._read(self.path)
 
     def read(self, name: str, what: str, folder: Path | None = None) -> bytes | None:
         """The content of a file that the mesh names; `what` is the plural of its kind, for notes."""
         path = self.find(name, what, folder)
-        if path is None:
-            return None
-        if path.stat().st_size > MAX_FILE_BYTES:
-            self.notes.add(f"{what} of more than {MAX_FILE_BYTES >> 30} GiB not read", name)
-            return None
+        return None if path is None else self.read_at(path, name, what)
+
+    def read_at(self, path: Path, name: str, what: str) -> bytes | None:
+        """The content of a file that has been found."""
         try:
-            return path.read_bytes()
+            return self._read(path)
         except OSError:
             self.notes.add(f"{what} that cannot be read", name)
             return None
+
+    def _read(self, path: Path) -> bytes:
+        if not self._is_unpacked:
+            self.budget.read(path.stat().st_size)
+        return path.read_bytes()
 
     def find(self, name: str, what: str, folder: Path | None = None) -> Path | None:
         """Where such a file is: in the folder of the mesh, or below.
 
         What is named by a path that leads elsewhere, as other machines have them, is looked for in the folder itself.
         """
-        home = self.path.parent.resolve()
-        folder = home if folder is None else folder
-        name = name.replace("\\", "/")
+        key = self._folder if folder is None else folder, name
+        if key not in self._found:
+            self.budget.spend("max_nodes", 1)
+            self._found[key] = self._looked_for(name.replace("\\", "/"), what, key[0])
+        return self._found[key]
+
+    def _looked_for(self, name: str, what: str, folder: Path) -> Path | None:
+        home = self._home
         leads_elsewhere = "\0" in name or re.match(r"/|[A-Za-z][A-Za-z0-9+.-]*:", name) is not None
         try:
             if not leads_elsewhere:
-                found = _as_spelled(folder / name)
+                found = self._as_spelled(folder / name)
                 if found is not None and found.resolve().is_relative_to(home):
                     return found
                 leads_elsewhere = not (folder / name).resolve().is_relative_to(home) or found is not None
             if leads_elsewhere and not re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", name):
-                found = _as_spelled(folder / name.rpartition("/")[2].replace("\0", ""))
+                found = self._as_spelled(folder / name.rpartition("/")[2].replace("\0", ""))
                 if found is not None and found.resolve().is_relative_to(home):
                     return found
         except (OSError, RuntimeError, ValueError):  # names that no disk can have; circles of links
@@ -121,18 +135,69 @@ class InputFile:
         self.notes.add(f"{what} {where}", name)
         return None
 
+    def _as_spelled(self, path: Path) -> Path | None:
+        """The file of that name, whatever the case of its letters; no pipe, no device."""
+        if path.is_file():
+            return path
+        if path.parent not in self._listings:
+            others = sorted(path.parent.iterdir(), reverse=True) if path.parent.is_dir() else ()
+            self._listings[path.parent] = {other.name.casefold(): other for other in others if other.is_file()}
+        return self._listings[path.parent].get(path.name.casefold())
+
     def picture(self, name: str, folder: Path | None = None) -> U8 | None:
-        """The picture (H, W, 4) of a file that the mesh names; each is read once."""
-        key = (folder or self.path.parent, name)
+        """The picture (H, W, 4) of a file that the mesh names; each is read once, whatever names it has."""
+        path = self.find(name, "textures", folder)
+        if path is None:
+            return None
+        if path not in self._resolved:
+            self._resolved[path] = path.resolve()
+        return self.decoded(self._resolved[path], name, lambda: self.read_at(path, name, "textures"))
+
+    def decoded(self, key: Any, name: str, read: Callable[[], bytes | None]) -> U8 | None:
+        """The picture (H, W, 4) of the bytes that `read` returns; that of a key is decoded once."""
         if key not in self._pictures:
-            content = self.read(name, "textures", folder)
-            self._pictures[key] = None if content is None else self.decode(content, name)
+            content = read()
+            self._pictures[key] = picture = None if content is None else self._decode(content, name)
+            if picture is not None:
+                self._not_laid.add(id(picture))
         return self._pictures[key]
 
-    def decode(self, content: bytes, name: str) -> U8 | None:
-        """The picture (H, W, 4) that the bytes of a file encode."""
+    def picture_content(self, name: str) -> bytes | None:
+        """The bytes of a picture that the mesh names, for somebody else to decode; counted each time."""
+        path = self.find(name, "textures")
+        content = None if path is None else self.read_at(path, name, "textures")
+        if content is None:
+            return None
         try:
-            return decoded(content, self.max_texture_pixels)
+            with opened(content) as image:
+                return content if self.may_have(image.width * image.height, name) else None
+        except Exception:  # as in `_decode`
+            self.notes.add("textures that cannot be read", name)
+            return None
+
+    def may_lay(self, picture: U8, name: str) -> bool:
+        """Whether a texture may be made of a picture, or of as many pixels; if not, that is noted.
+
+        The first texture of each picture that was decoded has been counted.
+        """
+        if id(picture) in self._not_laid:
+            self._not_laid.remove(id(picture))
+            return True
+        return self.may_have(picture.shape[0] * picture.shape[1], name)
+
+    def may_have(self, n_pixels: int, name: str) -> bool:
+        """Whether there may be so many more pixels of textures; if not, that is noted."""
+        if self.budget.has("max_texture_pixels", n_pixels):
+            self.budget.spend("max_texture_pixels", n_pixels)
+            return True
+        most = self.budget.limit("max_texture_pixels")
+        self.notes.add(f"textures beyond the {most} pixels of max_texture_pixels not read", name)
+        return False
+
+    def _decode(self, content: bytes, name: str) -> U8 | None:
+        try:
+            with opened(content) as image:
+                return rgba_of(image) if self.may_have(image.width * image.height, name) else None
         except MeshError as error:
             self.notes.add(f"textures {error} not read", name)
         except Exception:  # broken bytes end in whatever the decoder meets: OSError, SyntaxError, struct.error, ...
@@ -164,13 +229,14 @@ def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
         return values.astype(np.int64)
 
 
-def decoded(content: bytes, max_pixels: int = MAX_TEXTURE_PIXELS) -> U8:
-    """The picture (H, W, 4), uint8, of an encoded one.
+@contextmanager
+def opened(content: bytes) -> Iterator[Image.Image]:
+    """A picture whose pixels have not been decoded.
 
     Raises
     ------
     MeshError
-        If it has too many pixels; before they are decoded.
+        If a side of it is too long.
     OSError, ValueError, SyntaxError
         If it is broken.
     """
@@ -181,17 +247,24 @@ def decoded(content: bytes, max_pixels: int = MAX_TEXTURE_PIXELS) -> U8:
         try:
             image = Image.open(io.BytesIO(content), formats=[name for name in PICTURE_FORMATS if name in _known()])
         except Image.DecompressionBombError:
-            raise MeshError(f"of more than {max_pixels} pixels") from None
+            raise MeshError("of more pixels than Pillow opens") from None
         with image:
-            width, height = image.size
-            if width * height > max_pixels:
-                raise MeshError(f"of more than {max_pixels} pixels")
-            if max(width, height) > MAX_TEXTURE_SIZE:
+            if max(image.size) > MAX_TEXTURE_SIZE:
                 raise MeshError(f"with more than {MAX_TEXTURE_SIZE} pixels a side")
-            if image.mode.startswith("I"):  # 16 bits, which convert() would cut off at 255
-                grey = (np.asarray(image).astype(np.int64).clip(0, 65535) >> 8).astype(np.uint8)
-                return np.dstack([grey, grey, grey, np.full_like(grey, 255)])
-            return np.asarray(image.convert("RGBA"))
+            yield image
+
+
+def rgba_of(image: Image.Image) -> U8:
+    """The picture (H, W, 4), uint8, a few rows at a time: all of it is there twice and not more often."""
+    if image.mode.startswith("I"):  # 16 bits, which convert() would cut off at 255
+        grey = (np.asarray(image).clip(0, 65535) >> 8).astype(np.uint8)
+        return np.dstack([grey, grey, grey, np.full_like(grey, 255)])
+    image.load()
+    pixels = np.empty((image.height, image.width, 4), np.uint8)
+    for top in range(0, image.height, ROWS_AT_ONCE):
+        rows = image.crop((0, top, image.width, min(top + ROWS_AT_ONCE, image.height)))
+        pixels[top : top + ROWS_AT_ONCE] = np.asarray(rows.convert("RGBA"))
+    return pixels
 
 
 def _known() -> set[str]:
@@ -199,15 +272,3 @@ def _known() -> set[str]:
 
     Image.init()
     return set(Image.OPEN)
-
-
-def _as_spelled(path: Path) -> Path | None:
-    """The file of that name, whatever the case of its letters; no pipe, no device."""
-    if path.is_file():
-        return path
-    if not path.parent.is_dir():
-        return None
-    wanted = path.name.casefold()
-    return next(
-        (other for other in sorted(path.parent.iterdir()) if other.name.casefold() == wanted and other.is_file()), None
-    )

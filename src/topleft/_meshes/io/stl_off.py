@@ -35,7 +35,7 @@ def read_stl(source: InputFile) -> list[Mesh]:
     MeshError
         If the file is broken.
     """
-    content = source.path.read_bytes()
+    content = source.content()
     n = int.from_bytes(content[80:84], "little") if len(content) >= N_HEADER_BYTES else 0
     n_bytes = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
     # Binary files may begin with "solid", too.
@@ -47,7 +47,8 @@ def read_stl(source: InputFile) -> list[Mesh]:
     else:
         rows = np.frombuffer(content, np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")]), n, N_HEADER_BYTES)
         corners = rows["corners"].reshape(-1, 3)
-    source.check_n_vertices(len(corners))
+    source.budget.spend("max_vertices", len(corners))
+    source.budget.spend("max_triangles", len(corners) // 3)
     return [Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))] if len(corners) else []
 
 
@@ -92,7 +93,7 @@ def read_off(source: InputFile) -> list[Mesh]:
     MeshError
         If the file is broken.
     """
-    content = re.sub(rb"#[^\r\n]*", b"", source.path.read_bytes()).replace(b"\r", b"\n")
+    content = re.sub(rb"#[^\r\n]*", b"", source.content()).replace(b"\r", b"\n")
     head = HEAD.match(content)
     if head is None:
         raise MeshError("it does not begin with OFF")
@@ -106,7 +107,8 @@ def read_off(source: InputFile) -> list[Mesh]:
     if counts is None:
         raise MeshError("it does not say how many vertices and faces it has")
     n_vertices, n_faces = int(counts[1]), int(counts[2])
-    source.check_n_vertices(n_vertices)
+    source.budget.spend("max_vertices", n_vertices)
+    source.budget.spend("max_lines", content.count(b"\n"))
     body = rest[counts.end() :].lstrip()
     try:
         values = numbers_of_text(body)
@@ -199,6 +201,7 @@ def _meshes(
     if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < len(positions):
         bad = int(corners.min()) if int(corners.min()) < 0 else int(corners.max())
         raise MeshError(f"a face names vertex {bad} of {len(positions)}")
+    source.budget.spend("max_triangles", int(np.maximum(n_corners - 2, 0).sum()))
     triangles, faces = triangulate(positions, corners, n_corners)
     if not len(triangles):
         if not len(corners) and len(positions):
@@ -207,6 +210,7 @@ def _meshes(
     names = corners[triangles].astype(np.int32)
     if of_faces is None or colors is not None:
         return [Mesh(positions, names, normals, colors, uv)]
+    source.budget.spend("max_vertices", names.size)
     at_corner = names.ravel()
     own = (None if each is None else each[at_corner] for each in (normals, uv))
     own_normals, own_uv = own

@@ -22,6 +22,8 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_path, shown
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.camera.matrices import bounding_sphere
+from topleft._meshes.io.limits.budget import Budget
+from topleft._meshes.io.limits.npy import arrays_of
 from topleft._meshes.model.mesh import Mesh
 from topleft.errors import MeshError
 
@@ -139,7 +141,7 @@ class Levels(Sequence[Level]):
         write_whole(path, lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], mesh: Mesh) -> Levels:
+    def load(cls, path: str | os.PathLike[str], mesh: Mesh, *, max_unpacked_bytes: int | None = None) -> Levels:
         """Read what `save` wrote, and keep it with the mesh.
 
         Parameters
@@ -147,6 +149,8 @@ class Levels(Sequence[Level]):
         path : path
         mesh : Mesh
             The one whose levels they are: its arrays must be those of then, to the bit.
+        max_unpacked_bytes : int, optional
+            Of all arrays of the levels: a file with more is refused. Unless given 33,554,432, or 8 for each byte of it.
 
         Raises
         ------
@@ -161,28 +165,35 @@ class Levels(Sequence[Level]):
         if not isinstance(mesh, Mesh):
             raise TypeError(f"mesh must be a Mesh, got {shown(mesh)}")
         path = _checked_path(path)
+        budget = Budget(str(path), max_unpacked_bytes=max_unpacked_bytes)
         try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = dict(file)
-            if str(arrays["mesh"]) != digest_of(mesh):
-                raise MeshError(f"{str(path)!r} holds the levels of another mesh: make them anew with topleft.simplify")
-            bounds, knowns = (as_bounds(arrays[name]) for name in ("bound", "known"))
-            coarser = [
-                Level(
-                    Mesh(
-                        **{name: arrays.get(f"{name}_{i}") for name in ARRAYS},  # type: ignore[arg-type]
-                        materials=mesh.materials,
-                        crease=mesh.crease,
-                    ),
-                    bound,
-                    known,
-                )
-                for i, (bound, known) in enumerate(zip(bounds, knowns, strict=True), 1)
-            ]
+            with arrays_of(path, budget) as array:
+                digest = array("mesh")
+                if digest is None:
+                    raise MeshError("it has no array 'mesh'")
+                if str(digest) != digest_of(mesh):
+                    raise MeshError(
+                        f"{str(path)!r} holds the levels of another mesh: make them anew with topleft.simplify"
+                    )
+                bounds, knowns = (as_bounds(array(name)) for name in ("bound", "known"))
+                coarser = [
+                    Level(
+                        Mesh(
+                            **{name: array(f"{name}_{i}") for name in ARRAYS},  # type: ignore[arg-type]
+                            materials=mesh.materials,
+                            crease=mesh.crease,
+                        ),
+                        bound,
+                        known,
+                    )
+                    for i, (bound, known) in enumerate(zip(bounds, knowns, strict=True), 1)
+                ]
         except FileNotFoundError:
             raise FileNotFoundError(f"there is no file {str(path)!r}") from None
-        except MeshError:
-            raise
+        except MeshError as error:
+            if repr(str(path)) in str(error):
+                raise
+            raise MeshError(f"cannot read {str(path)!r}: broken, or not levels of detail ({error})") from error
         except (ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError,
                 ValueError, zipfile.BadZipFile, zlib.error) as error:  # fmt: skip
             if isinstance(error, OSError) and error.filename is not None:  # it is the file, not what it says
@@ -191,9 +202,14 @@ class Levels(Sequence[Level]):
         return keep_levels(mesh, cls(mesh, coarser))
 
 
-def as_bounds(values: npt.NDArray[Any]) -> list[float]:
+def as_bounds(values: npt.NDArray[Any] | None) -> list[float]:
     """Return distances of levels after checking them."""
-    if values.ndim != 1 or values.dtype.kind != "f" or not (np.isfinite(values) & (values >= 0)).all():
+    if (
+        values is None
+        or values.ndim != 1
+        or values.dtype.kind != "f"
+        or not (np.isfinite(values) & (values >= 0)).all()
+    ):
         raise ValueError("bounds must be finite and at least 0")
     return [float(value) for value in values]
 

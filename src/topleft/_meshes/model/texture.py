@@ -153,7 +153,7 @@ class Texture:
         """What the kernels read; made when it is first needed."""
         return self._mipmap(None)
 
-    def engine_cut_at(self, cutoff: float) -> engine.Mipmap:
+    def compiled_cut_at(self, cutoff: float) -> engine.Mipmap:
         """The same for an alpha test: its halvings let through as much of their area as the picture does."""
         if not self.has_alpha or self.filter is not Filter.TRILINEAR or not 0 < cutoff <= 1:
             return self.compiled
@@ -220,8 +220,11 @@ def as_image(name: str, pixels: npt.ArrayLike) -> U8:
         raise ValueError(f"{name} must have shape (H, W), (H, W, 3) or (H, W, 4), got {array.shape}")
     if not 0 < min(array.shape[:2]) <= max(array.shape[:2]) <= MAX_TEXTURE_SIZE:
         raise ValueError(f"{name} must have 1 to {MAX_TEXTURE_SIZE} pixels a side, got shape {array.shape}")
-    rgba = np.full((*array.shape[:2], 4), 255, np.uint8)
-    rgba[..., : array.shape[2] if array.ndim == 3 else 3] = array if array.ndim == 3 else array[..., None]
+    if array.shape[2:] == (4,):
+        rgba = array.copy()
+    else:
+        rgba = np.full((*array.shape[:2], 4), 255, np.uint8)
+        rgba[..., :3] = array if array.ndim == 3 else array[..., None]
     rgba.flags.writeable = False
     return rgba
 

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from topleft._core.base.array_types import F32, U8
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
+from topleft._core.raster.fragments import SeenSamples
 from topleft._core.raster.peel import peel_meshes
 from topleft._core.raster.rasterize import refuse_many
 from topleft._core.raster.snap import Snapped
@@ -30,10 +31,9 @@ from topleft._core.raster.view import View
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
-from topleft._meshes.picture.fragments import SceneFragments, parts_of
+from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place
-from topleft._meshes.picture.scene_shade import shade_by, shade_part
-from topleft._meshes.picture.shade import Shading, ShadingOptions
+from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions
 from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
 
 Mask = npt.NDArray[np.bool_]
@@ -124,11 +124,19 @@ class Glass:
         """The same, ready to be peeled."""
         return [self.blended.snap(i) for i, mask in enumerate(self.masks) if mask is not None]
 
+    @cached_property
+    def lit(self) -> Lit:
+        """The same, ready to be shaded."""
+        some = [i for i, mask in enumerate(self.masks) if mask is not None]
+        shown = [self.whole.as_shown(i, one.mesh, self.scene) for i, one in zip(some, self.snapped, strict=True)]
+        return Lit(shown, self.camera, self.view.size, self.options)
+
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:
         """Lay what is visible of the blended triangles over the picture of what is opaque."""
         if 0 in self.view.size:
             return
         positions = frags.positions
+        opaque = Lit(shown_of(frags, self.scene), self.camera, self.view.size, self.under)
         layers = [self.peel(frags, k) for k in range(len(positions))]
         is_seen = np.logical_or.reduce([ids[0] >= 0 for ids, _ in layers])
         at = np.nonzero(is_seen)
@@ -138,7 +146,8 @@ class Glass:
         for k, planes in enumerate(layers):
             under = picture
             if len(positions) > 1:
-                under = shade_by(frags.sample(k).only(*at), self.scene, self.camera, self.under)
+                sample = frags.sample(k).only(*at)
+                under = opaque.picture(sample._seen(), np.array(positions[k], np.int32))
             self.composite(*planes, positions[k], under[at], numbers, light, alpha)
         color = light / np.maximum(alpha, np.float32(1e-20))[:, None]
         steps = np.rint(np.minimum(color, 1) * LINEAR_ONE).astype(np.int64)
@@ -176,12 +185,12 @@ class Glass:
         for k in range(len(ids)):
             if not (ids[k] >= 0).any():
                 break
-            layer = SceneFragments(ids[k : k + 1], depth[k : k + 1], self.blended, [at_sample])
-            for part in parts_of(layer, self.scene):
-                own, pixels = shade_part(part, self.camera, self.options)[part.seen], numbers[part.box][part.seen]
-                share = through[pixels] * (own[:, 3] / np.float32(255))
-                light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
-                through[pixels] -= share
+            seen = ids[k] >= 0
+            layer = SeenSamples.of(ids[k : k + 1], depth[k : k + 1])
+            own, pixels = self.lit.picture(layer, np.array(at_sample, np.int32))[seen], numbers[seen]
+            share = through[pixels] * (own[:, 3] / np.float32(255))
+            light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
+            through[pixels] -= share
         share = through * (under[:, 3] / np.float32(255))
         light += share[:, None] * LIGHT_OF_SRGB[under[:, :3]]
         alpha += 1 - through + share

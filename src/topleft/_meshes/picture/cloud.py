@@ -17,7 +17,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, U8
 from topleft._core.base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
-from topleft._core.base.memory import FRESH, empty
+from topleft._core.base.memory import FRESH
 from topleft._core.base.options import PointShape
 from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.points import PointFragments, draw_points
@@ -28,7 +28,7 @@ from topleft._meshes.camera.lens import Lens
 from topleft._meshes.model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
 from topleft._meshes.model.normals import moved, turn_of_normals, unit_or_zero
 from topleft._meshes.model.points import Points, PointUnit
-from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_numbers, shade_samples
+from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_each, shade_numbers
 
 NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""
@@ -108,16 +108,9 @@ def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: S
         raise ValueError("shading 'normals' needs points that have normals")
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
-
-    def shade_one(sample: Any) -> U8:
-        picture = empty((*sample.id.shape, 4), np.uint8)
-        picture[...] = options.background
-        seen = sample.mask
-        picture[seen, :3] = colors_of(sample.id[seen], sample.depth[seen], cloud, camera, options)
-        picture[seen, 3] = 255
-        return picture
-
-    return shade_samples(frags, shade_one, options.background)
+    return shade_each(
+        frags._seen(), options.background, lambda ids, depth: colors_of(ids, depth, cloud, camera, options)
+    )
 
 
 def colors_of(ids: npt.NDArray[np.int32], depth: F32, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import as_aligned, as_array, set_aligned, shown
 from topleft._core.base.memory import empty
-from topleft._core.raster.fragments import Fragments, Viewer, as_sample, view_of
+from topleft._core.raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
 from topleft._core.raster.peel import DepthLayers
-from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh
+from topleft._meshes.picture.shade import ShownInstance
 from topleft._meshes.scene.scene import Instance, Scene, counted_ranges, meshes_of
 
 if TYPE_CHECKING:
@@ -67,10 +67,6 @@ class VisiblePart(Part):
         """World from object, (4, 4)."""
         return np.eye(4) if self.instance is None else self.instance.transform
 
-    def camera(self, camera: Camera) -> Camera:
-        """The camera as it stands in the object space of the instance, without its lens."""
-        return camera.straightened() if self.instance is None else camera.straightened().placed(self.instance.transform)
-
 
 PartT = TypeVar("PartT", bound=Part)
 
@@ -81,6 +77,16 @@ def parts_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[VisiblePart]:
         return [VisiblePart(0, WHOLE, frags, subject)]
     found = cast(SceneFragments, frags).parts
     return [VisiblePart(part.i, part.box, part.frags, subject[part.i].mesh, subject[part.i]) for part in found]
+
+
+def shown_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[ShownInstance]:
+    """The instances that some sample sees, as they are shaded, of the mesh or scene that was drawn."""
+    if isinstance(frags, SceneFragments):
+        return [frags.placed.as_shown(i, snapped, cast(Scene, subject)) for i, snapped in frags.snapped]
+    mesh = cast(Mesh, subject)
+    if isinstance(frags, BentFragments):
+        return [ShownInstance(frags.drawn._snapped, frags.bent.mesh_of(mesh))]
+    return [ShownInstance(frags._snapped, mesh)]
 
 
 def join(
@@ -196,6 +202,28 @@ class SceneFragments(InstanceIds, Fragments):
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
         return local_ids(self.samples_id, self.samples_instance, self.placed.whole_first_ids)
 
+    def _whole(self, ids: Ids) -> Ids:
+        return self.placed.whole_ids(ids)
+
+    def _seen(self) -> SeenSamples:
+        return SeenSamples.of(*self.drawn_planes)
+
+    @cached_property
+    def snapped(self) -> tuple[tuple[int, engine.SnappedMesh], ...]:
+        """Each instance that some sample sees: its index, and its mesh as the first sample sees it."""
+        ids, first_ids = self.drawn_planes[0], self.placed.first_ids
+        boxes = np.tile(np.array([*ids.shape[:0:-1], 0, 0], np.int32), (len(first_ids) - 1, 1))
+        for plane in ids:
+            find_instances(np.ascontiguousarray(as_aligned(plane)), first_ids, boxes)
+        found = []
+        for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
+            left, top, right, bottom = boxes[i].tolist()
+            first, end = first_ids[i : i + 2].tolist()
+            part = ids[:, top:bottom, left:right]
+            mesh = self.placed.snap_part(i, lambda part=part, first=first, end=end: local_part(part, first, end))
+            found.append((i, mesh.seen_from(*self.positions[0])))
+        return tuple(found)
+
     def _at_sample(self, i: int) -> SceneFragments:
         """Return ids, depth and attributes at one sample of each pixel."""
         i = as_sample(i, len(self.positions))
@@ -220,7 +248,7 @@ class SceneFragments(InstanceIds, Fragments):
             box = slice(top, bottom), slice(left, right)
             first, end = self.placed.first_ids[i : i + 2].tolist()
             own = local_part(self.drawn_planes[0][0][box], first, end)
-            scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(left, top)
+            scene = self.placed.snap_part(i, lambda own=own: own).seen_from(*self.positions[0]).moved(left, top)
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
             frags.corners = self.placed.corners(i)
@@ -368,6 +396,12 @@ class BentFragments(Fragments):
             self._samples = tuple(BentFragments(sample, self.bent, self._mesh) for sample in samples)
             self._planes = planes and (self.bent.whole_ids(planes[0]), planes[1])
         return self._samples, self._planes
+
+    def _whole(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
+        return self.bent.whole_ids(ids)
+
+    def _seen(self) -> SeenSamples:
+        return self.drawn._seen()
 
     def again(self) -> BentFragments:
         """Return the same made anew from the parts, whose buffers have changed."""

@@ -27,7 +27,7 @@ from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.fragments import BentFragments, SceneFragments
 from topleft._meshes.picture.instances import PlacedScene
-from topleft._meshes.picture.look import ShadingInputs
+from topleft._meshes.picture.look import ShadingInputs, Surface
 from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
 
 
@@ -159,9 +159,12 @@ def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, threads:
 
 def inputs_of(scene: engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
     """What the kernel reads of materials with holes."""
-    inputs = ShadingInputs(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
-    inputs.set_materials(mesh, cut.materials, is_unlit=True)
-    inputs.set_view(0, None, (0, 0, 0, 0))
+    finds_inverse_w = len(mesh.vertices) > size[0] * size[1]
+    surface = Surface(cut.materials, cut.rows is not None, is_unlit=True)
+    inputs = ShadingInputs(
+        scene, mesh, camera, camera.view, (size[0], size[1]), surface, finds_inverse_w=finds_inverse_w
+    )
+    inputs.set_picture(0, None, (0, 0, 0, 0))
     return inputs
 
 

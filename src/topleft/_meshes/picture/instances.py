@@ -31,6 +31,7 @@ from topleft._core.raster.view import View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
 from topleft._meshes.picture.fragments import Ids, SceneDepthLayers, SceneFragments
+from topleft._meshes.picture.shade import ShownInstance
 from topleft._meshes.picture.through_lens import DrawnScene, scene_through
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import DepthTestOption
@@ -86,11 +87,13 @@ class PlacedScene:
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
+        self._kept: dict[int, Snapped] = {}
+        self._n_kept = 0  # vertices of these
         self._last: tuple[int, View] | None = None  # the instance that was last asked for: often thrice in turn
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: views of instances are made there."""
-        return vars(self) | {"_last": None}
+        return vars(self) | {"_last": None, "_kept": {}, "_n_kept": 0}
 
     __setstate__ = set_aligned
 
@@ -108,7 +111,16 @@ class PlacedScene:
         return wholes[ids]  # part -1, none, is the last
 
     def snap(self, i: int) -> Snapped:
-        """Return an instance, snapped; in shared buffers it draws its own range of ids."""
+        """Return an instance, snapped; in shared buffers it draws its own range of ids. Small scenes are kept."""
+        kept = self._kept.get(i)
+        if kept is not None:
+            return kept
+        snapped = self._snap(i)
+        if self._n_kept < VERTICES_AT_ONCE:
+            self._kept[i], self._n_kept = snapped, self._n_kept + snapped.n_vertices
+        return snapped
+
+    def _snap(self, i: int) -> Snapped:
         mesh = self.scene[i].mesh
         view, with_depth = self._view_of(i), self._with_depth
         snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
@@ -119,11 +131,16 @@ class PlacedScene:
         mesh, view = self.scene[i].mesh, self._view_of(i)
         return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport)
 
-    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> engine.SnappedMesh:
+    def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
         if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
-            return ClusteredMesh(*self.clustered(i)).part(triangles)
+            return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i).mesh
+
+    def as_shown(self, i: int, snapped: engine.SnappedMesh, scene: Scene) -> ShownInstance:
+        """Return an instance as it is shaded, with the mesh that it has in this scene."""
+        mesh = scene[i].mesh if self.bent is None else self.bent[i].mesh_of(scene[i].mesh)
+        return ShownInstance(snapped, mesh, int(self.first_ids[i]), scene[i].transform)
 
     def _view_of(self, i: int) -> View:
         last = self._last

@@ -18,7 +18,7 @@ from topleft._core.base.arrays import as_names
 from topleft._meshes.picture.blended import blended_masks
 from topleft._meshes.picture.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._meshes.picture.edges import draw_all_edges
-from topleft._meshes.picture.fragments import VisiblePart
+from topleft._meshes.picture.fragments import VisiblePart, shown_of
 from topleft._meshes.picture.gbuffer import GBuffer, PointKind, points_of, project
 from topleft._meshes.picture.render import render
 from topleft._meshes.picture.scene_shade import shade_by
@@ -113,18 +113,19 @@ def world_position(gbuffer: GBuffer) -> Array:
 
 def camera_normal(gbuffer: GBuffer) -> Array:
     """Unit normal in eye space, (H, W, 3) float32, 0 where nothing is."""
-    return gbuffer.join((3,), 0.0, lambda part: normals_of(gbuffer, part, np.eye(3)))
+    return normals_of(gbuffer, np.eye(3))
 
 
 def world_normal(gbuffer: GBuffer) -> Array:
     """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
-    back = gbuffer.camera.view[:3, :3].T  # the transpose, where positions take the inverse
-    return gbuffer.join((3,), 0.0, lambda part: normals_of(gbuffer, part, back))
+    return normals_of(gbuffer, gbuffer.camera.view[:3, :3].T)  # the transpose, where positions take the inverse
 
 
-def normals_of(gbuffer: GBuffer, part: VisiblePart, turn: F64) -> npt.NDArray[np.float32]:
-    """Unit normals (H, W, 3) of a part, from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
-    return shade_normals(*part.drawn, part.camera(gbuffer.camera), turn, threads=gbuffer.options.get("threads"))
+def normals_of(gbuffer: GBuffer, turn: F64) -> npt.NDArray[np.float32]:
+    """Unit normals (H, W, 3), from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
+    frags = gbuffer.frags
+    seen, shown = frags._seen(), shown_of(frags, gbuffer.subject)
+    return shade_normals(shown, seen.ids[0], gbuffer.camera, turn, threads=gbuffer.options.get("threads"))
 
 
 def uv(gbuffer: GBuffer) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -36,7 +36,11 @@ from topleft._meshes.model.normals import (
 from topleft._meshes.model.texture import Texture
 
 LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
-WRAPPED_LIGHT = 2
+
+EYE = np.eye(4)
+
+MOST_TABLES = 4
+"""Tables that are kept of a mesh: what differs is the material, or whether faces are flat, lit, mirrored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,19 +70,6 @@ class CameraRays:
     scale: float
     distance_start: float
     distance_scale: float
-
-
-def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space: bool) -> CameraRays:
-    """How the camera sees shading space: the world, or its own eye space, moved so that `center` is the origin."""
-    view = np.eye(4) if in_eye_space else camera.view
-    has_perspective, rows, scale = engine.camera_rays(camera.clip_from_eye(size), view, center, *size)
-    if has_perspective:
-        start, way = 0.0, 1.0 / -float(camera.projection[3, 2])
-    else:
-        (a, b), (c, d) = camera.projection[2:, 2:]
-        near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
-        start, way = near, far - near
-    return CameraRays(has_perspective, rows[0], rows[1:5], rows[5:8], rows[8], scale, start, way)
 
 
 class ShadingMesh:
@@ -111,6 +102,7 @@ class ShadingMesh:
         low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
         self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
+        self.tables: dict[tuple[object, ...], tuple[Sequence[Material], engine.ShadingTable]] = {}  # see `table_of`
 
     @cached_property
     def face_normals(self) -> F32:
@@ -169,82 +161,117 @@ def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
     return (*numbers, material.emission, *compiled_maps)
 
 
-def is_similarity(view: F64) -> bool:
-    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
-    (a, b, c), (d, e, f), (g, h, i) = view[:3, :3].tolist()
-    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
-    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
-    scale = sum(squares) / 3
-    error = max(map(abs, (*products, *(square - scale for square in squares))))
-    return error <= 1e-9 * scale and engine.determinant(view[:3, :3]) > 0
+class Surface(NamedTuple):
+    """What a mesh is made of, whoever looks at it."""
+
+    materials: Sequence[Material]
+    is_by_triangle: bool
+    """Whether the triangles of the mesh name theirs; otherwise all have the first."""
+    is_flat: bool = False
+    is_unlit: bool = False
+    all_full: bool = False
+    """For an environment that lights them all, or their opacity; others are full where they need it."""
+
+
+def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: bool) -> engine.ShadingTable:
+    """What kernels read of a mesh that nobody looks at yet; the last ones are kept."""
+    key = (*map(id, surface.materials), *surface[1:], is_mirrored)
+    kept = own.tables.get(key)
+    if kept is not None:
+        return kept[1]
+    is_flat = surface.is_flat or mesh.is_faceted
+    table = engine.ShadingTable(
+        own.normals,
+        False,
+        own.normal_of_corner,
+        own.normals,
+        own.face_normals if is_flat else None,
+        own.positions,
+        None if is_flat else own.is_turned,
+        mesh.uv,
+        mesh.uv1,
+        own.colors,
+        mesh.has_alpha,
+        -1.0 if is_mirrored else 1.0,
+        mesh.material_of_triangle if surface.is_by_triangle else None,
+        LIGHT_OF_SRGB,
+    )
+    back_side = 1.0 if is_mirrored else -1.0
+    table.set_materials([material_row(one, mesh, surface, back_side) for one in surface.materials])
+    if len(own.tables) == MOST_TABLES:
+        own.tables.clear()
+    own.tables[key] = surface.materials, table
+    return table
+
+
+def material_row(one: Material, mesh: Mesh, surface: Surface, back_side: float) -> tuple[Any, ...]:
+    """What `ShadingTable.set_materials` takes of one."""
+    texture = one.texture if is_laid(one.texture, mesh) else None
+    has_colors = texture is not None or mesh.colors is not None
+    color = (*light_of(one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR))[:3], one.opacity)
+    back = light_of(one.back_color or (0, 0, 0))[:3]
+    side = 0.0 if one.back_color is None else back_side
+    shininess = one.shininess if one.specular > 0 else 0.0
+    cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
+    full = full_part(one, mesh) if surface.all_full or is_full(one) else None
+    compiled = None if texture is None else texture.compiled_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
+    return color, back, side, (one.specular,) * 3, shininess, surface.is_unlit or one.unlit, cutoff, compiled, full
 
 
 class ShadingInputs:
-    """The numbers of one picture, as the kernels read them."""
+    """The numbers of one instance in a picture, as the kernels read them.
+
+    Parameters
+    ----------
+    snapped, mesh
+        What was drawn, and the mesh that it was drawn from.
+    camera : Camera
+        Whose projection it is.
+    view : (4, 4) float64
+        Eye space from that of the mesh.
+    size : (width, height), pixels
+    surface : Surface
+    finds_inverse_w : bool
+        Whether 1/w is found for the vertices that show, where it can be; otherwise for all.
+    """
 
     def __init__(
         self,
-        scene: engine.SnappedMesh,
+        snapped: engine.SnappedMesh,
         mesh: Mesh,
         camera: Camera,
+        view: F64,
         size: tuple[int, int],
-        material_of: npt.NDArray[np.int32] | None,
+        surface: Surface,
         *,
-        is_flat: bool,
+        finds_inverse_w: bool,
     ) -> None:
-        is_flat = is_flat or mesh.is_faceted
-        in_eye_space = not is_similarity(camera.view)
-        self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
-        viewport = size if scene.viewport is None else scene.viewport.size
-        self.rays = rays_of(camera, viewport, self.mesh.center, in_eye_space=in_eye_space)
-        self.view = camera.view
-        self.back_side = -1.0 if engine.determinant(camera.view[:3, :3]) > 0 else 1.0
-        self.is_in_eye_space = in_eye_space
-        normals, finds_inverse_w = self.mesh.normals, False
-        if scene.viewport is not None and self.rays.has_perspective:
-            finds_inverse_w = scene.finds_inverse_w(size[0] * size[1])
-            if not finds_inverse_w:
-                own = normals[: len(mesh.vertices)]
-                normals = empty(own.shape, np.float32)
-                engine.set_inverse_w(scene, own, normals)
-        self.shading = engine.ShadingTable(
-            normals,
-            finds_inverse_w,
-            self.mesh.normal_of_corner,
-            self.mesh.normals,
-            self.mesh.face_normals if is_flat else None,
-            self.mesh.positions,
-            None if is_flat else self.mesh.is_turned,
-            mesh.uv,
-            mesh.uv1,
-            self.mesh.colors,
-            mesh.has_alpha,
-            -self.back_side,
-            material_of,
-            LIGHT_OF_SRGB,
-        )
+        keeps_angles, is_mirrored = engine.turns(view)
+        self.is_in_eye_space, self.view, self.camera = not keeps_angles, view, camera
+        self.mesh = shading_mesh_of(mesh) if keeps_angles else ShadingMesh(mesh, view)
+        viewport, normals = snapped.viewport, None
+        has_w = viewport is not None and bool(camera.projection[3, :3].any())
+        finds_inverse_w = has_w and finds_inverse_w and snapped.can_find_inverse_w
+        if has_w and not finds_inverse_w:
+            own = self.mesh.normals[: len(mesh.vertices)]
+            normals = empty(own.shape, np.float32)
+            engine.set_inverse_w(snapped, own, normals)
+        frame = size if viewport is None else viewport.size
+        place = (view if keeps_angles else EYE), self.mesh.center
+        table = table_of(self.mesh, mesh, surface, is_mirrored=is_mirrored)
+        self.shading = table.seen(normals, finds_inverse_w, camera.clip_from_eye(frame), *place, *frame)
 
-    def set_materials(
-        self, mesh: Mesh, materials: Sequence[Material], *, is_unlit: bool, all_full: bool = False
-    ) -> None:
-        """Take the materials; a row that several triangles name may be one for all.
-
-        `all_full`: for an environment that lights them all, or their opacity; others are full where they need it.
-        """
-        rows = []
-        for one in materials:
-            texture = one.texture if is_laid(one.texture, mesh) else None
-            has_colors = texture is not None or mesh.colors is not None
-            color = (*light_of(one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR))[:3], one.opacity)
-            back = light_of(one.back_color or (0, 0, 0))[:3]
-            side = 0.0 if one.back_color is None else self.back_side
-            shininess = one.shininess if one.specular > 0 else 0.0
-            cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
-            full = full_part(one, mesh) if all_full or is_full(one) else None
-            compiled = None if texture is None else texture.engine_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
-            row = color, back, side, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, compiled, full
-            rows.append(row)
-        self.shading.set_materials(rows)
+    @cached_property
+    def rays(self) -> CameraRays:
+        """How the camera sees shading space."""
+        has_perspective, rows, scale = self.shading.camera_rays
+        if has_perspective:
+            start, way = 0.0, 1.0 / -float(self.camera.projection[3, 2])
+        else:
+            (a, b), (c, d) = self.camera.projection[2:, 2:]
+            near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
+            start, way = near, far - near
+        return CameraRays(has_perspective, rows[0], rows[1:5], rows[5:8], rows[8], scale, start, way)
 
     def set_opacity(self) -> None:
         """Have the opacity of the surface in the alpha of the picture; all materials are full."""
@@ -253,15 +280,13 @@ class ShadingInputs:
     def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64 | None = None) -> None:
         """Take the lights, in shading space.
 
-        `world_from_mesh`: (4, 4) for a mesh that stands in the world by a matrix, whose camera is the one in its space.
+        `world_from_mesh`: (4, 4) for a mesh that stands in the world by a matrix.
         """
         if lights is None:
-            at = engine.product(self.rays.eye_from.T, TO_HEADLIGHT)
-            rows: list[tuple[Any, ...]] = [(WRAPPED_LIGHT, at, (max(0.0, 1 - ambient),) * 3, 0.0)]
-        else:
-            placed = lights if world_from_mesh is None else self._lights_by(lights, world_from_mesh)
-            rows = [self._light(light) for light in placed]
-        self.shading.set_lights(rows, (ambient,) * 3)
+            self.shading.set_headlight(TO_HEADLIGHT, max(0.0, 1 - ambient), ambient)
+            return
+        placed = lights if world_from_mesh is None else self._lights_by(lights, world_from_mesh)
+        self.shading.set_lights([self._light(light) for light in placed], (ambient,) * 3)
 
     def set_environment(self, environment: Environment | None, world_from_mesh: F64 | None = None) -> None:
         """Take the environment, or what metallic surfaces mirror without one.
@@ -306,19 +331,15 @@ class ShadingInputs:
         rgb = light_of(light.color)[:3]
         return LIGHT_CODES[LightKind(light.kind)], at, tuple(light.intensity * c for c in rgb), light.falloff
 
-    def set_view(self, show: int, matcap: Texture | None, background: Color) -> None:
+    def set_picture(self, show: int, matcap: Texture | None, background: Color) -> None:
         """Take what the picture tells, and its background."""
-        rays = self.rays
         compiled = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").compiled
-        eyes = rays.eye_from.tolist(), rays.has_perspective, rays.eye.tolist(), rays.ray.tolist()
-        self.shading.set_view(show, compiled, *eyes, light_of(background), background)
+        self.shading.set_picture(show, compiled, light_of(background), background)
 
     def set_turn(self, show: int, turn: F64) -> None:
         """Take what is told, in a space that the matrix (3, 3) takes eye space to."""
-        rays = self.rays
-        rows = engine.product(turn, rays.eye_from).tolist()
-        eyes = rows, rays.has_perspective, rays.eye.tolist(), rays.ray.tolist()
-        self.shading.set_view(show, None, *eyes, (0, 0, 0, 0), (0, 0, 0, 0))
+        self.shading.set_turn(engine.product(turn, self.rays.eye_from).tolist())
+        self.shading.set_picture(show, None, (0, 0, 0, 0), (0, 0, 0, 0))
 
     def set_fog(self, fog: Fog | None) -> None:
         """Take the depth cue, if there is one."""

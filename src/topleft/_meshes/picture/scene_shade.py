@@ -1,4 +1,4 @@
-"""Shades a visibility buffer, of a scene each instance by itself, in the rectangle that it shows in.
+"""Shades a visibility buffer of a mesh, a scene or points.
 
 Input: `Fragments`, the `Mesh` or `Scene` and the `Camera` they were made with. Output: a picture (H, W, 4) uint8, sRGB
 with alpha.
@@ -7,8 +7,6 @@ with alpha.
 from __future__ import annotations
 
 from collections.abc import Sequence
-
-import numpy as np
 
 from topleft._core.base.array_types import U8
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
@@ -22,8 +20,8 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture.cloud import shade_cloud
-from topleft._meshes.picture.fragments import SceneFragments, VisiblePart, join, parts_of
-from topleft._meshes.picture.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
+from topleft._meshes.picture.fragments import SceneFragments, shown_of
+from topleft._meshes.picture.shade import Shading, ShadingOptions, shade_instances, shade_numbers
 from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import ShadingOption
 
@@ -119,30 +117,7 @@ def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: Shad
     """The picture of a visibility buffer by checked options."""
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
-
-    def shade_own(part: VisiblePart) -> U8:
-        return shade_part(part, camera, options)
-
-    def shade_one(sample: Fragments) -> U8:
-        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_own, np.uint8)
-
-    def color_at(sample: Fragments, at: Places) -> U8:
-        left = sample.only(*at)
-        colors, instance = np.empty((len(at[0]), 4), np.uint8), left.instance[at]
-        for part in parts_of(left, mesh):
-            own = instance == part.i
-            rows, columns = (places[own] - side.start for places, side in zip(at, part.box, strict=True))
-            colors[own] = shade_own(part)[rows, columns]
-        return colors
-
-    # The kernel resolves the samples of one mesh; those of several are resolved here.
-    return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background, color_at)
-
-
-def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
-    """The picture of the rectangle of a part."""
-    place = None if part.instance is None else part.instance.transform
-    return shade_mesh(*part.drawn, part.camera(camera), options, place)
+    return shade_instances(shown_of(frags, mesh), frags._seen(), camera, options)
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:

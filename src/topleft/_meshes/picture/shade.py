@@ -1,6 +1,6 @@
-"""Shades the visible pixels of one mesh, resolves several samples a pixel, gives distances and normals.
+"""Shades the visible pixels of instances, all samples of them; colours by ids and distances; gives normals.
 
-Input: `Fragments`, the mesh and the camera they were made with. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+Input: what samples see, the instances that show, and a camera. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 
 Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
 half the light is half as bright on a screen. The kernel is csrc/shade/shade.c.
@@ -16,28 +16,18 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any, TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
-from topleft._core.base.arrays import shown
-from topleft._core.base.color import (
-    DEFAULT_COLOR,
-    LINEAR_ONE,
-    WHITE,
-    Color,
-    ColorLike,
-    as_color,
-    id_colors,
-    srgb_tables,
-)
+from topleft._core.base.arrays import INT32_MAX, shown
+from topleft._core.base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
 from topleft._core.base.memory import empty
 from topleft._core.base.options import parse
 from topleft._core.base.threads import count_threads, parse_threads, run_parts, threads_for
-from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.fragments import Fragments, SeenSamples
 from topleft._core.raster.sampling import sample_positions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.environment import Environment
@@ -45,10 +35,8 @@ from topleft._meshes.model.light import AMBIENT, Fog, Light, as_not_negative
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import ShadingInputs
+from topleft._meshes.picture.look import EYE, ShadingInputs, Surface
 from topleft.typing import ShadingOption
-
-Places = tuple[npt.NDArray[np.intp], ...]
 
 MIN_PX_PER_THREAD = 1 << 14
 """Pixels whose light is worth a thread: a tenth of a millisecond. A scene is shaded instance by instance."""
@@ -67,6 +55,9 @@ class Shading(StrEnum):
 
 
 SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
+PLAIN = (Material(),)
+"""What is not looked at where normals are told."""
+
 GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
 """Greys of the depth picture: neither black nor white, so that it shows on both."""
 
@@ -146,87 +137,189 @@ def plain_material(color: Color | None) -> Material:
     return Material(color)
 
 
-def shade_mesh(
-    frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOptions, world_from_mesh: F64 | None = None
-) -> U8:
-    """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
+class ShownInstance(NamedTuple):
+    """An instance as it is shaded."""
 
-    `world_from_mesh`: (4, 4) of an instance of a scene; the camera is the one in the space of its mesh.
-    The kernel reads the mesh triangle by triangle, so it has to be the one that was drawn: of a lens its parts.
-    """
-    picture = empty((*frags.triangle.shape, 4), np.uint8)
-    if not len(mesh.triangles) or 0 in frags.triangle.shape:
-        picture[...] = options.background
+    snapped: engine.SnappedMesh
+    mesh: Mesh
+    """The mesh as it was drawn, which kernels read triangle by triangle: of a lens its parts."""
+    first_id: int = 0
+    """What its triangle 0 is called in the ids."""
+    place: F64 | None = None
+    """World from object, (4, 4); None: the world is the space of the mesh."""
+
+
+def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
+    """Eye from object of each instance, (4, 4), as a camera without a lens sees it."""
+    if all(one.place is None for one in shown):
+        return [camera.view] * len(shown)
+    places = np.concatenate([EYE if one.place is None else one.place for one in shown], axis=1)
+    return list(np.ascontiguousarray(engine.product(camera.view, places).reshape(4, -1, 4).transpose(1, 0, 2)))
+
+
+class Lit:
+    """Instances that are ready to be shaded: at least those that show, in the order of their ids."""
+
+    def __init__(
+        self, shown: Sequence[ShownInstance], camera: Camera, size: tuple[int, int], options: ShadingOptions
+    ) -> None:
+        self.options, self.size = options, size
+        self.n_triangles = sum(len(one.mesh.triangles) for one in shown)
+        if self.n_triangles and all(size):
+            self.subpixel_bits = shown[0].snapped.subpixel_bits
+            finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
+            tables = [
+                look_of(one, view, camera, size, options, finds_inverse_w=finds_inverse_w).shading
+                for one, view in zip(shown, views_of(shown, camera), strict=True)
+            ]
+            self.scene = scene_of_tables(shown, tables)
+
+    def picture(self, seen: SeenSamples, at: I32 | None = None) -> U8:
+        """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
+
+        `at`: where the one sample that sees them lies, sub-pixels from the centre, unless the meshes are seen from it.
+        """
+        width, height = self.size
+        picture = empty((height, width, 4), np.uint8)
+        if not self.n_triangles or not picture.size:
+            picture[...] = self.options.background
+            return picture
+        positions = None if seen.n_samples == 1 else sample_positions(seen.n_samples, self.subpixel_bits)
+
+        def shade_rows(first: int, end: int) -> None:
+            part = picture, first, end - first
+            if positions is None:
+                self.scene.shade(seen.ids[0], seen.depth[0], *part, at)
+            else:
+                self.scene.shade_samples(positions, seen.ids, seen.depth, seen.split, *part)
+
+        n_threads = min(count_threads(self.options.threads, self.n_triangles), width * height // MIN_PX_PER_THREAD)
+        run_parts(shade_rows, height, n_threads)
         return picture
-    scene = frags._snapped
-    split = frags._split
-    several = (split.ids[None], split.depth[None]) if split is not None else frags._sampled()[1]
-    planes = several or (frags.id[None], frags.depth[None])
-    ids, depth = as_read(planes[0], np.int32), as_read(planes[1], np.float32)
+
+
+def shade_instances(shown: Sequence[ShownInstance], seen: SeenSamples, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture (H, W, 4) uint8 of instances, as `Lit` has it."""
+    height, width = seen.ids.shape[1:]
+    if seen.ids.dtype == np.int32:
+        return Lit(shown, camera, (width, height), options).picture(seen)
+    renamed = rename(shown, seen)
+    if renamed is not None:
+        return Lit(renamed[0], camera, (width, height), options).picture(renamed[1])
+    halves = []
+    for first, end in ((0, height // 2), (height // 2, height)):
+        ids, depth = (np.ascontiguousarray(planes[:, first:end]) for planes in (seen.ids, seen.depth))
+        moved = [one._replace(snapped=one.snapped.moved(0, first)) for one in shown]
+        halves.append(shade_instances(moved, SeenSamples.of(ids, depth), camera, options))
+    return np.concatenate(halves)
+
+
+def rename(shown: Sequence[ShownInstance], seen: SeenSamples) -> tuple[list[ShownInstance], SeenSamples] | None:
+    """Call triangles by numbers that int32 holds, of those instances alone that are seen; None where it does not.
+
+    A row of pixels is not halved.
+    """
+    first_ids = np.array([one.first_id for one in shown], np.int64)
+    place = np.searchsorted(first_ids, seen.ids, side="right") - 1
+    own = [shown[i] for i in np.unique(place[place >= 0])]
+    ends = np.cumsum([0, *(len(one.mesh.triangles) for one in own)])
+    if ends[-1] > INT32_MAX and seen.ids.shape[1] > 1:
+        return None
+    if ends[-1] > INT32_MAX:
+        raise ValueError(f"the instances in a row of pixels must have at most {INT32_MAX} triangles, got {ends[-1]}")
+    new = np.searchsorted([one.first_id for one in own], seen.ids, side="right") - 1
+    shift = np.array([one.first_id for one in own] + [0], np.int64) - [*ends[:-1], 0]
+    ids = (seen.ids - shift[new]).astype(np.int32)
+    named = [one._replace(first_id=int(end)) for one, end in zip(own, ends[:-1], strict=True)]
+    return named, seen._replace(ids=ids)
+
+
+def scene_of_tables(shown: Sequence[ShownInstance], tables: Sequence[engine.ShadingTable]) -> engine.ShadedScene:
+    """What kernels read of instances."""
+    return engine.ShadedScene([one.snapped for one in shown], tables, [one.first_id for one in shown])
+
+
+def look_of(
+    shown: ShownInstance,
+    view: F64,
+    camera: Camera,
+    size: tuple[int, int],
+    options: ShadingOptions,
+    *,
+    finds_inverse_w: bool,
+) -> ShadingInputs:
+    """What kernels read of an instance that is seen by `view`, eye from object."""
+    mesh = shown.mesh
     own = (options.material,) if options.material is not None else mesh.materials
     own = own or (plain_material(options.color if mesh.colors is None else None),)
-    rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
-    look = ShadingInputs(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=options.mode is Shading.FLAT)
-    all_full = options.environment is not None or options.shows_opacity
-    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
-    look.set_lights(options.lights, options.ambient, world_from_mesh)
+    surface = Surface(
+        own,
+        own is mesh.materials and len(own) > 1,
+        options.mode is Shading.FLAT,
+        options.mode is Shading.UNLIT,
+        options.environment is not None or options.shows_opacity,
+    )
+    look = ShadingInputs(shown.snapped, mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
+    look.set_lights(options.lights, options.ambient, shown.place)
     if options.environment is not None or any(one.is_metallic_rough for one in own):
-        look.set_environment(options.environment, world_from_mesh)
+        look.set_environment(options.environment, shown.place)
     if options.shows_opacity:
         look.set_opacity()
-    look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
+    look.set_picture(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
     look.set_fog(options.fog)
-    n_samples = len(ids) if split is None else len(split.positions)
-    positions = None if n_samples == 1 else sample_positions(n_samples, scene.subpixel_bits)
-
-    def shade_rows(first: int, end: int) -> None:
-        part = picture, first, end - first
-        if positions is None:
-            engine.shade(scene, look.shading, ids[0], depth[0], *part)
-        else:
-            listed = None if split is None else split.split
-            engine.shade_samples(scene, look.shading, positions, ids, depth, listed, *part)
-
-    n_px = picture.shape[0] * picture.shape[1]
-    n_threads = min(count_threads(options.threads, len(mesh.triangles)), n_px // MIN_PX_PER_THREAD)
-    run_parts(shade_rows, len(picture), n_threads)
-    return picture
-
-
-def as_read(planes: npt.NDArray[Any], kind: type) -> npt.NDArray[Any]:
-    """Planes as kernels read them: as they are, if that is so."""
-    return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
+    return look
 
 
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
     """Colour each triangle by its id, or by its distance: the picture (H, W, 4) uint8."""
-    ends = options.depth_range or distances(frags, camera) if options.mode is Shading.DEPTH else None
+    seen = frags._seen()
+    if options.mode is Shading.IDS:
+        return shade_each(seen, options.background, lambda ids, _: id_colors(frags._whole(ids)))
+    ends = options.depth_range or distances(seen, camera)
+    return shade_each(seen, options.background, lambda _, depth: greys_of(depth, camera, ends))
 
-    def picture_one(sample: Fragments) -> U8:
-        picture = empty((*sample.id.shape, 4), np.uint8)
-        picture[...] = options.background
-        at = np.nonzero(sample.mask)
-        picture[at] = color_at(sample, at)
+
+def shade_each(seen: SeenSamples, background: Color, colors_of: Callable[[I32, F32], U8]) -> U8:
+    """The picture (H, W, 4) uint8 of colours (P, 3) that ids and depths have.
+
+    A triangle has one colour in a pixel, that at the first of the samples that see it. Their light is averaged, alpha
+    as it is.
+    """
+    ids, depth = seen.ids[0], seen.depth[0]
+    picture = empty((*ids.shape, 4), np.uint8)
+    picture[...] = background
+    at = np.nonzero(ids >= 0)
+    picture[at] = opaque(colors_of(ids[at], depth[at]))
+    if seen.n_samples == 1:
         return picture
+    at, split_ids, split_depth = seen.split_pixels()
+    colors = np.empty((*split_ids.shape, 4), np.uint8)
+    colors[...] = background
+    colors[0] = picture[at]
+    for k, own in enumerate(split_ids[1:], 1):
+        is_new = own >= 0
+        for before in range(k):
+            is_known = is_new & (own == split_ids[before])
+            colors[k, is_known] = colors[before, is_known]
+            is_new &= ~is_known
+        colors[k, is_new] = opaque(colors_of(own[is_new], split_depth[k, is_new]))
+    means = np.empty((1, *colors.shape[1:]), np.uint8)
+    engine.mean_colors(colors[:, None], means, 0, 1, 4, engine.Transfer(srgb_tables(), 3, is_straight=True))
+    picture[at] = means[0]
+    return picture
 
-    def color_at(sample: Fragments, at: Places) -> U8:
-        return colors_of_numbers(sample.id[at], sample.depth[at], camera, ends)
 
-    return shade_samples(frags, picture_one, options.background, color_at)
+def opaque(colors: U8) -> U8:
+    """Colours (P, 3) with alpha 255."""
+    return np.concatenate([colors, np.full((len(colors), 1), 255, np.uint8)], axis=1)
 
 
-def colors_of_numbers(ids: I32, depth: F32, camera: Camera, depth_range: tuple[float, float] | None) -> U8:
-    """The colours (P, 4) of ids, or of distances when they have a range."""
-    colors = np.full((len(ids), 4), 255, np.uint8)
-    if depth_range is None:
-        colors[:, :3] = id_colors(ids)
-    elif len(depth):
-        nearest, farthest = depth_range
-        distance = eye_distance(depth, camera)
-        share = np.clip((distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
-        grey = GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share
-        colors[:, :3] = np.rint(grey).astype(np.uint8)[:, None]
-    return colors
+def greys_of(depth: F32, camera: Camera, ends: tuple[float, float]) -> U8:
+    """The greys (P, 3) of depths: near ones are bright, the ends of the range are neither black nor white."""
+    nearest, farthest = ends
+    share = np.clip((eye_distance(depth, camera) - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
+    grey = np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)
+    return np.repeat(grey[:, None], 3, axis=1)
 
 
 def eye_distance(depth: F32, camera: Camera) -> F64:
@@ -236,70 +329,30 @@ def eye_distance(depth: F32, camera: Camera) -> F64:
     return (ndc * d - b) / (ndc * c - a)
 
 
-def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
-    """The least and the greatest distance along the view of what any sample shows; None where there is nothing."""
-    depth = frags.samples_depth[frags.samples_triangle >= 0]
+def distances(seen: SeenSamples, camera: Camera) -> tuple[float, float]:
+    """The least and the greatest distance along the view of what is shown."""
+    depth = seen.depth[0][seen.ids[0] >= 0]
+    if seen.n_samples > 1:
+        _, ids, others = seen.split_pixels()
+        depth = np.append(depth, others[ids >= 0])
     if not depth.size:
-        return None
+        return 0.0, 0.0
     ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
     return float(ends[0]), float(ends[1])
 
 
-def shade_samples(
-    frags: Fragments,
-    shade_one: Callable[[Fragments], U8],
-    background: tuple[int, ...],
-    color_at: Callable[[Fragments, Places], U8] | None = None,
-) -> U8:
-    """Return the mean colour of the samples, (H, W, 4) uint8: light is averaged, alpha as it is.
-
-    `shade_one` gives the picture of one sample; pixels whose triangle an earlier sample has shown are left out of it.
-    `color_at` gives the colours (P, 4) of pixels alone, where there is a quicker way to them.
-    """
-    if frags.samples_depth.shape[-1] == 1:
-        return shade_one(frags)
-    ids = [frags.sample(k).id for k in range(frags.samples_depth.shape[-1])]
-    picture = shade_one(frags.sample(0))  # of the first sample; right wherever one triangle has all samples
-    is_split = np.zeros(ids[0].shape, np.bool_)
-    for other in ids[1:]:
-        is_split |= other != ids[0]
-    at = np.nonzero(is_split)
-    split = np.stack([own[at] for own in ids])  # (S, P)
-    decode, encode = srgb_tables()
-    light, alpha = np.zeros((split.shape[1], 3), np.int64), np.zeros(split.shape[1], np.int64)
-
-    def add(colors: U8, share: npt.NDArray[np.int64]) -> None:
-        weight = share * colors[:, 3]
-        light[...] += weight[:, None] * decode[colors[:, :3]]
-        alpha[...] += weight
-
-    ground = np.broadcast_to(np.array(background, np.uint8), (split.shape[1], 4))
-    add(ground, (split < 0).sum(0))
-    for k, own in enumerate(split):
-        is_new = (own >= 0) & (split[:k] != own).all(0)
-        share = (split == own).sum(0) * is_new
-        if k == 0:
-            add(picture[at], share)
-        elif is_new.any():
-            where, sample = (at[0][is_new], at[1][is_new]), frags.sample(k)
-            colors = np.zeros((split.shape[1], 4), np.uint8)
-            colors[is_new] = color_at(sample, where) if color_at else shade_one(sample.only(*where))[where]
-            add(colors, share)
-    steps = (2 * light + alpha[:, None]) // np.maximum(2 * alpha, 1)[:, None]  # to nearest, of at most LINEAR_ONE
-    mean = np.empty((split.shape[1], 4), np.uint8)
-    mean[:, :3] = encode[np.minimum(steps, LINEAR_ONE)]
-    mean[:, 3] = np.rint(alpha / len(ids))  # exact sixteenths
-    picture[at] = mean
-    return picture
-
-
-def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None) -> F32:
+def shade_normals(
+    shown: Sequence[ShownInstance], ids: I32, camera: Camera, turn: F64, *, threads: int | None = None
+) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
     Parameters
     ----------
-    frags, mesh, camera
-        As in `topleft.shade`.
+    shown
+        At least the instances that show, in the order of their ids.
+    ids : (H, W) int32
+    camera : Camera
+        That of the picture.
     turn : (3, 3) float64
         From eye space to where the normals are wanted.
     threads : int, optional
@@ -311,19 +364,20 @@ def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, th
     inverted looks like one whose faces are not, and no edge of light runs through a triangle. Where those of the
     corners cancel, or there are none, it is the normal of the face.
     """
-    ids = np.require(frags.triangle, np.int32, ["C", "A"])
-    if not len(mesh.triangles) or 0 in ids.shape:
+    n_triangles = sum(len(one.mesh.triangles) for one in shown)
+    if not n_triangles or 0 in ids.shape:
         return np.zeros((*ids.shape, 3), np.float32)
     out = empty((*ids.shape, 3), np.float32)
-    scene = frags._snapped
-    look = ShadingInputs(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
-    look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
-    n_threads = threads_for(threads, len(mesh.triangles))
-
-    def shade_rows(first: int, end: int) -> None:
-        engine.shade_normals(scene, look.shading, ids, out, first, end - first)
-
-    run_parts(shade_rows, len(ids), n_threads)
+    finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > ids.size
+    tables, size = [], (ids.shape[1], ids.shape[0])
+    for one, view in zip(shown, views_of(shown, camera), strict=True):
+        surface = Surface(PLAIN, is_by_triangle=False)
+        look = ShadingInputs(one.snapped, one.mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
+        look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
+        tables.append(look.shading)
+    scene = scene_of_tables(shown, tables)
+    run_parts(lambda first, end: scene.shade_normals(ids, out, first, end - first), len(ids),
+              threads_for(threads, n_triangles))  # fmt: skip
     return out
 
 

@@ -1,5 +1,8 @@
 """What this machine needs per vertex, triangle and pixel: scenes are measured, and costs fitted to them.
 
+Costs that choices follow from are then scaled, a choice after the other, so that less time is lost than with what
+ships; where this does not hold for other scenes, what ships is kept.
+
 In: seeded scenes. Out: `Costs`, with how far off their estimates are for scenes that were not fitted.
 """
 
@@ -9,7 +12,7 @@ import datetime
 import platform
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,16 +25,19 @@ from topleft._core.base.memory import KeptMemory, allocate
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.raster import choices
+from topleft._core.raster.costs import FEATURES, Costs, cost_table, draw_features, use_costs
 from topleft._core.raster.rasterize import draw
 from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import View, ViewOptions
-from topleft._meshes.plan.costs import FEATURES, Costs, features
 from topleft.scenes import blob, random_triangles
 from topleft.typing import SamplingOption
 
 GROUPS = {"mask": Sink.MASK, "count": Sink.COUNT, "depth": Sink.NEAREST, "samples": Sink.SAMPLES, "area": Sink.COUNT}
+
+#: The clock of what several threads do.
+WALL = time.perf_counter_ns
 
 FRAMES = ((640, 360), (1280, 720), (1920, 1080))
 
@@ -50,7 +56,7 @@ class Sample:
 
 
 def calibrate(*, n_rounds: int = 7) -> Costs:
-    """Measure this machine: some ten seconds, at one thread but for one draw at two.
+    """Measure this machine: half a minute.
 
     Parameters
     ----------
@@ -60,36 +66,40 @@ def calibrate(*, n_rounds: int = 7) -> Costs:
     Returns
     -------
     Costs
-        With today's date, and the residual of scenes that were not fitted.
+        With today's date, and how far off they are for scenes that were not fitted.
     """
-    fits, ratios = {}, []
+    fits: dict[str, Any] = {}
+    ratios = []
     for group, sink in GROUPS.items():
-        fits[group] = fit([measure_draw(scene, view, group, sink, n_rounds) for scene, view in scenes(FITTED)])
+        ns = fit([measure_draw(scene, view, group, sink, n_rounds) for scene, view in scenes(FITTED)])
+        fits[f"draw_{group}"] = tuple(ns.tolist())
         for scene, view in scenes(HELD_OUT, with_blob=True, seed=7):
             sample = measure_draw(scene, view, group, sink, n_rounds)
-            ratio = float(sample.counts @ np.array(list(fits[group].values()))) / sample.ns
+            ratio = float(sample.counts @ ns) / sample.ns
             ratios.append(max(ratio, 1 / ratio))
-    return Costs(
-        machine=processor(),
-        isa=engine.isa_in_use(),
-        date=datetime.datetime.now(datetime.UTC).date().isoformat(),
-        call=measure_calls(n_rounds),
-        vertex=measure_vertices(n_rounds),
-        draw=fits,
-        other=measure_others(n_rounds),
-        parallel=measure_parallel(n_rounds),
-        residual={"median": float(np.median(ratios)), "worst": max(ratios), "n_scenes": len(ratios)},
+    found = fits | measure_vertices(n_rounds) | measure_others(n_rounds)
+    return tune(
+        Costs(
+            machine=processor(),
+            isa=engine.isa_in_use(),
+            date=datetime.datetime.now(datetime.UTC).date().isoformat(),
+            call=measure_calls(n_rounds),
+            parallel=measure_parallel(n_rounds),
+            residual=(float(np.median(ratios)), max(ratios), len(ratios)),
+            **found,
+        ),
+        n_rounds,
     )
 
 
-def least_ns(work: Callable[[], object], n_rounds: int) -> float:
+def least_ns(work: Callable[[], object], n_rounds: int, clock: Callable[[], int] = time.thread_time_ns) -> float:
     """Return the least time of some runs, after one that does not count."""
     work()
     times = []
     for _ in range(n_rounds):
-        start = time.perf_counter_ns()
+        start = clock()
         work()
-        times.append(time.perf_counter_ns() - start)
+        times.append(clock() - start)
     return float(min(times))
 
 
@@ -130,7 +140,9 @@ def measure_draw(scene: Any, view: View, group: str, sink: Sink, n_rounds: int) 
     width, height = view.size
     samples = sample_positions(4, chosen.grid_bits) if group == "samples" else None
     _, census = snapped.mesh.count_classes(sink, width, height, samples)
-    return Sample(features(census, width * height), least_ns(drawing(memory, snapped, chosen, group, sink), n_rounds))
+    return Sample(
+        draw_features(census, width * height), least_ns(drawing(memory, snapped, chosen, group, sink), n_rounds)
+    )
 
 
 def drawing(memory: KeptMemory, snapped: Snapped, view: View, group: str, sink: Sink) -> Callable[[], object]:
@@ -145,7 +157,7 @@ def drawing(memory: KeptMemory, snapped: Snapped, view: View, group: str, sink: 
     return lambda: draw(memory, snapped, view, choices.drawing(view, snapped, sink), pixels, depth=depth)
 
 
-def fit(samples: list[Sample]) -> dict[str, float]:
+def fit(samples: list[Sample]) -> NDArray[np.float64]:
     """Return costs that are not negative, with the least sum of squared relative errors."""
     counts = np.stack([sample.counts / sample.ns for sample in samples])
     ns = np.zeros(len(FEATURES))
@@ -156,24 +168,24 @@ def fit(samples: list[Sample]) -> dict[str, float]:
         if ns.min() >= 0:
             break
         kept[int(np.argmin(ns * counts.sum(axis=0)))] = False
-    return dict(zip(FEATURES, ns.tolist(), strict=True))
+    return ns
 
 
-def measure_calls(n_rounds: int) -> dict[str, float]:
+def measure_calls(n_rounds: int) -> tuple[float, ...]:
     """Return the time of each verb for one triangle of a few pixels."""
     small = Rasterizer((8, 8), threads=1)
     vertices, triangles = np.array([[1.0, 1, 0], [6, 1, 0.5], [1, 6, 1]]), np.array([[0, 1, 2]], np.int32)
     colors = np.array([[1, 2, 3, 4]], np.uint8)
-    verbs: dict[str, Callable[[], object]] = {
-        "coverage": lambda: small.coverage(vertices, triangles),
-        "overdraw": lambda: small.overdraw(vertices, triangles),
-        "fill": lambda: small.fill(vertices, triangles, colors),
-        "rasterize": lambda: small.rasterize(vertices, triangles),
-    }
-    return {name: least_ns(partial(repeat, verb, 50), n_rounds) / 50 for name, verb in verbs.items()}
+    verbs = (
+        lambda: small.coverage(vertices, triangles),
+        lambda: small.overdraw(vertices, triangles),
+        lambda: small.fill(vertices, triangles, colors),
+        lambda: small.rasterize(vertices, triangles),
+    )  # in the order of CALLS
+    return tuple(least_ns(partial(repeat, verb, 50), n_rounds) / 50 for verb in verbs)
 
 
-def measure_vertices(n_rounds: int) -> dict[str, float]:
+def measure_vertices(n_rounds: int) -> dict[str, Any]:
     """Return the time of a vertex, by where it comes from."""
     n = 200_000
     rng = np.random.default_rng(3)
@@ -182,7 +194,7 @@ def measure_vertices(n_rounds: int) -> dict[str, float]:
     ortho = np.diag([1e-3, 1e-3, 1e-3, 1])
     eye = np.array([*ortho[:3], [0, 0, 1e-3, 1]])
     clip = np.concatenate([points * 1e-3, np.full((n, 1), 2.0)], axis=1)
-    found = {}
+    found: dict[str, Any] = {}
     for dtype in (np.float32, np.float64, np.int64):
         kinds: dict[str, tuple[NDArray[Any], Any]] = {"snap": (points, None)}
         if dtype is not np.int64:
@@ -191,7 +203,7 @@ def measure_vertices(n_rounds: int) -> dict[str, float]:
             array = values.astype(dtype)
             view = View.parse((640, 360), {"threads": 1, "transform": matrix})
             work = partial(snap_mesh, KeptMemory(), array, triangles, view, with_depth=True, out=None)
-            found[f"{name} {array.dtype}"] = least_ns(work, n_rounds) / n
+            found[name] = *found.get(name, ()), least_ns(work, n_rounds) / n
     return found
 
 
@@ -201,20 +213,22 @@ def measure_others(n_rounds: int) -> dict[str, float]:
     wide: NDArray[np.int64] = np.zeros((n, 3), np.int64)
     narrow: NDArray[np.int32] = np.zeros((n, 3), np.int32)
     clip, beyond = measure_beyond(n_rounds)
-    ids, depth = np.zeros((360, 640), np.int32), np.zeros((360, 640), np.float32)
-    vertices, triangles, _ = random_triangles(10, 300, 640, 360)
-    picture = Rasterizer((640, 360), threads=1)
-    colors = np.zeros((10, 4), np.uint8)
-    painted = least_ns(lambda: picture.fill(vertices, triangles, colors), n_rounds)
-    counted = least_ns(lambda: picture.overdraw(vertices, triangles), n_rounds)
+    width, height = FRAMES[-1]
+    ids, depth = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
+    vertices, triangles, _ = random_triangles(10, 300, width, height)
+    picture, colors = Rasterizer((width, height), threads=1), np.zeros((10, 4), np.uint8)
+    with choices.forced(is_direct=False, fills_few=False, draws_few=False):
+        painted = least_ns(lambda: picture.fill(vertices, triangles, colors), n_rounds)
+        counted = least_ns(lambda: picture.overdraw(vertices, triangles), n_rounds)
     fresh = 32 << 20
     return {
         "index": least_ns(lambda: engine.narrow_triangles(wide, 1, narrow), n_rounds) / n,
         "clip": clip,
         "beyond": beyond,
-        "paint": max(0.0, painted - counted) / ids.size,
-        "flat": least_ns(lambda: engine.set_flat_depth(ids, depth, 0, 360, True, 0.5, 1.0), n_rounds) / ids.size,
-        "wake": least_ns(lambda: [run_parts(lambda first, _: first, 2, 2) for _ in range(20)], n_rounds) / 20,
+        "paint": max(0.01, (painted - counted) / ids.size),
+        "flat_pixel": least_ns(lambda: engine.set_flat_depth(ids, depth, 0, height, True, 0.5, 1.0), n_rounds)
+        / ids.size,
+        "wake": least_ns(lambda: [run_parts(lambda first, _: first, 2, 2) for _ in range(20)], n_rounds, WALL) / 20,
         "touch": least_ns(lambda: allocate(fresh).fill(0), n_rounds) / fresh,
     }
 
@@ -240,8 +254,119 @@ def measure_parallel(n_rounds: int) -> float:
         return 1.0
     vertices, triangles, _ = random_triangles(60_000, 12)
     pair = [Rasterizer(FRAMES[-1], threads=n) for n in (1, 2)]
-    one, two = (least_ns(partial(picture.rasterize, vertices, triangles), 5 * n_rounds) for picture in pair)
+    one, two = (least_ns(partial(picture.rasterize, vertices, triangles), 5 * n_rounds, WALL) for picture in pair)
     return min(2.0, max(1.0, one / two))
+
+
+@dataclass(frozen=True, slots=True)
+class Tuned:
+    """A choice between two ways: the rows that decide it, and scenes of triangles, their number and size in pixels."""
+
+    choice: str
+    rows: tuple[str, ...]
+    verb: str
+    scenes: tuple[tuple[int, int], ...]
+    ways: tuple[Any, Any] = (False, True)
+    threads: int | None = 1
+    z: float | None = None
+
+    def draws(self, seed: int) -> Iterator[Callable[[], object]]:
+        """Give what draws each scene in a picture of its own."""
+        picture = Rasterizer(FRAMES[-1], threads=self.threads)
+        for n, size_px in self.scenes:
+            vertices, triangles, colors = random_triangles(n, size_px, *FRAMES[-1], seed)
+            if self.z is not None:
+                vertices[:, 2] = self.z
+            extra = (colors,) if self.verb == "fill" else ()
+            yield partial(getattr(picture, self.verb), vertices, triangles, *extra)
+
+
+def all_rows(view: View, *_: object, **__: object) -> int:
+    """Blend all rows at once."""
+    return view.size[1]
+
+
+def band_rows(_: object, __: object, row_bytes: int, **___: object) -> int:
+    """Blend a band of rows after the other."""
+    return max(1, int(cost_table().blend_bytes) // row_bytes)
+
+
+TUNED = (
+    Tuned("pays_without_depth", ("compared_sample", "compared_row"), "rasterize",
+          ((100, 60), (300, 60), (1_000, 60), (2_000, 8), (8_000, 8), (30_000, 8), (100, 300)), z=0.5),
+    Tuned("is_direct", ("direct_triangle",), "fill", ((8_000, 8), (20_000, 40), (40_000, 12), (80_000, 8))),
+    Tuned("pays_to_sort", ("sorted_triangle", "outside_triangle", "far_triangle"), "rasterize",
+          ((100, 60), (1_000, 300), (20_000, 40), (200_000, 8), (300_000, 6), (400_000, 5))),
+    Tuned("rows_to_blend", ("blended_triangle", "blended_vertex"), "fill",
+          ((1_000, 100), (1_000, 300), (10_000, 40), (30_000, 20)), (all_rows, band_rows)),
+    Tuned("pays_to_bound", ("bound_span",), "rasterize", ((300, 1_000), (1_000, 400), (1_000, 200), (5_000, 100))),
+    Tuned("threads_to_draw", ("thread_wakes",), "rasterize",
+          ((1, 60), (20, 60), (20, 200), (1_000, 20), (4_000, 20), (50, 400)), (1, 2), threads=None),
+    Tuned("is_shared", ("shared_setups",), "coverage", ((100_000, 2), (300_000, 2), (700_000, 2)), threads=2),
+    Tuned("pays_to_share", ("shared_item",), "coverage", ((20_000, 2), (50_000, 2), (100_000, 2)), threads=2),
+)  # fmt: skip
+
+#: What rows are multiplied with, to find what suits a machine.
+FACTORS = (1.0, 0.25, 0.5, 0.71, 1.41, 2.0, 4.0)
+
+#: How much less time must be lost, of scenes that were not looked at when the costs were chosen.
+LEAST_GAIN = 0.01
+
+
+def tune(own: Costs, n_rounds: int) -> Costs:
+    """Return costs with what loses the least time in each choice, on scenes, and on others no more than what ships."""
+    shipped, n_scenes = Costs(), 0
+    lost = np.zeros(2)
+    for one in TUNED if available_threads() > 1 else [one for one in TUNED if one.threads == 1]:
+        kept = replace(own, **{name: getattr(shipped, name) for name in (*one.rows, *MEASURED.get(one.choice, ()))})
+        tables = [kept, *(scaled(table, one.rows, by) for table in (own, kept) for by in FACTORS)]
+        fitted, others = (
+            np.stack([losses(one, draw, tables, min(5, n_rounds)) for draw in one.draws(seed)]) for seed in (1, 2)
+        )
+        best = int(np.argmin(fitted.mean(axis=0)))
+        if others[:, best].mean() > others[:, 0].mean() - LEAST_GAIN:
+            best = 0
+        own = tables[best]
+        lost += others[:, [0, best]].sum(axis=0)
+        n_scenes += len(others)
+    return replace(own, tuned=(*np.exp(lost / n_scenes).tolist(), n_scenes))
+
+
+#: Rows that `calibrate` measures, by the choice that follows from them: kept only where that does.
+MEASURED = {"pays_without_depth": ("flat_pixel",), "is_direct": ("paint",), "threads_to_draw": ("wake",)}
+
+
+def scaled(costs: Costs, rows: tuple[str, ...], factor: float) -> Costs:
+    """Return costs with some rows multiplied."""
+    return replace(costs, **{name: factor * getattr(costs, name) for name in rows})
+
+
+def losses(one: Tuned, draw: Callable[[], object], tables: list[Costs], n_rounds: int) -> NDArray[np.float64]:
+    """Return the logarithm of the time of what each table chooses, by that of the better way."""
+    decide, in_use = getattr(choices, one.choice), cost_table()
+    picked: list[int] = []
+
+    def spy(*arguments: Any, **options: Any) -> Any:
+        answers = []
+        for table in tables:
+            use_costs(table)
+            answers.append(decide(*arguments, **options))
+        use_costs(in_use)
+        if not picked:
+            low = one.ways[0](*arguments, **options) if callable(one.ways[0]) else one.ways[0]
+            picked.extend(int(answer != low) for answer in answers)
+        return answers[0]
+
+    with choices.forced(**{one.choice: spy}):
+        draw()
+    if not picked:
+        return np.zeros(len(tables))
+    took = np.full(2, np.inf)
+    for _ in range(n_rounds):
+        for i, way in enumerate(one.ways):
+            with choices.forced(**{one.choice: way}):
+                took[i] = min(took[i], least_ns(draw, 1, time.thread_time_ns if one.threads == 1 else WALL))
+    return np.asarray(np.log(took[picked] / took.min()))
 
 
 def processor() -> str:

@@ -19,6 +19,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.choices import ClusterRoute, Drawing, Route
 from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
 from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.costs import cost_table
 from topleft._core.raster.sampling import area_cells, sample_positions, split_bytes
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
@@ -271,7 +272,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     n, beyond = len(clusters), seen.find_beyond
     pays = choices.pays_to_draw_from(ClusterRoute.CLUSTERS, view, n_triangles, few, 0.0, beyond)
     can_grow = choices.can_draw_meshlets(view, sink, is_float32=clusters.is_float32)
-    can_grow = can_grow and choices.pays_to_grow(choices.MIN_PICTURES_TO_GROW, n_triangles, n)
+    can_grow = can_grow and choices.pays_to_grow(int(cost_table().grown_pictures), n_triangles, n)
     if not (pays or can_grow):
         return ClusterFacts(None, MOST_SHOWS)
     found = seen.survey(n)

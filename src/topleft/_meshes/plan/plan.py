@@ -19,13 +19,13 @@ from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import DepthTest, Sampling, parse
 from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.costs import cost_table
 from topleft._core.raster.fill import Style, draw_fill
 from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.lod.detail import check_tolerance, choose_detail
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.plan.costs import load_costs
 from topleft._meshes.plan.facts import CLASSES, find_cluster_facts, find_facts, memory_of
 from topleft._meshes.plan.stages import Stage, find_stages, plan_detail
 from topleft._meshes.plan.table import as_html, as_text
@@ -346,7 +346,7 @@ def plan(
     found = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)
     facts, own_triangles = find_facts(vertices, triangles, checked, verb, wanted, test)
     facts = replace(facts, clusters=found)
-    costs = load_costs()
+    costs = cost_table()
     scratch, results = memory_of(facts)
     return Plan(
         verb=verb,

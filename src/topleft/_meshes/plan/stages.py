@@ -12,9 +12,9 @@ from topleft._core import engine
 from topleft._core.base.options import Sampling, Sink
 from topleft._core.base.threads import available_threads
 from topleft._core.raster import choices
-from topleft._core.raster.choices import MIN_THREAD_NS, Route
+from topleft._core.raster.choices import Route
+from topleft._core.raster.costs import CALLS, Costs, draw_features, sink_group
 from topleft._meshes.lod.detail import Detail
-from topleft._meshes.plan.costs import Costs, features, sink_group
 from topleft._meshes.plan.facts import ClusterFacts, Decided, Facts, memory_of
 from topleft.methods import METHODS
 
@@ -53,14 +53,6 @@ SINKS = {
     Sink.SAMPLES: "a bit a sample, counted at the end",
 }
 
-#: What it takes to find out whether a cluster shows, and what one that does not would take of the time of one that
-#: does: of balls of 10**6 and 10**7 triangles.
-CLUSTER_TEST_NS = 160
-LEFT_OUT_SHARE = 0.6
-
-#: What drawing takes of vertices that are not snapped, beside the snapped draw: of the scenes in docs/design/exact.md.
-EXACT_TIMES = 1.1
-
 
 def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
     """Return the stages of a call."""
@@ -68,13 +60,13 @@ def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
     stages += [plan_method(facts, costs), *plan_sink(facts, costs)]
     stages += [plan_threads(facts, costs), plan_memory(facts, costs)]
     n_samples = facts.view.sampling.n_samples
-    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters, n_samples))
+    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters, n_samples, costs))
 
 
-def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int) -> list[Stage]:
+def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int, costs: Costs) -> list[Stage]:
     """Return the stages of a mesh that is drawn again, with one that tells what its clusters save, for each sample."""
     if found.clusters is None:
-        stages[1:1] = [Stage("clusters", "none", found.why_not, timed_in="method"), *plan_meshlets(found)]
+        stages[1:1] = [Stage("clusters", "none", found.why_not, timed_in="method"), *plan_meshlets(found, costs)]
         return stages
     n, n_triangles = len(found.clusters), found.clusters.n_triangles
     names = {"outside of the picture": found.n_outside, "turned away": found.n_turned, "hidden": found.n_hidden}
@@ -87,8 +79,8 @@ def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int) -> l
     choice = f"{found.n_drawn:,} of {n:,} drawn, front to back, at most {engine.CLUSTER} triangles each"
     row = Stage("clusters", choice, why, rejected, timed_in="method")
     vertex_stages = ("transform", "clip", "snap")
-    share = found.n_drawn / max(1.0, found.n_drawn + LEFT_OUT_SHARE * (n - found.n_drawn))
-    total = CLUSTER_TEST_NS * n_samples * n / 1e6
+    share = found.n_drawn / max(1.0, found.n_drawn + costs.cluster_hidden * (n - found.n_drawn))
+    total = costs.cluster_test * n_samples * n / 1e6
     scaled = []
     for stage in stages:
         if stage.name == "input":
@@ -101,15 +93,15 @@ def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int) -> l
             scaled.append(replace(stage, estimated_ms=total))
         else:
             scaled.append(stage)
-    scaled[1:1] = [row, *plan_meshlets(found)]
+    scaled[1:1] = [row, *plan_meshlets(found, costs)]
     return scaled
 
 
-def plan_meshlets(found: ClusterFacts) -> list[Stage]:
+def plan_meshlets(found: ClusterFacts, costs: Costs) -> list[Stage]:
     """Return the stage of a mesh that is drawn from meshlets once it has been drawn often, if it is."""
     if not found.meshlet_bytes:
         return []
-    choice = f"from picture {choices.MIN_PICTURES_TO_GROW} on, at most {engine.MESHLET_TRIANGLES} triangles each"
+    choice = f"from picture {costs.grown_pictures:g} on, at most {engine.MESHLET_TRIANGLES} triangles each"
     why = "what is drawn so often is worth growing, once; estimates are of the pictures before"
     rejected = ("from the first picture on: growing takes as long as a hundred of them save",)
     return [Stage("meshlets", choice, why, rejected, timed_in="method")]
@@ -150,9 +142,9 @@ def plan_input(facts: Facts, costs: Costs) -> Stage:
     rejected = ["a check of all indices beforehand: the pass that draws reads them anyway"]
     if converts:
         rejected = ["int64 in the kernels: twice the memory to read in each pass; pass int32, or a plan, to save this"]
-    ms = costs.call[facts.verb] / 1e6 + (costs.other["index"] * n / threads / 1e6 if converts else 0.0)
+    ms = costs.call[CALLS.index(facts.verb)] / 1e6 + (costs.index * n / threads / 1e6 if converts else 0.0)
     if facts.is_vertex_copy:
-        ms += costs.other["touch"] * 8 * facts.n_vertices * facts.n_components / 1e6
+        ms += costs.touch * 8 * facts.n_vertices * facts.n_components / 1e6
     return Stage("input", f"vertices {reads}; indices {indices}", why, tuple(rejected), ms, "input")
 
 
@@ -163,7 +155,7 @@ def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
     if facts.is_clip_space:
         kind = "project" if view.transform is None else "affine" if facts.is_affine else "transform"
     threads = choices.threads_to_snap(view.threads, facts.n_vertices, facts.n_triangles)
-    ms = costs.vertex[f"{kind} {facts.point_dtype}"] * facts.n_vertices / threads / 1e6
+    ms = costs.vertex_ns(kind, facts.point_dtype) * facts.n_vertices / threads / 1e6
     if kind == "snap":
         yield Stage("transform", "none", "vertices are in pixels", timed_in="snap")
         why = "pixels have no near or far plane, and sides never cut: all sums are exact"
@@ -216,7 +208,7 @@ def plan_clip(facts: Facts, costs: Costs) -> Stage:
         f"{plural(facts.n_cut, 'triangle')} cut into {plural(facts.n_pieces, 'piece')}",
         f"{vertices(facts.n_clipped)} outside of {names}, and {plural(facts.n_beyond, 'triangle')} with them",
         sides,
-        costs.other["clip"] * (facts.n_cut + facts.n_beyond) / 1e6,
+        costs.clip * (facts.n_cut + facts.n_beyond) / 1e6,
         "clip",
     )
 
@@ -286,15 +278,15 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     n_pixels = view.size[0] * view.size[1]
     group = sink_group(facts.drawing.sink, view.sampling)
     times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
-    counts = features(facts.census, n_pixels)
-    times *= EXACT_TIMES if facts.decided is not None else 1.0
+    counts = draw_features(facts.census, n_pixels)
+    times *= costs.exact_times if facts.decided is not None else 1.0
     ms = times * costs.draw_ms(group, counts, facts.drawing.n_threads, is_shared=facts.is_shared) if n_pixels else 0.0
     if view.sampling is Sampling.AREA:
         why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
         return Stage("method", choice, why, ("16 samples a pixel: not exact, and slower",), ms, "draw")
     parts = [text.format(facts.count(name)) for name, text in METHOD_NAMES.items() if facts.count(name)]
-    ms += costs.other["beyond"] * facts.n_beyond / 1e6  # each thread looks at all of them
+    ms += costs.beyond * facts.n_beyond / 1e6  # each thread looks at all of them
     layers = facts.covered / max(1, n_pixels)
     covered = f"about {facts.covered:,.0f} samples are covered, {layers:.2g} times the {n_pixels:,} pixels"
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
@@ -327,7 +319,7 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
         rejected = ("labels and colours from them: two passes over the picture, which pay for small triangles",)
         yield Stage("shade", "none", why, rejected, timed_in="method")
     elif facts.verb == "fill":
-        ms = costs.other["paint"] * n_pixels * n / 1e6
+        ms = costs.paint * n_pixels * n / 1e6
         why = f"at most {n_pixels:,} of about {facts.covered:,.0f} samples show"
         rejected = ("colours while drawing: hidden samples would be coloured too",)
         yield Stage("shade", "colours from ids, once a pixel", why, rejected, ms, "shade")
@@ -355,7 +347,7 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
         why = f"every vertex lies at depth {facts.common_depth:g}: {order}; one pass over {n_pixels:,} pixels writes it"
         compared = f"a comparison for each of about {facts.covered:,.0f} samples"
         rejected = (f"{compared}: planes through equal depths are equal to the bit",)
-        ms = costs.other["flat"] * n_pixels / facts.drawing.n_threads / 1e6
+        ms = costs.flat_pixel * n_pixels / facts.drawing.n_threads / 1e6
         return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
     why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
@@ -372,12 +364,12 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
     """Tell how many threads draw, and what each takes."""
     view, n = facts.view, facts.n_triangles
     n_threads, usable = facts.drawing.n_threads, available_threads()
-    wake = f"waking a thread takes {costs.other['wake'] / 1e3:.0f} us"
+    wake = f"waking a thread takes {costs.wake / 1e3:.0f} us"
     if view.threads is not None:
         why = f"threads={view.threads} was asked for"
     else:
         is_enough = "at least" if n_threads == usable else "less than"
-        each = f"{MIN_THREAD_NS / 1e6:g} ms for each of {usable}"
+        each = f"{costs.thread_ns / 1e6:.2g} ms for each of {usable}"
         why = f"about {facts.work_ms:.2g} ms of work are {is_enough} {each}; {wake}"
     if facts.in_bands:
         sorted_ = f"the {n:,} triangles are sorted into bands of rows, which are cleared and drawn in the cache"
@@ -398,7 +390,7 @@ def plan_memory(facts: Facts, costs: Costs) -> Stage:
     scratch, results = memory_of(facts)
     kept, made = sum(scratch.values()), sum(results.values())
     parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)
-    touch = f"{costs.other['touch'] * (kept + made) / 1e6:.2g} ms more for its first touch"
+    touch = f"{costs.touch * (kept + made) / 1e6:.2g} ms more for its first touch"
     rejected = (f"fresh memory for each frame: {touch}; a Rasterizer keeps it",)
     choice = f"{megabytes(kept)} of scratch, {megabytes(made)} of results, {megabytes(kept + made)} at most"
     return Stage("memory", choice, parts, rejected)

@@ -114,11 +114,12 @@ class Accessors:
             raise MeshError(f"accessors[{index}] is of {kind!r} and {code!r}, which is no type")
         n_columns, dtype = N_COMPONENTS[kind], np.dtype(DTYPES[code])
         sparse = row.get("sparse")
-        self._source.check_n_vertices(n // (3 if kind == "SCALAR" else 1))
+        self._source.budget.check("max_vertices", n // (3 if kind == "SCALAR" else 1))
         if "bufferView" in row:
             stride = whole(entry(self._tree, "bufferViews", row["bufferView"]), "byteStride", 0)
             values = self._rows(row["bufferView"], whole(row, "byteOffset", 0), n, n_columns, dtype, stride)
         else:
+            self._source.budget.spend("max_unpacked_bytes", n * n_columns * dtype.itemsize)
             values = np.zeros((n, n_columns), dtype)
         if sparse is not None:
             places = sparse["indices"]
@@ -129,9 +130,13 @@ class Accessors:
             new = self._rows(source["bufferView"], whole(source, "byteOffset", 0), n_set, n_columns, dtype, 0)
             if n_set and int(at.max()) >= n:
                 raise MeshError(f"accessors[{index}] sets row {int(at.max())} of {n}")
+            self._source.budget.spend("max_unpacked_bytes", values.nbytes)
             values = values.copy()
             values[at[:, 0].astype(np.intp)] = new
-        return normalized(values) if row.get("normalized") else values
+        if not row.get("normalized"):
+            return values
+        self._source.budget.spend("max_unpacked_bytes", 4 * values.size)
+        return normalized(values)
 
     def _rows(self, view: Any, offset: int, n: int, n_columns: int, dtype: np.dtype[Any], stride: int) -> Array:
         """Rows of numbers of a view, `stride` bytes from one to the next (0: without gaps)."""

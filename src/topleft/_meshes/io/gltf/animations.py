@@ -51,6 +51,8 @@ def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -
                 source.notes.add("animations of nodes that have a matrix not played")
             elif (target["node"], path) not in found:
                 sampler = entry(animation, "samplers", channel.get("sampler"))
+                source.budget.spend("max_nodes", 1)
+                source.budget.spend("max_vertices", len(accessors.array(sampler.get("input"))))  # keys, each time
                 found[target["node"], path] = value_at(sampler, accessors, moment.time, path).tolist()
     nodes = list(tree["nodes"]) if found else []
     for (index, path), value in found.items():

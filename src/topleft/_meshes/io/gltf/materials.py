@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import numpy.typing as npt
@@ -70,6 +71,7 @@ class Materials:
         """
         row = entry(self._tree, "materials", index)
         if index not in self._materials:
+            self._source.budget.spend("max_nodes", 1)
             self._uv_sets[index] = self._sets = uv_sets_of(row)
             self._materials[index] = self._made(row)
         return self._materials[index]
@@ -127,11 +129,13 @@ class Materials:
         specular = self._texture(row.get("specularGlossinessTexture"), "srgb")
         own: dict[str, Any] = {"opacity": _share(diffuse_factor[3])}
         there = [each for each in (diffuse, specular) if each is not None]
+        size = max((each.image.shape[:2] for each in there), key=math.prod, default=(0, 0))
+        if not self._source.may_have(2 * math.prod(size), "of KHR_materials_pbrSpecularGlossiness"):
+            there = []
         if not there:
             base, metallic = metallic_of_specular(diffuse_factor[:3], specular_factor)
             return {**own, "color": srgb_of_light(base), "metallic": float(metallic), "roughness": 1 - gloss}
         laid = there[0]
-        size = max((each.image.shape[:2] for each in there), key=math.prod)
         colors = _resized(None if diffuse is None else diffuse.image, size)
         strengths = _resized(None if specular is None else specular.image, size)
         bases, roughs = colors.copy(), np.zeros((*size, 3), np.uint8)
@@ -167,8 +171,10 @@ class Materials:
         sampler = {} if "sampler" not in row else entry(self._tree, "samplers", row["sampler"])
         key = (info["index"], encoding, uv_set, None if matrix is None else matrix.tobytes())
         if key not in self._textures:
+            self._source.budget.spend("max_nodes", 1)
             picture = self._picture(row)
-            self._textures[key] = None if picture is None else Texture(
+            may = picture is not None and self._source.may_lay(picture, f"textures[{info['index']}]")
+            self._textures[key] = None if picture is None or not may else Texture(
                 picture, filter=_filter_of(sampler), wrap=_wrap_of(sampler), encoding=encoding, uv_set=uv_set,
                 transform=matrix,
             )  # fmt: skip
@@ -192,15 +198,14 @@ class Materials:
     def _decoded(self, image: Tree, index: int) -> npt.NDArray[np.uint8] | None:
         uri = image.get("uri")
         name = str(image.get("name") or f"images[{index}]")
-        content: bytes | memoryview | None
         if "bufferView" in image:
-            content = self._accessors.view(image["bufferView"]).tobytes()
-        elif uri is None:
+            view = image["bufferView"]
+            return self._source.decoded(("view", view), name, lambda: self._accessors.view(view).tobytes())
+        if uri is None:
             raise MeshError(f"images[{index}] has neither a uri nor a bufferView")
-        else:
-            name = name if str(uri).startswith("data:") else str(uri)
-            content = uri_content(uri, self._source, "textures")
-        return None if content is None else self._source.decode(bytes(content), name)
+        if not str(uri).startswith("data:"):
+            return self._source.picture(unquote(str(uri)))
+        return self._source.decoded(("uri", uri), name, lambda: uri_content(uri, self._source, "textures"))
 
 
 def uv_sets_of(row: Tree) -> tuple[int, int]:

@@ -32,6 +32,8 @@ from topleft.errors import MeshError, MissingPackageError
 
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
+N_FLAT_AT_ONCE = 1 << 16
+"""Triangles whose normals are computed together: 10 MB."""
 
 READ_EXTENSIONS = frozenset({
     "EXT_mesh_gpu_instancing", "EXT_texture_avif", "EXT_texture_webp", "KHR_draco_mesh_compression",
@@ -120,7 +122,7 @@ def _tree_and_blob(source: InputFile) -> tuple[Tree, bytes | None]:
     """The JSON of the file, and the binary chunk of a GLB."""
     import json  # here, as the package is imported by many that read no glTF
 
-    content, blob = source.path.read_bytes(), None
+    content, blob = source.content(), None
     if content[:4] == b"glTF":
         content, blob = _chunks(content, source)
     try:
@@ -292,7 +294,7 @@ class _Reader:
         self._source = source
         self._nodes = _Nodes(tree)
         self._shapes: dict[tuple[int, int], _Shape | None] = {}
-        self._n_vertices = 0
+        self._skins: dict[int, F64] = {}
 
     def parts(self) -> Iterator[Mesh]:
         """The primitives of all nodes, placed."""
@@ -315,9 +317,11 @@ class _Reader:
                 matrices = [np.eye(4)] if is_skinned else places  # joints place a skin, its node does not
                 row = primitive.get("material")
                 materials = () if row is None else (self._materials.material(row),)
+                for option, count in (
+                    ("max_nodes", 1), ("max_vertices", len(shape.positions)), ("max_triangles", len(shape.triangles))
+                ):  # fmt: skip
+                    self._source.budget.spend(option, len(matrices) * count)
                 for matrix in matrices:
-                    self._n_vertices += len(shape.positions)
-                    self._source.check_n_vertices(self._n_vertices)
                     yield _placed(shape, matrix, materials)
 
     def _add_cloud(self, primitive: Tree, matrix: F64) -> None:
@@ -326,8 +330,7 @@ class _Reader:
         points = self._accessors.array(attributes["POSITION"])
         if points.shape[1] != 3:
             raise MeshError(f"POSITION has {points.shape[1]} numbers a vertex")
-        self._n_vertices += len(points)
-        self._source.check_n_vertices(self._n_vertices)
+        self._source.budget.spend("max_vertices", len(points))
         colors: npt.NDArray[np.uint8] | None = None
         if "COLOR_0" in attributes:
             light = _light_of_colors(self._accessors.array(attributes["COLOR_0"]))
@@ -343,8 +346,12 @@ class _Reader:
         instancing = node.get("extensions", {}).get("EXT_mesh_gpu_instancing")
         if instancing is None:
             return [world]
-        given = {name: self._accessors.array(i) for name, i in instancing["attributes"].items()}
-        n = min((len(given[name]) for name in ("TRANSLATION", "ROTATION", "SCALE") if name in given), default=0)
+        rows = instancing["attributes"]
+        given = {
+            name: self._accessors.array(rows[name]) for name in ("TRANSLATION", "ROTATION", "SCALE") if name in rows
+        }
+        n = min(map(len, given.values()), default=0)
+        self._source.budget.check("max_nodes", n)
         matrices = np.tile(np.eye(4), (n, 1, 1))
         if "ROTATION" in given:
             matrices[:, :3, :3] = rotations(given["ROTATION"][:n].astype(np.float64))
@@ -392,6 +399,8 @@ class _Reader:
                 continue
             for name, index in target.items():
                 if name in values:
+                    self._source.budget.spend("max_nodes", 1)
+                    self._source.budget.spend("max_vertices", len(values[name]))
                     delta = self._accessors.array(index)
                     if delta.shape[0] != len(values[name]) or delta.shape[1] > values[name].shape[1]:
                         raise MeshError(f"a morph target of {name} has shape {delta.shape}")
@@ -419,7 +428,7 @@ class _Reader:
                 f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install 'topleft[formats]'"
             ) from None
         mesh = DracoPy.decode(self._accessors.view(draco["bufferView"]).tobytes())
-        self._source.check_n_vertices(len(mesh.points))
+        self._source.budget.check("max_vertices", len(mesh.points))
         values = {}
         for name, number in draco["attributes"].items():
             if name in attributes:
@@ -430,10 +439,13 @@ class _Reader:
                 values[name] = normalized(rows) if accessor.get("normalized") else rows
         return values, np.asarray(mesh.faces).ravel()
 
-    def _skinned(self, values: dict[str, Array], attributes: Tree, skin: Any) -> dict[str, Array]:
-        """Positions and normals moved to where the joints hold them, in the world."""
+    def _joint_matrices(self, skin: Any) -> F64:
+        """World from the space of a skinned mesh, for each joint (J, 4, 4); made once for each skin."""
         row = entry(self._tree, "skins", skin)
+        if skin in self._skins:
+            return self._skins[skin]
         joints = row["joints"]
+        self._source.budget.spend("max_nodes", len(joints))
         matrices = np.array([self._nodes.matrix(_checked(self._tree, joint)) for joint in joints])
         if "inverseBindMatrices" in row:
             inverse = self._accessors.array(row["inverseBindMatrices"])
@@ -441,6 +453,13 @@ class _Reader:
                 raise MeshError(f"skins[{skin}] has {len(inverse)} inverse bind matrices for {len(joints)} joints")
             bind = inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
             matrices = np.array([engine.product(*pair) for pair in zip(matrices, bind, strict=True)]).reshape(-1, 4, 4)
+        self._skins[skin] = matrices
+        return matrices
+
+    def _skinned(self, values: dict[str, Array], attributes: Tree, skin: Any) -> dict[str, Array]:
+        """Positions and normals moved to where the joints hold them, in the world."""
+        matrices = self._joint_matrices(skin)
+        n_joints = len(matrices)
         n = len(values["POSITION"])
         blended = np.zeros((n, 3, 4))
         total = np.zeros((n, 1, 1))
@@ -453,8 +472,10 @@ class _Reader:
             )
             if at.shape != share.shape or at.dtype.kind not in "iu" or len(at) != n:
                 raise MeshError(f"JOINTS_{k} {at.shape} and WEIGHTS_{k} {share.shape} do not go with {n} vertices")
-            if at.size and not 0 <= int(at.min()) <= int(at.max()) < len(joints):
-                raise MeshError(f"JOINTS_{k} names joint {int(at.max())} of {len(joints)}")
+            if at.size and not 0 <= int(at.min()) <= int(at.max()) < n_joints:
+                raise MeshError(f"JOINTS_{k} names joint {int(at.max())} of {n_joints}")
+            self._source.budget.spend("max_nodes", 1)
+            self._source.budget.spend("max_vertices", n)
             for column in range(at.shape[1]):
                 weight = share[:, column, None, None].astype(np.float64)
                 blended += weight * matrices[at[:, column], :3]
@@ -519,10 +540,13 @@ def _flat(shape: _Shape) -> _Shape:
     if at.size and int(at.max()) >= len(shape.positions):
         raise MeshError(f"a triangle names vertex {int(at.max())} of {len(shape.positions)}")
     positions = shape.positions[at]
-    a, b, c = (positions[corner::3].astype(np.float64) for corner in range(3))
-    across = np.cross(b - a, c - a)
-    length = np.sqrt((across**2).sum(axis=1, keepdims=True))
-    normals = (across / np.where(length > 0, length, 1)).astype(np.float32).repeat(3, axis=0)
+    normals = np.empty((len(at), 3), np.float32)
+    for first in range(0, len(at), 3 * N_FLAT_AT_ONCE):
+        rows = slice(first, first + 3 * N_FLAT_AT_ONCE)
+        a, b, c = (positions[rows][corner::3].astype(np.float64) for corner in range(3))
+        across = np.cross(b - a, c - a)
+        length = np.sqrt((across**2).sum(axis=1, keepdims=True))
+        normals[rows] = (across / np.where(length > 0, length, 1)).astype(np.float32).repeat(3, axis=0)
     colors, uv, uv1 = (None if rows is None else rows[at] for rows in (shape.colors, shape.uv, shape.uv1))
     return _Shape(positions, np.arange(len(at), dtype=np.int32).reshape(-1, 3), normals, colors, uv, uv1)
 

@@ -1,6 +1,6 @@
-/* A stable sort of keys with numbers. */
-#ifndef TL_POLYGON_SORT_PAIRS_C
-#define TL_POLYGON_SORT_PAIRS_C
+/* A stable sort of keys with numbers, and keys along a curve through the plane. */
+#ifndef TL_SORT_PAIRS_H
+#define TL_SORT_PAIRS_H
 
 #include <stdint.h>
 
@@ -32,6 +32,14 @@ static keyed *sort_pairs(keyed *a, keyed *room, int64_t n)
         keyed *const other = a;
         a = room, room = other;
     }
+    return a;
+}
+
+/* A number below 2^16 with a zero between its bits. */
+static inline int64_t interleave_zeros(int64_t a)
+{
+    a = (a | a << 8) & 0x00ff00ff, a = (a | a << 4) & 0x0f0f0f0f;
+    a = (a | a << 2) & 0x33333333, a = (a | a << 1) & 0x55555555;
     return a;
 }
 

@@ -1,1 +1,0 @@
-"""Exact pictures to count errors against; nothing of topleft's engine."""

@@ -1,0 +1,1 @@
+"""What a file may take: counted over all of it, and unpacked no further."""

@@ -1,0 +1,110 @@
+"""Counts what a file makes of its bytes, all of it together, and refuses more than its options allow.
+
+Input: numbers that a file declares, before memory is asked for. Output: an error that names the number and the option.
+
+What a file may make without an option grows with the bytes that it has: a file that holds its triangles one by one is
+never refused, one that multiplies them is. The least of each is what ends within 5 seconds and 1 GB.
+"""
+
+from __future__ import annotations
+
+from numbers import Integral
+from typing import NamedTuple
+
+from topleft._core.base.arrays import shown
+from topleft.errors import MeshError
+
+
+class Limit(NamedTuple):
+    """How much of a kind a file may have if no option says so."""
+
+    what: str
+    least: int
+    per_byte: float
+
+
+LIMITS = {
+    "max_bytes": Limit("bytes with the files that it names", 1 << 33, 0),
+    "max_unpacked_bytes": Limit("bytes when it is unpacked", 1 << 25, 8),
+    "max_lines": Limit("lines and elements", 1 << 19, 0.25),
+    "max_vertices": Limit("vertices", 1 << 22, 1),
+    "max_triangles": Limit("triangles", 1 << 22, 1),
+    "max_nodes": Limit("parts (nodes, instances, materials, joints, names and members of files)", 1 << 15, 0.01),
+    "max_texture_pixels": Limit("pixels of textures", 1 << 26, 16),
+}
+"""By the options of `topleft.load`. 8 bytes of text are one in an archive; 16 pixels a byte are plain ones of PNG."""
+
+
+class Budget:
+    """What one file, with all that it names and holds, has taken of its limits.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    **limits : int or None
+        Options of `LIMITS`; those that are not given, or None, follow the bytes of the file.
+
+    Raises
+    ------
+    TypeError
+        If a limit is no whole number.
+    ValueError
+        If it is negative.
+    """
+
+    def __init__(self, name: str, **limits: int | None) -> None:
+        for option, limit in limits.items():
+            if limit is not None and (isinstance(limit, bool) or not isinstance(limit, Integral)):
+                raise TypeError(f"{option} must be a whole number, got {shown(limit)}")
+            if limit is not None and limit < 0:
+                raise ValueError(f"{option} must be at least 0, got {limit}")
+        self._name = name
+        self._given = limits
+        self._n_bytes = 0
+        self._spent = dict.fromkeys(LIMITS, 0)
+
+    def limit(self, option: str) -> int:
+        """The most that the file may have."""
+        given = self._given.get(option)
+        return max(LIMITS[option].least, int(LIMITS[option].per_byte * self._n_bytes)) if given is None else int(given)
+
+    def has(self, option: str, n: int) -> bool:
+        """Whether so many more are allowed."""
+        return self._spent[option] + n <= self.limit(option)
+
+    def check(self, option: str, n: int) -> None:
+        """Raise an error unless so many more are allowed; they are not counted yet.
+
+        Raises
+        ------
+        MeshError
+            If they are not.
+        """
+        if not self.has(option, n):
+            raise MeshError(
+                f"{self._name!r} has {self._spent[option] + n} {LIMITS[option].what}, more than the "
+                f"{self.limit(option)} of {option}"
+            )
+
+    def spend(self, option: str, n: int) -> None:
+        """Count so many more.
+
+        Raises
+        ------
+        MeshError
+            If they are more than allowed.
+        """
+        self.check(option, n)
+        self._spent[option] += n
+
+    def read(self, n_bytes: int) -> None:
+        """Count the bytes of a file on disk.
+
+        Raises
+        ------
+        MeshError
+            If they are more than allowed.
+        """
+        self.spend("max_bytes", n_bytes)
+        self._n_bytes += n_bytes
