@@ -13,9 +13,9 @@
 /* What was decided how. */
 typedef struct tl_exact_counts {
     int64_t n_triangles;  /* that were drawn, of each pass */
-    int64_t n_on_grid;    /* of which all vertices lie on 2^-8 px, where the others of their vector were asked */
-    int64_t n_asked;      /* samples and row ends that lie too near an edge for float lanes */
-    int64_t n_turns;      /* triangles of which the sign of the area was asked */
+    int64_t n_on_grid;    /* of which all vertices lie on 2^-8 px, where others of their vector were in doubt */
+    int64_t n_refined;    /* samples and row ends that lie too near an edge for float lanes */
+    int64_t n_turns;      /* triangles of which the sign of the area was refined */
     int64_t n_expansions; /* signs that only sums of many numbers told */
     int64_t n_integers;   /* signs that only integers of 2176 bits told */
 } tl_exact_counts;
@@ -41,7 +41,7 @@ typedef struct tl_exact_points {
     int64_t n_triangles;
     const int32_t *names;          /* (n_triangles,) which triangle of the mesh each is of; NULL: its index */
     const tl_exact_pieces *pieces; /* or NULL */
-    double band;                   /* 1; less shows that the bands of doubt are needed: pictures are then wrong */
+    double band;                   /* 1; tests pass less to prove that narrower bands draw wrong pixels */
 } tl_exact_points;
 
 #endif

@@ -70,7 +70,7 @@ typedef struct {
     const tl_view *view;
     const tl_window *window;
     const tl_target *target;   /* NEAREST, FARTHEST */
-    const tl_kernels *kernels; /* what draws triangles that are large, or need care */
+    const tl_kernels *kernels; /* what draws triangles that are large, or need draw_fallback */
     int32_t first_id;
     int32_t sample_x_fx, sample_y_fx; /* where in a pixel it is sampled, from the centre */
 } tl_meshlet_pass;
@@ -82,15 +82,16 @@ typedef struct {
     int64_t (*grow)(const tl_source *source, const int32_t *triangles, const int32_t *order, int64_t first, int64_t end,
                     int32_t *numbers, void *room, tl_meshlet *out, float *records, uint8_t *n_triangles);
 
-    /* Lists meshlets [first, end) that the window may show, and in `odd` those that need care; returns how many of the
+    /* Lists meshlets [first, end) that the window may show, and in `fallback` the others; returns how many of the
      * first there are.  Both have room for all. */
-    int64_t (*list)(const tl_meshlet_pass *pass, int64_t first, int64_t end, tl_seen_meshlet *seen, int32_t *odd,
-                    int64_t *n_odd);
+    int64_t (*list)(const tl_meshlet_pass *pass, int64_t first, int64_t end, tl_seen_meshlet *seen, int32_t *fallback,
+                    int64_t *n_fallback);
 
     /* Draws what is listed of rows [row0, row1) of the window, cleared first if `is_first`.  `others`, a number for
      * each triangle, gets those that clip planes may cut, or that 64 bits cannot hold; returns how many. */
-    int64_t (*draw)(const tl_meshlet_pass *pass, const tl_seen_meshlet *seen, int64_t n_seen, const int32_t *odd,
-                    int64_t n_odd, int32_t row0, int32_t row1, int is_first, tl_seen_meshlet *sorted, int32_t *others);
+    int64_t (*draw)(const tl_meshlet_pass *pass, const tl_seen_meshlet *seen, int64_t n_seen, const int32_t *fallback,
+                    int64_t n_fallback, int32_t row0, int32_t row1, int is_first, tl_seen_meshlet *sorted,
+                    int32_t *others);
 } tl_meshlet_kernels;
 
 /* The most meshlets that n triangles are grown into. */

@@ -189,16 +189,16 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
     /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
-    vm alone =
+    vm single =
         vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
-    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
-    for (unsigned lanes = vm_bits(alone); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
+    single = vm_and(live, vm_or(single, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    for (unsigned lanes = vm_bits(single); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
         push_alone(s, i + __builtin_ctz(lanes));
     const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
     /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing
      * there */
     const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), x_min), vi_gt(x_max, vi_set1(p->left_fx)));
-    vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_rows, meets_cols));
+    vm drawn = vm_and(vm_and_not(live, single), vm_and(meets_rows, meets_cols));
     if (!vm_any(drawn))
         return;
     /* twice the area: differences of at most 2^25, so every step is exact in float64 */

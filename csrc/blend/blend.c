@@ -16,7 +16,7 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
-#include "raster/alone_float.c"
+#include "raster/single_float.c"
 #include "raster/raster.c"
 #include "raster/refine.c"
 #include "raster/rows.c"
@@ -64,15 +64,15 @@ static __attribute__((noinline)) void refine_blend_rows(walk_state *s, int i, la
     vi_store(sample, t->sample);
     for (unsigned left = vm_bits(doubted); left; left &= left - 1) {
         const int k = __builtin_ctz(left), n = q->size[i + k] >> 16;
-        asked_triangle a;
-        set_asked(s, q, i, k, t, TL_FAR_BAND, &a);
+        refined_triangle a;
+        set_refined(s, q, i, k, t, TL_FAR_BAND, &a);
         for (int row = 0; row < n; row++) {
             int64_t first, end;
             decide_row(&a, row, &first, &end, s->counts);
             rows->first[row][k] = sample[k] + row * stride + (int32_t)first;
             rows->n[row][k] = (int32_t)(end - first);
         }
-        s->counts->n_asked += n;
+        s->counts->n_refined += n;
     }
 }
 
@@ -117,7 +117,7 @@ TL_INLINE void flush_blend(blend_pass *p, tl_geometry g)
 }
 
 /* A triangle of the list that is drawn, with the name of one of the mesh; TL_FLOAT. */
-static __attribute__((noinline)) void blend_alone_float(blend_pass *p, int64_t drawn, int64_t name)
+static __attribute__((noinline)) void blend_single_float(blend_pass *p, int64_t drawn, int64_t name)
 {
     blend_state *b = &p->mix;
     const int64_t n_whole = b->snapped->n_triangles;
@@ -125,7 +125,7 @@ static __attribute__((noinline)) void blend_alone_float(blend_pass *p, int64_t d
         return;
     if (!b->is_flat)
         begin_exact_gouraud(b, name, drawn < n_whole ? -1 : drawn - n_whole);
-    draw_lone(&p->walk, (int32_t)drawn, TL_SINK_BLEND);
+    draw_single_float(&p->walk, (int32_t)drawn, TL_SINK_BLEND);
 }
 
 /* Setup and cull of TL_LANES triangles, which come after all that wait. */
@@ -137,21 +137,21 @@ TL_INLINE void blend_batch(blend_pass *p, tl_geometry g, const int32_t *corners,
         return;
     if (g == TL_FIXED)
         find_fixed_boxes(s, &b);
-    vm drawn = vm_and(b.drawn, has_box(&b)), alone = b.alone;
+    vm drawn = vm_and(b.drawn, has_box(&b)), single = b.single;
     if (g == TL_FIXED) {
         const vi special = vi_set1(s->limits.special_x); /* of a sample it may be the greatest number, not the least */
         const vm is_special =
             vm_or(vm_or(vi_eq(b.c.x[0], special), vi_eq(b.c.x[1], special)), vi_eq(b.c.x[2], special));
-        alone = vm_and(alone, vm_or(is_special, has_box(&b)));
+        single = vm_and(single, vm_or(is_special, has_box(&b)));
     }
     if (TL_LANES == 1) { /* one lane gains nothing from the rows above */
-        alone = vm_or(alone, drawn);
-        drawn = vm_and_not(drawn, alone);
+        single = vm_or(single, drawn);
+        drawn = vm_and_not(drawn, single);
     }
-    if (vm_any(alone)) {
+    if (vm_any(single)) {
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
-        for (unsigned lanes = vm_bits(alone); lanes && s->bad_row < 0; lanes &= lanes - 1) {
+        for (unsigned lanes = vm_bits(single); lanes && s->bad_row < 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
             const vm before = vm_first(lane);
             push(&s->rows, g, vm_and(drawn, before), &b, id);
@@ -160,9 +160,9 @@ TL_INLINE void blend_batch(blend_pass *p, tl_geometry g, const int32_t *corners,
             if (tl_is_given_up(s->window))
                 return;
             if (g == TL_FIXED)
-                blend_alone(&p->mix, ids[lane]);
+                blend_single_fixed(&p->mix, ids[lane]);
             else
-                blend_alone_float(p, ids[lane], ids[lane]);
+                blend_single_float(p, ids[lane], ids[lane]);
         }
     }
     if (vm_any(drawn) && push(&s->rows, g, drawn, &b, id))
@@ -192,7 +192,7 @@ static void blend_each_fixed(blend_pass *p)
     p->walk.bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
     for (int64_t i = 0; p->walk.bad_row < 0 && i < snapped->n_triangles && !tl_is_given_up(window); i++) {
         tl_count_work(window, TL_SETUP_PX);
-        blend_alone(&p->mix, i);
+        blend_single_fixed(&p->mix, i);
     }
 }
 
@@ -206,9 +206,9 @@ static void blend_each_float(blend_pass *p)
     s->bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
     for (int64_t i = 0, k = 0; i < snapped->n_triangles && s->bad_row < 0 && !tl_is_given_up(s->window); i++) {
         tl_count_work(s->window, TL_SETUP_PX);
-        blend_alone_float(p, i, i);
+        blend_single_float(p, i, i);
         for (; k < n_pieces && pieces->source[k] == i; k++)
-            blend_alone_float(p, snapped->n_triangles + k, i);
+            blend_single_float(p, snapped->n_triangles + k, i);
     }
 }
 

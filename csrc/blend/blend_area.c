@@ -119,18 +119,18 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     const vi last_col = vi_shift_right(x_max, bits), last_row = vi_shift_right(y_max, bits);
     const vi n_cols = vi_sub(last_col, col), n_rows = vi_sub(last_row, row); /* less one */
     /* the cell right of the last column holds what is left of it.  A special vertex has x = INT32_MIN. */
-    vm alone =
+    vm single =
         vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
-    alone = vm_or(alone, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));
+    single = vm_or(single, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));
     const vm is_special = vi_eq(x_min, vi_set1(TL_SPECIAL));
     const vi right = vi_set1((int32_t)min64(window->x_px + window->width, INT32_MAX));
     const vi bottom = vi_set1((int32_t)min64(window->y_px + window->height, INT32_MAX));
     const vm meets_cols = vm_and(vi_gt(right, col), vi_gt(last_col, vi_set1((int32_t)window->x_px - 1)));
     const vm meets_rows = vm_and(vi_gt(bottom, row), vi_gt(last_row, vi_set1((int32_t)window->y_px - 1)));
     const vm meets = vm_and(meets_cols, meets_rows);
-    vm drawn = vm_and(vm_and_not(live, vm_or(alone, is_special)), meets);
-    alone = vm_and(live, vm_or(is_special, vm_and(alone, meets)));
-    if (!vm_any(vm_or(drawn, alone)))
+    vm drawn = vm_and(vm_and_not(live, vm_or(single, is_special)), meets);
+    single = vm_and(live, vm_or(is_special, vm_and(single, meets)));
+    if (!vm_any(vm_or(drawn, single)))
         return;
     /* twice the area: differences below 2^21, so every step is exact in float64 */
     const vd x1 = vd_from_vi(vi_sub(c.x[1], c.x[0])), y1 = vd_from_vi(vi_sub(c.y[1], c.y[0]));
@@ -142,7 +142,7 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
                           : cull == TL_CULL_FRONT ? is_positive
                                                   : vm_or(is_positive, is_negative));
     const vi rows = vi_add(n_rows, vi_set1(1));
-    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1) {
+    for (unsigned lanes = vm_bits(single); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
         const vm before = vm_first(lane);
         if (vm_any(vm_and(drawn, before)))
@@ -152,7 +152,7 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
             flush_atlas(p);
         if (tl_is_given_up(window))
             return;
-        blend_area_alone(p->mix, i + lane);
+        blend_area_single(p->mix, i + lane);
     }
     if (vm_any(drawn))
         push_atlas(p, drawn, &c, is_negative, id, col, row, rows);
@@ -168,7 +168,7 @@ static int64_t blend_areas(blend_state *b)
     if (window->x_px <= -far || window->x_px >= far || window->y_px <= -far || window->y_px >= far) {
         const int64_t bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
         for (int64_t i = 0; bad_row < 0 && i < snapped->n_triangles && !tl_is_given_up(window); i++)
-            blend_area_alone(b, i);
+            blend_area_single(b, i);
         lay_ground(b, window->height);
         return bad_row;
     }

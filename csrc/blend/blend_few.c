@@ -75,9 +75,9 @@ static int64_t blend_few(blend_state *b)
         for (f.id = 0; f.id < snapped->n_triangles; f.id++) {
             tl_count_work(window, TL_SETUP_PX);
             if (canvas->is_area)
-                blend_area_alone(b, f.id);
+                blend_area_single(b, f.id);
             else
-                blend_alone(b, f.id);
+                blend_single_fixed(b, f.id);
         }
         if (f.pixel_bytes == 4)
             put_band(b, band.height, row * canvas->stride_px, &run, 4);

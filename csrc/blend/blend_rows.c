@@ -195,7 +195,7 @@ static __attribute__((noinline)) void blend_rows_of(blend_state *b, const tl_tri
 }
 
 /* Triangle i, all of its pieces as one. */
-static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
+static __attribute__((noinline)) void blend_area_single(blend_state *b, int64_t i)
 {
     const tl_window *window = b->window;
     int32_t own[3];

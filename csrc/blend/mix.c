@@ -17,7 +17,7 @@
 #include "exact/pieces_exact.c"
 #include "exact/sign.c"
 #include "sink/sink.c"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 #include "pixels/paint.c"
 #include "pixels/weights_one.c"
 #include "blend/mix.h"
@@ -232,7 +232,7 @@ static void mix_pixels(blend_state *b, int64_t at, int64_t n)
 }
 
 /* Triangle i, or its pieces, by itself. */
-static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
+static __attribute__((noinline)) void blend_single_fixed(blend_state *b, int64_t i)
 {
     int32_t own[3];
     const triangle_parts parts = parts_of(b->snapped, i, own);

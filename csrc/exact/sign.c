@@ -223,7 +223,7 @@ TL_INLINE int are_in_range(exact_point a, exact_point b, exact_point p)
            is_in_range(p.y);
 }
 
-/* ---- what is asked ------------------------------------------------------------------------------------- */
+/* ---- signs ----------------------------------------------------------------------------------------------- */
 
 static __attribute__((noinline)) int slow_sign(exact_point a, exact_point b, exact_point p, tl_exact_counts *counts)
 {
@@ -284,8 +284,8 @@ TL_INLINE exact_point tested_point(exact_point a, exact_point b, exact_point p, 
 }
 
 /* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge where it is a top
- * or a left one.  Two triangles that share the edge ask the same number with opposite signs, and one of them owns a
- * tie: nothing is left open and nothing is covered twice.  Of squares a tie is within for INNER alone. */
+ * or a left one.  Two triangles that share the edge decide by the same number with opposite signs, and one of them owns
+ * a tie: nothing is left open and nothing is covered twice.  Of squares a tie is within for INNER alone. */
 TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_test test, tl_exact_counts *counts)
 {
     const int sign = edge_sign(a, b, tested_point(a, b, p, test), counts);

@@ -14,7 +14,7 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "sink/covered.c"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 #include "raster/raster.c"
 #include "few/row_runs.c"
 #include "few/row_spans.c"

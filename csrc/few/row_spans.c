@@ -10,7 +10,7 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "sink/hooks.h"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 
 /* The covered columns [first, end) of a row, none where they are equal. */
 typedef struct {

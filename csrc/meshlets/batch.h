@@ -45,7 +45,7 @@ typedef struct {
     int n_one, n_tiny, n_larger, n_covered;
     uint8_t one[TL_MESHLET_ROOM + 64], tiny[TL_MESHLET_ROOM + 64], larger[TL_MESHLET_ROOM + 64];
     int32_t covered[TL_MESHLET_ROOM + 64]; /* column | triangle << 8 | row << 16 | samples << 24 */
-    uint64_t alone[2];                     /* a bit for each triangle that needs care */
+    uint64_t fallback[2];                  /* a bit for each triangle for draw_fallback */
 } meshlet_slot;
 
 /* Triangles with boxes over 2x2, their corners measured from the first sample of the box: the lowest at the left. */

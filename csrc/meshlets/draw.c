@@ -21,7 +21,7 @@
 #include "vertex/fixed.h"
 #include "clusters/behind.h"
 #include "meshlets/batch.h"
-#include "meshlets/care.c"
+#include "meshlets/fallback.c"
 #include "meshlets/flush.c"
 #include "meshlets/list.c"
 #include "meshlets/queues.c"
@@ -49,8 +49,8 @@ TL_INLINE void flush_queued(meshlet_batch *s, meshlet_slot *slot)
         flush_long_boxes_farthest(s, slot);
     else if (s->rows.n)
         flush_long_boxes_nearest(s, slot);
-    if (__builtin_expect((slot->alone[0] | slot->alone[1]) != 0, 0))
-        draw_with_care(s, slot->meshlet, slot->alone);
+    if (__builtin_expect((slot->fallback[0] | slot->fallback[1]) != 0, 0))
+        draw_fallback(s, slot->meshlet, slot->fallback);
 }
 
 static __attribute__((noinline)) void draw_larger(meshlet_batch *s, meshlet_slot *slot)
@@ -72,7 +72,7 @@ static void draw_batch_of_meshlets(meshlet_batch *s)
     cover_tiny(s);
     list_covered(s);
     for (int j = 0; j < s->n_slots; j++)
-        if (s->slots[j].n_larger || (s->slots[j].alone[0] | s->slots[j].alone[1]))
+        if (s->slots[j].n_larger || (s->slots[j].fallback[0] | s->slots[j].fallback[1]))
             draw_larger(s, s->slots + j);
     make_fragment_room(s, TL_FRAGMENTS_KEPT - TL_FRAGMENTS_WRITTEN);
     s->n_slots = 0;
@@ -94,7 +94,7 @@ static __attribute__((noinline)) void draw_on_32_bits(meshlet_batch *s, meshlet_
         snap_slot(s, slot, 1, 0);
     if (s->is_too_far) {
         const uint64_t all[2] = {UINT64_MAX, UINT64_MAX};
-        draw_with_care(s, slot->meshlet, all);
+        draw_fallback(s, slot->meshlet, all);
         return;
     }
     if (slot->at.side & TL_SIDE_BOTH)
@@ -110,7 +110,7 @@ TL_INLINE void draw_meshlet(meshlet_batch *s, tl_seen_meshlet at)
     slot->meshlet = m, slot->at = at, slot->n_triangles = at.n_triangles;
     turn_slot(slot, at.side == TL_SIDE_BACK);
     slot->n_one = slot->n_tiny = slot->n_larger = slot->n_covered = 0;
-    slot->alone[0] = slot->alone[1] = 0;
+    slot->fallback[0] = slot->fallback[1] = 0;
     slot->name0 = (int32_t)(m->names - (const int32_t *)s->meshlets);
     slot->base = (at.below_px - 1) * s->stride_px + at.left_px;
     const vi any = s->is_f64 ? snap_slot_f64(s, slot) : snap_slot(s, slot, 0, 0);
@@ -299,10 +299,10 @@ static int draw_late_meshlets(meshlet_batch *s, tl_seen_meshlet *list, int64_t f
     return draw_listed_meshlets(s, list, first, n, n);
 }
 
-/* Draws what `seen` and `odd` list of rows [row0, row1) of the window, cleared first if `is_first`.  `others` gets the
- * names of triangles that clip planes may cut, or that 64 bits cannot hold; returns how many. */
+/* Draws what `seen` and `fallback` list of rows [row0, row1) of the window, cleared first if `is_first`.  `others` gets
+ * the names of triangles that clip planes may cut, or that 64 bits cannot hold; returns how many. */
 static int64_t draw_meshlets(const tl_meshlet_pass *pass, const tl_seen_meshlet *seen, int64_t n_seen,
-                             const int32_t *odd, int64_t n_odd, int32_t row0, int32_t row1, int is_first,
+                             const int32_t *fallback, int64_t n_fallback, int32_t row0, int32_t row1, int is_first,
                              tl_seen_meshlet *sorted, int32_t *others)
 {
     meshlet_batch s;
@@ -325,9 +325,9 @@ static int64_t draw_meshlets(const tl_meshlet_pass *pass, const tl_seen_meshlet 
     }
     draw_batch_of_meshlets(&s);
     make_fragment_room(&s, TL_FRAGMENTS_KEPT);
-    for (int64_t k = 0; k < n_odd && !is_given_up; k++) {
+    for (int64_t k = 0; k < n_fallback && !is_given_up; k++) {
         const uint64_t all[2] = {UINT64_MAX, UINT64_MAX};
-        draw_with_care(&s, s.meshlets + odd[k], all);
+        draw_fallback(&s, s.meshlets + fallback[k], all);
         is_given_up = tl_is_given_up(pass->window);
     }
     return s.n_others;

@@ -223,16 +223,16 @@ TL_INLINE vf depth_bound(const lane_view *l, const lane_bounds *b, vf q, vf inve
     return vf_add(depth, set(l->is_farthest ? 0x1p-21f : -0x1p-21f)); /* what is drawn lies in [0, 1] */
 }
 
-/* Lists meshlets [first, end) that the window may show in `seen`, and in `odd` those that draw_odd is for; returns how
- * many of the first there are. */
-static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end, tl_seen_meshlet *seen, int32_t *odd,
-                         int64_t *n_odd)
+/* Lists meshlets [first, end) that the window may show in `seen`, and others for draw_fallback in `fallback`; returns
+ * how many of the first there are. */
+static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end, tl_seen_meshlet *seen,
+                         int32_t *fallback, int64_t *n_fallback)
 {
     const lane_view l = place_view(pass);
     const tl_meshlets *mesh = pass->mesh;
     const tl_cull cull = pass->seen->cull;
     int64_t n = 0;
-    *n_odd = 0;
+    *n_fallback = 0;
     for (int64_t i = first; i < end; i += TL_LANES) {
         lane_bounds b;
         vm live = vm_first(end - i);
@@ -271,9 +271,9 @@ static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end
             is_far =
                 vm_or(is_far, vm_or(vf_not_lt(vf_abs(at[k]), set(TL_MAX_PX)), vf_not_lt(reach[k], set(TL_MAX_PX))));
         live = vm_and_not(live, vm_and(between_samples(&l, &b, at), vm_and_not(plain, is_far)));
-        const vm is_odd = vm_and(live, vm_or(vm_and_not(vm_all(), plain), is_far));
-        for (unsigned rest = vm_bits(is_odd); rest; rest &= rest - 1)
-            odd[(*n_odd)++] = (int32_t)(i + __builtin_ctz(rest));
+        const vm needs_fallback = vm_and(live, vm_or(vm_and_not(vm_all(), plain), is_far));
+        for (unsigned rest = vm_bits(needs_fallback); rest; rest &= rest - 1)
+            fallback[(*n_fallback)++] = (int32_t)(i + __builtin_ctz(rest));
         int32_t left[TL_LANES], below[TL_LANES], cols[TL_LANES], rows[TL_LANES];
         float depth[TL_LANES];
         vi_store(left, vi_sub(vi_nearest(at[0]), vi_set1(TL_SLOT_PX / 2)));
@@ -281,7 +281,7 @@ static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end
         vi_store(cols, vi_nearest(reach[0]));
         vi_store(rows, vi_nearest(reach[1]));
         vf_store(depth, depth_bound(&l, &b, vf_mul(b.clip[2], inverse), inverse_least));
-        for (unsigned rest = vm_bits(vm_and_not(live, is_odd)); rest; rest &= rest - 1) {
+        for (unsigned rest = vm_bits(vm_and_not(live, needs_fallback)); rest; rest &= rest - 1) {
             const int k = __builtin_ctz(rest);
             seen[n++] = (tl_seen_meshlet){
                 .meshlet = (int32_t)(i + k),

@@ -33,7 +33,7 @@ TL_INLINE lane_plane make_plane(const meshlet_slot *slot, const vi *corner, cons
                         vd_from_vi(vi_sub(zero, vi_signed_low(v[0]))), vd_from_vi(vi_signed_high(v[0]))};
 }
 
-/* Notes the lanes of m for draw_with_care. */
+/* Notes the lanes of m for draw_fallback. */
 TL_INLINE void leave_lanes(meshlet_slot *slot, vm m, vi triangle)
 {
     if (!__builtin_expect(vm_any(m), 0))
@@ -42,12 +42,12 @@ TL_INLINE void leave_lanes(meshlet_slot *slot, vm m, vi triangle)
     vi_store(numbers, triangle);
     for (unsigned rest = vm_bits(m); rest; rest &= rest - 1) {
         const int i = numbers[__builtin_ctz(rest)] & (TL_MESHLET_ROOM - 1);
-        slot->alone[i >> 6] |= 1ull << (i & 63);
+        slot->fallback[i >> 6] |= 1ull << (i & 63);
     }
 }
 
 /* Slivers, as setup_plane tells them: their depth is interpolated with exact weights, so they are left for
- * draw_with_care.  Returns which lanes of `live` are. */
+ * draw_fallback.  Returns which lanes of `live` are. */
 TL_INLINE vm leave_slivers(meshlet_slot *slot, const vi *v, vm live, vi triangle)
 {
     const vi least = vh_signed_min(vh_signed_min(v[0], v[1]), v[2]),

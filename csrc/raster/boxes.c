@@ -2,7 +2,7 @@
  * In: triangles that have been loaded, or a queue.  Out: lists of samples.
  *
  * TL_FLOAT: a sample at which the least of three edge functions lies beyond the band of doubt is decided by it; the
- * others are asked. */
+ * others are refined. */
 #ifndef TL_BOXES_C
 #define TL_BOXES_C
 
@@ -14,7 +14,7 @@
 #include "exact/sign.c"
 #include "sink/fragments.h"
 #include "sink/sink.c"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 #include "raster/state.h"
 #include "raster/triangles_fixed.c"
 #include "raster/triangles_float.c"
@@ -202,8 +202,8 @@ TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, uns
 }
 
 /* Decides the samples in doubt: on the grid by lanes, then by float64, then by the exact sign. */
-static __attribute__((noinline)) void ask_boxes(walk_state *s, lane_exact *t, vi n_cols, vi n_rows, int size,
-                                                box_masks in)
+static __attribute__((noinline)) void refine_boxes(walk_state *s, lane_exact *t, vi n_cols, vi n_rows, int size,
+                                                   box_masks in)
 {
     unsigned found[TL_SMALL_BOX * TL_SMALL_BOX] = {0};
     doubted_samples d;
@@ -227,7 +227,7 @@ static __attribute__((noinline)) void ask_boxes(walk_state *s, lane_exact *t, vi
         for (int k = 0; k < 3; k++)
             t->e[k] = vf_add(t->e[k], t->dx[k]);
     }
-    s->counts->n_asked += d.n;
+    s->counts->n_refined += d.n;
     if (!d.n)
         return;
     vi_store(d.codes + d.n, vi_set1(0));
@@ -255,7 +255,7 @@ TL_INLINE void find_box_samples(walk_state *s, tl_sink sink, lane_exact *t, vi n
     setup_float(s, sink, t, 1);
     if (__builtin_expect(vm_any(test_boxes(t, n_cols, n_rows, size, in)), 0)) {
         lane_exact own = *t;
-        ask_boxes(s, &own, n_cols, n_rows, size, in);
+        refine_boxes(s, &own, n_cols, n_rows, size, in);
     }
     if (sink_has_depth(sink)) {
         take_out_sliver_samples(s, t, size, in);

@@ -19,25 +19,25 @@
 #include "sink/covered.c"
 #include "sink/peel.c"
 #include "sink/sink.c"
-#include "raster/alone.c"
-#include "raster/alone_float.c"
+#include "raster/single_fixed.c"
+#include "raster/single_float.c"
 #include "raster/boxes.c"
 #include "raster/rows.c"
 #include "raster/sampled.c"
-#include "raster/sampled_alone.c"
+#include "raster/sampled_single.c"
 #include "raster/state.h"
 #include "raster/triangles_fixed.c"
 #include "raster/triangles_float.c"
 
-TL_INLINE void draw_one(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
-                        tl_sink sink)
+TL_INLINE void draw_one_fixed(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
+                              tl_sink sink)
 {
     if (sink == TL_SINK_CENSUS)
-        draw_alone(snapped, i, window, target, sink);
+        draw_single_fixed(snapped, i, window, target, sink);
     else if (sink == TL_SINK_SAMPLES)
-        draw_alone_each_sample(snapped, i, window, target);
+        draw_single_each_sample(snapped, i, window, target);
     else
-        TL_SINK_CALL(draw_alone, target->sink, snapped, i, window, target)
+        TL_SINK_CALL(draw_single_fixed, target->sink, snapped, i, window, target)
 }
 
 /* Loads TL_LANES triangles, and finds those that lanes can take, and of TL_FLOAT the boxes.  Returns 0, with the row in
@@ -67,7 +67,7 @@ TL_INLINE void list_others(const walk_state *s, const lane_batch *b, vi id)
     const vi end = vi_min(b->bottom, vi_set1(limits->picture_bottom));
     const vm is_seen = vm_and(b->drawn, vm_and(vi_gt(b->n_cols, vi_set1(0)), vi_gt(end, first)));
     const vm is_beyond = vm_or(vi_gt(b->row, first), vi_gt(end, vi_set1(limits->bottom)));
-    const vm m = vm_or(b->alone, vm_and(is_seen, is_beyond));
+    const vm m = vm_or(b->single, vm_and(is_seen, is_beyond));
     vi_compress(share->others + share->n_others, m, id);
     share->n_others += __builtin_popcount(vm_bits(m));
 }
@@ -81,12 +81,12 @@ TL_INLINE vi shorter_side(const walk_state *s, const lane_batch *b)
     return vi_min(vi_sub(end, first), vi_sub(b->bottom, b->top));
 }
 
-/* Leaves to be drawn alone what lanes could take but should not, and to nobody what is turned away for certain. */
+/* Leaves to be drawn singly what lanes could take but should not, and to nobody what is turned away for certain. */
 TL_INLINE void take_out(const walk_state *s, tl_geometry g, tl_sink sink, lane_batch *b)
 {
     if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows.c */
         const vm over_small = vm_and(b->drawn, vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX)));
-        b->alone = vm_or(b->alone, over_small);
+        b->single = vm_or(b->single, over_small);
         b->drawn = vm_and_not(b->drawn, over_small);
     }
     if (g == TL_FLOAT) {
@@ -96,22 +96,22 @@ TL_INLINE void take_out(const walk_state *s, tl_geometry g, tl_sink sink, lane_b
         const vi box = vi_shift_right(vi_sub(size, one), TL_SLIVER_BITS);
         /* box > area * 2^12, as setup_plane */
         const vm sliver = vm_and(b->drawn, vi_gt(box, vi_sub(b->absolute, one)));
-        b->alone = vm_or(b->alone, sliver);
+        b->single = vm_or(b->single, sliver);
         b->drawn = vm_and_not(b->drawn, sliver);
     }
 }
 
-TL_INLINE void draw_each_alone(walk_state *s, tl_geometry g, tl_sink sink, vm alone, vi id)
+TL_INLINE void draw_each_single(walk_state *s, tl_geometry g, tl_sink sink, vm single, vi id)
 {
-    if (!vm_any(alone))
+    if (!vm_any(single))
         return;
     int32_t ids[TL_MAX_LANES];
     vi_store(ids, id);
-    for (unsigned lanes = vm_bits(alone); lanes && s->bad_row < 0 && !tl_is_given_up(s->window); lanes &= lanes - 1)
+    for (unsigned lanes = vm_bits(single); lanes && s->bad_row < 0 && !tl_is_given_up(s->window); lanes &= lanes - 1)
         if (g == TL_FLOAT)
             draw_one_float(s, ids[__builtin_ctz(lanes)]);
         else
-            draw_one(s->snapped, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
+            draw_one_fixed(s->snapped, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
 }
 
 TL_INLINE void flush_queue_small(walk_state *s, tl_geometry g, tl_sink sink)
@@ -182,8 +182,8 @@ TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int3
     if (!load_batch(s, g, sink, corners, id, live, &b))
         return;
     if (g == TL_FIXED) {
-        count_faceless(s->target, sink, vm_and_not(vm_and_not(live, b.alone), b.drawn), b.area);
-        if (!vm_any(vm_or(b.drawn, b.alone)))
+        count_faceless(s->target, sink, vm_and_not(vm_and_not(live, b.single), b.drawn), b.area);
+        if (!vm_any(vm_or(b.drawn, b.single)))
             return;
         find_fixed_boxes(s, &b);
     }
@@ -193,7 +193,7 @@ TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int3
         count_unseen(s->target, sink, vm_and_not(b.drawn, has_box(&b)), shorter_side(s, &b));
     b.drawn = vm_and(b.drawn, has_box(&b));
     take_out(s, g, sink, &b);
-    draw_each_alone(s, g, sink, b.alone, id);
+    draw_each_single(s, g, sink, b.single, id);
     if (!vm_any(b.drawn))
         return;
     sort_boxes(&b, boxes);
@@ -287,7 +287,7 @@ TL_INLINE void draw_snapped(const tl_snapped *snapped, const tl_window *window, 
         return;
     for (int64_t i = 0; i < snapped->n_triangles && !tl_is_given_up(window); i++) {
         tl_count_work(window, TL_SETUP_PX);
-        draw_one(snapped, i, window, target, sink);
+        draw_one_fixed(snapped, i, window, target, sink);
     }
 }
 
@@ -410,7 +410,7 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
     if (share->counts) {
         share->counts->n_triangles += counts.n_triangles;
         share->counts->n_on_grid += counts.n_on_grid;
-        share->counts->n_asked += counts.n_asked;
+        share->counts->n_refined += counts.n_refined;
         share->counts->n_turns += counts.n_turns;
         share->counts->n_expansions += counts.n_expansions;
         share->counts->n_integers += counts.n_integers;

@@ -21,14 +21,14 @@ typedef struct {
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
 } row_ends;
 
-/* The row ends of one triangle, for what is asked. */
+/* The row ends of one triangle, for what is refined. */
 typedef struct {
     exact_point corners[3];
     double v[3], dx[3], dy[3], band[3]; /* of the edges in their order; at row 0 of the box */
     double sample_x, sample_y;          /* the first sample of the box */
     tl_test test;
     int n_cols;
-} asked_triangle;
+} refined_triangle;
 
 /* The band of an edge of a triangle: in columns. */
 TL_INLINE void set_bands(const walk_state *s, const lane_exact *t, float far, vf *inverse, vf *band)
@@ -44,15 +44,15 @@ TL_INLINE void set_bands(const walk_state *s, const lane_exact *t, float far, vf
 }
 
 /* Whether column k of a row lies inside edge i. */
-TL_INLINE int is_column_inside(const asked_triangle *a, int i, double y, int64_t k, tl_exact_counts *counts)
+TL_INLINE int is_column_inside(const refined_triangle *a, int i, double y, int64_t k, tl_exact_counts *counts)
 {
     const exact_point sample = {a->sample_x + (double)k, y};
     return is_inside_edge(a->corners[i], a->corners[i == 2 ? 0 : i + 1], sample, a->test, counts);
 }
 
 /* The columns of [*first, *end) inside edge i, by bisection. */
-static __attribute__((noinline)) void bisect_row(const asked_triangle *a, int i, double y, int64_t *first, int64_t *end,
-                                                 tl_exact_counts *counts)
+static __attribute__((noinline)) void bisect_row(const refined_triangle *a, int i, double y, int64_t *first,
+                                                 int64_t *end, tl_exact_counts *counts)
 {
     const int is_left = a->dy[i] < 0.0;
     int64_t low = *first, high = *end; /* the first column that is inside a left edge, or outside a right one */
@@ -67,7 +67,7 @@ static __attribute__((noinline)) void bisect_row(const asked_triangle *a, int i,
 }
 
 /* The columns [*first, *end) of a row of which some end is in doubt. */
-TL_INLINE void decide_row(const asked_triangle *a, int64_t row, int64_t *first, int64_t *end, tl_exact_counts *counts)
+TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first, int64_t *end, tl_exact_counts *counts)
 {
     const double y = a->sample_y + (double)row;
     *first = 0, *end = a->n_cols;
@@ -95,8 +95,8 @@ TL_INLINE void decide_row(const asked_triangle *a, int64_t row, int64_t *first, 
 }
 
 /* Lane k of a vector of triangles, in the numbers that lanes have. */
-static __attribute__((noinline)) void set_asked(const walk_state *s, const box_queue *q, int i, int k,
-                                                const lane_exact *t, float far, asked_triangle *a)
+static __attribute__((noinline)) void set_refined(const walk_state *s, const box_queue *q, int i, int k,
+                                                  const lane_exact *t, float far, refined_triangle *a)
 {
     vf inverse[3], band[3];
     float lane[TL_MAX_LANES];
@@ -187,12 +187,12 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
     const vi found = vi_bit_ranges(vi_min(begin, n_cols), vi_max(end, zero));
     vi_store(bits, vi_select(doubted, found, vi_load(bits)));
     for (int k = 0; k < 3; k++) {
-        const vm is_asked = vm_and(near[k], vm_and(vi_gt(end, col[k]), vi_gt(col[k], vi_sub(begin, one))));
-        if (!vm_any(is_asked))
+        const vm is_refined = vm_and(near[k], vm_and(vi_gt(end, col[k]), vi_gt(col[k], vi_sub(begin, one))));
+        if (!vm_any(is_refined))
             continue;
-        vi_compress(d[k].codes + d[k].n, is_asked,
+        vi_compress(d[k].codes + d[k].n, is_refined,
                     vi_add(vi_iota(), vi_shift_left(vi_add(vi_set1(row), vi_shift_left(col[k], 8)), 8)));
-        d[k].n += __builtin_popcount(vm_bits(is_asked));
+        d[k].n += __builtin_popcount(vm_bits(is_refined));
     }
     return wide;
 }
@@ -217,28 +217,28 @@ static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const bo
     }
     store_points_to_pick(t, &m);
     for (int k = 0; k < 3; k++) {
-        s->counts->n_asked += d[k].n;
+        s->counts->n_refined += d[k].n;
         decide_columns(&m, k, t->test, &d[k], bits, s->counts);
     }
     for (; any; any &= any - 1) {
         const int k = __builtin_ctz(any), n = q->size[i + k] >> 16;
-        asked_triangle a;
-        set_asked(s, q, i, k, t, TL_NEAR_BAND, &a);
+        refined_triangle a;
+        set_refined(s, q, i, k, t, TL_NEAR_BAND, &a);
         for (int row = 0; row < n; row++) {
             int64_t first, end;
             if (!(wide_rows[row] >> k & 1))
                 continue;
             decide_row(&a, row, &first, &end, s->counts);
             bits[row][k] = first < end ? (int32_t)((1u << end) - (1u << first)) : 0;
-            s->counts->n_asked++;
+            s->counts->n_refined++;
         }
     }
 }
 
 /* Decides TL_LANES rows of a triangle from row0 on: by float64, and, of each row where that does not tell, by the exact
  * sign. */
-TL_INLINE void ask_row_ends(const asked_triangle *a, int row0, unsigned doubted, row_ends *ends,
-                            tl_exact_counts *counts)
+TL_INLINE void decide_row_ends(const refined_triangle *a, int row0, unsigned doubted, row_ends *ends,
+                               tl_exact_counts *counts)
 {
     const vi zero = vi_set1(0), n_cols = vi_set1(a->n_cols);
     const vf rows = vf_from_vi(vi_add(vi_iota(), vi_set1(row0)));
@@ -263,7 +263,7 @@ TL_INLINE void ask_row_ends(const asked_triangle *a, int row0, unsigned doubted,
             end = vi_min(end, vi_add(floors, vi_set1(1)));
     }
     vi_store(ends->first, begin), vi_store(ends->end, end);
-    counts->n_asked += __builtin_popcount(doubted);
+    counts->n_refined += __builtin_popcount(doubted);
     for (unsigned left = vm_bits(unsure) & doubted; left; left &= left - 1) {
         const int row = __builtin_ctz(left);
         int64_t first, stop;
@@ -276,9 +276,9 @@ TL_INLINE void ask_row_ends(const asked_triangle *a, int row0, unsigned doubted,
 static __attribute__((noinline)) void refine_row_ends(walk_state *s, int i, int k, const lane_exact *t, int row0,
                                                       unsigned doubted, row_ends *ends)
 {
-    asked_triangle a;
-    set_asked(s, &s->rows, i, k, t, TL_FAR_BAND, &a);
-    ask_row_ends(&a, row0, doubted, ends, s->counts);
+    refined_triangle a;
+    set_refined(s, &s->rows, i, k, t, TL_FAR_BAND, &a);
+    decide_row_ends(&a, row0, doubted, ends, s->counts);
 }
 
 #endif

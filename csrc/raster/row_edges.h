@@ -84,7 +84,7 @@ TL_INLINE void sort_fixed_edges(const vi *e, const vi *dx, const vi *dy, lane_ed
     for (int k = 0; k < 3; k++) {
         start[k] = vf_add(vf_from_vi(e[k]), vf_set1(0.5f));
         step[k] = vf_from_vi(dx[k]);
-        /* a horizontal edge is never asked: 1 keeps infinities away */
+        /* a horizontal edge ends no row: 1 keeps infinities away */
         inverse[k] = vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_max(dy[k], vi_sub(vi_set1(0), dy[k])), vi_set1(1))));
     }
     sort_edges(TL_FIXED, &sides, start, step, inverse, NULL, r);

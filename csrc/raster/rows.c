@@ -11,7 +11,7 @@
 #include "lanes/lanes.h"
 #include "sink/covered.c"
 #include "sink/sink.c"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 #include "raster/refine.c"
 #include "raster/row_edges.h"
 #include "raster/state.h"
@@ -316,9 +316,9 @@ TL_INLINE void flush_rows(walk_state *s, tl_geometry g, tl_sink sink)
             TL_SINK_CALL(draw_rows_fixed, s->target->sink, s, &r, i, lanes_at(i, n))
             continue;
         }
-        const int64_t n_asked = s->counts->n_asked;
+        const int64_t n_refined = s->counts->n_refined;
         TL_SINK_CALL(draw_rows_float, s->target->sink, s, &r, &t, i, lanes.live)
-        if (s->counts->n_asked != n_asked)
+        if (s->counts->n_refined != n_refined)
             try_grid(s, &t, 0);
     }
 }

@@ -14,7 +14,7 @@
 #include "vertex/setup.c"
 #include "sink/fragments.h"
 #include "sink/sink.c"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 #include "raster/row_edges.h"
 
 #define TL_SMALL_BOX 4
@@ -57,10 +57,10 @@ typedef struct {
     const tl_exact_points *points;
     tl_exact_counts *counts;
     double centre_x, centre_y; /* of a pixel's sample, from its upper left corner; of squares 0 */
-    int is_far;                /* int32 cannot count the pixels of the window: all triangles are drawn alone */
+    int is_far;                /* int32 cannot count the pixels of the window: all triangles are drawn singly */
     int has_places;            /* of vertices, and all of the window lies within their limit */
-    int may_be_on_grid;        /* the triangles that asked last were: of so many vectors, that is looked at first */
-    int n_slivers;             /* triangles of the queues that have no depth plane, and wait to be drawn alone */
+    int may_be_on_grid;        /* the triangles last in doubt were: of so many vectors, that is looked at first */
+    int n_slivers;             /* triangles of the queues that have no depth plane, and wait to be drawn singly */
     int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
     /* both */
     box_queue small, middle, rows;
@@ -108,7 +108,7 @@ typedef struct {
 typedef struct {
     vi top, bottom;              /* rows of the extent in the picture */
     vi col, row, n_cols, n_rows; /* the box of samples in the window */
-    vm alone;                    /* lanes cannot take them */
+    vm single;                   /* lanes cannot take them */
     vm drawn;                    /* the others that are to be drawn */
     /* TL_FIXED */
     lane_corners c;

@@ -55,10 +55,10 @@ TL_INLINE void load_fixed_batch(const walk_state *s, const int32_t *corners, vm 
     /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
     const vm too_wide = vi_gt_unsigned(vi_sub(b->x_max, b->x_min), max_extent);
     const vm too_tall = vi_gt_unsigned(vi_sub(b->y_max, b->y_min), max_extent);
-    b->alone = vm_and(live, vm_or(vm_or(too_wide, too_tall), vi_eq(b->x_min, vi_set1(limits->special_x))));
+    b->single = vm_and(live, vm_or(vm_or(too_wide, too_tall), vi_eq(b->x_min, vi_set1(limits->special_x))));
     b->area = area_lanes(c);
     b->absolute = s->snapped->cull == TL_CULL_NONE ? vi_max(b->area, vi_sub(zero, b->area)) : b->area;
-    b->drawn = vm_and_not(vm_and(live, vi_gt(b->absolute, zero)), b->alone);
+    b->drawn = vm_and_not(vm_and(live, vi_gt(b->absolute, zero)), b->single);
 }
 
 TL_INLINE void find_fixed_boxes(const walk_state *s, lane_batch *b)

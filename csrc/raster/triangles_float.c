@@ -17,21 +17,21 @@
  *    moved by u X and u Y move E = (A - S) x (B - S) by 4 u XY.  The setup rounds dx, dy, two products and their
  *    difference: 5 u XY; i dx and k dy err by 2 u XY; six additions of values up to XY by 6 u XY.  Squares subtract
  *    their corner: 2 u XY; of an edge that float32 takes for level or upright they may take the wrong one, where E
- *    differs by 4 u XY at most.  That is 23 u XY: what lies within 24 u XY of 0 is asked (TL_BOX_BAND).  Twice the area
- *    errs by 13 u XY: three points moved, 6; four differences, two products and theirs, 7.
+ *    differs by 4 u XY at most.  That is 23 u XY: what lies within 24 u XY of 0 is refined (TL_BOX_BAND).  Twice the
+ *    area errs by 13 u XY: three points moved, 6; four differences, two products and theirs, 7.
  *    Places (exact.h) stand up to 2^-19 px beside points, and are measured without an error: that moves E by
- *    2^-18 (X + Y) <= 128 u XY instead of 4 u XY.  Together 147 u XY: what lies within 156 u XY is asked
+ *    2^-18 (X + Y) <= 128 u XY instead of 4 u XY.  Together 147 u XY: what lies within 156 u XY is refined
  *    (TL_PLACE_BAND), and twice the area errs by less than twice that.  Boxes are those of the places and a unit around
  *    them; a sample beside the extent lies outside of some edge as any other does.
  * 3. Rows: v = e0 + i dx, rounded once or twice, errs by 5 u XY at most from E at column 0, the errors of k dy for any
  *    column k included: |v - k d - E| <= 5 u XY < M = 6 u XY, d = |dy|.  q = v * (1 / d) errs by 2.01 u |q|.
- *    Where |q - k| > M / d + 2.01 u |q| the sign of v - k d is that of E.  So a row end is asked where
+ *    Where |q - k| > M / d + 2.01 u |q| the sign of v - k d is that of E.  So a row end is refined where
  *    |q - nearest integer| <= M / d + 36 u in boxes of up to 17 columns, 130 u in those of up to 62.
  *    Farther out both ends of the comparison are clamped to the box.
- * 4. A band above 1/2, of a nearly level edge, asks every row: |q - nearest integer| <= 1/2.  A level edge is never
- *    asked: the box, which is exact, says what it says.  A difference that only float32 takes for 0 is set to 1e-30.
+ * 4. A band above 1/2, of a nearly level edge, refines every row: |q - nearest integer| <= 1/2.  A level edge is never
+ *    refined: the box, which is exact, says what it says.  A difference that only float32 takes for 0 is set to 1e-30.
  *    Squares are tested at corners up to a pixel outside the extent: X and Y are then two pixels more.
- * 5. Vertices on 2^-8 px: ties are systematic, so lanes that ask are looked at, and the band of those on the grid is 0.
+ * 5. Vertices on 2^-8 px: ties are systematic, so lanes in doubt are looked at, and the band of those on the grid is 0.
  *    Boxes of up to 4x4 samples: points are measured without an error, edge functions are multiples of 2^-16, and while
  *    XY <= 64 nothing is rounded in 2., as all its numbers are below 2^7; they are moved by half a unit where a tie is
  *    not within, and otherwise the other way.  Larger boxes: integers of 2^-8 px, as triangles_fixed.c and rows.c have
@@ -98,9 +98,9 @@ TL_INLINE vd area_of_points(const vd *x, const vd *y)
     return vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
 }
 
-/* Asks for the sign of the area of each lane in `doubted`. */
-static __attribute__((noinline)) void ask_turns(const walk_state *s, vi all_ids, unsigned doubted, unsigned *negative,
-                                                unsigned *flat)
+/* Refines the sign of the area of each lane in `doubted`. */
+static __attribute__((noinline)) void refine_turns(const walk_state *s, vi all_ids, unsigned doubted,
+                                                   unsigned *negative, unsigned *flat)
 {
     int32_t ids[TL_MAX_LANES];
     vi_store(ids, all_ids);
@@ -116,7 +116,7 @@ static __attribute__((noinline)) void ask_turns(const walk_state *s, vi all_ids,
 }
 
 /* Finds the triangles that are to be turned, and those without an area: of a float64 area the sign holds beyond 2^-51
- * of its terms (J. R. Shewchuk), and is asked for otherwise.  Of vertices on 2^-8 px it is exact. */
+ * of its terms (J. R. Shewchuk), and is refined otherwise.  Of vertices on 2^-8 px it is exact. */
 TL_INLINE void find_turns(const walk_state *s, lane_exact *t, vm on_grid)
 {
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
@@ -132,7 +132,7 @@ TL_INLINE void find_turns(const walk_state *s, lane_exact *t, vm on_grid)
     t->turned = negative;
     if (__builtin_expect(doubted != 0, 0)) {
         unsigned turned = vm_bits(negative), flat = 0;
-        ask_turns(s, t->ids, doubted, &turned, &flat);
+        refine_turns(s, t->ids, doubted, &turned, &flat);
         t->turned = vm_from_bits(turned);
         t->live = vm_and_not(t->live, vm_from_bits(flat));
     }
@@ -304,7 +304,7 @@ static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
     t->on_grid = m;
 }
 
-/* Looks whether triangles that ask lie on the grid, and if so takes their edges from it; returns which. */
+/* Looks whether triangles in doubt lie on the grid, and if so takes their edges from it; returns which. */
 static __attribute__((noinline)) vm try_grid(walk_state *s, lane_exact *t, int of_boxes)
 {
     const vm good = vm_and_not(find_on_grid(s, t, of_boxes), t->on_grid);
@@ -319,7 +319,7 @@ static __attribute__((noinline)) vm try_grid(walk_state *s, lane_exact *t, int o
 }
 
 /* Whether points lie inside edge k of TL_LANES triangles, or outside, beyond the error of float64 (Shewchuk's bound A);
- * in neither where the exact sign is to be asked. */
+ * in neither where the exact sign decides. */
 typedef struct {
     vm inside, outside;
 } lane_sides_of_edge;
@@ -395,7 +395,7 @@ TL_INLINE void find_boxes_of_points(const walk_state *s, tl_sink sink, vm live, 
     const vm fits = vm_and(in_range, vd_ge(widest, vd_max(width, height)));
     const int is_left_of_0 = s->limits.left < 0 || s->limits.top < 0;
     vi left, right;
-    b->alone = vm_and_not(live, fits), b->drawn = vm_and(live, fits);
+    b->single = vm_and_not(live, fits), b->drawn = vm_and(live, fits);
     find_pixels_of(x_min, x_max, test, s->centre_x, is_left_of_0, &left, &right);
     find_pixels_of(y_min, y_max, test, s->centre_y, is_left_of_0, &b->top, &b->bottom);
     cut_boxes(s, left, right, b);
@@ -422,7 +422,8 @@ TL_INLINE int find_boxes_of_places(const walk_state *s, vm live, lane_batch *b)
     /* a special vertex has TL_SPECIAL for x: its triangle is too wide, or special throughout */
     const vm too_large = vm_or(vi_gt_unsigned(width, widest), vi_gt_unsigned(height, widest));
     vi left, right;
-    b->alone = vm_and(live, vm_or(too_large, vi_eq(x_min, vi_set1(TL_SPECIAL)))), b->drawn = vm_and_not(live, b->alone);
+    b->single = vm_and(live, vm_or(too_large, vi_eq(x_min, vi_set1(TL_SPECIAL)))),
+    b->drawn = vm_and_not(live, b->single);
     find_pixels_of_places(x_min, x_max, s->centre_x, &left, &right);
     find_pixels_of_places(y_min, y_max, s->centre_y, &b->top, &b->bottom);
     cut_boxes(s, left, right, b);
@@ -461,7 +462,8 @@ TL_INLINE void place_float(const walk_state *s, tl_sink sink, vi col, vi row, vf
 #define TL_LEAST_BOX 1e-250
 #define TL_MOST_EXTENT 1e120
 
-/* Puts by what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range. */
+/* Sets aside what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range.
+ * */
 TL_INLINE void take_out_slivers(walk_state *s, lane_exact *t)
 {
     const vd width = vd_sub(vd_max(vd_max(t->x[0], t->x[1]), t->x[2]), vd_min(vd_min(t->x[0], t->x[1]), t->x[2]));
@@ -517,7 +519,7 @@ TL_INLINE void setup_float(walk_state *s, tl_sink sink, lane_exact *t, int of_bo
     }
 }
 
-/* The same operations as plane_of_points in alone_float.c. */
+/* The same operations as plane_of_points in single_float.c. */
 TL_INLINE lane_planes plane_of_lanes(const walk_state *s, const lane_exact *t)
 {
     const vd zero = vd_set1(0.0);

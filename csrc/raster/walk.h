@@ -1,5 +1,5 @@
-/* The two walkers, written once and compiled for 64-bit and 128-bit integers: alone.c includes this file twice.  (No
- * guard, therefore.)
+/* The two walkers, written once and compiled for 64-bit and 128-bit integers: single_fixed.c includes this file twice,
+ * which has no guard therefore.
  * In: a set-up triangle.  Out: the covered span of each row.  TL_INT is the integer, TL_OP(name) what
  * base/integers.h has for it, TL_WALK(name) names its copy.
  *

@@ -12,6 +12,7 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.picture import view_layers
 from topleft._meshes.picture.gbuffer import GBuffer
 from topleft._meshes.picture.layers import LAYERS
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.view_layers import render_layers
 
 
@@ -209,7 +210,7 @@ def test_uv_and_attributes_are_interpolated():
 
 
 def test_only_what_is_asked_for_is_computed():
-    gbuffer = GBuffer(CUBE, CAMERAS["perspective"], SIZE)
+    gbuffer = GBuffer(Shot.of(CUBE, CAMERAS["perspective"], SIZE))
     assert "frags" not in vars(gbuffer)
     for name in ("color", "alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
         LAYERS[name](gbuffer)

@@ -76,13 +76,13 @@ cdef class UnsnappedPoints:
     def counts(self) -> tuple[int, int, int, int, int, int]:
         """`tl_exact_counts` of all that has been drawn, in its order."""
         cdef tl_exact_counts *c = &self.counted
-        return c.n_triangles, c.n_on_grid, c.n_asked, c.n_turns, c.n_expansions, c.n_integers
+        return c.n_triangles, c.n_on_grid, c.n_refined, c.n_turns, c.n_expansions, c.n_integers
 
     cdef void add(self, const tl_exact_counts *counts):
         cdef tl_exact_counts *c = &self.counted
         c.n_triangles += counts.n_triangles
         c.n_on_grid += counts.n_on_grid
-        c.n_asked += counts.n_asked
+        c.n_refined += counts.n_refined
         c.n_turns += counts.n_turns
         c.n_expansions += counts.n_expansions
         c.n_integers += counts.n_integers

@@ -467,7 +467,7 @@ def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: 
 
 def can_split(view: View, n_triangles: int) -> bool:
     """Tell whether what samples see may be kept once for the pixels that show one triangle."""
-    return view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_share(view)
+    return view.is_split and view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_share(view)
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:

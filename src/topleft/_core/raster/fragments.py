@@ -185,6 +185,14 @@ class Fragments:
         """Return what `.id` calls triangles that were drawn: the same, but for parts that a lens makes of them."""
         return ids
 
+    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
+        """Return each mesh that some sample sees, as the first does: its index, and what its triangle 0 is called."""
+        return [(0, self._snapped, 0)]
+
+    def _parts_of(self, i: int, mesh: Any) -> Any:  # noqa: ARG002
+        """Return mesh `i` as it was drawn: itself, but for a lens."""
+        return mesh
+
     def _seen(self) -> SeenSamples:
         """Return what the samples see, as it was drawn."""
         if self._split is not None:

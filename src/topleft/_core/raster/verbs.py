@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from threading import Lock
 from typing import Any, Unpack, cast
@@ -252,8 +253,7 @@ def rasterize(
         ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
         ``.sample(i)`` gives the same of another. Of a batch `FragmentsBatch`: ``.triangle`` and ``.depth`` (B, H, W),
         ``[i]`` is the `Fragments` of a pose, and each is what it is when it is drawn alone. A `plan` of one pose
-        saves the others the check of the triangles. Planes of samples are made when they are asked for, those of
-        depth by drawing again: the arrays that were passed in must not change before.
+        saves the others the check of the triangles.
 
     Raises
     ------
@@ -286,9 +286,31 @@ def rasterize(
     if n is not None:
         batch = draw_batch(n, vertices, triangles, size, view, depth_test, background_depth, out)
         return cast("Fragments", batch)  # the rare case: whoever passes a batch knows what comes back
-    # Fragments refer to what they were drawn from, so nothing of it can be reused.
-    checked = View.parse(size, view)
-    return draw_fragments(FRESH, vertices, triangles, checked, depth_test, background_depth, out)
+    return draw_ids(None, size, vertices, triangles, depth_test, background_depth, out, **view)
+
+
+def draw_ids(
+    rasterizer: Rasterizer | None,
+    size: int | tuple[int, int],
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    depth_test: DepthTestOption | None = "less",
+    background_depth: float | None = None,
+    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None = None,
+    *,
+    is_split: bool = False,
+    **view: Unpack[ViewOptions],
+) -> Fragments:
+    """Return the visibility buffer, on the memory of a `Rasterizer` or on fresh memory.
+
+    `is_split`: of several samples, what shading reads; without, a plane a sample.
+    """
+    if rasterizer is None:  # fragments refer to what they were drawn from, so nothing of it can be reused
+        checked = replace(View.parse(size, view), is_split=is_split)
+        return draw_fragments(FRESH, vertices, triangles, checked, depth_test, background_depth, out)
+    with rasterizer._turn:
+        checked = replace(rasterizer._view(view), is_split=is_split)
+        return draw_fragments(rasterizer._memory, vertices, triangles, checked, depth_test, background_depth, out)
 
 
 def wireframe(
@@ -456,10 +478,7 @@ class Rasterizer:
         **view: Unpack[ViewOptions],
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
-        with self._turn:
-            return draw_fragments(
-                self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out
-            )
+        return draw_ids(self, self.size, vertices, triangles, depth_test, background_depth, out, **view)
 
     def wireframe(
         self,

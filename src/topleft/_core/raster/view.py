@@ -103,6 +103,8 @@ class View:
     """1 for each triangle of which one side is not drawn, and the `tl_cull` that names that side."""
     sides_by_material: bool = True
     """Whether materials say which sides are drawn: no `cull` was given."""
+    is_split: bool = False
+    """Whether samples are kept once where a pixel shows one triangle, for shading: all else is drawn when asked for."""
     is_exact: bool = False
     """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 

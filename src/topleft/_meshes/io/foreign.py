@@ -272,12 +272,15 @@ def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, boo
             notes.add("lines not drawn")
     for node in list(root.iter(f"{space}node")):
         for row in node.findall(f"{space}instance_controller"):
-            _uncontrol(node, row, space, named, notes)
+            _uncontrol(row, space, named, notes)
     for bound in list(root.iter(f"{space}technique_common")):
-        for row in bound.findall(f"{space}instance_material"):
-            if not _is_material(row.get("target", ""), space, named):
-                bound.remove(row)
+        kept = []  # what is removed one by one is looked for among all
+        for row in bound:
+            if row.tag != f"{space}instance_material" or _is_material(row.get("target", ""), space, named):
+                kept.append(row)
+            else:
                 notes.add("materials that are not there", row.get("target", "")[1:])
+        bound[:] = kept
     if root.find(f"{space}library_animations/{space}animation") is not None:
         notes.add("animations not played: everything is at rest")
     _check_walks(root, space, named, budget)
@@ -354,8 +357,7 @@ def _cut(row: Element, space: str, named: dict[str | None, Element], known: dict
     vertex = next((one for one in inputs if one.get("semantic") == "VERTEX"), None)
     if vertex is None or row.find(f"{space}ph") is not None:
         notes.add("polygons with holes not read" if vertex is not None else "polygons without vertices not read")
-        for old in row.findall(f"{space}ph"):
-            row.remove(old)
+        row[:] = [one for one in row if one.tag != f"{space}ph"]
         if vertex is None:
             return
     lists = [one.text or "" for one in row.findall(f"{space}p")]
@@ -369,8 +371,7 @@ def _cut(row: Element, space: str, named: dict[str | None, Element], known: dict
     corners = corners.reshape(-1, stride)
     positions = _positions(vertex, space, named, known)
     triangles, _ = triangulate(positions, corners[:, int(vertex.get("offset", 0))], n_corners)
-    for old in [*row.findall(f"{space}p"), *row.findall(f"{space}vcount")]:
-        row.remove(old)
+    row[:] = [one for one in row if one.tag not in (f"{space}p", f"{space}vcount")]
     row.tag = f"{space}triangles"
     row.set("count", str(len(triangles)))
     ElementTree.SubElement(row, f"{space}p").text = " ".join(map(str, corners[triangles.ravel()].ravel().tolist()))
@@ -399,7 +400,7 @@ def _whole(text: str | None) -> npt.NDArray[np.int64]:
     return numbers_of_text((text or "").encode(), np.int64)
 
 
-def _uncontrol(node: Element, row: Element, space: str, named: dict[str | None, Element], notes: Notes) -> None:
+def _uncontrol(row: Element, space: str, named: dict[str | None, Element], notes: Notes) -> None:
     """Put the geometry of a controller where the controller is, in place."""
     notes.add(SKINS)
     matrix: str | None = None
@@ -415,10 +416,11 @@ def _uncontrol(node: Element, row: Element, space: str, named: dict[str | None, 
         url = kind.get("source", "")
     row.tag = f"{space}instance_geometry"
     row.set("url", url)
-    for old in row.findall(f"{space}skeleton"):
-        row.remove(old)
-    if matrix:
-        node.remove(row)
-        inner = ElementTree.SubElement(node, f"{space}node")
-        ElementTree.SubElement(inner, f"{space}matrix").text = matrix
-        inner.append(row)
+    row[:] = [one for one in row if one.tag != f"{space}skeleton"]
+    if matrix:  # the row becomes a node, with itself in it
+        inner = Element(row.tag, row.attrib)
+        inner[:] = row[:]
+        row.clear()
+        row.tag = f"{space}node"
+        ElementTree.SubElement(row, f"{space}matrix").text = matrix
+        row.append(inner)

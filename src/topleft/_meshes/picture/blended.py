@@ -33,7 +33,8 @@ from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
 from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place
-from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions
+from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
 
 Mask = npt.NDArray[np.bool_]
@@ -78,20 +79,18 @@ def blended_masks(subject: Mesh | Scene, options: ShadingOptions) -> list[Mask |
     return None if all(mask is None for mask in masks) else masks
 
 
-def glass_of(
-    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], options: ShadingOptions, view_options: dict[str, Any]
-) -> Glass | None:
-    """What a picture of the subject composites; None where all of it is opaque."""
-    masks = blended_masks(subject, options)
+def glass_of(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) -> Glass | None:
+    """What a picture composites; None where all of it is opaque."""
+    masks = blended_masks(shot.subject, options)
     if masks is None:
         return None
-    scene = scene_of(subject)
+    scene = scene_of(shot.subject)
     scene.check_counted("a scene that something shows through")
-    placed, view = place(scene, camera, size, view_options, material=options.material)
+    placed, view = place(scene, shot.camera, shot.size, view_options, material=options.material)
     refuse_many(view, "rasterize")
     if placed.bent is not None:  # the parts that a lens makes of the triangles
         masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
-    return Glass(placed, view, masks, camera, options)
+    return Glass(placed, view, masks, shot.camera, options)
 
 
 class Glass:
@@ -128,7 +127,11 @@ class Glass:
     def lit(self) -> Lit:
         """The same, ready to be shaded."""
         some = [i for i, mask in enumerate(self.masks) if mask is not None]
-        shown = [self.whole.as_shown(i, one.mesh, self.scene) for i, one in zip(some, self.snapped, strict=True)]
+        bent, first_ids = self.whole.bent, self.whole.first_ids
+        shown = []
+        for i, one in zip(some, self.snapped, strict=True):
+            mesh = self.scene[i].mesh if bent is None else bent[i].mesh_of(self.scene[i].mesh)
+            shown.append(ShownInstance(one.mesh, mesh, int(first_ids[i]), self.scene[i].transform))
         return Lit(shown, self.camera, self.view.size, self.options)
 
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:

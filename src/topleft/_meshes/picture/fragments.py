@@ -16,6 +16,7 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_aligned, as_array, set_aligned, shown
 from topleft._core.base.memory import empty
 from topleft._core.raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
@@ -23,7 +24,7 @@ from topleft._core.raster.peel import DepthLayers
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.shade import ShownInstance
-from topleft._meshes.scene.scene import Instance, Scene, counted_ranges, meshes_of
+from topleft._meshes.scene.scene import Scene, counted_ranges, meshes_in_places, meshes_of
 
 if TYPE_CHECKING:
     from topleft._meshes.picture.instances import PlacedScene
@@ -54,18 +55,18 @@ class VisiblePart(Part):
     """A part, and the instance that shows there; without one the mesh stands where its vertices are."""
 
     mesh: Mesh
-    instance: Instance | None = None
+    transform: F64 | None = None
 
     @cached_property
-    def drawn(self) -> tuple[Fragments, Mesh]:
-        """The fragments and the mesh as they were drawn, for the kernels: through a lens those of its parts."""
-        frags, mesh = self.frags, self.mesh
-        return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
+    def shown(self) -> ShownInstance:
+        """The mesh as it was drawn, for kernels."""
+        ((i, snapped, first),) = self.frags._drawn()
+        return ShownInstance(snapped, self.frags._parts_of(i, self.mesh), first)
 
     @property
     def place(self) -> npt.NDArray[np.float64]:
         """World from object, (4, 4)."""
-        return np.eye(4) if self.instance is None else self.instance.transform
+        return np.eye(4) if self.transform is None else self.transform
 
 
 PartT = TypeVar("PartT", bound=Part)
@@ -73,20 +74,18 @@ PartT = TypeVar("PartT", bound=Part)
 
 def parts_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[VisiblePart]:
     """What each instance shows that shows anything, of the mesh or scene that was drawn; a mesh shows one part."""
-    if isinstance(subject, Mesh):
-        return [VisiblePart(0, WHOLE, frags, subject)]
-    found = cast(SceneFragments, frags).parts
-    return [VisiblePart(part.i, part.box, part.frags, subject[part.i].mesh, subject[part.i]) for part in found]
+    parts: Sequence[Part] = getattr(frags, "parts", [Part(0, WHOLE, frags)])
+    placed = meshes_in_places(subject)
+    return [VisiblePart(part.i, part.box, part.frags, *placed[part.i]) for part in parts]
 
 
 def shown_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[ShownInstance]:
     """The instances that some sample sees, as they are shaded, of the mesh or scene that was drawn."""
-    if isinstance(frags, SceneFragments):
-        return [frags.placed.as_shown(i, snapped, cast(Scene, subject)) for i, snapped in frags.snapped]
-    mesh = cast(Mesh, subject)
-    if isinstance(frags, BentFragments):
-        return [ShownInstance(frags.drawn._snapped, frags.bent.mesh_of(mesh))]
-    return [ShownInstance(frags._snapped, mesh)]
+    placed = meshes_in_places(subject)
+    return [
+        ShownInstance(snapped, frags._parts_of(i, placed[i][0]), first, placed[i][1])
+        for i, snapped, first in frags._drawn()
+    ]
 
 
 def join(
@@ -208,9 +207,14 @@ class SceneFragments(InstanceIds, Fragments):
     def _seen(self) -> SeenSamples:
         return SeenSamples.of(*self.drawn_planes)
 
+    def _parts_of(self, i: int, mesh: Mesh) -> Mesh:
+        return mesh if self.placed.bent is None else self.placed.bent[i].mesh_of(mesh)
+
+    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
+        return self._snapped_instances
+
     @cached_property
-    def snapped(self) -> tuple[tuple[int, engine.SnappedMesh], ...]:
-        """Each instance that some sample sees: its index, and its mesh as the first sample sees it."""
+    def _snapped_instances(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
         ids, first_ids = self.drawn_planes[0], self.placed.first_ids
         boxes = np.tile(np.array([*ids.shape[:0:-1], 0, 0], np.int32), (len(first_ids) - 1, 1))
         for plane in ids:
@@ -221,7 +225,7 @@ class SceneFragments(InstanceIds, Fragments):
             first, end = first_ids[i : i + 2].tolist()
             part = ids[:, top:bottom, left:right]
             mesh = self.placed.snap_part(i, lambda part=part, first=first, end=end: local_part(part, first, end))
-            found.append((i, mesh.seen_from(*self.positions[0])))
+            found.append((i, mesh.seen_from(*self.positions[0]), first))
         return tuple(found)
 
     def _at_sample(self, i: int) -> SceneFragments:
@@ -399,6 +403,12 @@ class BentFragments(Fragments):
 
     def _whole(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
         return self.bent.whole_ids(ids)
+
+    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
+        return self.drawn._drawn()
+
+    def _parts_of(self, i: int, mesh: Mesh) -> Mesh:  # noqa: ARG002
+        return self.bent.mesh_of(mesh)
 
     def _seen(self) -> SeenSamples:
         return self.drawn._seen()

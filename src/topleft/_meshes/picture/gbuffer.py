@@ -25,7 +25,8 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import VisiblePart, join, parts_of
 from topleft._meshes.picture.holes import cuts_of, without_holes
-from topleft._meshes.picture.render import rasterize_subject
+from topleft._meshes.picture.render import rasterize_shot
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene
 
 
@@ -55,15 +56,16 @@ def evaluate(
     Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the snap,
     relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.
     """
-    frags, mesh = part.drawn
-    ids = np.require(frags.triangle, np.int32, ["C", "A"])
+    ids = part.frags._seen().ids[0]
+    shown = part.shown
+    mesh = shown.mesh
     n = N_NUMBERS.get(what, len(rows))
     out: npt.NDArray[Any] = empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
     half_size = size[0] / 2, size[1] / 2
     points = engine.PixelPoints(
         mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64
     )
-    scene = frags._snapped.with_inverse_w(ids.size, empty)
+    scene = shown.snapped.with_inverse_w(ids.size, empty)
     n_threads = threads_for(threads, len(mesh.triangles))
     run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
     return out
@@ -81,9 +83,7 @@ class GBuffer:
 
     Parameters
     ----------
-    subject : Mesh or Scene
-    camera : Camera
-    size : (width, height), pixels
+    shot : Shot
     options : dict
         `cull`, `subpixel_bits` and `threads`, as `rasterize_mesh` takes them.
     look : dict
@@ -96,33 +96,42 @@ class GBuffer:
         What layers hold may lie in its memory, which the next picture overwrites.
     """
 
-    subject: Mesh | Scene
-    camera: Camera
-    size: tuple[int, int]
+    shot: Shot
     options: dict[str, Any] = field(default_factory=dict)
     look: dict[str, Any] = field(default_factory=dict)
     camera_to: Camera | None = None
     transforms_to: F64 | None = None
     rasterizer: Rasterizer | None = None
 
+    @property
+    def subject(self) -> Mesh | Scene:
+        """What is drawn."""
+        return self.shot.subject
+
+    @property
+    def camera(self) -> Camera:
+        """Who looks."""
+        return self.shot.camera
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture."""
+        return self.shot.size
+
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels, without what materials cut out."""
-        return self._cut(rasterize_subject(*self._view, self.rasterizer, self.look.get("material"), **self.options))
+        return self._cut(rasterize_shot(self.shot, self.rasterizer, self.look.get("material"), **self.options))
 
     def sampled(self, sampling: str) -> Fragments:
         """Return the same with several samples a pixel."""
         material = self.look.get("material")
-        return self._cut(rasterize_subject(*self._view, material=material, sampling=sampling, **self.options))
+        return self._cut(rasterize_shot(self.shot, material=material, sampling=sampling, **self.options))
 
     @cached_property
     def has_holes(self) -> bool:
         """Whether materials cut something out."""
         return any(cuts_of(self.subject, self.look.get("material")))
-
-    @property
-    def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:
-        return self.subject, self.camera, self.size
 
     def _cut(self, frags: Fragments) -> Fragments:
         return without_holes(frags, self.subject, self.camera, self.look.get("material"))

@@ -31,7 +31,6 @@ from topleft._core.raster.view import View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
 from topleft._meshes.picture.fragments import Ids, SceneDepthLayers, SceneFragments
-from topleft._meshes.picture.shade import ShownInstance
 from topleft._meshes.picture.through_lens import DrawnScene, scene_through
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import DepthTestOption
@@ -136,11 +135,6 @@ class PlacedScene:
         if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
             return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i).mesh
-
-    def as_shown(self, i: int, snapped: engine.SnappedMesh, scene: Scene) -> ShownInstance:
-        """Return an instance as it is shaded, with the mesh that it has in this scene."""
-        mesh = scene[i].mesh if self.bent is None else self.bent[i].mesh_of(scene[i].mesh)
-        return ShownInstance(snapped, mesh, int(self.first_ids[i]), scene[i].transform)
 
     def _view_of(self, i: int) -> View:
         last = self._last

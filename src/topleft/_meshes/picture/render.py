@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from topleft._core.base.arrays import as_size, shown
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.verbs import Rasterizer, rasterize
+from topleft._core.raster.verbs import Rasterizer, draw_ids
 from topleft._core.raster.view import WindowOptions
-from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
-from topleft._meshes.lod.detail import detailed
+from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.material import Material
-from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.blended import glass_of
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
@@ -30,9 +28,10 @@ from topleft._meshes.picture.holes import without_holes
 from topleft._meshes.picture.instances import draw_scene
 from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import LookOptions, ShadingOptions
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import StaticPlan, seen_through
 from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Scene, as_subject
+from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
 
 DEFAULT_SIZE = (640, 480)
@@ -125,22 +124,20 @@ def render(
     """
     for option in look.keys() - LookOptions.__annotations__:
         raise TypeError(f"render() got an unexpected keyword argument {option!r}")
-    size = as_size(size)
-    subject = as_subject(mesh)
-    camera = camera_for(subject, camera, size)
+    shot = Shot.of(mesh, camera, size)
     options = ShadingOptions.parse(shading, color, background, threads=threads, **look)
     view: dict[str, Any] = {"cull": cull, "sampling": sampling, "subpixel_bits": subpixel_bits, "threads": threads}
-    if isinstance(subject, Points):
+    if shot.cloud is not None:
         if edges:
             raise ValueError("points have no edges")
-        cloud = draw_cloud(subject, camera, size, **view)
-        return shade_cloud(cloud, subject, camera, options)
-    subject = detailed(subject, camera, size, tolerance, cull=cull, material=options.material)
-    glass = glass_of(subject, camera, size, options, view)
+        return shade_cloud(draw_cloud(shot.cloud, shot.camera, shot.size, **view), shot.cloud, shot.camera, options)
+    shot = shot.within(tolerance, cull=cull, material=options.material)
+    glass = glass_of(shot, options, view)
     if glass is None:
-        frags = rasterize_subject(subject, camera, size, rasterizer, options.material, **view)
+        subject, frags = shot.subject, rasterize_shot(shot, rasterizer, options.material, **view)
     else:
         subject, frags = glass.scene, glass.draw_opaque()
+    camera = shot.camera
     frags = without_holes(frags, subject, camera, options.material, threads=threads)
     picture = shade_by(frags, subject, camera, options)
     if glass is not None:
@@ -195,32 +192,26 @@ def rasterize_mesh(
     >>> round(float(frags.distance(camera)[4, 4]), 3)
     4.0
     """
-    size = as_size(size)
+    shot = Shot.of(mesh, camera, size)
     if view.get("viewport") is not None:
         view["viewport"] = as_size(view["viewport"], "viewport", smallest=1)
-    subject = as_subject(mesh)
-    camera = camera_for(subject, camera, size)
-    if isinstance(subject, Points):
-        return draw_cloud(subject, camera, size, cull=cull, threads=threads, **view)
+    if shot.cloud is not None:
+        return draw_cloud(shot.cloud, shot.camera, shot.size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    subject = detailed(subject, camera, size, tolerance, cull=cull, **window)
-    return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)
+    shot = shot.within(tolerance, cull=cull, **window)
+    return rasterize_shot(shot, rasterizer, cull=cull, threads=threads, **view)
 
 
-def rasterize_subject(
-    subject: Mesh | Scene,
-    camera: Camera,
-    size: tuple[int, int],
-    rasterizer: Rasterizer | None = None,
-    material: Material | None = None,
-    **view: Any,
+def rasterize_shot(
+    shot: Shot, rasterizer: Rasterizer | None = None, material: Material | None = None, **view: Any
 ) -> Fragments:
-    """The visibility buffer of what `detailed` returned; options as for `rasterize_mesh`.
+    """The visibility buffer of meshes; options as for `rasterize_mesh`.
 
     `material`: whose backs are culled, instead of those that the meshes have.
     """
-    if isinstance(subject, Scene):
-        return draw_scene(subject, camera, size, material=material, **view)
+    subject, camera, size = shot.mesh, shot.camera, shot.size
+    if subject is None:
+        return draw_scene(scene_of(shot.subject), camera, size, material=material, **view)
     frame, near_clip = view.get("viewport") or size, view.get("near_clip", True)
     drawn = seen_through(subject.vertices, subject.triangles, camera, frame, near_clip=near_clip)
     view["transform"] = drawn.transform
@@ -231,8 +222,5 @@ def rasterize_subject(
     if drawn.bent is None:
         view.setdefault("plan", StaticPlan(subject))
     view["plan"] = drawn.sided(view.get("plan"), subject.single_sided(material))
-    if rasterizer is None:
-        frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
-    else:
-        frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
+    frags = draw_ids(rasterizer, size, drawn.vertices, drawn.triangles, is_split=True, **view)
     return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)

@@ -9,18 +9,18 @@ from typing import Any, Unpack
 
 import numpy.typing as npt
 
-from topleft._core.base.arrays import as_out, as_size
+from topleft._core.base.arrays import as_out
 from topleft._core.raster.verbs import coverage
 from topleft._core.raster.view import WindowOptions
-from topleft._meshes.camera.camera import CameraLike, camera_for
-from topleft._meshes.lod.detail import detailed
+from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.cloud import draw_share
 from topleft._meshes.picture.instances import draw_scene_coverage
 from topleft._meshes.picture.render import DEFAULT_SIZE
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import seen_through
 from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Scene, as_subject
+from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import CullOption, SamplingOption
 
 
@@ -86,22 +86,22 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
-    size, subject = as_size(size), as_subject(mesh)
-    camera = camera_for(subject, camera, size)
-    if isinstance(subject, Points):
-        found = draw_share(subject, camera, size, sampling=sampling, cull=cull, threads=threads, **view)
+    shot = Shot.of(mesh, camera, size)
+    if shot.cloud is not None:
+        found = draw_share(shot.cloud, shot.camera, shot.size, sampling=sampling, cull=cull, threads=threads, **view)
         if out is None:
             return found
         result = as_out("out", out, found.shape, found.dtype.type)
         result[...] = found
         return result
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    subject = detailed(subject, camera, size, tolerance, cull=cull, **window)
+    shot = shot.within(tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
-    if isinstance(subject, Scene):
-        return draw_scene_coverage(subject, camera, size, out, **options)
-    frame, near_clip = view.get("viewport") or size, view.get("near_clip", True)
-    drawn = seen_through(subject.vertices, subject.triangles, camera, frame, near_clip=near_clip)
+    subject = shot.mesh
+    if subject is None:
+        return draw_scene_coverage(scene_of(shot.subject), shot.camera, shot.size, out, **options)
+    frame, near_clip = view.get("viewport") or shot.size, view.get("near_clip", True)
+    drawn = seen_through(subject.vertices, subject.triangles, shot.camera, frame, near_clip=near_clip)
     options |= {"transform": drawn.transform, "plan": drawn.sided(view.get("plan"), subject.single_sided())}
-    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
+    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, shot.size, out=out, **options)
     return mask

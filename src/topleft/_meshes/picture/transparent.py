@@ -11,22 +11,22 @@ from typing import Any, Literal, Unpack
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.arrays import as_count, as_size
+from topleft._core.base.arrays import as_count
 from topleft._core.base.color import WHITE, ColorLike, as_color
 from topleft._core.raster.composite import composite
 from topleft._core.raster.peel import DepthLayers, peel
 from topleft._core.raster.view import WindowOptions
-from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
-from topleft._meshes.lod.detail import detailed
+from topleft._meshes.camera.camera import Camera, CameraLike
 from topleft._meshes.picture.fragments import SceneDepthLayers
 from topleft._meshes.picture.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
 from topleft._meshes.picture.instances import peel_scene
 from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.picture.scene_shade import shade
 from topleft._meshes.picture.shade import LookOptions
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import seen_through
 from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
+from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
 CLEAR = (0, 0, 0, 0)
@@ -96,10 +96,9 @@ def render_transparent(
     >>> tl.render_transparent(mesh, size=(64, 48), opacity=0.5, background=(0, 0, 0, 0))[24, 32].tolist()[3]
     192
     """
-    size, layers, material = as_size(size), as_count("layers", layers), look.get("material")
-    subject = as_meshes(mesh)
-    camera = camera_for(subject, camera, size)
-    subject = detailed(subject, camera, size, tolerance, cull=cull, material=material)
+    layers, material = as_count("layers", layers), look.get("material")
+    shot = Shot.of(mesh, camera, size, takes_points=False).within(tolerance, cull=cull, material=material)
+    subject, camera, size = shot.subject, shot.camera, shot.size
     ground = as_color("background", background, 4)
     view: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
     cuts = cuts_of(subject, material)
@@ -178,12 +177,11 @@ def visible_layers(
     >>> int(layers.count[8, 8])  # the front and the back
     2
     """
-    size = as_size(size)
-    subject = as_meshes(mesh)
-    camera = camera_for(subject, camera, size)
+    shot = Shot.of(mesh, camera, size, takes_points=False)
+    subject, camera, size = shot.mesh, shot.camera, shot.size
     check_straight(camera)
-    if isinstance(subject, Scene):
-        return peel_scene(subject, camera, size, **options)
+    if subject is None:
+        return peel_scene(scene_of(shot.subject), camera, size, **options)
     drawn = seen_through(subject.vertices, subject.triangles, camera, options.get("viewport") or size)
     options["plan"] = drawn.sided(options.get("plan"), subject.single_sided())
     return peel(subject.vertices, subject.triangles, size, transform=drawn.transform, **options)

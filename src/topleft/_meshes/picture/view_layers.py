@@ -13,21 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import F64, Array
-from topleft._core.base.arrays import as_real, as_size, shown
+from topleft._core.base.arrays import as_real, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.base.remote import Place
 from topleft._core.raster.verbs import Rasterizer
-from topleft._meshes.camera.camera import CameraLike, as_camera, camera_for
+from topleft._meshes.camera.camera import CameraLike, as_camera
 from topleft._meshes.io.layer_files import save_layers
-from topleft._meshes.lod.detail import detailed
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.cloud import CloudBuffer
 from topleft._meshes.picture.gbuffer import GBuffer
 from topleft._meshes.picture.layers import LAYERS, check_layers, draw_layers
 from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.picture.shade import LookOptions
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Scene, as_subject, meshes_of
+from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import CullOption, LayerOption, SamplesOption, ShadingOption
 
 LOOKS = frozenset({"shading", "color", "background", "edges", "sampling", *LookOptions.__annotations__})
@@ -233,19 +233,18 @@ def gbuffer_of(
     """
     for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
         raise TypeError(f"there is no option {option!r} of a picture")
-    size, subject = as_size(size), as_subject(mesh)
-    camera = camera_for(subject, camera, size)
+    shot = Shot.of(mesh, camera, size)
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
-    if not isinstance(subject, Points):
-        subject = detailed(subject, camera, size, tolerance, cull=cull, material=look.get("material"))
-    n = 1 if isinstance(subject, Points) else len(meshes_of(subject))
+    if shot.cloud is None:
+        shot = shot.within(tolerance, cull=cull, material=look.get("material"))
+    n = 1 if shot.cloud is not None else len(meshes_of(shot.subject))
     flow = (
         None if camera_to is None else as_camera(camera_to, "camera_to"),
         None if transforms_to is None else as_transforms(transforms_to, n),
     )
-    if isinstance(subject, Points):
-        return CloudBuffer(subject, camera, size, options, look, *flow)
-    return GBuffer(subject, camera, size, options, look, *flow, rasterizer)
+    if shot.cloud is not None:
+        return CloudBuffer(shot.cloud, shot.camera, shot.size, options, look, *flow)
+    return GBuffer(shot, options, look, *flow, rasterizer)
 
 
 def as_transforms(transforms: npt.ArrayLike, n: int) -> F64:

@@ -325,6 +325,13 @@ def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
     return given if isinstance(given, Scene) else as_mesh(given)
 
 
+def meshes_in_places(subject: Mesh | Scene) -> list[tuple[Mesh, F64 | None]]:
+    """The mesh of each instance and world from object; None for a mesh alone, which stands where its vertices are."""
+    if isinstance(subject, Mesh):
+        return [(subject, None)]
+    return [(instance.mesh, instance.transform) for instance in subject]
+
+
 def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
     """The mesh of each instance."""
     return [subject] if isinstance(subject, Mesh) else [instance.mesh for instance in subject]

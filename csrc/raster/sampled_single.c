@@ -1,11 +1,11 @@
-/* Sampled alone: one triangle by itself, at all samples of a pixel.
+/* Sampled single: one triangle by itself, at all samples of a pixel.
  * In: vertex records.  Out: bits of samples.
  *
  * The rows of a large triangle are the same for all samples but for their ends: the pixels between these are stored as
  * whole words, and two words at each end are put together from the spans of the samples, a vector of rows at a time.
  * Rows whose ends are more than two words wide, or that some samples miss, are put together word by word. */
-#ifndef TL_SAMPLED_ALONE_C
-#define TL_SAMPLED_ALONE_C
+#ifndef TL_SAMPLED_SINGLE_C
+#define TL_SAMPLED_SINGLE_C
 
 #include <stdint.h>
 
@@ -16,7 +16,7 @@
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
 #include "sink/covered.c"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 
 /* Marks the spans of all samples in a row, in the words that hold the pixels [from, to); `at` is the pixel of column
  * 0. */
@@ -212,8 +212,8 @@ static int walk_samples(const tl_snapped *snapped, const int32_t *corners, const
 }
 
 /* Triangle i by itself. */
-static __attribute__((noinline)) void draw_alone_each_sample(const tl_snapped *snapped, int64_t i,
-                                                             const tl_window *window, const tl_target *target)
+static __attribute__((noinline)) void draw_single_each_sample(const tl_snapped *snapped, int64_t i,
+                                                              const tl_window *window, const tl_target *target)
 {
     tl_snapped seen = *snapped;
     tl_target one = *target;
@@ -225,7 +225,7 @@ static __attribute__((noinline)) void draw_alone_each_sample(const tl_snapped *s
     for (one.sample = 0; one.sample < 1 << target->sample_bits; one.sample++) {
         seen.mesh.sample_x_fx = target->samples_fx[2 * one.sample];
         seen.mesh.sample_y_fx = target->samples_fx[2 * one.sample + 1];
-        draw_alone_samples(&seen, i, window, &one);
+        draw_single_fixed_samples(&seen, i, window, &one);
     }
 }
 

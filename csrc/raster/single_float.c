@@ -1,11 +1,11 @@
-/* Alone: one triangle of any finite float64 vertices by itself, by the ends of rows in float64.
+/* Single: one triangle of any finite float64 vertices by itself, by the ends of rows in float64.
  * In: points in pixels.  Out: spans of samples to the sink.
  *
  * As rows.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
- * itself, 3 u for each column of the box.  What is not finite is asked.  Extents of any size may come: a box is the
+ * itself, 3 u for each column of the box.  What is not finite is refined.  Extents of any size may come: a box is the
  * samples of the window, and the first of them lies in the extent. */
-#ifndef TL_ALONE_FLOAT_C
-#define TL_ALONE_FLOAT_C
+#ifndef TL_SINGLE_FLOAT_C
+#define TL_SINGLE_FLOAT_C
 
 #include <float.h>
 #include <math.h>
@@ -17,23 +17,23 @@
 #include "vertex/setup.c"
 #include "exact/sign.c"
 #include "sink/sink.c"
-#include "raster/alone.c"
+#include "raster/single_fixed.c"
 #include "raster/refine.c"
 #include "raster/state.h"
 #include "raster/triangles_float.c"
 
 /* A triangle by itself, with positive area. */
 typedef struct {
-    asked_triangle edges;
+    refined_triangle edges;
     double inverse[3];        /* 1 / |dy| */
-    int asks_all;             /* some band is wider than half a column */
+    int refines_all;          /* some band is wider than half a column */
     int64_t col, row, n_rows; /* the box in the window */
     double z[3];
     int has_plane;
     double slope_x, slope_y;
     scaled_number area; /* twice the area, unless has_plane */
     int32_t id;
-} lone_triangle;
+} single_triangle;
 
 /* The first pixel of [low, high) whose sample, so far from its upper left corner, is not left of x; `high` if none is.
  * Exact: x - centre can only round to an integer that is too low. */
@@ -59,8 +59,8 @@ static int64_t first_square(double x, int64_t low, int64_t high)
 
 /* The pixels of [low, high) whose samples lie in an extent, or whose squares meet it in more than a line, or lie in
  * it. */
-static int64_t find_lone_box(double x0, double x1, tl_test test, double centre, int64_t low, int64_t high,
-                             int64_t *first)
+static int64_t find_single_box(double x0, double x1, tl_test test, double centre, int64_t low, int64_t high,
+                               int64_t *first)
 {
     *first = test == TL_TEST_OUTER ? first_square(x0, low, high) : first_pixel(x0, centre, low, high);
     return (test == TL_TEST_INNER ? first_square(x1, low, high) : first_pixel(x1, centre, low, high)) - *first;
@@ -72,7 +72,7 @@ TL_INLINE double least_of(double a, double b, double c) { return lesser_of(lesse
 TL_INLINE double most_of(double a, double b, double c) { return larger_of(larger_of(a, b), c); }
 
 /* The same operations as plane_of_lanes and take_out_slivers in triangles_float.c. */
-static void plane_of_points(lone_triangle *t, double width, double height)
+static void plane_of_points(single_triangle *t, double width, double height)
 {
     const exact_point *p = t->edges.corners;
     const double x1 = p[1].x - p[0].x, y1 = p[1].y - p[0].y, x2 = p[2].x - p[0].x, y2 = p[2].y - p[0].y;
@@ -92,7 +92,7 @@ static void plane_of_points(lone_triangle *t, double width, double height)
 #define TL_WEIGHTED_PX 256
 
 /* The depth of a sample by weights: parts of the area, each within 2^-49 of its size. */
-static float weighted_depth(const lone_triangle *t, exact_point sample)
+static float weighted_depth(const single_triangle *t, exact_point sample)
 {
     const exact_point *p = t->edges.corners;
     const double w1 = scaled_quotient(edge_value(p[2], p[0], sample), t->area);
@@ -101,9 +101,9 @@ static float weighted_depth(const lone_triangle *t, exact_point sample)
 }
 
 /* The edge functions at the first sample of the box, with their bands. */
-static void setup_lone_edges(const walk_state *s, lone_triangle *t, double width, double height)
+static void setup_single_edges(const walk_state *s, single_triangle *t, double width, double height)
 {
-    asked_triangle *e = &t->edges;
+    refined_triangle *e = &t->edges;
     const double border = e->test == TL_TEST_SAMPLE ? 0.0 : 2.0;
     const double margin =
         12.0 * 0x1p-53 * larger_of(width + border, 1.0) * larger_of(height + border, 1.0) * s->points->band;
@@ -125,9 +125,9 @@ static void setup_lone_edges(const walk_state *s, lone_triangle *t, double width
 TL_INLINE double nearest_of(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
 
 /* The same from vertices that lie on 2^-8 px, near enough that 2E < 2^51: without a band.  Returns whether they do. */
-static int setup_on_grid(lone_triangle *t)
+static int setup_on_grid(single_triangle *t)
 {
-    asked_triangle *e = &t->edges;
+    refined_triangle *e = &t->edges;
     const double unit = (double)(1 << TL_GRID_BITS);
     int64_t x[3], y[3]; /* doubled, from the first sample */
     for (int k = 0; k < 3; k++) {
@@ -152,12 +152,12 @@ static int setup_on_grid(lone_triangle *t)
 
 /* The columns [*first, *end) of a row; returns whether it is in doubt.  0x1.8p52 makes the nearest integer: floor() is
  * a call where there are no lanes. */
-TL_INLINE unsigned find_lone_end(const lone_triangle *t, int64_t row, int32_t *first, int32_t *end)
+TL_INLINE unsigned find_single_end(const single_triangle *t, int64_t row, int32_t *first, int32_t *end)
 {
-    const asked_triangle *e = &t->edges;
+    const refined_triangle *e = &t->edges;
     const double far = e->n_cols + 2.0, magic = 0x1.8p52;
     double begin = 0.0, stop = e->n_cols;
-    int is_doubted = t->asks_all;
+    int is_doubted = t->refines_all;
     for (int k = 0; k < 3; k++) {
         if (e->dy[k] == 0.0)
             continue;
@@ -181,31 +181,31 @@ typedef struct {
     int n;
     int is_left[3];
     int64_t at[3], step[3]; /* q, and what a row adds */
-    int64_t band[3];        /* what lies so near to an integer is asked */
+    int64_t band[3];        /* what lies so near to an integer is refined */
     int64_t twice[3];       /* twice of it, or -1: nothing is */
 } row_steps;
 
 /* Returns 0 where steps of 64 bits do not reach.  Beside the errors that the band allows for, q at the first row and
  * each step err by 2^-52 of the most that |q| gets, and by one unit when they become integers.  On the grid, where
- * nothing is asked, q is at least 0.5 / |dy| away from integers. */
-static int setup_steps(const lone_triangle *t, row_steps *r)
+ * nothing is refined, q is at least 0.5 / |dy| away from integers. */
+static int setup_steps(const single_triangle *t, row_steps *r)
 {
-    const asked_triangle *e = &t->edges;
+    const refined_triangle *e = &t->edges;
     const double unit = (double)((int64_t)1 << TL_STEP_BITS), n_rows = (double)t->n_rows;
-    if (t->asks_all || t->n_rows > 1 << 12 || e->n_cols > 1 << 20)
+    if (t->refines_all || t->n_rows > 1 << 12 || e->n_cols > 1 << 20)
         return 0;
     r->n = 0;
     for (int k = 0; k < 3; k++) {
         const double q = e->v[k] * t->inverse[k], step = e->dx[k] * t->inverse[k], most = fabs(q) + fabs(step) * n_rows;
-        const int is_asked = e->band[k] >= 0.0, i = r->n;
-        const double band = (is_asked ? e->band[k] * unit : 0.0) + n_rows * (1.0 + 0x1p-12 * most) + 4.0;
+        const int is_refined = e->band[k] >= 0.0, i = r->n;
+        const double band = (is_refined ? e->band[k] * unit : 0.0) + n_rows * (1.0 + 0x1p-12 * most) + 4.0;
         if (e->dy[k] == 0.0)
             continue;
-        if (!(most < 0x1p20) || !(band < 0.49 * unit * (is_asked ? 1.0 : t->inverse[k])))
+        if (!(most < 0x1p20) || !(band < 0.49 * unit * (is_refined ? 1.0 : t->inverse[k])))
             return 0;
         r->is_left[i] = e->dy[k] < 0.0;
         r->at[i] = (int64_t)(q * unit), r->step[i] = (int64_t)(step * unit);
-        r->band[i] = is_asked ? (int64_t)band : 0, r->twice[i] = is_asked ? 2 * (int64_t)band : -1;
+        r->band[i] = is_refined ? (int64_t)band : 0, r->twice[i] = is_refined ? 2 * (int64_t)band : -1;
         r->n++;
     }
     return 1;
@@ -231,15 +231,15 @@ TL_INLINE unsigned take_step(row_steps *r, int32_t n_cols, int32_t *first, int32
 }
 
 /* The columns [first, end) of TL_LANES rows; returns the rows in doubt. */
-TL_INLINE unsigned find_lone_ends(const lone_triangle *t, int64_t row0, int32_t *first, int32_t *end)
+TL_INLINE unsigned find_single_ends(const single_triangle *t, int64_t row0, int32_t *first, int32_t *end)
 {
-    const asked_triangle *e = &t->edges;
+    const refined_triangle *e = &t->edges;
     if (TL_LANES == 1)
-        return find_lone_end(t, row0, first, end);
+        return find_single_end(t, row0, first, end);
     const vd rows = vd_add(vd_set1((double)row0), vd_from_vi(vi_iota())), low = vd_set1(0.0);
     const vd high = vd_set1((double)e->n_cols);
     vd begins = low, ends = high;
-    vm doubted = vm_first(t->asks_all ? TL_LANES : 0);
+    vm doubted = vm_first(t->refines_all ? TL_LANES : 0);
     for (int k = 0; k < 3; k++) {
         if (e->dy[k] == 0.0)
             continue;
@@ -257,8 +257,8 @@ TL_INLINE unsigned find_lone_ends(const lone_triangle *t, int64_t row0, int32_t 
 }
 
 /* The samples [first, end) of a row of the box, with depth; `at` is the first sample of the row. */
-TL_INLINE void put_lone_depths(const tl_target *target, tl_sink sink, const lone_triangle *t, int64_t row, int64_t at,
-                               int32_t first, int32_t end)
+TL_INLINE void put_single_depths(const tl_target *target, tl_sink sink, const single_triangle *t, int64_t row,
+                                 int64_t at, int32_t first, int32_t end)
 {
     const exact_point *p = t->edges.corners;
     const double y = t->edges.sample_y + (double)row;
@@ -278,9 +278,9 @@ TL_INLINE void put_lone_depths(const tl_target *target, tl_sink sink, const lone
 }
 
 /* Sets up triangle i; returns whether there is anything to draw.  A vertex that is not finite ends the pass. */
-static int setup_lone(walk_state *s, int32_t i, lone_triangle *t, tl_test test, int with_depth)
+static int setup_single_float(walk_state *s, int32_t i, single_triangle *t, tl_test test, int with_depth)
 {
-    asked_triangle *e = &t->edges;
+    refined_triangle *e = &t->edges;
     const tl_window *w = s->window;
     exact_point *p = e->corners;
     int32_t corners[3];
@@ -295,8 +295,8 @@ static int setup_lone(walk_state *s, int32_t i, lone_triangle *t, tl_test test, 
             return 0;
         }
     e->test = test;
-    e->n_cols = (int)find_lone_box(x0, x1, test, s->centre_x, w->x_px, w->x_px + w->width, &t->col);
-    t->n_rows = find_lone_box(y0, y1, test, s->centre_y, w->y_px, w->y_px + w->height, &t->row);
+    e->n_cols = (int)find_single_box(x0, x1, test, s->centre_x, w->x_px, w->x_px + w->width, &t->col);
+    t->n_rows = find_single_box(y0, y1, test, s->centre_y, w->y_px, w->y_px + w->height, &t->row);
     if (e->n_cols <= 0 || t->n_rows <= 0)
         return 0;
     const int sign = edge_sign(p[0], p[1], p[2], s->counts), second = sign < 0 ? 2 : 1;
@@ -309,8 +309,8 @@ static int setup_lone(walk_state *s, int32_t i, lone_triangle *t, tl_test test, 
     e->sample_x = (double)t->col + s->centre_x, e->sample_y = (double)t->row + s->centre_y;
     t->id = name_of(s->snapped, i);
     if (!setup_on_grid(t))
-        setup_lone_edges(s, t, x1 - x0, y1 - y0);
-    t->asks_all = e->band[0] == INFINITY || e->band[1] == INFINITY || e->band[2] == INFINITY;
+        setup_single_edges(s, t, x1 - x0, y1 - y0);
+    t->refines_all = e->band[0] == INFINITY || e->band[1] == INFINITY || e->band[2] == INFINITY;
     if (with_depth) {
         const int32_t ordered[3] = {corners[0], corners[second], corners[3 - second]};
         for (int k = 0; k < 3; k++)
@@ -322,10 +322,10 @@ static int setup_lone(walk_state *s, int32_t i, lone_triangle *t, tl_test test, 
 }
 
 /* The ends of the rows in doubt, by the exact sign. */
-static __attribute__((noinline)) void ask_lone_ends(const asked_triangle *a, int64_t row0, unsigned doubted,
-                                                    int32_t *first, int32_t *end, tl_exact_counts *counts)
+static __attribute__((noinline)) void refine_single_ends(const refined_triangle *a, int64_t row0, unsigned doubted,
+                                                         int32_t *first, int32_t *end, tl_exact_counts *counts)
 {
-    counts->n_asked += __builtin_popcount(doubted);
+    counts->n_refined += __builtin_popcount(doubted);
     for (; doubted; doubted &= doubted - 1) {
         const int k = __builtin_ctz(doubted);
         int64_t from, to;
@@ -334,14 +334,14 @@ static __attribute__((noinline)) void ask_lone_ends(const asked_triangle *a, int
     }
 }
 
-TL_INLINE void draw_lone(walk_state *s, int32_t i, tl_sink sink)
+TL_INLINE void draw_single_float(walk_state *s, int32_t i, tl_sink sink)
 {
     const tl_target target = *s->target; /* copies that no store can change */
-    lone_triangle found;
+    single_triangle found;
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
-    if (!setup_lone(s, i, &found, test_of(s, sink), sink_has_depth(sink)))
+    if (!setup_single_float(s, i, &found, test_of(s, sink), sink_has_depth(sink)))
         return;
-    const lone_triangle t = found;
+    const single_triangle t = found;
     const int64_t stride = target.stride_px, corner = (t.row - s->window->y_px) * stride + t.col - s->window->x_px;
     const int is_slow = sink_has_depth(sink) && !t.has_plane;
     if (!is_slow)
@@ -353,32 +353,32 @@ TL_INLINE void draw_lone(walk_state *s, int32_t i, tl_sink sink)
         if (is_slow)
             tl_count_work(s->window, (int64_t)TL_WEIGHTED_PX * n * t.edges.n_cols);
         const unsigned doubted = takes_steps ? take_step(&steps, t.edges.n_cols, first, end)
-                                             : find_lone_ends(&t, row0, first, end) & ((1u << n) - 1);
+                                             : find_single_ends(&t, row0, first, end) & ((1u << n) - 1);
         if (__builtin_expect(doubted != 0, 0))
-            ask_lone_ends(&found.edges, row0, doubted, first, end, s->counts);
+            refine_single_ends(&found.edges, row0, doubted, first, end, s->counts);
         for (int k = 0; k < n; k++) {
             const int64_t at = corner + (row0 + k) * stride;
             if (first[k] >= end[k])
                 continue;
             if (sink_has_depth(sink))
-                put_lone_depths(&target, sink, &t, row0 + k, at, first[k], end[k]);
+                put_single_depths(&target, sink, &t, row0 + k, at, first[k], end[k]);
             else
                 put_plain(&target, sink, at + first[k], end[k] - first[k], t.id);
         }
     }
 }
 
-TL_SINK_COPIES(draw_lone, (walk_state * s, int32_t i), s, i)
+TL_SINK_COPIES(draw_single_float, (walk_state * s, int32_t i), s, i)
 
 /* Counts the squares that any of the pieces [first, end) of one triangle meets, or holds, once each. */
 static void count_squares_of_pieces(walk_state *s, int64_t first, int64_t end)
 {
-    lone_triangle t[TL_MAX_PIECES];
+    single_triangle t[TL_MAX_PIECES];
     const int64_t left = s->window->x_px, top = s->window->y_px;
     int64_t row0 = top + s->window->height, row1 = top;
     int n = 0;
     for (int64_t i = first; i < end && n < TL_MAX_PIECES; i++) {
-        if (!setup_lone(s, (int32_t)i, &t[n], s->window->test, 0))
+        if (!setup_single_float(s, (int32_t)i, &t[n], s->window->test, 0))
             continue;
         row0 = min64(row0, t[n].row);
         row1 = max64(row1, t[n].row + t[n].n_rows);
@@ -391,8 +391,8 @@ static void count_squares_of_pieces(walk_state *s, int64_t first, int64_t end)
             int32_t from, to;
             if (row < t[i].row || row >= t[i].row + t[i].n_rows)
                 continue;
-            if (find_lone_end(&t[i], row - t[i].row, &from, &to))
-                ask_lone_ends(&t[i].edges, row - t[i].row, 1, &from, &to, s->counts);
+            if (find_single_end(&t[i], row - t[i].row, &from, &to))
+                refine_single_ends(&t[i].edges, row - t[i].row, 1, &from, &to, s->counts);
             const int64_t col = t[i].col - left;
             spans[n_spans++] = (row_span){col + from, col + to};
         }
@@ -412,7 +412,7 @@ static __attribute__((noinline)) void count_pieces(walk_state *s, int64_t first,
 
 static __attribute__((noinline)) void draw_one_float(walk_state *s, int32_t i)
 {
-    TL_SINK_CALL(draw_lone, s->target->sink, s, i)
+    TL_SINK_CALL(draw_single_float, s->target->sink, s, i)
 }
 
 /* Draws the slivers that queues set aside: they have no depth plane. */

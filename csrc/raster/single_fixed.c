@@ -1,7 +1,7 @@
-/* Alone: one triangle by itself, of any size, range and method, through setup and a walker to the sink.
+/* Single: one triangle by itself, of any size, range and method, through setup and a walker to the sink.
  * In: vertex records, the pieces of cut triangles.  Out: samples to the sink. */
-#ifndef TL_ALONE_C
-#define TL_ALONE_C
+#ifndef TL_SINGLE_FIXED_C
+#define TL_SINGLE_FIXED_C
 
 #include <math.h>
 #include <stdint.h>
@@ -120,8 +120,9 @@ TL_INLINE int takes_edge(const tl_triangle *t, const tl_snapped *snapped)
 }
 
 /* Sets a triangle up; returns how it is drawn, or TL_CLASS_CULLED when there is nothing to draw. */
-TL_ONCE tl_class setup_alone(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_snapped *snapped,
-                             const tl_window *window, const tl_target *target, tl_sink sink, tl_triangle *t)
+TL_ONCE tl_class setup_single_fixed(const tl_vertex_set *set, const int32_t *corners, int32_t id,
+                                    const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                                    tl_sink sink, tl_triangle *t)
 {
     const tl_sink drawn = sink_of(target, sink);
     const int sign = load_triangle(set, corners, t);
@@ -159,7 +160,7 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
                              const tl_window *window, const tl_target *target, tl_sink sink)
 {
     tl_triangle t;
-    const tl_class walker = setup_alone(set, corners, id, snapped, window, target, sink, &t);
+    const tl_class walker = setup_single_fixed(set, corners, id, snapped, window, target, sink, &t);
     if (walker == TL_CLASS_CULLED)
         return;
     if (sink == TL_SINK_CENSUS)
@@ -245,8 +246,8 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
 }
 
 /* Triangle i, or its pieces, by itself. */
-TL_INLINE void draw_alone(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
-                          tl_sink sink)
+TL_INLINE void draw_single_fixed(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
+                                 tl_sink sink)
 {
     int32_t own[3];
     const triangle_parts parts = parts_of(snapped, i, own);
@@ -258,10 +259,11 @@ TL_INLINE void draw_alone(const tl_snapped *snapped, int64_t i, const tl_window 
         draw_triangle(&parts.set, parts.corners + 3 * k, (int32_t)i, snapped, window, target, sink);
 }
 
-TL_SINK_COPY(draw_alone, samples, TL_SINK_SAMPLES,
+TL_SINK_COPY(draw_single_fixed, samples, TL_SINK_SAMPLES,
              (const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target), snapped, i,
              window, target)
-TL_SINK_COPIES(draw_alone, (const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target),
-               snapped, i, window, target)
+TL_SINK_COPIES(draw_single_fixed,
+               (const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target), snapped, i,
+               window, target)
 
 #endif

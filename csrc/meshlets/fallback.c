@@ -2,8 +2,8 @@
  * may cut, or that is very close to the eye.
  * In: a meshlet and a bit for each of its triangles.  Out: the target's buffers, by the kernels that draw any mesh; the
  * names of triangles with special corners. */
-#ifndef TL_CARE_C
-#define TL_CARE_C
+#ifndef TL_FALLBACK_C
+#define TL_FALLBACK_C
 
 #include <stdint.h>
 #include <string.h>
@@ -15,7 +15,7 @@
 
 #if TL_HAS_HALVES
 
-static __attribute__((noinline)) void draw_with_care(meshlet_batch *s, const tl_meshlet *m, const uint64_t *which)
+static __attribute__((noinline)) void draw_fallback(meshlet_batch *s, const tl_meshlet *m, const uint64_t *which)
 {
     enum { TAIL = TL_CLUSTER_TAIL };
     const tl_meshlet_pass *pass = s->pass;
