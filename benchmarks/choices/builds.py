@@ -24,9 +24,9 @@ from benchmarks.harness.ways import Way, Ways
 SOURCES = ("csrc", "src", "setup.py", "pyproject.toml", "README.md", "LICENSE")
 
 BUILDS: Mapping[str, tuple[str, str, Mapping[str, str]]] = {
-    "boxes to 4x4": ("raster/batch.c", "TL_SMALL_BOX", {"none": "2"}),
-    "boxes to 16x16": ("raster/batch.c", "TL_MIDDLE_BOX", {"to 8x8": "8", "to 12x12": "12"}),
-    "boxes to 62x62": ("raster/batch.c", "TL_MAX_BOX_PX", {"to 16x16": "16", "to 32x32": "32"}),
+    "boxes to 4x4": ("raster/state.h", "TL_SMALL_BOX", {"none": "2"}),
+    "boxes to 16x16": ("raster/state.h", "TL_MIDDLE_BOX", {"to 8x8": "8", "to 12x12": "12"}),
+    "boxes to 62x62": ("raster/state.h", "TL_MAX_BOX_PX", {"to 16x16": "16", "to 32x32": "32"}),
 }
 """By choice: the file, the constant, and other values by name."""
 

@@ -1,7 +1,6 @@
 """Choices, and the ways that a scene could be drawn instead: each draws the same bits, in another time.
 
-A way forces a choice by putting a value in the place of a function or constant of the library while it draws, by an
-option that the verbs have, or by calling the parts of the pipeline itself; nothing in the library is made for it.
+A way forces a choice by `choices.forced`, by an option that the verbs have, or by calling the parts of the pipeline.
 """
 
 from __future__ import annotations
@@ -16,13 +15,14 @@ from numpy.typing import NDArray
 
 import topleft as tl
 from benchmarks.choices.scenes import Scene
-from benchmarks.harness.ways import Draw, Picture, Way, Ways
+from benchmarks.harness.ways import Draw, Picture, Way, Ways, answers_of
 from topleft._core import engine
-from topleft._core.base import threads
-from topleft._core.base.memory import FreshMemory, KeptMemory
+from topleft._core.base.memory import FRESH, SCRATCH, KeptMemory, Memory
 from topleft._core.base.options import Sink
-from topleft._core.raster import choices, sampling
-from topleft._core.raster.rasterize import draw
+from topleft._core.raster import choices
+from topleft._core.raster.costs import cost_table
+from topleft._core.raster.fill import Style, draw_fill
+from topleft._core.raster.rasterize import draw, draw_coverage, draw_overdraw
 from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
@@ -66,28 +66,19 @@ def verb_of(scene: Scene, owner: Any, vertices: Any, triangles: Any, size: tuple
     return lambda: (function(vertices, triangles, *extra, *size, **options),)
 
 
-def other_than(scene: Scene, where: Any, name: str, names: Mapping[bool, str], **changes: Any) -> Ways:
+def other_than(scene: Scene, name: str, names: Mapping[bool, str], **changes: Any) -> Ways:
     """Return the way that a yes or no is decided, and the other; one alone if it is not asked."""
-    decided: list[bool] = []
-    asked = getattr(where, name)
-
-    def spy(*arguments: Any, **options: Any) -> bool:
-        decided.append(bool(asked(*arguments, **options)))
-        return decided[-1]
-
     chosen = drawing(scene, **changes)
-    with Way("", chosen, ((where, name, spy),)).in_force():
-        chosen()
-    if not decided:
+    answers = answers_of(name, chosen)
+    if not answers:
         return []
-    other = not decided[0]
-    forced = ((where, name, lambda *_, **__: other),)
-    return [Way(names[decided[0]], chosen), Way(names[other], drawing(scene, **changes), forced)]
+    own, other = bool(answers[0]), not answers[0]
+    return [Way(names[own], chosen), Way(names[other], drawing(scene, **changes), {name: other})]
 
 
-def constant(scene: Scene, where: Any, name: str, values: Mapping[str, Any], **changes: Any) -> Ways:
-    """Return the way with a constant as it is, and with others."""
-    others = [Way(label, drawing(scene, **changes), ((where, name, value),)) for label, value in values.items()]
+def forcing(scene: Scene, name: str, values: Mapping[str, Any], **changes: Any) -> Ways:
+    """Return the way with a choice or a cost as it is, and with others."""
+    others = [Way(label, drawing(scene, **changes), {name: value}) for label, value in values.items()]
     return [Way("as it is", drawing(scene, **changes)), *others]
 
 
@@ -125,14 +116,14 @@ def of_clip(scene: Scene) -> Ways:
     """The search for cut triangles, where no vertex is outside of a plane."""
     if "transform" not in scene.options or scene.kind == "clip-crossing" or scene.sampling != "center":
         return []
-    return other_than(scene, choices, "must_cut", {True: "searched", False: "left out"})
+    return other_than(scene, "must_cut", {True: "searched", False: "left out"})
 
 
 def of_divide(scene: Scene) -> Ways:
     """The divide by w, where it is 1."""
     if scene.kind != "orthographic" or scene.sampling != "center":
         return []
-    return other_than(scene, choices, "is_affine", {True: "left out", False: "divided"})
+    return other_than(scene, "is_affine", {True: "left out", False: "divided"})
 
 
 def of_depth(scene: Scene) -> Ways:
@@ -140,14 +131,14 @@ def of_depth(scene: Scene) -> Ways:
     is_flat = scene.kind == "flat z" or len(scene.arrays[0]) == 3
     if not is_flat or scene.verb != "rasterize" or scene.sampling != "center" or not scene.has_depth:
         return []
-    return other_than(scene, choices, "pays_without_depth", {True: "ids alone", False: "compared"})
+    return other_than(scene, "pays_without_depth", {True: "ids alone", False: "compared"})
 
 
 def of_direct(scene: Scene) -> Ways:
     """Colours stored as triangles come, or labels first."""
     if scene.verb != "fill" or scene.sampling != "center":
         return []
-    return other_than(scene, choices, "is_direct", {True: "as they come", False: "labels first"})
+    return other_than(scene, "is_direct", {True: "as they come", False: "labels first"})
 
 
 def of_samples(scene: Scene) -> Ways:
@@ -193,23 +184,23 @@ def of_planes(scene: Scene) -> Ways:
     """Samples of ids in bands of rows, set up once, or a whole picture for each."""
     if scene.verb not in ("rasterize", "fill") or scene.sampling not in MSAA:
         return []
-    return other_than(scene, choices, "can_share", {True: "bands", False: "a picture each"})
+    return other_than(scene, "can_share", {True: "bands", False: "a picture each"})
 
 
 def of_bands(scene: Scene) -> Ways:
     """Bytes of a band of rows in which several samples are drawn."""
     if scene.sampling not in MSAA or scene.verb not in ("rasterize", "fill"):
         return []
-    name = "BAND_BYTES" if scene.verb == "rasterize" else "LABEL_BAND_BYTES"
+    name = "plane_bytes" if scene.verb == "rasterize" else "label_bytes"
     sizes = {f"{kib} KiB": kib << 10 for kib in (128, 256, 1024, 4096)}
-    return constant(scene, sampling, name, sizes)
+    return forcing(scene, name, sizes)
 
 
 def of_sorting(scene: Scene) -> Ways:
     """Triangles sorted into bands of rows, one band after the other, or drawn as they come."""
     if scene.sampling != "center" or scene.verb not in ("rasterize", "overdraw"):
         return []
-    return other_than(scene, choices, "pays_to_sort", {True: "sorted", False: "as they come"})
+    return other_than(scene, "pays_to_sort", {True: "sorted", False: "as they come"})
 
 
 def of_blended_bands(scene: Scene) -> Ways:
@@ -221,9 +212,9 @@ def of_blended_bands(scene: Scene) -> Ways:
         return view.size[1]
 
     def bands(_view: View, _snapped: Any, row_bytes: int, **__: Any) -> int:
-        return max(1, choices.BLEND_BAND_BYTES // row_bytes)
+        return max(1, int(cost_table().blend_bytes) // row_bytes)
 
-    return constant(scene, choices, "rows_to_blend", {"at once": whole, "in bands": bands})
+    return forcing(scene, "rows_to_blend", {"at once": whole, "in bands": bands})
 
 
 def of_sums(scene: Scene) -> Ways:
@@ -255,46 +246,41 @@ def of_memory(scene: Scene) -> Ways:
     """Scratch that a thread keeps, or fresh memory; results are fresh either way."""
     if scene.verb == "rasterize" or scene.sampling not in ("center", "area"):
         return []
-    from topleft._core.raster import verbs as api
+    return [Way(name, drawing_on(memory, scene)) for name, memory in (("kept", SCRATCH), ("fresh", FRESH))]
 
-    call = verb_of(scene, tl, *scene.arrays, (scene.size,), scene.asked())
-    return [Way("kept", call), Way("fresh", call, ((api, "SCRATCH", FreshMemory()),))]
+
+def drawing_on(memory: Memory, scene: Scene) -> Draw:
+    """Return what draws as the verb does, on a memory."""
+    options, arrays = scene.asked(), scene.arrays
+    if scene.verb == "fill":
+        style = Style("auto", None, "replace", "straight", "values")
+        return lambda: (draw_fill(memory, *arrays, scene.colors(), View.parse(scene.size, options), style, None),)
+    draw_verb = {"coverage": draw_coverage, "overdraw": draw_overdraw}[scene.verb]
+    return lambda: (draw_verb(memory, *arrays, View.parse(scene.size, options), None),)
 
 
 def of_threads(scene: Scene) -> Ways:
     """As many threads as are said to pay, or one, or two."""
     if scene.sampling not in ("center", "area") or scene.verb == "overdraw":
         return []
-    found: list[int] = []
-
-    def spy(*arguments: Any) -> int:
-        found.append(asked(*arguments))
-        return found[-1]
-
-    asked, chosen = choices.threads_to_draw, drawing(scene, threads=None)
-    two = (threads, "available_threads", lambda: 2), (choices, "available_threads", lambda: 2)
-    with Way("", chosen, ((choices, "threads_to_draw", spy), *two)).in_force():
-        chosen()
+    chosen, two = drawing(scene, threads=None), {"available_threads": 2}
+    found = answers_of("threads_to_draw", chosen, **two)[0]
     names = {1: "1 thread", 2: "2 threads"}
-    n_other = 3 - found[0]
-    return [Way(names[found[0]], chosen, two), Way(names[n_other], drawing(scene, threads=n_other))]
+    return [Way(names[found], chosen, two), Way(names[3 - found], drawing(scene, threads=3 - found))]
 
 
 def of_shares(scene: Scene) -> Ways:
     """Two threads: shares of the triangles or bands of rows."""
     if scene.sampling != "center" or scene.verb == "fill":
         return []
-    return other_than(scene, choices, "is_shared", {True: "shares", False: "bands"}, threads=2)
+    return other_than(scene, "is_shared", {True: "shares", False: "bands"}, threads=2)
 
 
 def of_array_threads(scene: Scene) -> Ways:
     """Two threads that draw: vertices and indices by both of them or by one."""
     if scene.verb != "coverage" or scene.sampling != "center":
         return []
-    n = max(len(scene.arrays[0]), len(scene.arrays[1]))
-    other = ("one", 1 << 62) if n >= choices.MIN_TO_SHARE_ARRAYS else ("both", 0)
-    ways = constant(scene, choices, "MIN_TO_SHARE_ARRAYS", dict([other]), threads=2)
-    return [replace(ways[0], name="one" if other[0] == "both" else "both"), ways[1]]
+    return other_than(scene, "pays_to_share", {True: "both", False: "one"}, threads=2)
 
 
 CHOICES: Mapping[str, Callable[[Scene], Ways]] = {

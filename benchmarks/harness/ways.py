@@ -1,20 +1,20 @@
-"""Ways to draw the same bits, in this process and in turns: each puts values in the place of the library's own."""
+"""Ways to draw the same bits, in this process and in turns: each forces choices of the library."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.harness.turns import Clock, turn_of
+from topleft._core.raster import choices
 
 Picture = tuple[NDArray[Any], ...]
 Draw = Callable[[], Picture]
-Forced = tuple[tuple[Any, str, Any], ...]
 
 HOPELESS = 4.0
 """A way that takes so many times as long as the planner's sits out after the first round."""
@@ -22,27 +22,33 @@ HOPELESS = 4.0
 
 @dataclass(frozen=True)
 class Way:
-    """A way to draw: its name, what draws, and what it puts in place of what."""
+    """A way to draw: its name, what draws, and the choices and costs that are forced."""
 
     name: str
     draw: Draw
-    forced: Forced = ()
+    forced: Mapping[str, Any] = field(default_factory=dict)
 
-    @contextmanager
-    def in_force(self) -> Iterator[None]:
-        """Put values in place, and back."""
-        kept = [(where, name, getattr(where, name)) for where, name, _ in self.forced]
-        try:
-            for where, name, value in self.forced:
-                setattr(where, name, value)
-            yield
-        finally:
-            for where, name, value in kept:
-                setattr(where, name, value)
+    def in_force(self) -> AbstractContextManager[None]:
+        """Force the choices while the context lasts."""
+        return choices.forced(**self.forced)
 
 
 Ways = list[Way]
 """The planner's own way first; fewer than two where there is nothing to choose."""
+
+
+def answers_of(name: str, draw: Draw, **forced: Any) -> list[Any]:
+    """Return what a choice of the library answers while something is drawn."""
+    found: list[Any] = []
+    asked = getattr(choices, name)
+
+    def spy(*arguments: Any, **options: Any) -> Any:
+        found.append(asked(*arguments, **options))
+        return found[-1]
+
+    with choices.forced(**{name: spy}, **forced):
+        draw()
+    return found
 
 
 def check_same_bits(label: str, ways: Ways) -> None:

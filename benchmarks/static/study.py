@@ -16,30 +16,31 @@ import sys
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import topleft as tl
 from benchmarks.harness.arguments import add_names, add_number, add_out, add_scale, options_of, set_options
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, forget, read_record, tell
 from benchmarks.harness.turns import digits, quartiles
-from benchmarks.harness.ways import Draw, Forced, Picture, Way, check_same_bits, take_rounds
+from benchmarks.harness.ways import Draw, Picture, Way, answers_of, check_same_bits, take_rounds
 from benchmarks.report.study import Study
 from benchmarks.static import tables
 from benchmarks.static.scenes import StaticScene, scenes
-from topleft._core.raster import choices
+from topleft._core.raster.choices import ClusterRoute
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
+from topleft._core.raster.costs import cost_table
 from topleft._meshes.picture import instances
 
-WHOLE: Forced = ((choices, "pays_to_cluster", lambda *_: False),)
-ASKED = ("pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_instances")
-FORCED: Forced = tuple((choices, name, lambda *_: True) for name in ASKED)
-
-NEVER_GROWN: Forced = ((choices, "pays_to_grow", lambda *_: False),)
+WHOLE = {"pays_to_cluster": False}
+FORCED = {"pays_to_cluster": True, "pays_to_draw_clusters": True, "pays_to_draw_instances": True}
+NEVER_GROWN = {"pays_to_grow": False}
 
 Row = dict[str, Any]
 
@@ -102,8 +103,9 @@ class CountedEngine:
         return found
 
 
-def counting(fates: Fates) -> Forced:
-    """Return what puts a scene in place of that of the library which counts its clusters."""
+@contextmanager
+def counting(fates: Fates) -> Iterator[None]:
+    """Count the clusters of what is drawn, while the context lasts."""
 
     class CountedScene(ClusteredMesh):
         def __init__(self, clusters: Clusters, view: Any, first_id: int = 0) -> None:
@@ -119,7 +121,8 @@ def counting(fates: Fates) -> Forced:
             return super().draw_rows(*arguments, **options)
 
     rasterize = sys.modules["topleft._core.raster.rasterize"]  # not the verb of the same name
-    return (rasterize, "ClusteredMesh", CountedScene), (instances, "ClusteredMesh", CountedScene)
+    with patch.object(rasterize, "ClusteredMesh", CountedScene), patch.object(instances, "ClusteredMesh", CountedScene):
+        yield
 
 
 @lru_cache(maxsize=1)
@@ -166,13 +169,13 @@ def measure_scene(scene: StaticScene, options: Options) -> Row:
     first = [cpu_ms(planned.draw), cpu_ms(planned.draw)]
     with whole.in_force():
         whole_first = cpu_ms(whole.draw)
-    with Way("", planned.draw, counting(fates)).in_force():
+    with counting(fates):
         planned.draw()
     ways = [planned, whole]
     shares = fates.shares()
     if shares is None:
         ways.append(Way("clusters", drawing(scene), FORCED))
-        with Way("", ways[2].draw, (*FORCED, *counting(fates))).in_force():
+        with ways[2].in_force(), counting(fates):
             ways[2].draw()
     is_grown = grow(planned)
     if is_grown:
@@ -210,17 +213,13 @@ def measure_scene(scene: StaticScene, options: Options) -> Row:
 
 def grow(planned: Way) -> bool:
     """Draw as often as it takes before a mesh is grown into meshlets; returns whether it was."""
-    grown = []
 
-    def draw_meshlets(*arguments: Any) -> Any:
-        grown.append(1)
-        return draw(*arguments)
+    def draw_often() -> Picture:
+        for _ in range(int(cost_table().grown_pictures) + LONGEST_BACKOFF):
+            picture = planned.draw()
+        return picture
 
-    draw = ClusteredMesh.draw_meshlets
-    with Way("", planned.draw, ((ClusteredMesh, "draw_meshlets", draw_meshlets),)).in_force():
-        for _ in range(choices.MIN_PICTURES_TO_GROW + LONGEST_BACKOFF):
-            planned.draw()
-    return bool(grown)
+    return ClusterRoute.MESHLETS in answers_of("cluster_route", draw_often)
 
 
 def measure_model(scene: StaticScene) -> Row:

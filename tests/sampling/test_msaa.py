@@ -1,6 +1,7 @@
 """Several samples a pixel: each is the engine's own picture, seen from the sample."""
 
 import copy
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_cen
 
 import topleft as tl
 from topleft._core.raster.sampling import POSITIONS
+from topleft._core.raster.verbs import draw_ids
 from topleft.methods.reference import sampling as ref
 
 COUNTS = (2, 4, 8, 16)
@@ -201,7 +203,12 @@ def test_index_outside_the_vertices_is_an_error():
             verb([[0, 0], [1, 0], [0, 1]], [[0, 1, 2], [0, 1, 3]], (4, 4), sampling="msaa4")
 
 
-# ---- what is kept of samples ----------------------------------------------------------------------------------------
+# ---- what is kept of samples for shading ----------------------------------------------------------------------------
+
+
+def split_ids(vertices, triangles, size, rasterizer=None, **options):
+    """The visibility buffer as pictures have it drawn."""
+    return draw_ids(rasterizer, size, vertices, triangles, is_split=True, **options)
 
 
 def kept(frags):
@@ -242,7 +249,7 @@ def test_listed_pixels_are_those_whose_samples_see_several_triangles(isa, name):
     scene = SCENES[name](np.random.default_rng(31))
     with on(isa):
         for n, threads in zip(COUNTS, THREADS, strict=True):
-            check_kept(draw(scene, n, tl.rasterize, threads=threads))
+            check_kept(draw(scene, n, split_ids, threads=threads))
 
 
 @ON_EACH_ISA
@@ -251,7 +258,7 @@ def test_listed_pixels_of_all_sizes_and_many_bands(isa, depth_test):
     scene = mixed(np.random.default_rng(9), 400, (1900, 75), origin=(-40, 7))
     with on(isa):
         for n, threads in zip(COUNTS, THREADS, strict=True):
-            check_kept(draw(scene, n, tl.rasterize, threads=threads, depth_test=depth_test, background_depth=0.25))
+            check_kept(draw(scene, n, split_ids, threads=threads, depth_test=depth_test, background_depth=0.25))
 
 
 class Guarded:
@@ -276,7 +283,7 @@ def test_lists_of_every_pixel_stay_in_their_room(isa, guard, width):
     rasterizer = tl.Rasterizer((width, 67), threads=3)
     rasterizer._memory = Guarded(guard)
     with on(isa):
-        frags = rasterizer.rasterize(corners, triangles, sampling="msaa8")
+        frags = split_ids(corners, triangles, (width, 67), rasterizer, sampling="msaa8")
         assert kept(frags)[0].all()
         check_kept(frags)
     assert "split columns of samples" in rasterizer._memory.names
@@ -286,15 +293,16 @@ def test_samples_outlive_what_other_verbs_do_with_the_memory():
     scene = mixed(np.random.default_rng(2), 50, (40, 30))
     expected = draw(scene, 4, tl.rasterize)
     rasterizer = tl.Rasterizer(scene.size)
-    frags = rasterizer.rasterize(scene.vertices, scene.triangles, sampling="msaa4")
-    for verb in (rasterizer.coverage, rasterizer.overdraw, rasterizer.rasterize):
-        verb(scene.vertices[::-1] * 3, scene.triangles[::-1])
-    assert_same(frags.samples_triangle, expected.samples_triangle)
-    assert_same(frags.samples_depth, expected.samples_depth)
+    for found in (rasterizer.rasterize, partial(draw_ids, rasterizer, scene.size, is_split=True)):
+        frags = found(scene.vertices, scene.triangles, sampling="msaa4")
+        for verb in (rasterizer.coverage, rasterizer.overdraw, rasterizer.rasterize):
+            verb(scene.vertices[::-1] * 3, scene.triangles[::-1])
+        assert_same(frags.samples_triangle, expected.samples_triangle)
+        assert_same(frags.samples_depth, expected.samples_depth)
 
 
 def test_a_copy_keeps_its_samples():
-    frags = draw(mixed(np.random.default_rng(2), 50, (40, 30)), 4, tl.rasterize)
+    frags = draw(mixed(np.random.default_rng(2), 50, (40, 30)), 4, split_ids)
     found = copy.copy(frags)
     assert_same(found.samples_triangle, frags.samples_triangle)
     assert_same(found.sample(2).depth, frags.sample(2).depth)
@@ -302,8 +310,10 @@ def test_a_copy_keeps_its_samples():
 
 def test_triangles_that_change_before_samples_are_asked_for_are_an_error():
     corners, triangles = np.array([[0, 0, 1.0], [9, 0, 1], [0, 9, 1]]), np.array([[0, 1, 2]], np.int32)
-    frags = tl.rasterize(corners, triangles, (8, 8), sampling="msaa4")
+    frags = split_ids(corners, triangles, (8, 8), sampling="msaa4")
+    planes = tl.rasterize(corners, triangles, (8, 8), sampling="msaa4")
     triangles[0, 2] = 3
+    assert (planes.samples_depth[0, 0] == 1).all()
     with pytest.raises(IndexError, match="triangles must stay what they were drawn from until samples are asked for"):
         frags.samples_depth  # noqa: B018
 

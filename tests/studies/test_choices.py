@@ -15,10 +15,10 @@ from benchmarks.choices.builds import BUILDS, imported_from, with_constant
 from benchmarks.choices.scenes import Scene, scenes
 from benchmarks.choices.ways import CHOICES
 from benchmarks.harness.machine import ROOT
-from benchmarks.harness.ways import Way, check_same_bits, take_rounds
+from benchmarks.harness.ways import Way, answers_of, check_same_bits, take_rounds
 from benchmarks.scenes.arrays import strewn_arrays
 
-from topleft._core.raster import choices
+from topleft._core.raster.costs import cost_table
 
 TINY = bench.Options(rounds=1, seconds=0.0, scale=0.02)
 
@@ -50,7 +50,7 @@ def test_every_kind_of_scene_is_measured(record):
 def test_first_way_is_that_of_the_planner(choice, chosen):
     ways = CHOICES[choice](flat_scene())
     assert ways[0].name == chosen
-    assert ways[0].forced == ()
+    assert ways[0].forced == {}
     assert all(way.name != chosen for way in ways[1:])
 
 
@@ -61,24 +61,16 @@ def test_threads_are_chosen_as_if_there_were_two(n, names):
 
 
 def test_way_puts_its_value_in_place_and_back():
-    way = Way("", lambda: (), ((choices, "MIN_TO_SHARE_ARRAYS", 7),))
-    before = choices.MIN_TO_SHARE_ARRAYS
-    with way.in_force():
-        assert choices.MIN_TO_SHARE_ARRAYS == 7
-    assert choices.MIN_TO_SHARE_ARRAYS == before
+    before = cost_table().shared_item
+    with Way("", lambda: (), {"shared_item": 7.0}).in_force():
+        assert cost_table().shared_item == 7.0
+    assert cost_table().shared_item == before
 
 
 def test_forced_depth_test_is_another_decision():
     chosen, other = CHOICES["depth test"](flat_scene())
-    found = []
-    asked = choices.common_depth
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(choices, "common_depth", lambda *a, **k: found.append(1) or asked(*a, **k))
-        for way in (chosen, other):
-            with way.in_force():
-                way.draw()
-            found.append(0)
-    assert found == [1, 0, 0]  # where depths are compared, nobody asks which they are
+    found = [len(answers_of("common_depth", way.draw, **way.forced)) for way in (chosen, other)]
+    assert found == [1, 0]  # where depths are compared, nobody asks which they are
 
 
 def test_other_bits_are_an_error():

@@ -253,8 +253,7 @@ def rasterize(
         ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
         ``.sample(i)`` gives the same of another. Of a batch `FragmentsBatch`: ``.triangle`` and ``.depth`` (B, H, W),
         ``[i]`` is the `Fragments` of a pose, and each is what it is when it is drawn alone. A `plan` of one pose
-        saves the others the check of the triangles. Planes of samples are made when they are asked for, those of
-        depth by drawing again: the arrays that were passed in must not change before.
+        saves the others the check of the triangles.
 
     Raises
     ------
