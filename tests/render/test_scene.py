@@ -363,28 +363,26 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
 @pytest.mark.parametrize(("height", "n"), [(40, 1), (40, 2), (40, 3), (4, 4), (5, 4), (1, 1)])
 def test_bands_of_instances_share_the_rows(height, n, monkeypatch):
     """Also where all instances lie in one row, above the window, or behind the eye."""
-    monkeypatch.setattr(choices, "MIN_TRIANGLES_OF_INSTANCE", 0)
-    monkeypatch.setattr(choices, "MIN_ROWS_OF_INSTANCE", 0)
     camera = tl.Camera.look_at((0, 0, 9), near=0.1, far=50.0)
     at = np.tile(np.eye(4), (10, 1, 1))
     at[:, 1, 3], at[:, 2, 3] = np.repeat([-2, -2, 0, 1, 90], 2), np.tile([0, 20], 5)
     standing = [tl.Instance(BALLS[0], matrix) for matrix in at]
     seen = instances.place(tl.Scene(standing), camera, (60, height), {})[0]
-    for some in (range(10), (0, 2), (8,), (1, 3, 5), (4, 4, 4)):
-        tops = seen.split_rows(np.array(some), height, n)
-        assert tops[0] == 0
-        assert tops[-1] == height
-        assert len(tops) == n + 1
-        assert min(np.diff(tops)) >= 1
-    if n == 2:
-        assert seen.split_rows(np.arange(0, 8, 2), height, n)[1] in range(20, 30)  # two at -2, one in the middle
-    monkeypatch.setattr(instances, "MOST_PIXELS_OF_PART", 60 * height - 1)  # what a mask counts ends there
-    assert seen.split_rows(np.arange(0, 8, 2), height, n) == [height * k // n for k in range(n + 1)]
-    monkeypatch.setattr(instances, "MOST_PIXELS_OF_PART", 60 * height)
-    for name, least in (("MIN_ROWS_OF_INSTANCE", height), ("MIN_TRIANGLES_OF_INSTANCE", 701)):  # a fifth of that high
-        monkeypatch.setattr(choices, name, least)
-        assert seen.split_rows(np.arange(0, 8, 2), height, n) == [0, height]
-        monkeypatch.setattr(choices, name, 0)
+    with choices.forced(scene_triangles=0, scene_rows=0):
+        for some in (range(10), (0, 2), (8,), (1, 3, 5), (4, 4, 4)):
+            tops = seen.split_rows(np.array(some), height, n)
+            assert tops[0] == 0
+            assert tops[-1] == height
+            assert len(tops) == n + 1
+            assert min(np.diff(tops)) >= 1
+        if n == 2:
+            assert seen.split_rows(np.arange(0, 8, 2), height, n)[1] in range(20, 30)  # two at -2, one in the middle
+        monkeypatch.setattr(instances, "MOST_PIXELS_OF_PART", 60 * height - 1)  # what a mask counts ends there
+        assert seen.split_rows(np.arange(0, 8, 2), height, n) == [height * k // n for k in range(n + 1)]
+        monkeypatch.setattr(instances, "MOST_PIXELS_OF_PART", 60 * height)
+    for name, least in (("scene_rows", height), ("scene_triangles", 701)):  # a fifth of that high
+        with choices.forced(**{"scene_triangles": 0, "scene_rows": 0, name: least}):
+            assert seen.split_rows(np.arange(0, 8, 2), height, n) == [0, height]
 
 
 @pytest.mark.parametrize("instance", [3, b"cube", (CUBE,), None, [CUBE, CUBE], tl.Scene([CUBE])])
