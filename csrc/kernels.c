@@ -11,6 +11,7 @@
 #include "clusters/mark.c"
 #include "exact/pieces_exact.c"
 #include "exact/take_points.c"
+#include "mesh/bend.c"
 #include "mesh/creases.c"
 #include "mesh/ears.c"
 #include "mesh/equal.c"
@@ -124,6 +125,10 @@ const tl_kernels TL_KERNELS = {
     .group_rows = group_rows,
     .build_tree = build_tree,
     .find_nearest = nearest_of_points,
+    .bend_vertices = bend_vertices,
+    .see_points = see_points,
+    .find_bent = find_bent,
+    .split_bent = split_bent,
     .find_reach = find_reach,
     .set_feet = set_feet,
     .snap_points = snap_points,

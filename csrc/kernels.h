@@ -275,6 +275,23 @@ typedef struct tl_kernels {
     /* The first three of n_channels of colours [first, end) as float32 (n, 4) and 1. */
     void (*color_rows)(const uint8_t *colors, int n_channels, int64_t first, int64_t end, float *rows);
 
+    /* Bends vertices [first, end), float32 or float64, moved to eye space by the rows of an affine matrix, as far as
+     * they lie well in the picture; their records. */
+    void (*bend_vertices)(const tl_lens *lens, const tl_source *source, const double *eye_from, int64_t first,
+                          int64_t end, double *bent, float *records);
+
+    /* The places (n, 2) in the image plane at which a lens sees points (n, 3) in eye space. */
+    void (*see_points)(const tl_lens *lens, const double *points, int64_t n, double *places);
+
+    /* Lists the triangles [first, end) that a lens may bend, and those that it cannot see, with room for end - first +
+     * 16 each; returns how many it may bend. */
+    int64_t (*find_bent)(const tl_lens *lens, const float *records, int64_t n_vertices, const int32_t *triangles,
+                         int64_t first, int64_t end, int32_t *bent, int32_t *outside, int64_t *n_outside);
+
+    /* Splits n listed triangles until their sides are straight enough; adds their parts to `parts`, or counts them. */
+    void (*split_bent)(const tl_lens *lens, const double *points, const float *records, int64_t n_vertices,
+                       const int32_t *triangles, const int32_t *ids, int64_t n, tl_bent_parts *parts);
+
     /* Groups of n equal rows of n_words words, in the order of their first rows: the first row of each, and the group
      * of every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 where
      * many hashes meet. */

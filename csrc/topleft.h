@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "faces.h"
+#include "lens.h"
 #include "nearest.h"
 #include "tiles.h"
 

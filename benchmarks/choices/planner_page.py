@@ -57,8 +57,8 @@ what it was then: the plan has a copy. After such a call, or `plan.measure()`, t
 | threads | how many, and what each of them takes |
 | memory | bytes of scratch, of results, and at most, before anything is allocated |
 
-*Choices* and *estimates* follow from costs per vertex, triangle and pixel. Those of one machine ship with the
-package; `topleft calibrate` measures yours within a minute, and keeps the result in `~/.cache/topleft/costs.json`
+*Choices* and *estimates* follow from one table of costs per vertex, triangle and pixel. That of one machine ships with
+the package; `topleft calibrate` measures yours within a minute, and keeps the result in `~/.cache/topleft/costs.json`
 (`$XDG_CACHE_HOME`). The last line of each plan says whose costs they are, and how far off they were for scenes that
 were not fitted. They are for memory that is kept, as a `Rasterizer` does, and for threads that have a core each.
 

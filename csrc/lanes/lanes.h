@@ -31,6 +31,7 @@
  *   vd_load_places(base, first, x, y, z, a, b)    three doubles and two int32 at base + 32 * first[3 * k], as columns
  *   vd_store_places(base, x, y, z, a, b)          the same, TL_LANES of them one after the other
  *   vi_ceil(vd)             the next integer that is not less
+ *   vi_low_bits(vd)         the last 32 bits of each number
  *   vf_off_integer, vd_off_integer    a number less the nearest integer
  *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8
  *   vd_or(a, b)             the bits of both: 0 where both are

@@ -157,12 +157,15 @@ TL_INLINE vd vd_abs(vd a)
     return (vd){_mm256_andnot_pd(sign, a.lo), _mm256_andnot_pd(sign, a.hi)};
 }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm256_floor_pd(a.lo), _mm256_floor_pd(a.hi)}; }
-TL_INLINE vm vd_ge(vd a, vd b)
+TL_INLINE vi vi_low_bits(vd a)
 {
-    const __m256 lo = _mm256_castpd_ps(_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ));
-    const __m256 hi = _mm256_castpd_ps(_mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ));
+    const __m256 lo = _mm256_castpd_ps(a.lo), hi = _mm256_castpd_ps(a.hi);
     const __m256i packed = _mm256_castps_si256(_mm256_shuffle_ps(lo, hi, 0x88)); /* 0 1 4 5 2 3 6 7 */
     return _mm256_permute4x64_epi64(packed, 0xd8);
+}
+TL_INLINE vm vd_ge(vd a, vd b)
+{
+    return vi_low_bits((vd){_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ), _mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ)});
 }
 TL_INLINE vd vd_from_vf(vf a)
 {

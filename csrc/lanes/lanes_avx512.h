@@ -117,6 +117,11 @@ TL_INLINE vd vd_from_vf(vf a)
 {
     return (vd){_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps(a, 1))};
 }
+TL_INLINE vi vi_low_bits(vd a)
+{
+    const __m256i lo = _mm512_cvtepi64_epi32(_mm512_castpd_si512(a.lo));
+    return _mm512_inserti64x4(_mm512_castsi256_si512(lo), _mm512_cvtepi64_epi32(_mm512_castpd_si512(a.hi)), 1);
+}
 TL_INLINE vi vi_round(vd a)
 {
     return _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvtpd_epi32(a.lo)), _mm512_cvtpd_epi32(a.hi), 1);

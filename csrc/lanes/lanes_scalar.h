@@ -223,6 +223,12 @@ TL_INLINE vd vd_max(vd a, vd b) { return a > b ? a : b; }
 TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }
 TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN; }
+TL_INLINE vi vi_low_bits(vd a)
+{
+    uint64_t bits;
+    memcpy(&bits, &a, sizeof bits);
+    return (vi)(uint32_t)bits;
+}
 TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 

@@ -27,6 +27,15 @@
 #define TL_SPAN 512 /* pixels of a row that are shaded together */
 #define TL_SPAN_ROOM (TL_SPAN + 2 * TL_MAX_LANES)
 
+/* Columns of the picture, from a multiple of this on, that a run of the unsnapped does not leave; a power of two. */
+#define TL_RUN_BLOCK 32
+
+/* Twice the area of unsnapped triangles, in the units that their edge functions are integers of. */
+#define TL_UNIT_AREA 0x1p24
+
+/* What no step of theirs to the next column exceeds, in units. */
+#define TL_MOST_STEP 0x1p36
+
 /* |E| below this stay int32, with the step to anywhere else in the box. */
 #define TL_INT32_BOX 0x1p30f
 
@@ -41,14 +50,15 @@ enum {                                /* coefficients of runs, float32 */
        RUN_V = RUN_U + 3,
        RUN_COLOR = RUN_V + 3,
        RUN_GRADIENT = RUN_COLOR + 9, /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
-       RUN_ALPHA = RUN_GRADIENT + 6, /* from here on of full materials and holes */
+       RUN_REST = RUN_GRADIENT + 6,  /* of the unsnapped: what E1 and E2 lack in the middle of a block, and a column */
+       RUN_ALPHA = RUN_REST + 4,     /* from here on of full materials and holes */
        RUN_UV1 = RUN_ALPHA + 3,      /* as RUN_U and RUN_V, of the second set */
        RUN_GRADIENT1 = RUN_UV1 + 6,
        RUN_TANGENT = RUN_GRADIENT1 + 6, /* of both sets: see set_tangents; not times q */
        N_TANGENT_FLOATS = 7,
        N_RUN_FLOATS = RUN_TANGENT + 2 * N_TANGENT_FLOATS,
 };
-enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, N_RUN_INTS };
+enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, RUN_COLUMN, N_RUN_INTS };
 
 /* A triangle whose edge functions are float64: E_k = at[k] + step[k] * (x_fx - from[k]) in the row of the run. */
 typedef struct {
@@ -80,10 +90,13 @@ typedef struct {
     special_run special[TL_SPAN];
 } shade_runs;
 
-/* Lists the runs of n ids; run r stands in slot TL_LANES + r.  Ids outside the mesh count as background; runs have
- * those of its triangles. */
-TL_ONCE void find_runs(shade_runs *s, const int32_t *ids, int n)
+/* Lists the runs of n ids from `column` on; run r stands in slot TL_LANES + r.  Ids outside the mesh count as
+ * background; runs have those of its triangles.  Runs of the unsnapped end with a block of columns, and know where they
+ * begin. */
+TL_INLINE void list_runs(shade_runs *s, const int32_t *ids, int n, int64_t column, int is_exact)
 {
+    const vi first_column = vi_add(vi_iota(), vi_set1((int32_t)column));
+    const vi in_block = vi_set1((int32_t)(s->window->x_px & (TL_RUN_BLOCK - 1))), last = vi_set1(TL_RUN_BLOCK - 1);
     const vi none = vi_set1(-1), end = vi_set1((int32_t)s->snapped->n_triangles), first = vi_set1(s->first_id);
     vi before = none;
     int slot = TL_LANES;
@@ -92,7 +105,13 @@ TL_ONCE void find_runs(shade_runs *s, const int32_t *ids, int n)
         const vi name = n - x >= TL_LANES ? vi_load(ids + x) : vi_select(inside, vi_load_masked(inside, ids + x), none);
         const vi id = vi_sub(name, first);
         const vm visible = vm_and(vi_gt(id, none), vi_gt(end, id));
-        const vm starts = vm_and_not(visible, vi_eq(id, vi_shift_in(id, before)));
+        vm same = vi_eq(id, vi_shift_in(id, before));
+        if (is_exact) {
+            const vi own = vi_add(first_column, vi_set1(x));
+            same = vm_and_not(same, vi_eq(vi_and(vi_add(own, in_block), last), vi_set1(0)));
+            vi_compress(s->ints[RUN_COLUMN] + slot, vm_and_not(visible, same), own);
+        }
+        const vm starts = vm_and_not(visible, same);
         vi_compress(s->ints[RUN_ID] + slot, starts, id);
         s->first_run[i] = slot;
         s->starts[i] = vm_bits(starts), s->visible[i] = vm_bits(visible);
@@ -100,6 +119,13 @@ TL_ONCE void find_runs(shade_runs *s, const int32_t *ids, int n)
         before = id;
     }
     s->n_runs = slot - TL_LANES;
+}
+TL_ONCE void find_runs(shade_runs *s, const int32_t *ids, int n, int64_t column)
+{
+    if (s->snapped->mesh.exact)
+        list_runs(s, ids, n, column, 1);
+    else
+        list_runs(s, ids, n, column, 0);
 }
 
 /* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have.
@@ -467,7 +493,8 @@ static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vert
 }
 
 /* Edge functions over the area, of vertices that are not snapped, whose range no float32 has.  Of a sliver whose box
- * holds 2^36 of its areas or more float64 has lost the weights: it takes the mean of its corners. */
+ * holds more of its areas float64 has lost the weights: it takes the mean of its corners. */
+#define TL_BOX_AREAS 0x1p36
 static void normalize_edges(special_run *e, const tl_vertex_set *set, const int32_t *corners, const double *x_fx,
                             const double *y_fx, float *row_step)
 {
@@ -475,7 +502,7 @@ static void normalize_edges(special_run *e, const tl_vertex_set *set, const int3
     const double height = fmax(y_fx[0], fmax(y_fx[1], y_fx[2])) - fmin(y_fx[0], fmin(y_fx[1], y_fx[2]));
     const double area = (x_fx[2] - x_fx[0]) * (y_fx[1] - y_fx[0]) - (x_fx[1] - x_fx[0]) * (y_fx[2] - y_fx[0]);
     const double box = width * height, scale = 1.0 / fabs(area);
-    if (isfinite(box) && isfinite(scale) && box <= fabs(area) * 0x1p36) {
+    if (isfinite(box) && isfinite(scale) && box <= fabs(area) * TL_BOX_AREAS) {
         for (int k = 0; k < 3; k++) {
             const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
             e->at[k] *= scale, e->step[k] *= scale;
@@ -544,18 +571,6 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     }
 }
 
-/* Where all runs are special. */
-static void set_no_edges(shade_runs *s, int slot, run_setup *r)
-{
-    const vi zero = vi_set1(0);
-    const int ints[5] = {RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM};
-    for (int k = 0; k < 5; k++)
-        vi_store(s->ints[ints[k]] + slot, zero);
-    for (int k = 0; k < 3; k++)
-        r->col_step[k] = r->row_step[k] = vf_set1(0.0f);
-    r->area = vf_set1(0.0f);
-}
-
 /* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: what wraps on the way there
  * comes back at the pixel.  Returns the runs that need others; their sum is the area. */
 TL_INLINE vm find_edges(shade_runs *s, int slot, int64_t row, vi *x, vi *y, vf *col_step, vf *row_step)
@@ -589,14 +604,94 @@ TL_INLINE vm find_edges(shade_runs *s, int slot, int64_t row, vi *x, vi *y, vf *
     return is_special;
 }
 
+/* The corners of TL_LANES runs in pixels; `corners` are their numbers times 2^shift. */
+TL_INLINE void load_exact_corners(const tl_exact_points *points, const int32_t *corners, int shift, vd *x, vd *y)
+{
+    if (points->stride == TL_PLACED) {
+        vd c[4];
+        vd_load_records(points->points, TL_PLACED >> shift, corners, c);
+        *x = c[0], *y = c[1];
+        return;
+    }
+    double lanes[2][TL_MAX_LANES];
+    for (int lane = 0; lane < TL_LANES; lane++)
+        for (int axis = 0; axis < 2; axis++)
+            lanes[axis][lane] = points->points[(int64_t)(corners[lane] >> shift) * points->stride + axis];
+    *x = vd_load(lanes[0]), *y = vd_load(lanes[1]);
+}
+
+/* A number near column `near` and its step, in units: the nearest integers, which int32 has modulo 2^32, and what they
+ * lack; as the coefficients of edge k. */
+TL_INLINE void put_exact_edge(shade_runs *s, int slot, int k, vd e, vd step, vi near, vd to_middle)
+{
+    const vd integers = vd_set1(0x1.8p52); /* next to it are the integers, and its last bits theirs */
+    const vd rounded = vd_add(e, integers), rounded_step = vd_add(step, integers);
+    const vd rest = vd_sub(e, vd_sub(rounded, integers)), rest_step = vd_sub(step, vd_sub(rounded_step, integers));
+    const vi whole_step = vi_low_bits(rounded_step);
+    vi_store(s->ints[RUN_E1 + k - 1] + slot, vi_sub(vi_low_bits(rounded), vi_mul(near, whole_step)));
+    vi_store(s->ints[RUN_STEP1 + k - 1] + slot, whole_step);
+    put(s, RUN_REST + 2 * k - 2, slot, vf_from_vd(vd_add(rest, vd_mul(rest_step, to_middle))));
+    put(s, RUN_REST + 2 * k - 1, slot, vf_from_vd(rest_step));
+}
+
+/* As find_edges, of corners x and y in pixels that are not snapped; returns the area, too.
+ *
+ * Edge functions are counted in 2^-24 of twice the area: an integer, exact modulo 2^32 at every column, and a rest,
+ * float32, which stays below 17 and errs by less than 2^-20.  The sum of both is rounded once.  Both are found in
+ * float64 at the column of the block that is nearest to corner 0, and rests counted from the middle of the block.  So
+ * E / area errs by 2^-24 of itself, 2^-44, and what float64 has lost: less than 2^-50 boxes over areas.  Nothing
+ * depends on the window: columns and rows are those of the picture. */
+TL_INLINE vm find_exact_edges(shade_runs *s, int slot, int64_t row, const vd *x, const vd *y, vf *col_step,
+                              vf *row_step, vf *area)
+{
+    const tl_vertex_set *set = &s->snapped->mesh;
+    const tl_window *window = s->window;
+    const double unit = 1.0 / (double)(1 << window->subpixel_bits);
+    const double sample_x = 0.5 + set->sample_x_fx * unit, sample_y = 0.5 + set->sample_y_fx * unit;
+    const vi in_block = vi_set1((int32_t)(window->x_px & (TL_RUN_BLOCK - 1))), last = vi_set1(TL_RUN_BLOCK - 1);
+    const vi column = vi_load(s->ints[RUN_COLUMN] + slot);
+    const vi block = vi_sub(column, vi_and(vi_add(column, in_block), last));
+    const vd origin = vd_set1((double)window->x_px), zero = vd_set1(0.0);
+    const vd block_px = vd_add(vd_from_vi(block), origin);
+    const vd near = vd_min(vd_max(vd_floor(x[0]), block_px), vd_add(block_px, vd_set1(TL_RUN_BLOCK - 1)));
+    const vd u = vd_sub(vd_add(near, vd_set1(sample_x)), x[0]);
+    const vd v = vd_sub(y[0], vd_set1((double)(row + window->y_px) + sample_y));
+    const vd x1 = vd_sub(x[1], x[0]), y1 = vd_sub(y[1], y[0]), x2 = vd_sub(x[2], x[0]), y2 = vd_sub(y[2], y[0]);
+    const vd twice_area = vd_sub(vd_mul(x2, y1), vd_mul(x1, y2)), size = vd_abs(twice_area);
+    const vd scale = vd_div(vd_set1(TL_UNIT_AREA), size);
+    const vd step1 = vd_mul(vd_sub(zero, y2), scale), step2 = vd_mul(y1, scale);
+    const vd down1 = vd_mul(x2, scale), down2 = vd_mul(vd_sub(zero, x1), scale);
+    const vd e1 = vd_mul(vd_add(vd_mul(x2, v), vd_mul(y2, u)), vd_sub(zero, scale));
+    const vd e2 = vd_mul(vd_add(vd_mul(x1, v), vd_mul(y1, u)), scale);
+    const vi near_column = vi_round(vd_sub(near, origin));
+    const vd to_middle = vd_from_vi(vi_sub(vi_add(block, vi_set1(TL_RUN_BLOCK / 2)), near_column));
+    const vm is_back = vd_ge(zero, twice_area);
+    const vi whole = vi_set1((int32_t)TL_UNIT_AREA), sum = vi_select(is_back, vi_sub(vi_set1(0), whole), whole);
+    put_exact_edge(s, slot, 1, e1, step1, near_column, to_middle);
+    put_exact_edge(s, slot, 2, e2, step2, near_column, to_middle);
+    vi_store(s->ints[RUN_SUM] + slot, sum);
+    *area = vf_from_vi(sum);
+    col_step[1] = vf_from_vd(step1), col_step[2] = vf_from_vd(step2);
+    col_step[0] = vf_from_vd(vd_sub(vd_sub(zero, step1), step2));
+    row_step[1] = vf_from_vd(down1), row_step[2] = vf_from_vd(down2);
+    row_step[0] = vf_from_vd(vd_sub(vd_sub(zero, down1), down2));
+    const vd width = vd_sub(vd_max(vd_max(x1, x2), zero), vd_min(vd_min(x1, x2), zero));
+    const vd height = vd_sub(vd_max(vd_max(y1, y2), zero), vd_min(vd_min(y1, y2), zero));
+    const vd box = vd_mul(width, height), most = vd_set1(TL_MOST_STEP);
+    const vm has_weights = vm_and(vd_ge(vd_mul(size, vd_set1(TL_BOX_AREAS)), box), vd_ge(vd_set1(0x1p900), box));
+    return vm_and_not(vm_all(), vm_and(has_weights, vd_ge(most, vd_add(vd_abs(step1), vd_abs(step2)))));
+}
+
 /* The same of corners that are not loaded yet. */
 TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
     vi x[3], y[3];
     if (set->exact) {
-        set_no_edges(s, slot, r);
-        return vm_all();
+        vd x_px[3], y_px[3];
+        for (int k = 0; k < 3; k++)
+            load_exact_corners(set->exact, r->corners[k], 0, &x_px[k], &y_px[k]);
+        return find_exact_edges(s, slot, row, x_px, y_px, r->col_step, r->row_step, &r->area);
     }
     for (int k = 0; k < 3; k++) {
         vz z;
@@ -615,6 +710,15 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
 TL_INLINE void fetch_row(const void *rows, uintptr_t n_bytes, int32_t row)
 {
     __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)row * n_bytes));
+}
+
+TL_INLINE void fetch_vertex(const shade_runs *s, int32_t corner)
+{
+    const tl_exact_points *exact = s->snapped->mesh.exact;
+    if (exact)
+        fetch_row(exact->points, sizeof(double) * (unsigned)exact->stride, corner);
+    else
+        fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), corner);
 }
 
 /* Asks for what names the corners of runs [first, end), and for the normals of their faces. */
@@ -640,7 +744,7 @@ TL_INLINE void fetch_corners(const shade_runs *s, int first, int end)
         const int64_t at = 3 * (int64_t)s->ints[RUN_ID][slot];
         for (int k = 0; k < 3; k++) {
             const int32_t corner = s->snapped->triangles[at + k];
-            fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), corner);
+            fetch_vertex(s, corner);
             if (shading->normal_of_corner)
                 fetch_row(shading->corner_normals, 16, shading->normal_of_corner[at + k]);
             if (!shading->normal_of_corner || !shading->finds_inverse_w)
@@ -708,7 +812,7 @@ TL_INLINE vf load_plain_normal(const shade_runs *s, int slot, int k, vf *normal)
 
 /* The same of runs that need no more than normals of vertices, where none is special: 0 if one is.  Passes of few
  * operations, so that those of several vectors of runs overlap. */
-TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches)
+TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
 {
     const int end = TL_LANES + s->n_runs;
     vm is_special = vm_first(0);
@@ -721,6 +825,14 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches)
         vf col_step[3], row_step[3];
         if (fetches)
             fetch_corners(s, ahead, (int)min64(end, ahead + TL_LANES));
+        if (is_exact) {
+            vd x_px[3], y_px[3];
+            vf area;
+            for (int k = 0; k < 3; k++)
+                load_exact_corners(s->snapped->mesh.exact, s->corners[k] + slot, 1, &x_px[k], &y_px[k]);
+            is_special = vm_or(is_special, find_exact_edges(s, slot, row, x_px, y_px, col_step, row_step, &area));
+            continue;
+        }
         for (int k = 0; k < 3; k++) {
             vi c[4];
             vi_load_rows(s->snapped->mesh.vertices, s->corners[k] + slot, c);
@@ -745,12 +857,13 @@ TL_ONCE void set_runs(shade_runs *s, int64_t row)
 {
     const tl_shading *shading = s->shading;
     const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
+    const int is_exact = s->snapped->mesh.exact != NULL;
     s->n_special = 0;
     if (!s->n_runs)
         return;
     /* the rest of the last vector: a triangle that is there */
     vi_store(s->ints[RUN_ID] + end, vi_set1(s->ints[RUN_ID][end - 1]));
-    if (!s->is_plain || !set_plain_runs(s, row, fetches))
+    if (!s->is_plain || !(is_exact ? set_plain_runs(s, row, fetches, 1) : set_plain_runs(s, row, fetches, 0)))
         set_any_runs(s, row, fetches);
     if (shading->material_of)
         for (int slot = TL_LANES; slot < end; slot++)
@@ -806,6 +919,17 @@ TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t c
     e[2] = vi_add(pick_int(p, RUN_E2), vi_mul(p->column, pick_int(p, RUN_STEP2)));
     *sum = pick_int(p, RUN_SUM);
     e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
+}
+
+/* What edge functions of the unsnapped lack. */
+TL_INLINE void find_rests(const shaded_lanes *p, vf *rest)
+{
+    const vi in_block = vi_set1((int32_t)(p->s->window->x_px & (TL_RUN_BLOCK - 1))), last = vi_set1(TL_RUN_BLOCK - 1);
+    const vi from_middle = vi_sub(vi_and(vi_add(p->column, in_block), last), vi_set1(TL_RUN_BLOCK / 2));
+    const vf column = vf_from_vi(from_middle);
+    rest[1] = vf_fma(pick(p, RUN_REST + 1), column, pick(p, RUN_REST));
+    rest[2] = vf_fma(pick(p, RUN_REST + 3), column, pick(p, RUN_REST + 2));
+    rest[0] = vf_sub(vf_sub(vf_set1(0.0f), rest[1]), rest[2]);
 }
 
 /* The lanes of a vector of pixels that belong to special runs, run by run. */

@@ -142,7 +142,7 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
             vi_spill(setup.corners[k], vi_load(r->corners[k] + slot));
         const vm is_run = vm_first(TL_LANES + s->n_runs - slot);
         vm is_alone = vi_gt(vi_set1(0), vi_load(s->ints[RUN_SPECIAL] + slot));
-        vm is_special = set_edges(s, slot, row, &setup);
+        vm is_special = s->snapped->mesh.exact ? vm_all() : set_edges(s, slot, row, &setup);
         is_alone = vm_or(is_alone, vm_and_not(vi_eq(vi_load(s->ints[RUN_SUM] + slot), vi_set1(0)), is_special));
         for (int k = 0; r->has_w && k < 3; k++) {
             const vd q = vd_load(r->q[k] + slot);
@@ -230,7 +230,7 @@ TL_INLINE void weigh_lanes(weighed_span *r, int i, int64_t column, int64_t row)
 /* The runs of n ids of a row, and the weights of the pixels that they show. */
 TL_ONCE void weigh_span(weighed_span *r, const int32_t *ids, int n, int64_t row, int64_t column)
 {
-    find_runs(&r->runs, ids, n);
+    find_runs(&r->runs, ids, n, column);
     set_weighed_runs(r, row);
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++)
         if (r->runs.visible[i])

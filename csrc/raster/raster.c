@@ -10,6 +10,7 @@
 #include "clusters.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
 #include "vertex/snap.c"
@@ -345,6 +346,20 @@ static void clear(const tl_window *window, const tl_target *target)
         clear_depth(target->bounds, tl_segments(target->stride_px) * window->height, farthest);
 }
 
+/* The pieces of listed triangles. */
+static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t n_whole, const tl_share *share)
+{
+    const tl_exact_pieces *pieces = s->snapped->mesh.exact->pieces;
+    for (int64_t i = share->first; i < share->end; i++) {
+        int64_t k = first_piece(pieces->source, pieces->n_pieces, share->ids[i]);
+        for (; k < pieces->n_pieces && pieces->source[k] == share->ids[i]; k++) {
+            if (s->bad_row >= 0 || tl_is_given_up(s->window))
+                return;
+            draw_one_float(s, (int32_t)(n_whole + k));
+        }
+    }
+}
+
 /* Every triangle of a share whose vertices are not snapped; from n_whole on they are pieces. */
 TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
                            tl_share *share, tl_exact_counts *counts, int64_t *bad_row, tl_sink sink)
@@ -357,6 +372,8 @@ TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_win
     part.end = counts_pieces ? min64(share->end, n_whole) : share->end;
     draw_triangles(&s, TL_FLOAT, sink, &part);
     draw_slivers(&s);
+    if (share->ids && mesh->mesh.exact->pieces)
+        draw_listed_pieces(&s, n_whole, share);
     flush_fragments(target, &s.fragments, s.fragments.n);
     if (counts_pieces && s.bad_row < 0)
         count_pieces(&s, max64(share->first, n_whole), share->end);

@@ -225,16 +225,15 @@ TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Triangle k of those at i in the queue, in blocks of TL_LANES x TL_LANES samples.  With ints for k and columns, gcc
- * spills more registers of the mask's copy: 3 % of its time on AVX-512. */
+/* Triangle k of those at i in the queue, in blocks of TL_LANES x TL_LANES samples.  With an int for k, gcc spills a
+ * register more of the mask's copy: 3 % of its time on AVX-512. */
 TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
                          const lane_exact *t, int i, int64_t k)
 {
     const double unit = plane_step(s, g);
     const box_queue *q = &s->rows;
     const int32_t size = q->size[i + k], id = name_of(s->snapped, q->id[i + k]), sample = r->sample[k];
-    const int64_t n_cols = size & 0xffff;
-    const int n_rows = size >> 16;
+    const int n_cols = size & 0xffff, n_rows = size >> 16;
     const vi zero = vi_set1(0);
     const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[k]));
     const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[k]));
@@ -245,7 +244,7 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
         const int64_t at = (uint32_t)sample + row0 * target->stride_px;
         vm doubted = vm_first(0);
         vi first, end;
-        find_rows_of_one(g, r, k, third_is_left, third_is_right, row0, (int)n_cols, &first, &end, &doubted);
+        find_rows_of_one(g, r, k, third_is_left, third_is_right, row0, n_cols, &first, &end, &doubted);
         doubted = vm_and(doubted, vm_first(n_rows - row0));
         if (g == TL_FLOAT && __builtin_expect(vm_any(doubted), 0)) {
             row_ends ends;
@@ -258,10 +257,10 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
             const vd from = g == TL_FIXED ? y : vd_sub(y, vd_set1(r->y0[k]));
             vd_store(z_row, vd_add(vd_set1(r->z0[k]), vd_mul(vd_set1(r->slope_y[k]), from)));
         }
-        for (int64_t col0 = 0; col0 < n_cols; col0 += TL_LANES) {
-            const int width = n_cols - col0 < TL_LANES ? (int)(n_cols - col0) : TL_LANES;
-            const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1((int)col0)), zero),
-                                              vi_max(vi_min(vi_sub(end, vi_set1((int)col0)), vi_set1(width)), zero));
+        for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
+            const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
+            const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
+                                              vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
             const unsigned drawn = vm_bits(vi_gt(in_block, zero));
             if (!drawn)
                 continue;

@@ -7,6 +7,7 @@
 #ifndef TL_ALPHA_TEST_C
 #define TL_ALPHA_TEST_C
 
+#include <math.h>
 #include <stdint.h>
 
 #include "shading.h"
@@ -15,6 +16,7 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
+#include "exact/sign.c"
 #include "sink/peel.c"
 #include "raster/raster.c"
 #include "pixels/runs.c"
@@ -84,7 +86,7 @@ TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64
     const int is_nearest = c->target->sink == TL_SINK_NEAREST;
     if (is_nearest)
         hide_nearest(c, n, own, own_depth, to);
-    find_runs(s, own, n);
+    find_runs(s, own, n, column);
     if (!s->n_runs)
         return;
     set_runs(s, row);
@@ -107,16 +109,40 @@ TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64
     }
 }
 
+/* The pixels of a window that begins at `start` which lie around the points from low to high. */
+static void find_pixels_around(double low, double high, int64_t start, int64_t size, int64_t *first, int64_t *end)
+{
+    const double most = (double)size;
+    *first = (int64_t)fmin(fmax(floor(low) - (double)start - 1.0, 0.0), most);
+    *end = (int64_t)fmin(fmax(ceil(high) - (double)start + 1.0, 0.0), most);
+}
+
+/* Finds the box of a window that a triangle can reach; returns 0 where there is none. */
+static int find_cut_box(const tl_vertex_set *set, const int32_t *corners, const tl_window *window, tl_triangle *t)
+{
+    t->col0 = 0, t->col1 = window->width, t->row0 = 0, t->row1 = window->height;
+    if (is_clipped(set, corners))
+        return 1;
+    if (!set->exact)
+        return load_triangle(set, corners, t) && clip_box(t, window);
+    const exact_point a = point_of(set->exact, corners[0]), b = point_of(set->exact, corners[1]);
+    const exact_point c = point_of(set->exact, corners[2]);
+    const double left = fmin(a.x, fmin(b.x, c.x)), right = fmax(a.x, fmax(b.x, c.x));
+    const double top = fmin(a.y, fmin(b.y, c.y)), bottom = fmax(a.y, fmax(b.y, c.y));
+    find_pixels_around(left, right, window->x_px, window->width, &t->col0, &t->col1);
+    find_pixels_around(top, bottom, window->y_px, window->height, &t->row0, &t->row1);
+    return t->col0 < t->col1 && t->row0 < t->row1;
+}
+
 /* One triangle, tile by tile of the box that it can reach. */
 static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int32_t id)
 {
     const tl_shading *shading = s->shading;
     const int32_t material = shading->material_of ? shading->material_of[id] : 0;
-    tl_triangle t = {.col0 = 0, .col1 = window->width, .row0 = 0, .row1 = window->height};
+    tl_triangle t;
     int32_t corners[3];
     read_corners(&c->snapped, id, corners);
-    if (!is_clipped(&c->snapped.mesh, corners) &&
-        (load_triangle(&c->snapped.mesh, corners, &t) == 0 || !clip_box(&t, window)))
+    if (!find_cut_box(&c->snapped.mesh, corners, window, &t))
         return;
     for (int64_t top = t.row0; top < t.row1; top += TL_CUTOUT_TILE)
         for (int64_t left = t.col0; left < t.col1; left += TL_CUTOUT_TILE) {

@@ -98,7 +98,7 @@ static void shade(const tl_shaded_scene *scene, const tl_window *window, const i
             for (int k = 0; k < list.n; k++) {
                 const int first = list.parts[k].first, n_own = list.parts[k].end - first;
                 set_part(&s, &list, k, at_fx);
-                find_runs(&s, ids + at + first, n_own);
+                find_runs(&s, ids + at + first, n_own, column + first);
                 set_runs(&s, row);
                 shade_runs_of(&s, n_own, column + first, row, depth + at + first, own + first);
             }
@@ -166,7 +166,7 @@ static void shade_normals(const tl_shaded_scene *scene, const tl_window *window,
             for (int k = 0; k < list.n; k++) {
                 const int first = list.parts[k].first, n_own = list.parts[k].end - first;
                 set_part(&s, &list, k, NULL);
-                find_runs(&s, ids + at + first, n_own);
+                find_runs(&s, ids + at + first, n_own, column + first);
                 set_runs(&s, row);
                 find_unit_normals(&s, n_own, column + first, planes, first);
             }

@@ -35,6 +35,12 @@ TL_INLINE void find_most_pixels(shaded_lanes *p, const shade_runs *s, int i, int
     p->area = vf_from_vi(sum);
     for (int k = 0; k < 3; k++)
         p->e[k] = vf_from_vi(e[k]);
+    if (s->snapped->mesh.exact) {
+        vf rest[3];
+        find_rests(p, rest);
+        for (int k = 0; k < 3; k++)
+            p->e[k] = vf_add(p->e[k], rest[k]);
+    }
 }
 
 /* The same of all runs. */

@@ -82,7 +82,7 @@ TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, span_list *list, con
     for (int k = 0; k < list->n; k++) {
         const int first = list->parts[k].first, n_own = list->parts[k].end - first;
         set_part(s, list, k, at_fx);
-        find_runs(s, sums->ids + first, n_own);
+        find_runs(s, sums->ids + first, n_own, column + first);
         set_runs(s, row);
         add_samples(sums, s, first, n_own, column + first, row, depth + first);
     }

@@ -98,6 +98,15 @@ def test_foreign_host_is_refused(server, host):
     assert (status, text) == (403, f"Host must be 127.0.0.1:{server.port}: this page is for this machine alone.\n")
 
 
+def test_foreign_host_is_refused_by_every_name_of_this_machine():
+    for name in ("localhost", "::1"):
+        here = Server(Content(), name)
+        assert here.refusal({"host": f"evil.example:{here.port}"}, here.token, is_socket=False).startswith(
+            "Host must be"
+        )
+        assert not here.refusal({"host": f"localhost:{here.port}"}, here.token, is_socket=False)
+
+
 def test_foreign_origin_is_refused(server):
     told = (403, "Origin must be this page: others may not talk to it.")
     assert get(server, f"/{server.token}/", Origin="http://evil.example")[:2] == (told[0], told[1] + "\n")
@@ -141,7 +150,8 @@ def test_more_pages_than_may_be_open_are_refused(server, monkeypatch):
 
 @pytest.mark.parametrize("frame", [b"", b"abc", b"\xff\xff\xff\x7f", pack({"id": 1}, [])[:-4], b"\x04\x00\x00\x00nope",
                                    struct.pack("<I", 2) + b"[]", struct.pack("<I", 6) + b'{"a":\xff', "[" * 10000,
-                                   '{"do": NaN}', "no JSON", '{"parts": [9], "id": 1}'])  # fmt: skip
+                                   '{"do": NaN}', '{"do": 1e999}',
+                                   '{"do": 1' + "0" * 400 + "}", "no JSON", '{"parts": [9], "id": 1}'])  # fmt: skip
 def test_broken_message_is_answered_by_a_sentence_and_the_next_one_as_usual(server, frame):
     with connect(server) as page:
         page.send(frame)

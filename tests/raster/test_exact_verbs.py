@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from strategies import CLIP_SCENES, soup, with_depth
 
 import topleft as tl
-from topleft._meshes.picture.holes import cut_of, cut_out
 from topleft.methods import reference
 from topleft.methods.reference import blend as ref_blend
 from topleft.methods.reference import peel as ref_peel
@@ -285,12 +284,3 @@ TRIANGLE = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]]
 def test_what_needs_the_grid_says_so(call, message):
     with pytest.raises(ValueError, match=r"subpixel_bits must be in 0\.\.16 " + message):
         call()
-
-
-def test_holes_of_textures_are_refused():
-    texture = tl.Texture(np.zeros((2, 2, 4), np.uint8))
-    material = tl.Material(texture=texture, alpha_mode="mask")
-    mesh = tl.Mesh(*TRIANGLE, uv=[[0, 0], [1, 0], [0, 1]], materials=[material])
-    frags = tl.rasterize_mesh(mesh, tl.Camera.from_matrix(FLAT), (8, 8), **EXACT)
-    with pytest.raises(ValueError, match=r"0\.\.16 where textures cut holes, got 'exact'"):
-        cut_out(frags, mesh, tl.Camera.from_matrix(FLAT), cut_of(mesh))

@@ -16,16 +16,17 @@ from topleft._meshes.picture.holes import cut_of, cut_out, cuts_of
 from topleft._meshes.picture.transparent import solid_layers
 
 ORDER = (2, 0, 3, 1)
+ON_EACH_BITS = pytest.mark.parametrize("bits", [8, "exact"])
 CLEAR = (0, 0, 0, 0)
 
 
-def expected_ids(mesh):
+def expected_ids(mesh, bits):
     """Each layer drawn and tested by itself; the nearest that is left, of all pixels."""
     nearest, ids = np.full(SIZE[::-1], np.inf), np.full(SIZE[::-1], -1)
     for k in range(N_LAYERS + 1):
         own = replace(mesh, triangles=mesh.triangles[2 * k : 2 * k + 2], materials=(), material_of_triangle=None)
-        frags = tl.rasterize_mesh(own, CAMERA, SIZE)
-        w = reference.Weights(frags, own, CAMERA, SIZE)
+        frags = tl.rasterize_mesh(own, CAMERA, SIZE, subpixel_bits=bits)
+        w = reference.Weights(frags, own, CAMERA, SIZE, is_snapped=bits == 8)
         opacity = reference.sample(LEAF.texture, w.of(own.uv), w.slopes_of(own.uv))[:, 3]
         is_left = np.zeros(SIZE[::-1], bool)
         is_left[w.rows, w.cols] = (opacity >= 0.5) | (k == N_LAYERS)
@@ -35,10 +36,11 @@ def expected_ids(mesh):
     return ids
 
 
+@ON_EACH_BITS
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)])
-def test_cutout_shows_the_nearest_that_is_left(order):
+def test_cutout_shows_the_nearest_that_is_left(order, bits):
     mesh = layers(order)
-    got, expected = cut(mesh).triangle, expected_ids(mesh)
+    got, expected = cut(mesh, subpixel_bits=bits).triangle, expected_ids(mesh, bits)
     assert len(np.unique(expected)) == 2 * (N_LAYERS + 1) + 1
     # float32 opacity of 0.5 to a few units in the last place: no pixel of these scenes is that close.
     assert_same(got, expected.astype(np.int32))
@@ -55,38 +57,61 @@ def test_cutout_without_holes_is_the_visibility_buffer():
     assert_same(after.depth, before.depth)
 
 
+@ON_EACH_BITS
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
-def test_cutout_threads_and_windows_change_no_bit(sampling):
+def test_cutout_threads_and_windows_change_no_bit(sampling, bits):
     mesh = layers((2, 0, 3, 1))
-    whole = cut(mesh, threads=1, sampling=sampling)
-    three = cut(mesh, threads=3, sampling=sampling)
-    part = cut(mesh, (40, 33), origin=(21, 17), viewport=SIZE, sampling=sampling)
+    options = {"sampling": sampling, "subpixel_bits": bits}
+    whole = cut(mesh, threads=1, **options)
+    three = cut(mesh, threads=3, **options)
+    part = cut(mesh, (40, 33), origin=(21, 17), viewport=SIZE, **options)
     assert_same(three.samples_triangle, whole.samples_triangle)
     assert_same(three.samples_depth, whole.samples_depth)
     assert_same(part.samples_triangle, whole.samples_triangle[17:50, 21:61])
 
 
-def test_cutout_each_isa_gives_the_same_bits():
+@ON_EACH_BITS
+def test_cutout_each_isa_gives_the_same_bits(bits):
     mesh, name, found = layers((2, 0, 3, 1)), build_info()["isa"], []
     try:
         for isa in engine.isa_available():
             engine.use_isa(isa)
-            found.append(cut(mesh, sampling="msaa4").samples_triangle)
+            found.append(cut(mesh, sampling="msaa4", subpixel_bits=bits).samples_triangle)
     finally:
         engine.use_isa(name)
     for other in found[1:]:
         assert_same(other, found[0])
 
 
-def test_cutout_of_a_triangle_that_the_near_plane_cuts():
+@ON_EACH_BITS
+def test_cutout_of_a_triangle_that_the_near_plane_cuts(bits):
     floor = [[-9, 0, 8], [9, 0, 8], [0, 0, -60]]
     mesh = tl.Mesh(floor, [[0, 1, 2]], uv=np.array(floor)[:, [0, 2]] / 4, materials=(LEAF,))
     camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
-    frags = tl.rasterize_mesh(mesh, camera, SIZE)
+    frags = tl.rasterize_mesh(mesh, camera, SIZE, subpixel_bits=bits)
     before = frags.mask
     cut_out(frags, mesh, camera, cut_of(mesh))
     assert not (frags.mask & ~before).any()
     assert 0.3 < frags.mask.sum() / before.sum() < 0.8  # 7 of 15 diagonals, and the far end is the mean of all
+
+
+@ON_EACH_BITS
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_cutout_keeps_what_has_no_holes_and_is_cut_by_the_near_plane(sampling, bits):
+    corners = np.array([[-9, 0, 8], [9, 0, 8], [0, 0, -60], [-1, 0.1, 3], [1, 0.1, 3], [0, 2, 3]])
+    rows, uv = [1, 0], corners[:, :2] / 4
+    mesh = tl.Mesh(corners, [[0, 1, 2], [3, 4, 5]], uv=uv, materials=(LEAF, tl.Material()), material_of_triangle=rows)
+    camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
+    options = {"sampling": sampling, "subpixel_bits": bits}
+    frags = tl.rasterize_mesh(mesh, camera, SIZE, **options)
+    alone = [replace(mesh, triangles=mesh.triangles[k : k + 1], material_of_triangle=[1 - k]) for k in range(2)]
+    floor, leaf = (tl.rasterize_mesh(one, camera, SIZE, **options) for one in alone)
+    for drawn, own in ((frags, mesh), (leaf, alone[1])):
+        cut_out(drawn, own, camera, cut_of(own))
+    shows_floor, shows_leaf = floor.samples_triangle == 0, leaf.samples_triangle == 0
+    assert (shows_floor & ~shows_leaf).sum() > 1000
+    assert shows_leaf.sum() > 1000
+    assert_same(frags.samples_triangle, np.select([shows_leaf, shows_floor], [1, 0], -1).astype(np.int32))
 
 
 WIRES = np.full((64, 64, 4), 200, np.uint8)
@@ -112,11 +137,12 @@ def test_cutout_keeps_its_area_in_small_pictures(image, cutoff, opacity, size):
     assert abs(small - large) < 0.06  # what is between two halvings; without their scales up to 0.6
 
 
-def test_render_cuts_holes_out():
+@ON_EACH_BITS
+def test_render_cuts_holes_out(bits):
     mesh = layers((0, 1, 2, 3))
     alone = replace(mesh, triangles=mesh.triangles[:2], materials=(LEAF,), material_of_triangle=None)
-    picture = tl.render(alone, CAMERA, SIZE, background=(0, 0, 0, 0))
-    assert_same(picture[..., 3] == 255, cut(alone).mask)
+    picture = tl.render(alone, CAMERA, SIZE, background=(0, 0, 0, 0), subpixel_bits=bits)
+    assert_same(picture[..., 3] == 255, cut(alone, subpixel_bits=bits).mask)
     assert 0.2 < (picture[..., 3] == 255).sum() / tl.rasterize_mesh(alone, CAMERA, SIZE).mask.sum() < 0.8
 
 
@@ -138,11 +164,12 @@ MESH = layers(ORDER)
 SCENE = tl.Scene(pieces(MESH))
 
 
+@ON_EACH_BITS
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
 @pytest.mark.parametrize("threads", [1, 3])
-def test_layers_of_a_scene_are_those_of_one_mesh(sampling, threads):
+def test_layers_of_a_scene_are_those_of_one_mesh(sampling, threads, bits):
     names = ("depth", "distance", "silhouette", "alpha", "world_position")
-    options = {"sampling": sampling, "threads": threads}
+    options = {"sampling": sampling, "threads": threads, "subpixel_bits": bits}
     one, many = (
         tl.render_layers(subject, CAMERA, SIZE, layers=("triangle", "instance", *names), **options)
         for subject in (MESH, SCENE)
@@ -154,9 +181,10 @@ def test_layers_of_a_scene_are_those_of_one_mesh(sampling, threads):
     assert_same(np.where(seen, 2 * many["instance"] + many["triangle"], -1), one["triangle"])
 
 
+@ON_EACH_BITS
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
-def test_picture_of_a_scene_is_that_of_one_mesh(sampling):
-    options = {"shading": "unlit", "sampling": sampling}
+def test_picture_of_a_scene_is_that_of_one_mesh(sampling, bits):
+    options = {"shading": "unlit", "sampling": sampling, "subpixel_bits": bits}
     expected = tl.render(MESH, CAMERA, SIZE, **options)
     assert (expected != tl.render(replace(MESH, uv=None), CAMERA, SIZE, **options)).any()
     assert_same(tl.render(SCENE, CAMERA, SIZE, **options), expected)
@@ -186,13 +214,16 @@ def test_material_of_a_look_cuts_all_instances():
     assert (got[expected == wall] == -1).any()
 
 
-def test_cutout_of_a_scene_with_an_edge_at_the_near_plane():
+@ON_EACH_BITS
+def test_cutout_of_a_scene_with_an_edge_at_the_near_plane(bits):
     near = tl.Camera.look_at((0.4, 0.3, 0.55), (0.4, 0.3, -3), near=0.5, far=9, fov_y_deg=120)
     tilt = np.eye(4)
     tilt[2, 0] = 0.9
     moved = [replace(mesh, vertices=mesh.vertices @ tilt[:3, :3].T) for mesh in pieces(MESH)]
     whole = replace(MESH, vertices=MESH.vertices @ tilt[:3, :3].T)
-    one, many = (look(near, "depth", subject=subject)["depth"] for subject in (whole, tl.Scene(moved)))
+    one, many = (
+        look(near, "depth", subject=subject, subpixel_bits=bits)["depth"] for subject in (whole, tl.Scene(moved))
+    )
     assert np.isfinite(one).any()
     assert_same(many, one)
 
@@ -200,22 +231,24 @@ def test_cutout_of_a_scene_with_an_edge_at_the_near_plane():
 # ---- glass ----------------------------------------------------------------------------------------------------------
 
 
-def expected_layers(n):
+def expected_layers(n, bits=8):
     """Every leaf cut by itself, sorted by depth, then id."""
     ids, depth = [], []
     for k, mesh in enumerate(pieces(MESH)):
-        frags = cut(mesh)
+        frags = cut(mesh, subpixel_bits=bits)
         ids.append(np.where(frags.mask, frags.triangle + 2 * k, -1))
         depth.append(np.where(frags.mask, frags.depth, np.inf))
     order = np.argsort(depth, axis=0, kind="stable")[:n]
     return np.take_along_axis(np.array(ids), order, 0), np.take_along_axis(np.array(depth), order, 0)
 
 
+@ON_EACH_BITS
 @pytest.mark.parametrize("n", [1, 3, 5])
 @pytest.mark.parametrize("threads", [1, 3])
-def test_layers_of_glass_are_those_that_are_left(n, threads):
-    found = solid_layers(SCENE, CAMERA, SIZE, cuts_of(SCENE, None), layers=n, threads=threads)
-    ids, depth = expected_layers(n)
+def test_layers_of_glass_are_those_that_are_left(n, threads, bits):
+    options = {"layers": n, "threads": threads, "subpixel_bits": bits}
+    found = solid_layers(SCENE, CAMERA, SIZE, cuts_of(SCENE, None), **options)
+    ids, depth = expected_layers(n, bits)
     assert_same(found.planes[0], ids.astype(np.int32))
     assert_same(found.planes[1], depth.astype(np.float32))
 

@@ -3,6 +3,7 @@
 import gc
 import weakref
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -208,8 +209,9 @@ def everything(threads=None, origin=(0, 0), size=SIZE, sampling="center"):
     material = tl.Material(texture=tl.Texture(NOISE), specular=0.5, shininess=30, back_color=(9, 99, 199))
     options = {"lights": LIGHTS, "material": material, "fog": tl.Fog(3, 9), "threads": threads}
     near = tl.Camera.look_at((0.2, 0.1, 1.0), near=0.5, far=9)
-    for camera in (*CAMERAS.values(), near):
-        frags = tl.rasterize_mesh(COLORED, camera, size, origin=origin, viewport=SIZE, sampling=sampling)
+    for camera, bits in product((*CAMERAS.values(), near), (8, "exact")):
+        view = {"origin": origin, "viewport": SIZE, "sampling": sampling, "subpixel_bits": bits}
+        frags = tl.rasterize_mesh(COLORED, camera, size, **view)
         for shading in ("smooth", "flat", "normals", "unlit"):
             yield shade(frags, COLORED, camera, shading=shading, **options)
 

@@ -38,14 +38,15 @@ def encode(light):
 class Weights:
     """Perspective-correct weights (P, 3) of the corners at the visible pixels, and how they change with the pixel."""
 
-    def __init__(self, frags, mesh, camera, size, origin=(0, 0)):
+    def __init__(self, frags, mesh, camera, size, origin=(0, 0), *, is_snapped=True):
         width, height = size
         self.rows, self.cols = np.nonzero(frags.triangle >= 0)
         self.ids = frags.triangle[self.rows, self.cols]
         clip = np.c_[mesh.vertices, np.ones(len(mesh.vertices))] @ camera.clip_from_world(size).T
         ndc = clip[:, :3] / clip[:, 3:]
-        snapped = np.rint(np.c_[(ndc[:, 0] + 1) * width / 2, (1 - ndc[:, 1]) * height / 2] * 256) / 256
-        xy, q = snapped[mesh.triangles[self.ids]], 1 / clip[:, 3][mesh.triangles[self.ids]]
+        points = np.c_[(ndc[:, 0] + 1) * width / 2, (1 - ndc[:, 1]) * height / 2]
+        points = np.rint(points * 256) / 256 if is_snapped else points
+        xy, q = points[mesh.triangles[self.ids]], 1 / clip[:, 3][mesh.triangles[self.ids]]
         at = np.c_[self.cols + 0.5 + origin[0], self.rows + 0.5 + origin[1]]
         edge, along = np.empty((len(at), 3)), np.empty((2, len(at), 3))
         for k in range(3):

@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from topleft._apps.explore.session import Reply, Request, Session
 from topleft._core.base.array_types import U8
 from topleft._core.base.arrays import as_number
 from topleft._core.base.color import Color, as_color
+from topleft._core.base.options import check_choice
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import FRAMING_MARGIN, bounding_sphere, box_corners, ends_to_frame, orbit_view
@@ -38,6 +39,7 @@ from topleft._meshes.picture.view_layers import render_layers
 from topleft._meshes.plan.plan import plan
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
+from topleft.typing import CullOption, SamplesOption, UpOption
 
 MAX_SIDE_PX, MAX_PIXELS = 8192, 2**23
 """Of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""
@@ -90,6 +92,16 @@ HEAT = np.array([
 """Colours of counts 0, 1, 2, 3-4, 5-8, ... and more: light to dark, which all eyes see. ColorBrewer's YlGnBu."""
 
 HEAT_LABELS = ("1", "2", "3-4", "5-8", "9-16", "17-32", "33-64", "65 and more")
+
+
+WORDS = {
+    "layer": LAYERS,
+    "lights": tuple(LIGHTS),
+    "up": get_args(UpOption),
+    "cull": get_args(CullOption),
+    "sampling": get_args(SamplesOption),
+}
+"""What fields of `MeshView` may say; a job file holds it between quotes."""
 
 
 @dataclass(frozen=True)
@@ -152,10 +164,8 @@ class MeshView:
         if len(pan) != 2 or not all(abs(x) < 1e6 for x in pan):
             raise ValueError(f"pan must be two numbers, got {pan}")
         view = cls(**{**given, "size": size, "pan": pan})
-        if view.layer not in LAYERS:
-            raise ValueError(f"layer must be one of {', '.join(map(repr, LAYERS))}, got {view.layer!r}")
-        if view.lights not in LIGHTS:
-            raise ValueError(f"lights must be one of {', '.join(map(repr, LIGHTS))}, got {view.lights!r}")
+        for name, words in WORDS.items():
+            check_choice(name, getattr(view, name), words)
         if not 1e-3 <= view.zoom <= 1e4:
             raise ValueError(f"zoom must lie in 0.001 to 10000, got {view.zoom}")
         if view.fov and not 1 <= view.fov <= 170:

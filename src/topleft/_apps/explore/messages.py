@@ -9,6 +9,7 @@ dtype, shape and part of each array by its name.
 from __future__ import annotations
 
 import json
+import math
 import struct
 from typing import Any, NoReturn
 
@@ -19,6 +20,10 @@ from topleft._apps.explore.session import Reply, Request
 
 MAX_HEADER_BYTES = 4 << 20
 """Of a question: a thousand triangles and their vertices need a tenth of it."""
+
+
+MAX_DIGITS = 18
+"""Of whole numbers, which int64 and float64 then hold."""
 
 
 def split(reply: Reply) -> tuple[dict[str, Any], list[memoryview]]:
@@ -87,8 +92,18 @@ def read_header(text: bytes | str) -> dict[str, Any]:
     def refuse(constant: str) -> NoReturn:
         raise ValueError(f"numbers must be finite, got {constant}")
 
+    def finite(digits: str) -> float:
+        if math.isinf(number := float(digits)):
+            refuse(digits)
+        return number
+
+    def countable(digits: str) -> int:
+        if len(digits) > MAX_DIGITS:
+            refuse(f"one of {len(digits)} digits")
+        return int(digits)
+
     try:
-        header = json.loads(text, parse_constant=refuse)
+        header = json.loads(text, parse_constant=refuse, parse_float=finite, parse_int=countable)
     except RecursionError:
         raise ValueError("a message must not be nested so deeply") from None
     except (UnicodeDecodeError, json.JSONDecodeError) as error:

@@ -160,7 +160,8 @@ class Server:
     def refusal(self, headers: Mapping[str, str], token: str, *, is_socket: bool) -> str:
         """Return why somebody is refused, "" when nobody is."""
         host, origin = headers.get("host", ""), headers.get("origin")
-        if self.host == LOOPBACK and host not in (f"{LOOPBACK}:{self.port}", f"localhost:{self.port}"):
+        own = [f"{name}:{self.port}" for name in (LOOPBACK, "localhost", "[::1]")]
+        if self.host in (LOOPBACK, "localhost", "::1") and host not in own:
             return f"Host must be {LOOPBACK}:{self.port}: this page is for this machine alone."
         if (origin is not None or is_socket) and origin != f"http://{host}":
             return "Origin must be this page: others may not talk to it."

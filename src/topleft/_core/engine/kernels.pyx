@@ -70,6 +70,7 @@ AREA_OVERFLOW = TL_AREA_OVERFLOW
 BLENDED_ROWS = TL_BLENDED_ROWS
 FEW_OF_BITS, FEW_STORED, FEW_LABELLED = <int>TL_FEW_OF_BITS, <int>TL_FEW_STORED, <int>TL_FEW_LABELLED
 MAX_LAYERS = TL_MAX_LAYERS
+LENS_RINGS = TL_LENS_RINGS
 SCALARS: dict[np.dtype[Any], int] = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
 
 
@@ -103,6 +104,7 @@ include "pixels.pxi"
 include "matrices.pxi"
 include "shade.pxi"
 include "detail.pxi"
+include "lens.pxi"
 include "mesh.pxi"
 include "polygons.pxi"
 include "tiles.pxi"

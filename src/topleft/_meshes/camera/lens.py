@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +52,19 @@ class Lens(Protocol):
 
     def bend(self, points_eye: F64) -> F64:
         """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
+
+    @property
+    def terms(self) -> Terms:
+        """What kernels know of the lens."""
+
+
+class Terms(NamedTuple):
+    """The terms of a lens by kind: k1 to k6, p1 and p2, s1 to s4; cosine and sine of tau_x, then of tau_y."""
+
+    radial: tuple[float, ...]
+    tangential: tuple[float, float] = (0.0, 0.0)
+    prism: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    tilt: tuple[float, ...] = (1.0, 0.0, 1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -134,10 +147,17 @@ class OpenCVLens:
             u, v = self._tilt(u, v)
         return np.stack([u, v], axis=1)
 
+    @property
+    def terms(self) -> Terms:
+        """What kernels know of the lens."""
+        radial = self.k1, self.k2, self.k3, self.k4, self.k5, self.k6
+        tilts = (engine.cosine_and_sine(math.degrees(angle)) for angle in (self.tau_x, self.tau_y))
+        prism = self.s1, self.s2, self.s3, self.s4
+        return Terms(radial, (self.p1, self.p2), prism, tuple(number for tilt in tilts for number in tilt))
+
     def _tilt(self, u: F64, v: F64) -> tuple[F64, F64]:
         """Places in a plane that is turned about x, then y, seen from the lens."""
-        cos_x, sin_x = engine.cosine_and_sine(math.degrees(self.tau_x))
-        cos_y, sin_y = engine.cosine_and_sine(math.degrees(self.tau_y))
+        cos_x, sin_x, cos_y, sin_y = self.terms.tilt
         a = cos_y * u + sin_x * sin_y * v - sin_y * cos_x
         b = cos_x * v + sin_x
         c = sin_y * u - cos_y * sin_x * v + cos_y * cos_x
@@ -203,6 +223,11 @@ class FisheyeLens:
         # On the axis, where the angle is nothing, the direction is too.
         scale = np.divide(bent, off_axis, out=np.zeros_like(bent), where=off_axis > 0)
         return points[:, :2] * scale[:, None]
+
+    @property
+    def terms(self) -> Terms:
+        """What kernels know of the lens."""
+        return Terms((self.k1, self.k2, self.k3, self.k4, 0.0, 0.0))
 
     def range_along(self, points: F64) -> F64:
         """The distance from the lens."""

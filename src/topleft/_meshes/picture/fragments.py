@@ -22,7 +22,7 @@ from topleft._core.base.memory import empty
 from topleft._core.raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
 from topleft._core.raster.peel import DepthLayers
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.picture.bend import BentMesh, weighed
+from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.shade import ShownInstance
 from topleft._meshes.scene.scene import Scene, counted_ranges, meshes_in_places, meshes_of
 
@@ -387,8 +387,9 @@ class BentFragments(Fragments):
     """
 
     def __init__(self, drawn: Fragments, bent: BentMesh, mesh: Mesh) -> None:
-        wholes = bent.wholes
-        super().__init__(wholes[drawn.triangle], drawn.depth, drawn._snapped, len(mesh.vertices), len(mesh.triangles))
+        super().__init__(
+            bent.whole_ids(drawn.triangle), drawn.depth, drawn._snapped, len(mesh.vertices), len(mesh.triangles)
+        )
         self.drawn, self.bent = drawn, bent
         self._mesh = mesh
 
@@ -397,11 +398,11 @@ class BentFragments(Fragments):
         if self._planes is None:
             samples, planes = self.drawn._sampled()
             self._samples = tuple(BentFragments(sample, self.bent, self._mesh) for sample in samples)
-            self._planes = planes and (self.bent.wholes[planes[0]], planes[1])
+            self._planes = planes and (self.bent.whole_ids(planes[0]), planes[1])
         return self._samples, self._planes
 
     def _whole(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
-        return self.bent.wholes[ids]
+        return self.bent.whole_ids(ids)
 
     def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
         return self.drawn._drawn()
@@ -422,9 +423,11 @@ class BentFragments(Fragments):
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel."""
-        if not len(self.bent.source):
+        if not len(self.bent.triangles):
             return np.zeros((*self.triangle.shape, 3), np.float32)
-        return self.drawn.interpolate(self.bent.weights)
+        if self.bent.parts is None:
+            return self.drawn.barycentric()
+        return self._interpolated(np.broadcast_to(np.eye(3, dtype=np.float32), (len(self._mesh.triangles), 3, 3)), 0.0)
 
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
         """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
@@ -433,15 +436,16 @@ class BentFragments(Fragments):
 
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
         """The attribute of checked values, by way of the parts."""
-        if not len(self.bent.source):
+        if not len(self.bent.triangles):
             channels = array.shape[-1:] if array.ndim > 1 else ()
             return np.full((*self.triangle.shape, *channels), background, np.float32)
-        out = self.drawn.interpolate(self._corners_of_parts(array), background=background)
-        return out if array.ndim > 1 else out[..., 0]
+        own = array if self.bent.parts is None else self._corners_of_parts(array)
+        out = self.drawn.interpolate(own, background=background)
+        return out if array.ndim > 1 else out.reshape(self.triangle.shape)
 
     def _derivatives(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
         """The derivatives of checked values, by way of the parts."""
-        if not len(self.bent.source):
+        if not len(self.bent.triangles):
             channels = array.shape[-1:] if array.ndim > 1 else ()
             return np.zeros((*self.triangle.shape, *channels, 2), np.float32)
         _, slopes = self.drawn.interpolate(self._corners_of_parts(array), derivatives=True)
@@ -449,8 +453,5 @@ class BentFragments(Fragments):
 
     def _corners_of_parts(self, array: NDArray[np.float32]) -> NDArray[np.float64]:
         """Checked values at the corners of the parts, (T, 3, K)."""
-        if array.ndim == 3:
-            corners = array[self.bent.source]
-        else:
-            corners = array.reshape(len(array), -1)[self._mesh.triangles[self.bent.source]]
-        return weighed(self.bent.weights, corners)
+        corners = array if array.ndim == 3 else array.reshape(len(array), -1)[self._mesh.triangles]
+        return self.bent.at_corners(corners)

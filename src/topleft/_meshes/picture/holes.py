@@ -44,7 +44,7 @@ class Cut:
         """Those with holes."""
         return np.flatnonzero(self.is_cut).astype(np.int32)
 
-    def of_parts(self, source: npt.NDArray[np.int64]) -> Cut:
+    def of_parts(self, source: I32) -> Cut:
         """The same of parts of triangles."""
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
@@ -159,8 +159,6 @@ def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, threads:
 
 def inputs_of(scene: engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
     """What the kernel reads of materials with holes."""
-    if scene.exact is not None:
-        raise ValueError("subpixel_bits must be in 0..16 where textures cut holes, got 'exact'")
     finds_inverse_w = len(mesh.vertices) > size[0] * size[1]
     surface = Surface(cut.materials, cut.rows is not None, is_unlit=True)
     inputs = ShadingInputs(

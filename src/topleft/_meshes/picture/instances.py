@@ -103,7 +103,7 @@ class PlacedScene:
 
     def whole_ids(self, ids: Ids) -> Ids:
         """Return ids in terms of the whole scene: as they are, but for a lens."""
-        if self.bent is None:
+        if self.bent is None or all(one.parts is None for one in self.bent):
             return ids
         firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
         wholes = np.concatenate([*(one.source + first for one, first in firsts), [-1]]).astype(np.int32)

@@ -50,7 +50,7 @@ def shade(
     frags : Fragments
         What `rasterize` or `rasterize_mesh` returned for the mesh or scene. With several samples a pixel a triangle is
         shaded once in a pixel, at the first of the samples that see it, and the picture is the mean of the light of the
-        samples.
+        samples, each at most white.
     mesh : Mesh, Scene or Points
         Its materials, and its colours, are used if it has any. Each instance of a scene is shaded by itself.
     camera : Camera

@@ -99,6 +99,7 @@ def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_
         own = camera.placed(instance.transform)
         bent = bend(mesh.vertices, mesh.triangles, own, camera.lens, frame, near_clip=near_clip)
         place = MIRROR if instance.is_mirrored else np.eye(4)
+        points = bent.points_eye * np.diag(MIRROR)[:3] if instance.is_mirrored else bent.points_eye
         many.append(bent)
-        instances.append(Instance(Mesh(bent.points_eye * np.diag(place)[:3], bent.triangles.astype(np.int32)), place))
+        instances.append(Instance(Mesh(points, bent.triangles), place))
     return DrawnScene(Scene(instances), scene, camera.clip_from_eye(frame), tuple(many))
