@@ -186,7 +186,7 @@ class Costs:
     def draw_ms(self, group: str, counts: NDArray[np.float64], n_threads: int, *, is_shared: bool) -> float:
         """Return the time of a draw: each thread has its rows, and sets up all triangles or a share of them."""
         ns: Numbers = getattr(self, f"draw_{group}")
-        alone = math.fsum(cost * n for cost, n in zip(ns, counts.tolist(), strict=True))
+        alone = float((np.array(ns) * counts).sum())
         if n_threads == 1:
             return alone / 1e6
         speedup = 1 + (n_threads - 1) * (self.parallel - 1)

@@ -58,7 +58,7 @@ LONGEST_CHORD, LONGEST_CHORD_OF_RANGES = 0.249, 0.0436
 cos(w/2) < 2^-12."""
 
 
-class Parts(NamedTuple):
+class SubdividedTriangles(NamedTuple):
     """The parts of triangles that are not drawn as they are.
 
     Attributes
@@ -90,13 +90,13 @@ class BentMesh:
         used, then those of parts.
     triangles : (T', 3) int32
         Rows of `points_eye`; what the lens cannot see is left out.
-    parts : Parts or None
+    parts : SubdividedTriangles or None
         None: the triangles are those of the mesh.
     """
 
     points_eye: F64
     triangles: I32
-    parts: Parts | None
+    parts: SubdividedTriangles | None
 
     __setstate__ = set_aligned
 
@@ -403,5 +403,5 @@ def _joined(bent: F64, triangles: I32, kept: I32, split: _Split) -> BentMesh:
     order = np.argsort(source, kind="stable")
     rows = np.flatnonzero(order >= len(kept))
     own = np.concatenate([triangles[kept], split.triangles])[order]
-    parts = Parts(source[order], rows, split.weights, split.is_outline)
+    parts = SubdividedTriangles(source[order], rows, split.weights, split.is_outline)
     return BentMesh(np.concatenate([bent, split.points]), own, parts)
