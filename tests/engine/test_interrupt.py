@@ -65,8 +65,8 @@ DRAWS = {
     "labels of polygons": lambda n: tl.polygons(
         (chords(1_000_000), np.arange(0, 1_000_001, 100), np.arange(10_001)), SIZE, values="index", threads=n
     ),
-    "area of a polygon": lambda n: tl.polygons(crossing_star(100_000), SIZE, sampling="area", threads=n),
-    "table of a polygon": lambda n: tl.overlap([[crossing_star(100_000)]] * 2, SIZE, threads=n),
+    "area of a polygon": lambda n: tl.polygons(crossing_star(400_000), SIZE, sampling="area", threads=n),
+    "table of a polygon": lambda n: tl.overlap([[crossing_star(400_000)]] * 2, SIZE, threads=n),
     "crossings in a pixel": lambda n: tl.polygons(chords(12_000) / 2000, 1, sampling="area", threads=n),
     "polygons": lambda n: tl.polygons(POLYGONS, SIZE, values="index", threads=n),
     "polygons by area": lambda n: tl.polygons(POLYGONS, SIZE, sampling="area", threads=n),
