@@ -202,10 +202,22 @@ def test_load_scaled_node_normals_stay_at_right_angles(write):
     assert edges @ mesh.vertex_normals()[0] == pytest.approx([0, 0], abs=1e-6)
 
 
+LFS = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
+
+
+def test_texture_that_is_a_pointer_of_git_lfs_is_told(write, tmp_path):
+    write("a.mtl", "newmtl one\nmap_Kd t.png\n")
+    write("t.png", LFS)
+    with pytest.warns(tl.MeshWarning, match="textures that are Git LFS pointers .git lfs pull.*t.png"):
+        mesh = files.load(write("a.obj", "mtllib a.mtl\nusemtl one\n" + SQUARE + "f 1 2 3\n"))
+    assert len(mesh.triangles) == 1
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
         ("a.obj", "", "'.*a.obj' has no triangles"),
+        *((f"a.{kind}", LFS, f"a.{kind}' is a Git LFS pointer.*git lfs pull") for kind in ("obj", "glb", "ply", "stl")),
         ("a.obj", "what is this\n", "has no triangles"),
         ("a.obj", SQUARE + "f 1 2 9\n", "cannot read '.*a.obj': broken, or not a '.obj' file"),
         ("a.obj", SQUARE + "f 1 two 3\n", "cannot read '.*a.obj': broken"),

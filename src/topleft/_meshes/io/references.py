@@ -33,6 +33,14 @@ PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "GIF", "TIFF", "PPM", "D
 """Formats of Pillow that are data and nothing else: EPS, say, would run a program."""
 
 
+LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+"""How a file begins that stands for one which has not been fetched."""
+
+
+class LfsPointerError(MeshError):
+    """A file stands for one that has not been fetched."""
+
+
 class Cloud(NamedTuple):
     """Points of a file that belong to no triangle."""
 
@@ -98,12 +106,17 @@ class InputFile:
             return self._read(path)
         except OSError:
             self.notes.add(f"{what} that cannot be read", name)
-            return None
+        except LfsPointerError:
+            self.notes.add(f"{what} that are Git LFS pointers (git lfs pull)", name)
+        return None
 
     def _read(self, path: Path) -> bytes:
         if not self._is_unpacked:
             self.budget.read(path.stat().st_size)
-        return path.read_bytes()
+        content = path.read_bytes()
+        if content.startswith(LFS_POINTER):
+            raise LfsPointerError(f"{str(path)!r} is a Git LFS pointer, not the file itself: run git lfs pull")
+        return content
 
     def find(self, name: str, what: str, folder: Path | None = None) -> Path | None:
         """Where such a file is: in the folder of the mesh, or below.
