@@ -216,9 +216,13 @@ class SceneFragments(InstanceIds, Fragments):
     @cached_property
     def _snapped_instances(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
         ids, first_ids = self.drawn_planes[0], self.placed.first_ids
-        boxes = np.tile(np.array([*ids.shape[:0:-1], 0, 0], np.int32), (len(first_ids) - 1, 1))
-        for plane in ids:
-            find_instances(np.ascontiguousarray(as_aligned(plane)), first_ids, boxes)
+        width, height = ids.shape[:0:-1]
+        if len(first_ids) == 2:  # there is one, wherever it shows
+            boxes = np.array([[0, 0, width, height]], np.int32)
+        else:
+            boxes = np.tile(np.array([width, height, 0, 0], np.int32), (len(first_ids) - 1, 1))
+            for plane in ids:
+                find_instances(np.ascontiguousarray(as_aligned(plane)), first_ids, boxes)
         found = []
         for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
             left, top, right, bottom = boxes[i].tolist()
