@@ -20,7 +20,7 @@ from topleft.errors import MeshError
 
 
 @dataclass(frozen=True)
-class RingSet:
+class ObjectRings:
     """Polygons of one object."""
 
     points: npt.NDArray[np.float64]  # (N, 2)
@@ -35,11 +35,11 @@ class PolygonPicture:
     name: str
     size: tuple[int, int] | None  # pixels; None: the polygons are on a plane, y up
     folder: str = ""  # of the image, as the file has it
-    parts: list[RingSet] = field(default_factory=list)  # of each object
+    parts: list[ObjectRings] = field(default_factory=list)  # of each object
     objects: list[Mapping[str, Any]] = field(default_factory=list)  # what is said of each
     n_skipped: int = 0  # objects that are no polygons
 
-    def add(self, parts: RingSet, said: Mapping[str, Any]) -> None:
+    def add(self, parts: ObjectRings, said: Mapping[str, Any]) -> None:
         """Add an object of several polygons."""
         self.parts.append(parts)
         self.objects.append(said)
@@ -115,7 +115,7 @@ def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPictur
     return pictures
 
 
-def _coco_parts(segmentation: Any, size: tuple[int, int], name: object) -> RingSet | None:
+def _coco_parts(segmentation: Any, size: tuple[int, int], name: object) -> ObjectRings | None:
     """Return the polygons of a segmentation: flat rings, or run lengths; None of what is neither."""
     if isinstance(segmentation, list):
         return _joined([[_pairs(flat)] for flat in segmentation], f"annotation {name}")
@@ -161,7 +161,7 @@ def _read_counts(text: str, name: object) -> npt.NDArray[np.int64]:
     return np.array(lengths, np.int64)
 
 
-def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> RingSet:
+def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> ObjectRings:
     """Return the pixels of run lengths as rectangles, a polygon each.
 
     Runs go down columns, the first of pixels outside; neighbours of the same rows become one rectangle.
@@ -183,21 +183,21 @@ def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> RingSet:
     right = right[np.append(is_new[1:], np.ones(min(1, len(left)), np.bool_))]
     left, y0, y1 = left[is_new], y0[is_new], y1[is_new]
     corners = np.stack([left, y0, right, y0, right, y1, left, y1], axis=1).reshape(-1, 2)
-    return RingSet(corners.astype(np.float64), np.full(len(left), 4), np.ones(len(left), np.int64))
+    return ObjectRings(corners.astype(np.float64), np.full(len(left), 4), np.ones(len(left), np.int64))
 
 
 def _pairs(flat: list[float]) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in zip(flat[::2], flat[1::2], strict=True)]
 
 
-def _joined(polygons: list[list[list[tuple[float, float]]]], what: str) -> RingSet:
+def _joined(polygons: list[list[list[tuple[float, float]]]], what: str) -> ObjectRings:
     """Return polygons, of each its rings."""
     rings = list(chain.from_iterable(polygons))
     points = np.array(list(chain.from_iterable(rings)), np.float64).reshape(-1, 2)
     if not np.isfinite(points).all():
         raise ContentError(f"{what} has a coordinate of {points[~np.isfinite(points)][0]}")
     lengths, counts = (np.array([len(one) for one in of], np.int64) for of in (rings, polygons))
-    return RingSet(points, lengths, counts)
+    return ObjectRings(points, lengths, counts)
 
 
 def _geojson(content: Mapping[str, Any], name: str) -> PolygonPicture:
