@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core import engine
 from topleft._core.base.array_types import F32, U8
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.fragments import SeenSamples
 from topleft._core.raster.peel import peel_meshes
 from topleft._core.raster.rasterize import refuse_many
-from topleft._core.raster.snap import Snapped
 from topleft._core.raster.view import View
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import AlphaMode, Material
@@ -119,7 +119,7 @@ class Glass:
         return self.whole.of(collapsed(self.whole.scene, inverse, keeps_others=False))
 
     @cached_property
-    def snapped(self) -> list[Snapped]:
+    def snapped(self) -> list[engine.SnappedMesh]:
         """The same, ready to be peeled."""
         return [self.blended.snap(i) for i, mask in enumerate(self.masks) if mask is not None]
 
@@ -131,7 +131,7 @@ class Glass:
         shown = []
         for i, one in zip(some, self.snapped, strict=True):
             mesh = self.scene[i].mesh if bent is None else bent[i].mesh_of(self.scene[i].mesh)
-            shown.append(ShownInstance(one.mesh, mesh, int(first_ids[i]), self.scene[i].transform))
+            shown.append(ShownInstance(one, mesh, int(first_ids[i]), self.scene[i].transform))
         return Lit(shown, self.camera, self.view.size, self.options)
 
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:
