@@ -1,5 +1,7 @@
 """Instances are projected together: the picture of a scene is that of its meshes, each drawn alone by arrays."""
 
+from dataclasses import replace
+
 import numpy as np
 import picture_cases as cases
 import pytest
@@ -60,3 +62,47 @@ def test_scene_is_drawn_as_its_instances_alone(isa, seed):
         frags = tl.rasterize_mesh(scene, camera, cases.SIZE, cull=cull, **options)
     assert_same(np.asarray(frags.samples_id), ids)
     assert_same(np.asarray(frags.samples_depth), depth)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_material_of_an_instance_is_as_good_as_one_of_its_mesh(seed):
+    """Whatever it does: colours, textures, holes, glass, backs that are culled, in each sampling."""
+    rng = np.random.default_rng(seed)
+    meshes, camera = [cases.random_mesh(rng) for _ in range(2)], cases.random_camera(rng)
+    materials = [cases.random_material(rng), tl.Material("orange"), None]
+    given, baked = [], []
+    for _ in range(5):
+        mesh, material, place = meshes[rng.integers(2)], materials[rng.integers(3)], np.eye(4)
+        place[:3, :3] *= rng.uniform(0.2, 0.6, 3) * rng.choice([-1, 1], 3)
+        place[:3, 3] = rng.uniform(-0.8, 0.8, 3)
+        own = mesh if material is None else replace(mesh, materials=(material,), material_of_triangle=None)
+        given.append(tl.Instance(mesh, place, material=material))
+        baked.append(tl.Instance(own, place))
+    options = cases.random_look(rng) | cases.random_view(rng)
+    expected = tl.render(tl.Scene(baked), camera, cases.SIZE, **options)
+    assert_same(tl.render(tl.Scene(given), camera, cases.SIZE, **options), expected)
+    layers = tl.render_transparent(tl.Scene(baked), camera, cases.SIZE) if camera.lens is None else None
+    if layers is not None:
+        assert_same(tl.render_transparent(tl.Scene(given), camera, cases.SIZE), layers)
+
+
+def test_color_of_an_instance_is_short_for_a_material():
+    cube, aside = tl.Mesh(*tl.scenes.cube()), np.eye(4)
+    aside[0, 3] = 3
+    scene = tl.Scene([tl.Instance(cube, color="red"), tl.Instance(cube, aside, color=(0, 128, 0)), tl.Instance(cube)])
+    assert [one.material and one.material.color for one in scene] == [(255, 0, 0), (0, 128, 0), None]
+    picture = tl.render(scene, tl.Camera.framing(scene), (64, 32), shading="unlit")
+    assert {tuple(color) for color in picture.reshape(-1, 4)[:, :3].tolist()} >= {(255, 0, 0), (0, 128, 0)}
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"color": "red", "material": tl.Material()}, ValueError, "a colour or a material, got both"),
+        ({"material": "red"}, TypeError, "material must be a Material or None, got 'red'"),
+        ({"color": "rde"}, ValueError, "color"),
+    ],
+)
+def test_look_of_an_instance_that_is_none_is_refused(options, error, words):
+    with pytest.raises(error, match=words):
+        tl.Instance(tl.Mesh(*tl.scenes.cube()), **options)

@@ -35,7 +35,7 @@ from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place
 from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
+from topleft._meshes.scene.scene import Scene, collapsed, meshes_in_places, scene_of
 
 Mask = npt.NDArray[np.bool_]
 
@@ -75,7 +75,7 @@ def blended_masks(subject: Mesh | Scene, options: ShadingOptions) -> list[Mask |
     """The blended triangles of each instance; None where there are none, or a picture does not tell them apart."""
     if options.mode not in BLENDING:
         return None
-    masks = [blended_triangles(mesh, options.material) for mesh in meshes_of(subject)]
+    masks = [blended_triangles(one.mesh, one.material) for one in meshes_in_places(subject, options.material)]
     return None if all(mask is None for mask in masks) else masks
 
 
@@ -131,7 +131,8 @@ class Glass:
         shown = []
         for i, one in zip(some, self.snapped, strict=True):
             mesh = self.scene[i].mesh if bent is None else bent[i].mesh_of(self.scene[i].mesh)
-            shown.append(ShownInstance(one, mesh, int(first_ids[i]), self.scene[i].transform))
+            own = self.scene[i]
+            shown.append(ShownInstance(one, mesh, int(first_ids[i]), own.transform, own.material))
         return Lit(shown, self.camera, self.view.size, self.options)
 
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:

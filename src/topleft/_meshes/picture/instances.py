@@ -164,8 +164,8 @@ class PlacedScene:
         is_mirrored = np.array([one.is_mirrored for one in self.scene.instances], np.bool_)
         culls = np.where(is_mirrored, MIRRORED[self._view.cull], self._view.cull).astype(np.int32)
         is_mixed = np.zeros(len(culls), np.bool_)
-        for mesh, at in self.whole.meshes.values() if self._view.sides_by_material else ():
-            is_single = mesh.single_sided(self._material)
+        for mesh, material, at in self.whole.looks(self._material) if self._view.sides_by_material else ():
+            is_single = mesh.single_sided(material)
             if is_single is None:
                 continue
             is_mixed[at] = not is_single.all()
@@ -195,7 +195,8 @@ class PlacedScene:
         own = replace(self._view, transform=self._clip_from_objects[i], cull=int(culls[i]))
         if not is_mixed[i]:
             return own
-        is_single = self.whole[i].mesh.single_sided(self._material)
+        whole = self.whole[i]
+        is_single = whole.mesh.single_sided(whole.material if self._material is None else self._material)
         is_single = is_single if is_single is None or self.bent is None else is_single[self.bent[i].source]
         return own.without_backs(is_single, is_mirrored=self.scene[i].is_mirrored)
 
