@@ -47,6 +47,7 @@
 #include "shade/alpha_test.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
+#include "grid/voxels.c"
 #include "tiles/corners.c"
 #include "tiles/merge.c"
 #include "tiles/spans.c"
@@ -146,4 +147,9 @@ const tl_kernels TL_KERNELS = {
     .take_corners = take_corners,
     .merge_fragments = merge_fragments,
     .name_triangles = name_triangles,
+    .fill_columns = fill_columns,
+    .expand_columns = expand_columns,
+    .count_columns = count_columns,
+    .scatter_columns = scatter_columns,
+    .touch_voxels = touch_voxels,
 };

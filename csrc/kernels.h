@@ -378,6 +378,19 @@ typedef struct tl_kernels {
 
     /* Ids [first, end) become names[1 + id]. */
     void (*name_triangles)(int32_t *ids, int64_t first, int64_t end, const int32_t *names);
+
+    /* Columns of tl_crossings: filled by the even-odd rule in place, where the number of odd ones is returned; a byte or
+     * a share of each voxel, n_steps a column; each bit at strides of a row, a column and a step. */
+    int64_t (*fill_columns)(uint64_t *bits, int64_t n_columns, int64_t n_words);
+    void (*expand_columns)(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out);
+    void (*count_columns)(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, int sample_bits,
+                          float *out);
+    void (*scatter_columns)(const uint64_t *bits, int64_t n_rows, int64_t n_columns, int64_t n_words,
+                            const int64_t *strides, uint8_t *out);
+
+    /* Writes 1 for the voxels of a grid of a shape that triangles [first, end) meet, whose points are in voxels. */
+    void (*touch_voxels)(const double *points, const int32_t *triangles, int64_t first, int64_t end,
+                         const int64_t *shape, uint8_t *out);
 } tl_kernels;
 
 #endif

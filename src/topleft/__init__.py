@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from topleft._apps.explore.open import Explorer, explore
     from topleft._apps.tiles.merge import merge
     from topleft._apps.tiles.tiles import Tiles, Window, tiles
+    from topleft._meshes.grid.voxels import Voxels, voxelize
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
 
@@ -60,6 +61,7 @@ _LATE = {
     "Job": "topleft._apps.batch.jobs",
     "Tiles": "topleft._apps.tiles.tiles",
     "ViewLayers": "topleft._meshes.picture.view_layers",
+    "Voxels": "topleft._meshes.grid.voxels",
     "Window": "topleft._apps.tiles.tiles",
     "explore": "topleft._apps.explore.open",
     "merge": "topleft._apps.tiles.merge",
@@ -69,6 +71,7 @@ _LATE = {
     "render_transparent": "topleft._meshes.picture.transparent",
     "tiles": "topleft._apps.tiles.tiles",
     "visible_layers": "topleft._meshes.picture.transparent",
+    "voxelize": "topleft._meshes.grid.voxels",
 }
 
 __version__: str = build_info()["version"]
@@ -108,6 +111,7 @@ __all__ = [
     "Tiles",
     "TopleftError",
     "ViewLayers",
+    "Voxels",
     "Window",
     "__version__",
     "as_mesh",
@@ -146,6 +150,7 @@ __all__ = [
     "turntable",
     "viewpoints",
     "visible_layers",
+    "voxelize",
     "wireframe",
 ]
 

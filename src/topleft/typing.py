@@ -38,6 +38,7 @@ __all__ = [
     "SurfaceOption",
     "TiffCompressionOption",
     "UpOption",
+    "VoxelRuleOption",
     "WindingOption",
     "WrapOption",
     "YOption",
@@ -82,6 +83,7 @@ ResolveOption: TypeAlias = Literal["values", "linear"]
 RuleOption: TypeAlias = Literal["evenodd", "nonzero"]
 SamplesOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16"]
 SamplingOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner"]
+VoxelRuleOption: TypeAlias = Literal["center", "touched"]
 WindingOption: TypeAlias = Literal["either", "clockwise", "counter-clockwise"]
 
 # Grids and cameras
