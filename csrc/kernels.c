@@ -47,6 +47,7 @@
 #include "shade/alpha_test.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
+#include "grid/atlas.c"
 #include "grid/voxels.c"
 #include "tiles/corners.c"
 #include "tiles/merge.c"
@@ -147,6 +148,12 @@ const tl_kernels TL_KERNELS = {
     .take_corners = take_corners,
     .merge_fragments = merge_fragments,
     .name_triangles = name_triangles,
+    .touch_texels = touch_texels,
+    .average_texels = average_texels,
+    .find_in_rows = find_in_rows,
+    .find_gutter = find_gutter,
+    .copy_texels = copy_texels,
+    .add_taken = add_taken,
     .fill_columns = fill_columns,
     .expand_columns = expand_columns,
     .count_columns = count_columns,

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "atlas.h"
 #include "faces.h"
 #include "lens.h"
 #include "nearest.h"

@@ -51,18 +51,21 @@ if TYPE_CHECKING:
     from topleft._apps.explore.open import Explorer, explore
     from topleft._apps.tiles.merge import merge
     from topleft._apps.tiles.tiles import Tiles, Window, tiles
+    from topleft._meshes.grid.bake import Baked, bake
     from topleft._meshes.grid.voxels import Voxels, voxelize
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
+    "Baked": "topleft._meshes.grid.bake",
     "Explorer": "topleft._apps.explore.open",
     "Job": "topleft._apps.batch.jobs",
     "Tiles": "topleft._apps.tiles.tiles",
     "ViewLayers": "topleft._meshes.picture.view_layers",
     "Voxels": "topleft._meshes.grid.voxels",
     "Window": "topleft._apps.tiles.tiles",
+    "bake": "topleft._meshes.grid.bake",
     "explore": "topleft._apps.explore.open",
     "merge": "topleft._apps.tiles.merge",
     "pixel_grid": "topleft._apps.diagram.pixel_grid",
@@ -77,6 +80,7 @@ _LATE = {
 __version__: str = build_info()["version"]
 
 __all__ = [
+    "Baked",
     "Camera",
     "DepthLayers",
     "Detail",
@@ -115,6 +119,7 @@ __all__ = [
     "Window",
     "__version__",
     "as_mesh",
+    "bake",
     "bresenham_line",
     "build_info",
     "choose_detail",

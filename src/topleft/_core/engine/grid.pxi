@@ -1,4 +1,4 @@
-# Meshes onto voxels: columns of crossings, bytes and shares, the voxels that triangles meet.
+# Meshes onto voxels (columns of crossings, bytes and shares, the voxels that triangles meet) and onto texels.
 
 
 def column_words(int64_t n_steps) -> int:
@@ -77,3 +77,75 @@ def touch_voxels(const double[:, ::1] points, const int32_t[:, ::1] triangles, i
     if end > first:
         with nogil:
             K.touch_voxels(&points[0, 0], &triangles[0, 0], first, end, shape, &out[0, 0, 0])
+
+
+cdef class Atlas:
+    """Triangles in texels, and values of their corners: `tl_atlas`. The arrays have been checked."""
+
+    cdef tl_atlas atlas
+    cdef object arrays
+    cdef int64_t height
+
+    def __init__(self, const double[:, ::1] points, const int32_t[:, ::1] triangles, size: tuple[int, int],
+                 const float[:, ::1] values, bint per_corner):
+        """`points` (V, 2), at least one triangle; `values` (V, K), or (3 T, K) per corner."""
+        self.arrays = (points, triangles, values)
+        self.atlas.points, self.atlas.triangles, self.atlas.n_triangles = &points[0, 0], &triangles[0, 0], triangles.shape[0]
+        self.atlas.width, self.height = size
+        self.atlas.values, self.atlas.n_values, self.atlas.per_corner = &values[0, 0], values.shape[1], per_corner
+
+    def touch(self, int64_t first, int64_t end, int32_t[:, ::1] ids, float[:, ::1] squared, float[:, :, ::1] out):
+        """Give texels of rows [first, end) without an id those of triangles that meet them; `squared` is INFINITY."""
+        if end > first:
+            with nogil:
+                K.touch_texels(&self.atlas, first, end, &ids[0, 0], &squared[first, 0], &out[0, 0, 0])
+
+    def average(self, int64_t first, int64_t end, double[:, :, ::1] sums, float[:, ::1] most, int32_t[:, ::1] ids,
+                float[:, :, ::1] out):
+        """Write means over rows [first, end); `sums` (H, W, 1 + K) and `most` (H, W) are 0."""
+        if end > first:
+            with nogil:
+                K.average_texels(&self.atlas, first, end, &sums[first, 0, 0], &most[first, 0], &ids[0, 0], &out[0, 0, 0])
+
+
+def find_in_rows(const int32_t[:, ::1] ids, int64_t first, int64_t end, int reach, int16_t[:, ::1] along):
+    """Write the distance along rows [first, end) to the nearest texel with an id."""
+    if end > first and ids.shape[1]:
+        with nogil:
+            K.find_in_rows(&ids[0, 0], ids.shape[1], first, end, reach, &along[0, 0])
+
+
+def find_gutter(const int16_t[:, ::1] along, int64_t first, int64_t end, int reach, int32_t[:, ::1] from_texel):
+    """Write the index of the nearest texel with an id for rows [first, end), -1 where none is within reach."""
+    cdef int32_t[::1] room = np.empty(max(1, 2 * along.shape[1]), np.int32)
+    if end > first and along.shape[1]:
+        with nogil:
+            K.find_gutter(&along[0, 0], along.shape[1], along.shape[0], first, end, reach, &room[0], &from_texel[0, 0])
+
+
+def copy_texels(const int32_t[:, ::1] from_texel, int64_t first, int64_t end, texels: Array):
+    """Copy texels of rows [first, end) from where the nearest with an id are."""
+    cdef uint8_t[::1] raw = as_bytes(texels)
+    cdef int64_t n = from_texel.shape[0] * from_texel.shape[1], width = from_texel.shape[1]
+    if end > first and n and raw.shape[0]:
+        with nogil:
+            K.copy_texels(&from_texel[0, 0], first * width, end * width, raw.shape[0] // n, &raw[0])
+
+
+def add_taken(const int32_t[:, ::1] seen, const float[:, ::1] depth, const float[:, :, ::1] light,
+              const double[:, ::1] clip_from_object, const double[::1] eye, bint keeps_best,
+              const float[:, ::1] positions, const float[:, ::1] normals, const int32_t[::1] ids, int64_t first,
+              int64_t end, float[:, ::1] sums, float[::1] weights):
+    """Add what a picture shows of texels [first, end) to their sums and weights: `tl_taken`."""
+    cdef tl_taken taken
+    cdef int k
+    taken.height, taken.width, taken.n_channels = light.shape[0], light.shape[1], light.shape[2]
+    if end <= first or not (taken.height and taken.width):
+        return
+    taken.ids, taken.depth, taken.light, taken.keeps_best = &seen[0, 0], &depth[0, 0], &light[0, 0, 0], keeps_best
+    for k in range(16):
+        taken.clip_from_object[k] = clip_from_object[k // 4, k % 4]
+    for k in range(4):
+        taken.eye[k] = eye[k]
+    with nogil:
+        K.add_taken(&taken, &positions[0, 0], &normals[0, 0], &ids[0], first, end, &sums[0, 0], &weights[0])

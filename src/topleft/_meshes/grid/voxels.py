@@ -11,7 +11,7 @@ from __future__ import annotations
 import operator
 import warnings
 from dataclasses import dataclass
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -234,7 +234,7 @@ def grid_of(box: F64, shape: object, pitch: object, samples: int) -> VoxelGrid:
         side = float(extent.max()) / as_count("shape", shape) or 1.0
         counts = counts_of(extent, side)
     else:
-        numbers = tuple(map(operator.index, shape))  # type: ignore[arg-type,call-overload]
+        numbers = tuple(operator.index(n) for n in cast(Any, shape))
         if len(numbers) != 3 or min(numbers) < 1:
             raise ValueError(f"shape must be a number or three of at least 1, got {shape!r}")
         side = float((extent / numbers).max()) or 1.0
