@@ -1,4 +1,4 @@
-/* The contract of csrc/grid/atlas.c: a mesh on the texels of its texture coordinates. */
+/* The contract of csrc/grid: a mesh on the texels of its texture coordinates, and what is seen of a height grid. */
 #ifndef TL_ATLAS_H
 #define TL_ATLAS_H
 
@@ -27,5 +27,16 @@ typedef struct {
     double clip_from_object[16];
     double eye[4]; /* homogeneous: a place, or with 0 the direction to it */
 } tl_taken;
+
+/* A height grid and who looks over it. */
+typedef struct {
+    const double *heights; /* (height, width), NaN where there is none */
+    int64_t width;
+    double eye[3];         /* column, row and height; at the middles of cells columns and rows are whole; in the grid */
+    const double *ways[2]; /* 1 / (k - eye) of each column, and of each row; of none where that is 0 */
+    double cell[2];        /* width and height of a cell */
+    double curvature;      /* how far the ground falls, a unit of squared distance */
+    double most_squared;   /* distance of the farthest cells */
+} tl_terrain;
 
 #endif

@@ -48,6 +48,7 @@
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 #include "grid/atlas.c"
+#include "grid/viewshed.c"
 #include "grid/voxels.c"
 #include "tiles/corners.c"
 #include "tiles/merge.c"
@@ -154,6 +155,7 @@ const tl_kernels TL_KERNELS = {
     .find_gutter = find_gutter,
     .copy_texels = copy_texels,
     .add_taken = add_taken,
+    .view_heights = view_heights,
     .fill_columns = fill_columns,
     .expand_columns = expand_columns,
     .count_columns = count_columns,

@@ -398,6 +398,9 @@ typedef struct tl_kernels {
     void (*add_taken)(const tl_taken *taken, const float *positions, const float *normals, const int32_t *ids,
                       int64_t first, int64_t end, float *sums, float *weights);
 
+    /* Rows [first, end) of how high above the ground something is seen; NaN where there is no ground, or too far. */
+    void (*view_heights)(const tl_terrain *terrain, int64_t first, int64_t end, double *out);
+
     /* Columns of tl_crossings: filled by the even-odd rule in place, where the number of odd ones is returned; a byte or
      * a share of each voxel, n_steps a column; each bit at strides of a row, a column and a step. */
     int64_t (*fill_columns)(uint64_t *bits, int64_t n_columns, int64_t n_words);
