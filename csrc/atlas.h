@@ -7,7 +7,7 @@
 typedef struct {
     const double *points;     /* (V, 2): in texels, y down */
     const int32_t *triangles; /* (T, 3), checked */
-    int64_t n_triangles;
+    int64_t n_points, n_triangles;
     int64_t width;
     const float *values; /* (V, n_values), or per corner (T, 3, n_values) */
     int n_values, per_corner;

@@ -12,6 +12,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/corners.h"
 
 #define TL_MOST_PART 7 /* corners of what four lines leave of a triangle */
 
@@ -108,14 +109,15 @@ static double nearest_in(const double (*c)[2], double doubled, double x, double 
 static double take_triangle(const tl_atlas *a, int64_t i, double (*c)[2])
 {
     for (int k = 0; k < 3; k++)
-        memcpy(c[k], a->points + 2 * (int64_t)a->triangles[3 * i + k], sizeof c[k]);
+        memcpy(c[k], a->points + 2 * (int64_t)corner_within(a->triangles[3 * i + k], a->n_points), sizeof c[k]);
     return (c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[1][1] - c[0][1]) * (c[2][0] - c[0][0]);
 }
 
 static const float *corner_values(const tl_atlas *a, int64_t triangle, int corner)
 {
-    return a->values +
-           a->n_values * (a->per_corner ? 3 * triangle + corner : (int64_t)a->triangles[3 * triangle + corner]);
+    return a->values + a->n_values * (a->per_corner
+                                          ? 3 * triangle + corner
+                                          : (int64_t)corner_within(a->triangles[3 * triangle + corner], a->n_points));
 }
 
 /* Rows [first, end): where an id is -1, that of the nearest of the triangles that meet the texel, the first of several,
@@ -246,8 +248,8 @@ static void copy_texels(const int32_t *from, int64_t first, int64_t end, int64_t
             memcpy(texels + i * n_bytes, texels + from[i] * n_bytes, (size_t)n_bytes);
 }
 
-/* Whether a picture shows a point, which lies at (x, y) of it: the id of the texel, or no nearer depth, at one of the four
- * pixels whose middles are next to it. */
+/* Whether a picture shows a point, which lies at (x, y) of it: the id of the texel, or no nearer depth, at one of the
+ * four pixels whose middles are next to it. */
 static int is_seen(const tl_taken *t, double x, double y, double z, int32_t id)
 {
     const int64_t left = (int64_t)floor(x - 0.5), top = (int64_t)floor(y - 0.5);
@@ -280,8 +282,8 @@ static void take_light(const tl_taken *t, double x, double y, float *light)
         light[c] = (float)(sums[c] / total); /* one shows it: see is_seen */
 }
 
-/* Adds what a picture shows of texels [first, end) to their sums (n_channels of them) and weights: light times the squared
- * cosine at which it is seen; or keeps the light that is seen best. */
+/* Adds what a picture shows of texels [first, end) to their sums (n_channels of them) and weights: light times the
+ * squared cosine at which it is seen; or keeps the light that is seen best. */
 static void add_taken(const tl_taken *t, const float *positions, const float *normals, const int32_t *ids,
                       int64_t first, int64_t end, float *sums, float *weights)
 {

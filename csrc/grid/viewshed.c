@@ -4,8 +4,8 @@
  * The line to each cell is followed by itself, over every line between the middles of neighbours, along rows and along
  * columns, where the height is between theirs.
  *
- * Based on: W. R. Franklin, C. K. Ray, Higher Isn't Necessarily Better: Visibility Algorithms and Experiments, 1994 (R3,
- * along both axes). */
+ * Based on: W. R. Franklin, C. K. Ray, Higher Isn't Necessarily Better: Visibility Algorithms and Experiments, 1994
+ * (R3, along both axes). */
 #ifndef TL_VIEWSHED_C
 #define TL_VIEWSHED_C
 
@@ -15,8 +15,9 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* The steepest way up from the eye over the lines across one axis: (height - eye) / t, t from 0 at the eye to 1.  Heights
- * lie `stride` apart along the axis and `other` across; a NaN hides nothing.  `ways`: 1 / (k - from) for each line k. */
+/* The steepest way up from the eye over the lines across one axis: (height - eye) / t, t from 0 at the eye to 1.
+ * Heights lie `stride` apart along the axis and `other` across; a NaN hides nothing.  `ways`: 1 / (k - from) for each
+ * line k. */
 static double steepest(const tl_terrain *t, const double *ways, double from, double to, double from_other,
                        double to_other, int64_t stride, int64_t other, double fall, double most)
 {

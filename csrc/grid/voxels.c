@@ -1,9 +1,9 @@
 /* Voxels: columns of crossings to what lies inside, and the voxels that triangles meet.
- * In: bits that TL_SINK_PEEL has noted of a mesh seen along its columns, or points in voxels.  Out: a byte or a share of
- * each voxel, the steps of a column side by side.
+ * In: bits that TL_SINK_PEEL has noted of a mesh seen along its columns, or points in voxels.  Out: a byte or a share
+ * of each voxel, the steps of a column side by side.
  *
- * Based on: M. Schwarz, H.-P. Seidel, Fast Parallel Surface and Solid Voxelization on GPUs, 2010 (parity by flipped bits;
- * a triangle meets a cube if their projections meet and the cube meets the plane). */
+ * Based on: M. Schwarz, H.-P. Seidel, Fast Parallel Surface and Solid Voxelization on GPUs, 2010 (parity by flipped
+ * bits; a triangle meets a cube if their projections meet and the cube meets the plane). */
 #ifndef TL_VOXELS_C
 #define TL_VOXELS_C
 
@@ -14,6 +14,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "polygons/row_bits.c"
+#include "vertex/corners.h"
 
 /* Fills columns between their crossings by the even-odd rule, in place; returns how many have an odd number.  The last
  * crossing of such a column is left out. */
@@ -181,7 +182,7 @@ static void touch_triangle(const voxel_test *t, const int64_t *strides, uint8_t 
 }
 
 /* Writes 1 for the voxels of a grid, of sides of 1 from the origin on, that triangles [first, end) meet. */
-static void touch_voxels(const double *points, const int32_t *triangles, int64_t first, int64_t end,
+static void touch_voxels(const double *points, int64_t n_points, const int32_t *triangles, int64_t first, int64_t end,
                          const int64_t *shape, uint8_t *out)
 {
     const int64_t strides[3] = {shape[1] * shape[2], shape[2], 1};
@@ -189,7 +190,7 @@ static void touch_voxels(const double *points, const int32_t *triangles, int64_t
         double v[3][3];
         voxel_test t;
         for (int k = 0; k < 3; k++)
-            memcpy(v[k], points + 3 * (int64_t)triangles[3 * i + k], sizeof v[k]);
+            memcpy(v[k], points + 3 * (int64_t)corner_within(triangles[3 * i + k], n_points), sizeof v[k]);
         if (set_voxel_test(&t, (const double (*)[3])v, shape))
             touch_triangle(&t, strides, out);
     }

@@ -1,5 +1,6 @@
 /* Peel: the nearest layers of every pixel, in one pass; or bits of columns that cross the surface.
- * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id; or bits.
+ * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id, or
+ * bits.
  *
  * Depth peeling draws the mesh once a layer, each time what lies behind the layer before.  Here a sample goes through
  * the planes from the first to the last: where it comes before what is there it takes the place, and what was there

@@ -76,7 +76,7 @@ def touch_voxels(const double[:, ::1] points, const int32_t[:, ::1] triangles, i
     shape[0], shape[1], shape[2] = out.shape[0], out.shape[1], out.shape[2]
     if end > first:
         with nogil:
-            K.touch_voxels(&points[0, 0], &triangles[0, 0], first, end, shape, &out[0, 0, 0])
+            K.touch_voxels(&points[0, 0], points.shape[0], &triangles[0, 0], first, end, shape, &out[0, 0, 0])
 
 
 cdef class Atlas:
@@ -92,6 +92,7 @@ cdef class Atlas:
         self.arrays = (points, triangles, values)
         self.atlas.points, self.atlas.triangles, self.atlas.n_triangles = &points[0, 0], &triangles[0, 0], triangles.shape[0]
         self.atlas.width, self.height = size
+        self.atlas.n_points = points.shape[0]
         self.atlas.values, self.atlas.n_values, self.atlas.per_corner = &values[0, 0], values.shape[1], per_corner
 
     def touch(self, int64_t first, int64_t end, int32_t[:, ::1] ids, float[:, ::1] squared, float[:, :, ::1] out):
