@@ -58,7 +58,9 @@ TAKEN = {
 }  # fmt: skip
 
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))
-SQUARE = tl.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]], colors=[[1, 2, 3]] * 3, uv=[[0, 0], [1, 0], [1, 1]])
+SQUARE = tl.Mesh(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]], colors=np.ones((3, 3), np.uint8), uv=[[0, 0], [1, 0], [1, 1]]
+)
 FLAT = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]], [[0, 1, 2]]
 
 #: Options whose check reads the type: a call of each.
