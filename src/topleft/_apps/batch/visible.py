@@ -16,7 +16,7 @@ import numpy.typing as npt
 from topleft._apps.batch.batch import render_batch
 from topleft._apps.batch.jobs import Job
 from topleft._core.base.array_types import I32
-from topleft._core.base.arrays import as_count
+from topleft._core.base.arrays import as_count, shown
 from topleft._meshes.camera.camera import CameraLike, as_camera
 from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.scene.adapt import MeshLike
@@ -126,6 +126,8 @@ def visible_faces(
     (True, 3)
     """
     least = as_count("min_pixels", min_pixels)
+    if not isinstance(cameras, Iterable) or isinstance(cameras, str | bytes | np.ndarray):
+        raise TypeError(f"cameras must be an iterable of Camera, got {shown(cameras)}")
     subject = as_meshes(mesh)
     scene = scene_of(subject)
     scene.check_counted("a scene whose visible triangles are counted")

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_array, as_number, as_real
+from topleft._core.base.arrays import as_number, as_real
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH
 from topleft._core.base.threads import run_parts, threads_for
@@ -128,7 +128,8 @@ def viewshed(
         raise ValueError(f"eye must be finite (x, y) or (x, y, z), got {np.asarray(eye).tolist()}")
     if len(place) == 3 and eye_height is not None:
         raise ValueError("an eye has z or eye_height, got both")
-    numbers = {"target_height": target_height, "curvature": curvature, "eye_height": eye_height or 0.0}
+    eye_height = 0.0 if eye_height is None else eye_height
+    numbers = {"target_height": target_height, "curvature": curvature, "eye_height": eye_height}
     for name, value in numbers.items():
         if not np.isfinite(as_number(name, value)):
             raise ValueError(f"{name} must be finite, got {value!r}")
@@ -139,7 +140,7 @@ def viewshed(
     last = np.array(own.size) - 1
     if not ((at >= 0) & (at <= last)).all():
         raise ValueError(f"eye must lie within the middles of the cells, got ({place[0]}, {place[1]}) on {own!r}")
-    z = float(place[2]) if len(place) == 3 else ground_at(heights, at) + float(eye_height or 0.0)
+    z = float(place[2]) if len(place) == 3 else ground_at(heights, at) + float(eye_height)
     with np.errstate(divide="ignore"):
         columns, rows = (1 / (np.arange(n) - p) for n, p in zip(own.size, at.tolist(), strict=True))
     place, cell, falls = np.array([*at, z]), np.array(own.pixel_size), curvature / (2 * EARTH_RADIUS)
@@ -158,14 +159,13 @@ def heights_of(terrain: Any, grid: Grid | None, pixel_size: Any) -> tuple[F64, G
     """The heights (H, W) and where they are."""
     if not isinstance(grid, Grid | None):
         raise TypeError(f"grid must be a Grid or None, got {type(grid).__name__}")
-    is_array = not isinstance(terrain, str) and np.ndim(terrain if hasattr(terrain, "__array__") else 0) == 2
-    if is_array or (isinstance(terrain, list) and np.ndim(terrain) == 2):
+    if isinstance(terrain, np.ndarray | list) or hasattr(terrain, "__array__") or hasattr(terrain, "__dlpack__"):
         if pixel_size is not None:
             raise ValueError("pixel_size is for a mesh: give the Grid of an array")
-        heights = np.ascontiguousarray(as_array("terrain", terrain), np.float64)
+        heights = np.ascontiguousarray(as_real("terrain", terrain))
+        if heights.ndim != 2 or 0 in heights.shape:
+            raise ValueError(f"terrain must have shape (H, W) with cells, got {heights.shape}")
         height, width = heights.shape
-        if 0 in heights.shape:
-            raise ValueError(f"terrain must have cells, got shape {heights.shape}")
         own = Grid((width, height), (0.0, float(width), 0.0, float(height)), "down") if grid is None else grid
         if own.size != (width, height):
             raise ValueError(f"grid must have the {width} x {height} cells of the terrain, got {own.size}")

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32, U8
-from topleft._core.base.arrays import as_count, as_number, as_real
+from topleft._core.base.arrays import as_count, as_number, as_real, shown
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits
 from topleft._core.base.options import check_choice
 from topleft._core.base.threads import run_parts, threads_for
@@ -166,7 +166,9 @@ def voxelize(
     """
     subject = as_meshes(mesh)
     check_choice("rule", rule, get_args(VoxelRuleOption))
-    if samples not in SAMPLES:
+    if not isinstance(solid, bool | np.bool_):
+        raise TypeError(f"solid must be True or False, got {shown(solid)}")
+    if as_count("samples", samples) not in SAMPLES:
         raise ValueError(f"samples must be one of {', '.join(map(str, SAMPLES))}, got {samples!r}")
     if samples > 1 and not (solid and rule == "center"):
         raise ValueError(f"samples must be 1 for a surface and for rule 'touched', got {samples}")
@@ -230,20 +232,27 @@ def grid_of(box: F64, shape: object, pitch: object, samples: int) -> VoxelGrid:
         if not 0 < side < np.inf:
             raise ValueError(f"pitch must be greater than 0 and finite, got {pitch!r}")
         counts = counts_of(extent, side)
-    elif np.ndim(shape) == 0:  # type: ignore[arg-type]
+    elif isinstance(shape, int | np.integer):
         side = float(extent.max()) / as_count("shape", shape) or 1.0
         counts = counts_of(extent, side)
     else:
-        numbers = tuple(operator.index(n) for n in cast(Any, shape))
+        try:
+            numbers = tuple(operator.index(n) for n in cast(Any, shape))
+        except TypeError:
+            raise TypeError(f"shape must be a whole number or three, got {shown(shape)}") from None
         if len(numbers) != 3 or min(numbers) < 1:
-            raise ValueError(f"shape must be a number or three of at least 1, got {shape!r}")
+            raise ValueError(f"shape must be a number or three of at least 1, got {shown(shape)}")
         side = float((extent / numbers).max()) or 1.0
         counts = list(numbers)
     if max(counts) * samples > MOST_ALONG:
         raise ValueError(
             f"voxels must be at most {MOST_ALONG // samples} along an axis with samples={samples}, got {max(counts)}"
         )
-    low = box[0] if np.ndim(shape) == 0 else (box[0] + box[1] - side * np.array(counts)) / 2  # type: ignore[arg-type]
+    low = (
+        box[0]
+        if shape is None or isinstance(shape, int | np.integer)
+        else (box[0] + box[1] - side * np.array(counts)) / 2
+    )
     x, y, z = counts
     return VoxelGrid((x, y, z), side, np.asarray(low, np.float64))
 
