@@ -6,8 +6,7 @@ In: meshes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and 
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 from typing import Unpack
 
 import numpy as np
@@ -160,7 +159,7 @@ def peel(
     n, is_farthest = check_peel(checked, layers, depth_test)
     # Layers refer to what they were drawn from, so nothing of it can be reused.
     snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
-    ids, depth = peel_meshes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
+    ids, depth = peel_meshes(SCRATCH, [[snapped]], checked, n, is_farthest=is_farthest)
     return DepthLayers(ids, depth, snapped)
 
 
@@ -185,7 +184,7 @@ def as_layers(layers: object) -> int:
 
 def peel_meshes(
     memory: Memory,
-    meshes: Sequence[Snapped],
+    chunks: Iterable[Sequence[Snapped]],
     view: View,
     n_layers: int,
     *,
@@ -194,42 +193,47 @@ def peel_meshes(
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids.
 
+    `chunks`: some meshes at a time; a band of rows is drawn once with all of them, and none is held afterwards.
     `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre.
     """
-    meshes = [replace(snapped, mesh=snapped.mesh.seen_from(*at_fx)) for snapped in meshes] if any(at_fx) else meshes
     reach_fx = max(map(abs, at_fx))
     width, height = view.size
     check_fits((n_layers, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
-    if 0 in view.size:
-        return ids, depth
-    n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
     n_pixels = BAND_BYTES // (8 * n_layers) if choices.can_share(view) else min(height * width, 2**31 - 1)
-    band_bits = bits_of_bands((height, width), n_pixels, n_threads)
-    bins = [bins_of(memory, snapped, view, band_bits, reach_fx) for snapped in meshes]
-    n_bands = -(-height >> band_bits)
 
-    def peel_bands(first: int, end: int) -> int:
-        drawn = [snapped.mesh for snapped in meshes]
-        return engine.peel(drawn, bins, ids, depth, is_farthest, band_bits, first, end)
+    def peel_chunk(meshes: Sequence[Snapped], *, is_first: bool) -> None:
+        drawn = [snapped.mesh.seen_from(*at_fx) if any(at_fx) else snapped.mesh for snapped in meshes]
+        n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
+        bits = bits_of_bands((height, width), n_pixels, n_threads)
+        bins = [bins_of(memory, one, snapped, view, bits, reach_fx) for one, snapped in zip(drawn, meshes, strict=True)]
 
-    if max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
-        for snapped in meshes:
-            snapped.given.check_indices()
-        meshes[0].refuse()
+        def peel_bands(first: int, end: int) -> int:
+            return engine.peel(drawn, bins, ids, depth, is_farthest, bits, first, end, is_first)
+
+        if max(run_parts(peel_bands, -(-height >> bits), n_threads)) >= 0:
+            for snapped in meshes:
+                snapped.given.check_indices()
+            meshes[0].refuse()
+
+    is_first = True
+    for meshes in chunks if 0 not in view.size else ():
+        peel_chunk(meshes, is_first=is_first)
+        is_first = False
     return ids, depth
 
 
-def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int, reach_fx: int) -> engine.Bins | None:
+def bins_of(
+    memory: Memory, seen: engine.SnappedMesh, snapped: Snapped, view: View, band_bits: int, reach_fx: int
+) -> engine.Bins | None:
     """Return the triangles of each band of rows; None where every band looks at all of them."""
     width, height = view.size
     if not (snapped.n_triangles and choices.can_share(view)):
         return None
-    bins = engine.Bins(
-        snapped.mesh, height, width, reach_fx, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
-    )
+    found = memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
+    bins = engine.Bins(seen, height, width, reach_fx, band_bits, found)
     if bins.bad_row >= 0:
         snapped.refuse()
     bins.fill(np.empty(bins.n_listed + 1, np.int32))
