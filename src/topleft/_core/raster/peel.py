@@ -6,8 +6,8 @@ In: meshes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable, Sequence
-from typing import Unpack
+from collections.abc import Callable, Iterable, Sequence
+from typing import NoReturn, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.sampling import bits_of_bands
-from topleft._core.raster.snap import Snapped, snap_mesh
+from topleft._core.raster.snap import Snapped, refuse_changed, snap_mesh
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption
 
@@ -159,7 +159,7 @@ def peel(
     n, is_farthest = check_peel(checked, layers, depth_test)
     # Layers refer to what they were drawn from, so nothing of it can be reused.
     snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
-    ids, depth = peel_meshes(SCRATCH, [[snapped]], checked, n, is_farthest=is_farthest)
+    ids, depth = peel_meshes(SCRATCH, [[snapped.mesh]], checked, n, is_farthest=is_farthest, refuse=snapped.refuse)
     return DepthLayers(ids, depth, snapped)
 
 
@@ -184,17 +184,19 @@ def as_layers(layers: object) -> int:
 
 def peel_meshes(
     memory: Memory,
-    chunks: Iterable[Sequence[Snapped]],
+    chunks: Iterable[Sequence[engine.SnappedMesh]],
     view: View,
     n_layers: int,
     *,
     is_farthest: bool,
     at_fx: tuple[int, int] = (0, 0),
+    refuse: Callable[[], NoReturn] = refuse_changed,
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids.
 
     `chunks`: some meshes at a time; a band of rows is drawn once with all of them, and none is held afterwards.
-    `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre.
+    `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre. `refuse` raises
+    the error for an index outside the vertices.
     """
     reach_fx = max(map(abs, at_fx))
     width, height = view.size
@@ -204,19 +206,18 @@ def peel_meshes(
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
     n_pixels = BAND_BYTES // (8 * n_layers) if choices.can_share(view) else min(height * width, 2**31 - 1)
 
-    def peel_chunk(meshes: Sequence[Snapped], *, is_first: bool) -> None:
-        drawn = [snapped.mesh.seen_from(*at_fx) if any(at_fx) else snapped.mesh for snapped in meshes]
-        n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
+    def peel_chunk(meshes: Sequence[engine.SnappedMesh], *, is_first: bool) -> None:
+        meshes = [mesh.seen_from(*at_fx) for mesh in meshes] if any(at_fx) else meshes
+        n_threads = min(height, count_threads(view.threads, sum(mesh.n_triangles for mesh in meshes)))
         bits = bits_of_bands((height, width), n_pixels, n_threads)
-        bins = [bins_of(memory, one, snapped, view, bits, reach_fx) for one, snapped in zip(drawn, meshes, strict=True)]
+        bins = [bins_of(memory, mesh, view, bits, reach_fx) for mesh in meshes]
 
         def peel_bands(first: int, end: int) -> int:
-            return engine.peel(drawn, bins, ids, depth, is_farthest, bits, first, end, is_first)
+            return engine.peel(meshes, bins, ids, depth, is_farthest, bits, first, end, is_first)
 
-        if max(run_parts(peel_bands, -(-height >> bits), n_threads)) >= 0:
-            for snapped in meshes:
-                snapped.given.check_indices()
-            meshes[0].refuse()
+        is_bad = any(one is not None and one.bad_row >= 0 for one in bins)
+        if is_bad or max(run_parts(peel_bands, -(-height >> bits), n_threads)) >= 0:
+            refuse()
 
     is_first = True
     for meshes in chunks if 0 not in view.size else ():
@@ -225,16 +226,12 @@ def peel_meshes(
     return ids, depth
 
 
-def bins_of(
-    memory: Memory, seen: engine.SnappedMesh, snapped: Snapped, view: View, band_bits: int, reach_fx: int
-) -> engine.Bins | None:
+def bins_of(memory: Memory, mesh: engine.SnappedMesh, view: View, band_bits: int, reach_fx: int) -> engine.Bins | None:
     """Return the triangles of each band of rows; None where every band looks at all of them."""
-    width, height = view.size
-    if not (snapped.n_triangles and choices.can_share(view)):
+    if not (mesh.n_triangles and choices.can_share(view)):
         return None
-    found = memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
-    bins = engine.Bins(seen, height, width, reach_fx, band_bits, found)
-    if bins.bad_row >= 0:
-        snapped.refuse()
-    bins.fill(np.empty(bins.n_listed + 1, np.int32))
+    room = memory.empty("bins", (3, mesh.n_triangles + 16), np.int32)
+    bins = engine.Bins(mesh, *view.size[::-1], reach_fx, band_bits, room)
+    if bins.bad_row < 0:
+        bins.fill(np.empty(bins.n_listed + 1, np.int32))
     return bins
