@@ -20,6 +20,7 @@ import argparse
 import ast
 import copy
 import ctypes
+import importlib
 import json
 import os
 import random
@@ -281,12 +282,11 @@ def prepare(tree: Path, places: list[str], n: int, seed: int) -> dict[int, Mutan
 
 def reached_so_far() -> list[int]:
     """Numbers of the mutants that this process has reached since the last call."""
-    from topleft import _mutants
-    from topleft._core.engine import kernels
-
-    flags = (ctypes.c_ubyte * MOST_C_MUTANTS).in_dll(ctypes.CDLL(kernels.__file__), "tl_reached")
-    found = sorted(_mutants.reached | {k for k, flag in enumerate(bytes(flags)) if flag})
-    _mutants.reached.clear()
+    reached = importlib.import_module("topleft._mutants").reached  # which the changed tree alone has
+    kernels = importlib.import_module("topleft._core.engine.kernels").__file__
+    flags = (ctypes.c_ubyte * MOST_C_MUTANTS).in_dll(ctypes.CDLL(kernels), "tl_reached")
+    found = sorted(reached | {k for k, flag in enumerate(bytes(flags)) if flag})
+    reached.clear()
     ctypes.memset(flags, 0, MOST_C_MUTANTS)
     return found
 

@@ -249,7 +249,7 @@ def _sided(mesh: Mesh, double_sided: bool | None) -> Mesh:
 _unpacking: ContextVar[Budget | None] = ContextVar("_unpacking", default=None)
 
 
-class _Counted:
+class _CountedModule:
     """A module that unpacks, on the budget of the file that is being read."""
 
     def __init__(self, module: Any, unpacker: str) -> None:
@@ -283,8 +283,8 @@ def counted_vtu(budget: Budget) -> Iterator[None]:
         from meshio.vtu import _vtu
 
         for name, unpacker in (("zlib", "decompressobj"), ("lzma", "LZMADecompressor")):
-            if not isinstance(getattr(_vtu, name), _Counted):
-                setattr(_vtu, name, _Counted(getattr(_vtu, name), unpacker))
+            if not isinstance(getattr(_vtu, name), _CountedModule):
+                setattr(_vtu, name, _CountedModule(getattr(_vtu, name), unpacker))
     token = _unpacking.set(budget)
     try:
         yield

@@ -14,7 +14,7 @@ MOST_DEEP = 32
 SEQUENTIAL = 0
 
 
-class _Bytes:
+class _DracoBytes:
     """Bytes that are read one after the other; those beyond the end are an IndexError."""
 
     def __init__(self, content: bytes, at: int) -> None:
@@ -61,7 +61,7 @@ def declared_by_draco(content: bytes) -> tuple[int, int]:
     head = content[:11]
     if head[:5] != b"DRACO" or head[5:7] != b"\2\2" or len(head) < 11 or head[7] != 1:
         raise MeshError("what is compressed is no mesh of Draco 2.2")
-    rest = _Bytes(content, 11)
+    rest = _DracoBytes(content, 11)
     try:
         if int.from_bytes(head[9:11], "little") & HAS_METADATA:
             for _ in range(rest.number()):  # of attributes, by their number, then of the mesh
