@@ -160,4 +160,4 @@ def test_wrong_environments_are_named(make, error, message):
 
 
 def test_environment_is_white_unless_told():
-    assert tl.Environment() == tl.Environment((255, 255, 255), intensity=1.0, up=(0, 1, 0), turn=0.0)
+    assert repr(tl.Environment()) == repr(tl.Environment((255, 255, 255), intensity=1.0, up=(0.0, 1.0, 0.0), turn=0.0))
