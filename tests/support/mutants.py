@@ -352,10 +352,11 @@ def record(
                 seconds[node] = took
                 for k in mutants:
                     reached[k].add(node)
-    for k, found in reached.items():
-        if found == {""}:  # reached by importing it alone, before any test: those of its room
-            room = Path(mutants_of[k].file).parent.name.strip("_")
-            found |= {node for node in seconds if node.startswith(f"tests/{room}/")}
+    for k, mutant in mutants_of.items():
+        if reached[k] == {""}:  # by importing it alone, before any test: those of its room, and of others in its file
+            room = Path(mutant.file).parent.name.strip("_")
+            reached[k] |= {node for node in seconds if node.startswith(f"tests/{room}/")}
+            reached[k] |= {node for i, other in mutants_of.items() if other.file == mutant.file for node in reached[i]}
     nodes = {k: sorted(found - failed - {""}, key=lambda node: seconds[node]) for k, found in reached.items()}
     return nodes, seconds
 
