@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._apps.cli.arguments import UsageError, positive, size
-from topleft._apps.cli.render import FAILED, complain
+from topleft._apps.cli.arguments import FAILED, UsageError, positive, size
+from topleft._apps.cli.report import complain
 from topleft._core.base.grid import Grid
 from topleft._core.base.options import Sampling
 from topleft._core.polygons.polygons import Rule, polygons

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from topleft._apps.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, positive, size, subpixel_bits
-from topleft._apps.cli.render import client_of, complain
+from topleft._apps.cli.render import client_of
+from topleft._apps.cli.report import complain
 from topleft._apps.tiles.blocks import Triangles, mapped_npy, triangles_of
 from topleft._apps.tiles.drawing import KINDS
 from topleft._apps.tiles.tiles import WINDOW, Tiles, extent_of, tiles
