@@ -220,7 +220,8 @@ def test_triangles_are_added_split_flipped_and_removed(page):
 
 def test_methods_and_rules_are_switched(page):
     for label, value in (("method", "edge_increment/bottom-right"),
-                         ("compare with", ""), ("method", "scanline"), ("sampling", "msaa4"), ("sub-pixel bits", "exact"),
+                         ("compare with", ""), ("method", "scanline"), ("sampling", "msaa4"),
+                         ("sub-pixel bits", "exact"),
                          ("sampling", "outer"), ("sampling", "area"), ("cull", "back"), ("winding", "clockwise"),
                          ("sampling", "center")):  # fmt: skip
         pixels_of(page).get_by_label(label, exact=True).select_option(value)
@@ -419,23 +420,22 @@ def test_window_is_pinched_by_two_fingers(chromium, explorer):
         check_pictures(page)
 
 
+BOXES = """() => ["figcaption", ".view", ".why", ".side"]
+  .flatMap((one) => [...document.querySelectorAll(`[data-panel=pixels] ${one}`)])
+  .map((one) => one.getBoundingClientRect()).map(({left, right, top, bottom}) => [left, right, top, bottom])"""
+
+
 @pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
 @pytest.mark.parametrize("scene", ["shared-edge", "tight-fan", "fan-128-gap"])
 def test_nothing_overlaps_and_nothing_is_wider_than_the_page(chromium, scene, width):
-    with tl.explore(scene, wait=False, browser=False) as found:
-        with opened(chromium, found, viewport={"width": width, "height": 860}) as page:
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
-            boxes = page.evaluate("""() => [...document.querySelectorAll(
-              "[data-panel=pixels] figcaption, [data-panel=pixels] .view, [data-panel=pixels] .why, [data-panel=pixels] .side")]
-              .map((one) => one.getBoundingClientRect()).map(({left, right, top, bottom}) => [left, right, top, bottom])""")
-            for i, (left, right, top, bottom) in enumerate(boxes):
-                for others in boxes[:i]:
-                    assert (
-                        right <= others[0] + 1
-                        or left >= others[1] - 1
-                        or bottom <= others[2] + 1
-                        or top >= others[3] - 1
-                    )
+    viewport = {"width": width, "height": 860}
+    with tl.explore(scene, wait=False, browser=False) as found, opened(chromium, found, viewport=viewport) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        boxes = page.evaluate(BOXES)
+        for i, (left, right, top, bottom) in enumerate(boxes):
+            for others in boxes[:i]:
+                is_beside = right <= others[0] + 1 or left >= others[1] - 1
+                assert is_beside or bottom <= others[2] + 1 or top >= others[3] - 1
 
 
 def test_edges_are_switched_off(page):
