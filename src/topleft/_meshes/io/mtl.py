@@ -1,6 +1,6 @@
 """Reads material libraries of OBJ files (MTL).
 
-Input: text. Output: `Material` by name; a file says little of what it means, so what is not given is not there.
+Input: text. Output: `Material` by name; what a file does not set is off.
 
 Based on: Wavefront Technologies, "Advanced Visualizer Manual", appendix B1, 1995; `Pr`, `Pm`, `map_Pr`, `map_Pm` and
 `norm` as Exocortex proposed them in 2014.
