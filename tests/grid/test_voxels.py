@@ -194,3 +194,18 @@ def test_mesh_without_triangles_needs_bounds():
     with pytest.raises(ValueError, match="a mesh without triangles has no bounds"):
         tl.voxelize(empty, 3)
     assert not tl.voxelize(empty, 3, bounds=[[0, 0, 0], [1, 1, 1]]).values.any()
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus-knot"])
+def test_occupancy_away_from_the_surface_is_that_of_trimesh(name):
+    trimesh = pytest.importorskip("trimesh")
+    vertices, triangles = tl.scenes.shape(name)
+    found = tl.voxelize((vertices, triangles), 48)
+    met = tl.voxelize((vertices, triangles), 48, solid=False, rule="touched").values
+    away = ~met  # two voxels and more: those of trimesh stand elsewhere, and what the surface meets counts as filled
+    for axis in (0, 1, 2, 0, 1, 2):
+        away &= np.roll(away, 1, axis) & np.roll(away, -1, axis)
+    theirs = trimesh.Trimesh(vertices, triangles, process=False).voxelized(found.pitch).fill()
+    points = np.argwhere(away) * found.pitch + found.transform[:3, 3]
+    assert 1000 < away.sum()
+    assert_same(found.values[away], theirs.is_filled(points))
