@@ -31,6 +31,16 @@ typedef struct {
     int64_t n, n_columns;
 } tl_grad_sums;
 
+/* The numbers that a triangle sums up: X0, Y0; gradients of q_k by X, by Y, and there; of z; of w. */
+enum { TL_SUMS_OF_FACE = 17 };
+
+/* Gradients of where pixels lie in triangles.  g_db may be NULL. */
+typedef struct {
+    const void *rast, *g_rast, *g_db;
+    tl_grad_sums *faces;    /* by triangle, TL_SUMS_OF_FACE columns: scratch */
+    tl_grad_sums *vertices; /* x, y, z, w */
+} tl_grad_points;
+
 /* Attributes of vertices.  Backward `out` and `out_da` are gradients, and the last two are written. */
 typedef struct {
     const void *attr; /* (n_attr, n_columns) */

@@ -380,17 +380,15 @@ typedef struct tl_kernels {
     void (*name_triangles)(int32_t *ids, int64_t first, int64_t end, const int32_t *names);
 
     /* Where the pixels of a band lie in the triangles that they show: `ids` is its picture's lowest row, -1 for none,
-     * the next one stands `step` numbers on, and first_id is added.  What shows nothing is left as it is.  rast_db may
-     * be NULL. */
+     * the next one stands `step` numbers on, and first_id is added.  rast_db may be NULL. */
     void (*grad_points)(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
                         void *rast_db);
 
-    /* The sums by vertex (x, y, z, w) of what the gradients of `rast` and of `rast_db`, or NULL, give in a band.
-     * Returns, as the next two do, the number of a triangle that does not exist, or -1. */
-    int64_t (*grad_points_vjp)(const tl_grad_view *view, const void *rast, const void *g_rast, const void *g_db,
-                               tl_grad_sums *sums);
+    /* The sums by vertex of what the gradients of `rast` and of `rast_db` give in a band.  Returns, as the next two do,
+     * the number of a triangle that does not exist, or -1. */
+    int64_t (*grad_points_vjp)(const tl_grad_view *view, const tl_grad_points *points);
 
-    /* Attributes in a band, and what they change by; what shows nothing is left as it is. */
+    /* Attributes in a band, and what they change by. */
     int64_t (*grad_values)(const tl_grad_view *view, const tl_grad_values *values);
 
     /* Their gradients: sums by row of attributes, and those of `rast` and `rast_db`. */
@@ -399,7 +397,7 @@ typedef struct tl_kernels {
     /* A texture at the pixels of a band. */
     void (*grad_texels)(const tl_grad_view *view, const tl_grad_texture *texture);
 
-    /* Its gradients: sums by texel, and those of where it is looked at, which have been 0. */
+    /* Its gradients: sums by texel, and those of where it is looked at. */
     void (*grad_texels_vjp)(const tl_grad_view *view, const tl_grad_texture *texture, tl_grad_sums *sums);
 
     /* A band with smooth silhouettes; or backward the gradients of its colours, and the sums by vertex. */

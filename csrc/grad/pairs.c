@@ -21,7 +21,7 @@
 
 #define TL_CROSSING_SLACK 0.0625 /* px by which the snap may move an edge past a middle that it separates */
 #define TL_HANDOVER 0.6          /* width of the hand-over about 45 degrees, in the cosine of twice the angle */
-#define TL_WALK_STEPS 256         /* of a walk */
+#define TL_WALK_STEPS 256        /* of a walk */
 
 /* What `known` holds of a triangle. */
 enum {

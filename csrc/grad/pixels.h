@@ -1,7 +1,6 @@
-/* Numbers of tensors, the visible pixels of a band some at a time, and sums by row.
+/* Numbers of tensors, the visible pixels of a band run by run, and sums by row.
  *
- * Loops over the pixels of a group are plain C that compilers turn into vectors: each lane does what one pixel needs,
- * so every instruction set gives the same bits. */
+ * It is plain C, whose sums have one order: every instruction set gives the same bits. */
 #ifndef TL_GRAD_PIXELS_H
 #define TL_GRAD_PIXELS_H
 
@@ -11,7 +10,6 @@
 #include "topleft.h"
 #include "lanes/inline.h"
 
-#define TL_GROUP 64
 #define TL_LAST_EXACT_ID (1 << 24) /* the largest that float32 counts up to; from there on its bits are counted */
 #define TL_BITS_OF_LAST 0x4B800000
 
@@ -65,55 +63,47 @@ TL_INLINE int has_corners(const tl_grad_view *view, int64_t n_rows, int32_t id)
     return (uint64_t)(int64_t)c[0] < n && (uint64_t)(int64_t)c[1] < n && (uint64_t)(int64_t)c[2] < n;
 }
 
-/* Where a walk over the visible pixels of a band is. */
+/* Pixels of a row that show one triangle. */
 typedef struct {
-    int64_t row, column;
-    int64_t bad_id; /* a number that is no triangle's, -1: none was met */
-} band_place;
+    int32_t id;
+    int64_t row, column, at, n; /* `at`: the first one's number in the picture */
+    int64_t bad_id;             /* a number that is no triangle's, -1: none was met */
+} pixel_run;
 
-/* Visible pixels, in order. */
-typedef struct {
-    int n, padded; /* the lanes up to `padded` are computed, too */
-    int32_t id[TL_GROUP];
-    int64_t at[TL_GROUP]; /* pixel of the picture */
-    int64_t row[TL_GROUP], column[TL_GROUP];
-} pixel_group;
-
-TL_INLINE void start_band(const tl_grad_view *view, band_place *place, pixel_group *group)
+TL_INLINE pixel_run before_shown(const tl_grad_view *view)
 {
-    *place = (band_place){view->first_row, 0, -1};
-    memset(group, 0, sizeof *group);
+    return (pixel_run){.id = -1, .row = view->first_row, .bad_id = -1};
 }
 
-TL_INLINE void add_pixel(pixel_group *group, const band_place *place, int64_t width, int32_t id)
+/* The next pixels of `rast` whose triangle has rows below n_rows; 0 when there are no more. */
+TL_INLINE int next_shown(const tl_grad_view *view, const void *rast, int64_t n_rows, pixel_run *run, int is_f64)
 {
-    const int i = group->n++;
-    group->id[i] = id;
-    group->at[i] = place->row * width + place->column;
-    group->row[i] = place->row, group->column[i] = place->column;
-}
-
-/* The next pixels of `rast`, whose triangles have rows below n_rows; 0 when there are no more. */
-TL_INLINE int next_group(const tl_grad_view *view, const void *rast, int64_t n_rows, band_place *place,
-                         pixel_group *group, int is_f64)
-{
-    int32_t last = -1;
-    for (group->n = 0; place->row < view->end_row; place->row++, place->column = 0)
-        for (; place->column < view->width; place->column++) {
-            const int32_t id = get_id(rast, place->row * view->width + place->column, is_f64);
+    int64_t column = run->column + run->n, row = run->row;
+    for (; row < view->end_row; row++, column = 0) {
+        const int64_t first = row * view->width;
+        while (column < view->width) {
+            const int32_t id = get_id(rast, first + column, is_f64);
+            const int64_t begin = column++;
             if (id < 0)
                 continue;
-            if (id != last && !has_corners(view, n_rows, id)) {
-                place->bad_id = id;
-                continue;
+            while (column < view->width && get_id(rast, first + column, is_f64) == id)
+                column++;
+            if (id == run->id || has_corners(view, n_rows, id)) {
+                run->id = id, run->row = row, run->column = begin, run->at = first + begin, run->n = column - begin;
+                return 1;
             }
-            if (group->n == TL_GROUP)
-                goto full;
-            add_pixel(group, place, view->width, last = id);
+            run->bad_id = id;
         }
-full:
-    group->padded = (group->n + 7) & ~7;
-    return group->n;
+    }
+    return 0;
+}
+
+/* The rows of a band of a tensor with n numbers a pixel become 0. */
+TL_INLINE void clear_band(const tl_grad_view *view, void *out, int64_t n)
+{
+    const size_t size = (size_t)((view->is_f64 ? 8 : 4) * n * view->width);
+    if (out)
+        memset((char *)out + size * (size_t)view->first_row, 0, size * (size_t)(view->end_row - view->first_row));
 }
 
 /* The sums of a row. */
@@ -128,7 +118,7 @@ TL_INLINE double *sums_of(tl_grad_sums *sums, int64_t row)
     return sums->sums + slot * sums->n_columns;
 }
 
-/* The same of the three corners of a triangle.  Slots may move no sums, so pointers stay. */
+/* The same of the three corners of a triangle. */
 TL_INLINE void corner_sums(const tl_grad_view *view, tl_grad_sums *sums, int32_t id, double **out)
 {
     for (int k = 0; k < 3; k++)

@@ -2,8 +2,10 @@
  * and backwards, from gradients of these to sums of gradients by vertex.
  * In: ids of a picture.  Out: `rast`, `rast_db`; backward: sums of x, y, z, w.
  *
- * With X, Y the pixel's middle and x' = x - X w, y' = y - Y w of each corner, a_k = x'_i y'_j - y'_i x'_j of the other
- * two corners; weights are a_k / (a_0 + a_1 + a_2).
+ * With X, Y a pixel's middle, about that of the first pixel that shows the triangle, and x' = x - X0 w, y' = y - Y0 w of
+ * its corners, a_k = q_k . (X, Y, 1) with q_k the cross product of the other two corners (x', y', w).  Weights are
+ * a_k / (a_0 + a_1 + a_2), so backward a triangle needs the sums of the gradients of a_k times X, Y and 1: those of its
+ * corners follow from them at once.  What the weights change by has the first two numbers of q_k alone.
  *
  * Based on: Laine, S. et al., "Modular Primitives for High-Performance Differentiable Rendering", 2020, section 3. */
 #ifndef TL_GRAD_POINTS_C
@@ -16,134 +18,95 @@
 #include "lanes/inline.h"
 #include "grad/pixels.h"
 
-typedef double group_reals[TL_GROUP];
-
-/* What is computed of a group of pixels. */
+/* A triangle about a pixel. */
 typedef struct {
-    group_reals middle[2];   /* X, Y */
-    group_reals p[4][3];     /* x', y', z, w of the corners */
-    group_reals a[3], total; /* total: 1 for 0 */
-    group_reals zw;          /* not clamped */
-    group_reals by[2][3];    /* what a_k change by along x and along y */
-    double scale[2];
-} weighed_group;
+    double x[3], y[3], z[3], w[3];
+    double q[3][3];           /* q[k]: by X, by Y, and there */
+    double sum[3];            /* of q[0], q[1], q[2] */
+    double over[3], under[3]; /* z/w as a quotient: sums of z q and of w q */
+    double middle[2];
+} grad_triangle;
 
-/* The same backward. */
+TL_INLINE double middle_at(const tl_grad_view *view, int axis, int64_t i)
+{
+    return (2.0 * (double)i + 1.0) * view->scale[axis] + view->shift[axis];
+}
+
+TL_INLINE void load_seen_triangle(const tl_grad_view *view, int32_t id, double x, double y, grad_triangle *t, int is_f64)
+{
+    t->middle[0] = x, t->middle[1] = y;
+    for (int k = 0; k < 3; k++) {
+        const int64_t at = 4 * (int64_t)view->tri[3 * (int64_t)id + k];
+        t->z[k] = get_real(view->pos, at + 2, is_f64), t->w[k] = get_real(view->pos, at + 3, is_f64);
+        t->x[k] = get_real(view->pos, at, is_f64) - x * t->w[k];
+        t->y[k] = get_real(view->pos, at + 1, is_f64) - y * t->w[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        t->q[k][0] = t->y[i] * t->w[j] - t->w[i] * t->y[j];
+        t->q[k][1] = t->w[i] * t->x[j] - t->x[i] * t->w[j];
+        t->q[k][2] = t->x[i] * t->y[j] - t->y[i] * t->x[j];
+    }
+    for (int c = 0; c < 3; c++) {
+        t->sum[c] = t->q[0][c] + t->q[1][c] + t->q[2][c];
+        t->over[c] = t->z[0] * t->q[0][c] + t->z[1] * t->q[1][c] + t->z[2] * t->q[2][c];
+        t->under[c] = t->w[0] * t->q[0][c] + t->w[1] * t->q[1][c] + t->w[2] * t->q[2][c];
+    }
+}
+
+/* A function of X and Y that has these numbers, in the row of the middle. */
+TL_INLINE double plane_at(const double *q, double x) { return q[0] * x + q[2]; }
+
+/* Writes pixel i of a run, X off the first: weights are clamped to a sum of at most 1, z/w to -1..1. */
+TL_INLINE void store_point(const tl_grad_view *view, const grad_triangle *t, const pixel_run *run, int64_t i, double x,
+                           void *const *out, int is_f64)
+{
+    const int64_t at = 4 * (run->at + i);
+    const double total = plane_at(t->sum, x), under = plane_at(t->under, x), r = total == 0.0 ? 1.0 : 1.0 / total;
+    const double u = plane_at(t->q[0], x) * r, v = plane_at(t->q[1], x) * r;
+    double u_in = clamped(u, 0.0, 1.0), v_in = clamped(v, 0.0, 1.0);
+    const double sum = u_in + v_in;
+    if (sum > 1.0)
+        u_in /= sum, v_in /= sum;
+    put_real(out[0], at, u_in, is_f64), put_real(out[0], at + 1, v_in, is_f64);
+    put_real(out[0], at + 2, clamped(plane_at(t->over, x) / (under == 0.0 ? 1.0 : under), -1.0, 1.0), is_f64);
+    put_id(out[0], run->at + i, run->id, is_f64);
+    for (int axis = 0; out[1] && axis < 2; axis++) {
+        const double step = 2.0 * view->scale[axis] * r;
+        put_real(out[1], at + axis, (t->q[0][axis] - u * t->sum[axis]) * step, is_f64);
+        put_real(out[1], at + 2 + axis, (t->q[1][axis] - v * t->sum[axis]) * step, is_f64);
+    }
+}
+
+/* Rows of ids as `grad_points` has them. */
 typedef struct {
-    group_reals weight[2], zw, db[4]; /* gradients of u, v, z/w and of du/dX, du/dY, dv/dX, dv/dY */
-    group_reals p[4][3];              /* of the corners */
-} group_gradients;
+    const int32_t *lowest;
+    int64_t step, first_id;
+} id_rows;
 
-/* Loads the corners of a group, and moves them so that the pixel is the origin. */
-TL_INLINE void load_group(const tl_grad_view *view, const pixel_group *group, weighed_group *g, int is_f64)
+TL_INLINE void points_of_ids(const tl_grad_view *view, const id_rows *ids, void *const *out, int is_f64)
 {
-    for (int i = 0; i < group->n; i++) {
-        g->middle[0][i] = (2.0 * (double)group->column[i] + 1.0) * view->scale[0] + view->shift[0];
-        g->middle[1][i] = (2.0 * (double)group->row[i] + 1.0) * view->scale[1] + view->shift[1];
-        if (i && group->id[i] == group->id[i - 1]) {
-            for (int c = 0; c < 4; c++)
-                for (int k = 0; k < 3; k++)
-                    g->p[c][k][i] = g->p[c][k][i - 1];
-            continue;
-        }
-        for (int k = 0; k < 3; k++) {
-            const int64_t vertex = view->tri[3 * (int64_t)group->id[i] + k];
-            for (int c = 0; c < 4; c++)
-                g->p[c][k][i] = get_real(view->pos, 4 * vertex + c, is_f64);
-        }
-    }
-    for (int axis = 0; axis < 2; axis++) {
-        g->scale[axis] = 2.0 * view->scale[axis];
-        for (int k = 0; k < 3; k++)
-            for (int i = 0; i < group->padded; i++)
-                g->p[axis][k][i] -= g->middle[axis][i] * g->p[3][k][i];
-    }
-}
-
-static const int next_corner[3] = {1, 2, 0}, last_corner[3] = {2, 0, 1};
-
-/* a_k, their sum, and z/w. */
-TL_INLINE void weigh_group(weighed_group *g, int n)
-{
-    for (int k = 0; k < 3; k++) {
-        const double *x1 = g->p[0][next_corner[k]], *y1 = g->p[1][next_corner[k]];
-        const double *x2 = g->p[0][last_corner[k]], *y2 = g->p[1][last_corner[k]];
-        for (int i = 0; i < n; i++)
-            g->a[k][i] = x1[i] * y2[i] - y1[i] * x2[i];
-    }
-    for (int i = 0; i < n; i++) {
-        const double total = g->a[0][i] + g->a[1][i] + g->a[2][i];
-        g->total[i] = total == 0.0 ? 1.0 : total;
-        const double over = g->p[2][0][i] * g->a[0][i] + g->p[2][1][i] * g->a[1][i] + g->p[2][2][i] * g->a[2][i];
-        const double under = g->p[3][0][i] * g->a[0][i] + g->p[3][1][i] * g->a[1][i] + g->p[3][2][i] * g->a[2][i];
-        g->zw[i] = over / (under == 0.0 ? 1.0 : under);
-    }
-}
-
-/* What a_k change by from pixel to pixel. */
-TL_INLINE void slope_group(weighed_group *g, int n)
-{
-    for (int k = 0; k < 3; k++) {
-        const double *x1 = g->p[0][next_corner[k]], *y1 = g->p[1][next_corner[k]], *w1 = g->p[3][next_corner[k]];
-        const double *x2 = g->p[0][last_corner[k]], *y2 = g->p[1][last_corner[k]], *w2 = g->p[3][last_corner[k]];
-        for (int i = 0; i < n; i++) {
-            g->by[0][k][i] = g->scale[0] * (y1[i] * w2[i] - w1[i] * y2[i]);
-            g->by[1][k][i] = g->scale[1] * (w1[i] * x2[i] - x1[i] * w2[i]);
-        }
-    }
-}
-
-/* Writes a group; weights are clamped to a sum of at most 1, z/w to -1..1. */
-TL_INLINE void store_group(const pixel_group *group, const weighed_group *g, void *rast, void *rast_db, int is_f64)
-{
-    for (int i = 0; i < group->n; i++) {
-        const int64_t at = 4 * group->at[i];
-        const double r = 1.0 / g->total[i], u = g->a[0][i] * r, v = g->a[1][i] * r;
-        const double u_in = clamped(u, 0.0, 1.0), v_in = clamped(v, 0.0, 1.0), sum = u_in + v_in;
-        put_real(rast, at, sum > 1.0 ? u_in / sum : u_in, is_f64);
-        put_real(rast, at + 1, sum > 1.0 ? v_in / sum : v_in, is_f64);
-        put_real(rast, at + 2, clamped(g->zw[i], -1.0, 1.0), is_f64);
-        put_id(rast, group->at[i], group->id[i], is_f64);
-        for (int axis = 0; rast_db && axis < 2; axis++) {
-            const double sum_by = g->by[axis][0][i] + g->by[axis][1][i] + g->by[axis][2][i];
-            put_real(rast_db, at + axis, (g->by[axis][0][i] - u * sum_by) * r, is_f64);
-            put_real(rast_db, at + 2 + axis, (g->by[axis][1][i] - v * sum_by) * r, is_f64);
-        }
-    }
-}
-
-/* The next pixels of rows of ids, which lie `step` apart. */
-TL_INLINE int next_ids(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, band_place *place,
-                       pixel_group *group)
-{
-    for (group->n = 0; place->row < view->end_row; place->row++, place->column = 0)
-        for (const int32_t *row = ids + step * place->row; place->column < view->width; place->column++) {
-            const int32_t id = row[place->column];
-            if (id < 0 || !has_corners(view, view->n_vertices, (int32_t)(id + first_id)))
+    grad_triangle t;
+    pixel_run run = before_shown(view);
+    clear_band(view, out[0], 4);
+    clear_band(view, out[1], 4);
+    for (; run.row < view->end_row; run.row++) {
+        const int32_t *row = ids->lowest + ids->step * run.row;
+        const double y = middle_at(view, 1, run.row);
+        for (int64_t x = 0; x < view->width;) {
+            const int32_t id = row[x];
+            run.column = x++;
+            if (id < 0)
                 continue;
-            if (group->n == TL_GROUP)
-                goto full;
-            add_pixel(group, place, view->width, (int32_t)(id + first_id));
+            while (x < view->width && row[x] == id)
+                x++;
+            run.id = (int32_t)(id + ids->first_id), run.n = x - run.column, run.at = run.row * view->width + run.column;
+            if (!has_corners(view, view->n_vertices, run.id))
+                continue;
+            load_seen_triangle(view, run.id, middle_at(view, 0, run.column), y, &t, is_f64);
+            for (int64_t i = 0; i < run.n; i++)
+                store_point(view, &t, &run, i, 2.0 * view->scale[0] * (double)i, out, is_f64);
         }
-full:
-    group->padded = (group->n + 7) & ~7;
-    return group->n;
-}
-
-TL_INLINE void points_of_ids(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
-                             void *rast_db, int is_f64)
-{
-    band_place place;
-    pixel_group group;
-    weighed_group g;
-    memset(&g, 0, sizeof g);
-    start_band(view, &place, &group);
-    while (next_ids(view, ids, step, first_id, &place, &group)) {
-        load_group(view, &group, &g, is_f64);
-        weigh_group(&g, group.padded);
-        if (rast_db)
-            slope_group(&g, group.padded);
-        store_group(&group, &g, rast, rast_db, is_f64);
     }
 }
 
@@ -151,117 +114,132 @@ TL_INLINE void points_of_ids(const tl_grad_view *view, const int32_t *ids, int64
 static void grad_points(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
                         void *rast_db)
 {
+    const id_rows rows = {ids, step, first_id};
+    void *const out[2] = {rast, rast_db};
     if (view->is_f64)
-        points_of_ids(view, ids, step, first_id, rast, rast_db, 1);
+        points_of_ids(view, &rows, out, 1);
     else
-        points_of_ids(view, ids, step, first_id, rast, rast_db, 0);
+        points_of_ids(view, &rows, out, 0);
 }
 
-/* Gradients of a_k and of the corners from those of the weights, of z/w and of the derivatives. */
-TL_INLINE void pull_weights(const weighed_group *g, const group_gradients *d, int i, int has_db, double *g_a,
-                            double g_by[2][3])
+/* Gradients at a pixel, of `rast` and of `rast_db`. */
+typedef struct {
+    double u, v, zw, db[4];
+} point_gradients;
+
+/* What a row of pixels sums up. */
+typedef struct {
+    double a[3], a_x[3]; /* gradients of a_k, and times X */
+    double q[3][2];      /* of q_k alone */
+    double z[3], w[3];
+} row_sums;
+
+/* Adds the gradients at X. */
+TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, const point_gradients *g, double x,
+                          int has_db, row_sums *s)
 {
-    const double live = g->a[0][i] + g->a[1][i] + g->a[2][i] == 0.0 ? 0.0 : 1.0, r = live / g->total[i];
-    const double u = g->a[0][i] * r, v = g->a[1][i] * r;
+    const double a[3] = {plane_at(t->q[0], x), plane_at(t->q[1], x), plane_at(t->q[2], x)};
+    const double total = plane_at(t->sum, x), r = total == 0.0 ? 0.0 : 1.0 / total;
+    const double u = a[0] * r, v = a[1] * r;
+    double g_u = g->u, g_v = g->v, g_total = 0.0, g_a[3];
     const double u_in = clamped(u, 0.0, 1.0), v_in = clamped(v, 0.0, 1.0), sum = u_in + v_in;
-    const double s = sum > 1.0 ? 1.0 / sum : 1.0;
-    const double g_sum = sum > 1.0 ? (d->weight[0][i] * u_in + d->weight[1][i] * v_in) * s * s : 0.0;
-    double g_u = u == u_in ? d->weight[0][i] * s - g_sum : 0.0, g_v = v == v_in ? d->weight[1][i] * s - g_sum : 0.0;
-    double g_total = 0.0;
+    if (u != u_in || v != v_in || sum > 1.0) {
+        const double scale = sum > 1.0 ? 1.0 / sum : 1.0;
+        const double g_sum = sum > 1.0 ? (g_u * u_in + g_v * v_in) * scale * scale : 0.0;
+        g_u = u == u_in ? g_u * scale - g_sum : 0.0, g_v = v == v_in ? g_v * scale - g_sum : 0.0;
+    }
     for (int axis = 0; has_db && axis < 2; axis++) {
-        const double by_sum = g->by[axis][0][i] + g->by[axis][1][i] + g->by[axis][2][i];
-        const double g_du = d->db[axis][i] * r, g_dv = d->db[2 + axis][i] * r, both = g_du * u + g_dv * v;
-        g_by[axis][0] = g_du - both, g_by[axis][1] = g_dv - both, g_by[axis][2] = -both;
-        g_u -= g_du * by_sum, g_v -= g_dv * by_sum;
-        g_total -= g_du * (g->by[axis][0][i] - u * by_sum) * r + g_dv * (g->by[axis][1][i] - v * by_sum) * r;
+        const double step = 2.0 * view->scale[axis] * r, g_du = g->db[axis] * step, g_dv = g->db[2 + axis] * step;
+        const double both = g_du * u + g_dv * v;
+        s->q[0][axis] += g_du - both, s->q[1][axis] += g_dv - both, s->q[2][axis] -= both;
+        g_u -= g_du * t->sum[axis], g_v -= g_dv * t->sum[axis];
+        g_total -= (g_du * (t->q[0][axis] - u * t->sum[axis]) + g_dv * (t->q[1][axis] - v * t->sum[axis])) * r;
     }
     g_total -= (g_u * u + g_v * v) * r;
     g_a[0] = g_u * r + g_total, g_a[1] = g_v * r + g_total, g_a[2] = g_total;
+    if (g->zw != 0.0) {
+        const double under = plane_at(t->under, x), zw = plane_at(t->over, x) / (under == 0.0 ? 1.0 : under);
+        const double g_over = under != 0.0 && zw >= -1.0 && zw <= 1.0 ? g->zw / under : 0.0, g_under = -g_over * zw;
+        for (int k = 0; k < 3 && g_over != 0.0; k++) {
+            g_a[k] += g_over * t->z[k] + g_under * t->w[k];
+            s->z[k] += g_over * a[k], s->w[k] += g_under * a[k];
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        s->a[k] += g_a[k], s->a_x[k] += g_a[k] * x;
 }
 
-/* Gradients of the corners: of p' first, then of what was moved. */
-TL_INLINE void pull_group(const weighed_group *g, group_gradients *d, int n, int has_db)
+/* Adds what a run has summed up at Y, its X beginning `from` off the triangle's, to the triangle's sums. */
+TL_INLINE void close_row(const row_sums *s, double from, double y, double *sums)
 {
-    for (int i = 0; i < n; i++) {
-        double g_a[3], g_by[2][3] = {{0}}, out[4][3] = {{0}};
-        pull_weights(g, d, i, has_db, g_a, g_by);
-        const double under = g->p[3][0][i] * g->a[0][i] + g->p[3][1][i] * g->a[1][i] + g->p[3][2][i] * g->a[2][i];
-        const int is_in = under != 0.0 && g->zw[i] >= -1.0 && g->zw[i] <= 1.0;
-        const double g_over = is_in ? d->zw[i] / under : 0.0, g_under = -g_over * (is_in ? g->zw[i] : 0.0);
-        for (int k = 0; k < 3; k++) {
-            g_a[k] += g_over * g->p[2][k][i] + g_under * g->p[3][k][i];
-            out[2][k] += g_over * g->a[k][i];
-            out[3][k] += g_under * g->a[k][i];
-        }
-        for (int k = 0; k < 3; k++) {
-            const int k1 = next_corner[k], k2 = last_corner[k];
-            const double x1 = g->p[0][k1][i], y1 = g->p[1][k1][i], w1 = g->p[3][k1][i];
-            const double x2 = g->p[0][k2][i], y2 = g->p[1][k2][i], w2 = g->p[3][k2][i];
-            const double by_x = has_db ? g_by[0][k] * g->scale[0] : 0.0, by_y = has_db ? g_by[1][k] * g->scale[1] : 0.0;
-            out[0][k1] += g_a[k] * y2 - by_y * w2, out[1][k1] += by_x * w2 - g_a[k] * x2;
-            out[0][k2] += by_y * w1 - g_a[k] * y1, out[1][k2] += g_a[k] * x1 - by_x * w1;
-            out[3][k1] += by_y * x2 - by_x * y2, out[3][k2] += by_x * y1 - by_y * x1;
-        }
-        for (int k = 0; k < 3; k++) {
-            out[3][k] -= g->middle[0][i] * out[0][k] + g->middle[1][i] * out[1][k];
-            for (int c = 0; c < 4; c++)
-                d->p[c][k][i] = out[c][k];
-        }
+    for (int k = 0; k < 3; k++) {
+        sums[2 + 3 * k] += s->a_x[k] + from * s->a[k] + s->q[k][0];
+        sums[3 + 3 * k] += y * s->a[k] + s->q[k][1];
+        sums[4 + 3 * k] += s->a[k];
+        sums[11 + k] += s->z[k], sums[14 + k] += s->w[k];
     }
 }
 
-/* Adds the gradients of a group to the sums of vertices, pixel by pixel. */
-TL_INLINE void add_group(const tl_grad_view *view, const pixel_group *group, const group_gradients *d,
-                         tl_grad_sums *sums)
+/* Gradients of the corners of a triangle from its sums: q_k = v_i x v_j. */
+TL_INLINE void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices,
+                              int is_f64)
 {
-    double *to[3] = {0};
-    for (int i = 0; i < group->n; i++) {
-        if (!i || group->id[i] != group->id[i - 1])
-            corner_sums(view, sums, group->id[i], to);
-        for (int k = 0; k < 3; k++)
-            for (int c = 0; c < 4; c++)
-                to[k][c] += d->p[c][k][i];
+    grad_triangle t;
+    double *to[3], g[3][3] = {{0}};
+    load_seen_triangle(view, id, sums[0], sums[1], &t, is_f64);
+    corner_sums(view, vertices, id, to);
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const double *d = sums + 2 + 3 * k;
+        g[i][0] += t.y[j] * d[2] - t.w[j] * d[1], g[i][1] += t.w[j] * d[0] - t.x[j] * d[2];
+        g[i][2] += t.x[j] * d[1] - t.y[j] * d[0];
+        g[j][0] += d[1] * t.w[i] - d[2] * t.y[i], g[j][1] += d[2] * t.x[i] - d[0] * t.w[i];
+        g[j][2] += d[0] * t.y[i] - d[1] * t.x[i];
+    }
+    for (int k = 0; k < 3; k++) {
+        to[k][0] += g[k][0], to[k][1] += g[k][1], to[k][2] += sums[11 + k];
+        to[k][3] += g[k][2] + sums[14 + k] - (sums[0] * g[k][0] + sums[1] * g[k][1]);
     }
 }
 
-TL_INLINE int64_t pull_points(const tl_grad_view *view, const void *rast, const void *g_rast, const void *g_db,
-                              tl_grad_sums *sums, int is_f64)
+TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p, int has_db, int is_f64)
 {
-    band_place place;
-    pixel_group group;
-    weighed_group g;
-    group_gradients d;
-    memset(&g, 0, sizeof g);
-    memset(&d, 0, sizeof d);
-    start_band(view, &place, &group);
-    while (next_group(view, rast, view->n_vertices, &place, &group, is_f64)) {
-        load_group(view, &group, &g, is_f64);
-        weigh_group(&g, group.padded);
-        if (g_db)
-            slope_group(&g, group.padded);
-        for (int i = 0; i < group.n; i++) {
-            const int64_t at = 4 * group.at[i];
-            d.weight[0][i] = get_real(g_rast, at, is_f64), d.weight[1][i] = get_real(g_rast, at + 1, is_f64);
-            d.zw[i] = get_real(g_rast, at + 2, is_f64);
-            for (int c = 0; g_db && c < 4; c++)
-                d.db[c][i] = get_real(g_db, at + c, is_f64);
+    grad_triangle t;
+    pixel_run run = before_shown(view);
+    while (next_shown(view, p->rast, view->n_vertices, &run, is_f64)) {
+        row_sums s;
+        const double x = middle_at(view, 0, run.column), y = middle_at(view, 1, run.row);
+        const int is_new = p->faces->slot_of[run.id] < 0;
+        double *sums = sums_of(p->faces, run.id);
+        memset(&s, 0, sizeof s);
+        if (is_new)
+            sums[0] = x, sums[1] = y;
+        load_seen_triangle(view, run.id, x, y, &t, is_f64);
+        for (int64_t i = 0; i < run.n; i++) {
+            const int64_t at = 4 * (run.at + i);
+            point_gradients g = {get_real(p->g_rast, at, is_f64),
+                                 get_real(p->g_rast, at + 1, is_f64),
+                                 get_real(p->g_rast, at + 2, is_f64),
+                                 {0}};
+            for (int c = 0; has_db && c < 4; c++)
+                g.db[c] = get_real(p->g_db, at + c, is_f64);
+            pull_point(view, &t, &g, 2.0 * view->scale[0] * (double)i, has_db, &s);
         }
-        if (g_db)
-            pull_group(&g, &d, group.padded, 1);
-        else
-            pull_group(&g, &d, group.padded, 0);
-        add_group(view, &group, &d, sums);
+        close_row(&s, x - sums[0], y - sums[1], sums);
     }
-    leave_band(sums);
-    return place.bad_id;
+    for (int64_t i = 0; i < p->faces->n; i++)
+        close_triangle(view, p->faces->rows[i], p->faces->sums + TL_SUMS_OF_FACE * i, p->vertices, is_f64);
+    leave_band(p->faces);
+    leave_band(p->vertices);
+    return run.bad_id;
 }
 
 /* See kernels.h. */
-static int64_t grad_points_vjp(const tl_grad_view *view, const void *rast, const void *g_rast, const void *g_db,
-                               tl_grad_sums *sums)
+static int64_t grad_points_vjp(const tl_grad_view *view, const tl_grad_points *p)
 {
-    return view->is_f64 ? pull_points(view, rast, g_rast, g_db, sums, 1)
-                        : pull_points(view, rast, g_rast, g_db, sums, 0);
+    if (view->is_f64)
+        return p->g_db ? pull_points(view, p, 1, 1) : pull_points(view, p, 0, 1);
+    return p->g_db ? pull_points(view, p, 1, 0) : pull_points(view, p, 0, 0);
 }
 
 #endif

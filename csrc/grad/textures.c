@@ -48,8 +48,9 @@ TL_INLINE int64_t place_texel(const tl_grad_texture *t, int level, int face, int
     const int64_t width = t->widths[level], height = t->heights[level];
     const int is_in = x >= 0 && x < width && y >= 0 && y < height;
     *is_there = 1;
-    if (!is_in && t->edge == TL_EDGE_WRAP) {
-        x = (x % width + width) % width, y = (y % height + height) % height;
+    if (!is_in && t->edge == TL_EDGE_WRAP) { /* by one at most */
+        x = x < 0 ? width - 1 : x >= width ? 0 : x;
+        y = y < 0 ? height - 1 : y >= height ? 0 : y;
     } else if (!is_in) {
         *is_there = t->edge != TL_EDGE_ZERO;
         if (t->edge == TL_EDGE_CUBE && (x >= 0 && x < width) != (y >= 0 && y < height))
@@ -197,7 +198,7 @@ static void grad_texels(const tl_grad_view *view, const tl_grad_texture *texture
 
 /* Adds a pixel's gradients to its texels of a level; returns those of u and v, and the sum of gradient and value. */
 TL_INLINE double pull_shares(const tl_grad_texture *t, const texel_shares *quad, int level, int64_t pixel, double share,
-                           double *g_uv, tl_grad_sums *sums, int is_f64)
+                             double *g_uv, tl_grad_sums *sums, int is_f64)
 {
     double total = 0.0;
     for (int j = 0; j < quad->n; j++) {
@@ -247,9 +248,12 @@ TL_INLINE int is_pulled(const tl_grad_texture *t, int64_t pixel, int is_f64)
     return found;
 }
 
-/* What is written has been 0. */
 TL_INLINE void pull_texels(const tl_grad_view *view, const tl_grad_texture *t, tl_grad_sums *sums, int is_f64)
 {
+    const int n_axes = t->edge == TL_EDGE_CUBE ? 3 : 2;
+    clear_band(view, t->g_uv, n_axes);
+    clear_band(view, t->g_uv_da, 2 * n_axes);
+    clear_band(view, t->g_bias, 1);
     for (int64_t pixel = view->first_row * view->width; pixel < view->end_row * view->width; pixel++) {
         if (!is_pulled(t, pixel, is_f64))
             continue;

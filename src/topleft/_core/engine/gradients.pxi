@@ -1,6 +1,7 @@
 # Tensors of pixels and their gradients. Included by kernels.pyx.
 
 MOST_LEVELS = TL_MOST_LEVELS
+SUMS_OF_FACE = TL_SUMS_OF_FACE
 
 
 cdef const void *first_of(array: object):
@@ -48,18 +49,19 @@ cdef class GradientView:
         with nogil:
             K.grad_points(&view, lowest, step, first_id, out, out_db)
 
-    def points_vjp(self, rast: Array, g_rast: Array, g_db: Array | None, GradientSums sums, int64_t first, int64_t end) -> int:
+    def points_vjp(self, rast: Array, g_rast: Array, g_db: Array | None, GradientSums faces, GradientSums sums,
+                   int64_t first, int64_t end) -> int:
         """Sum up gradients of vertices from rows of those of `rast` and, unless None, of `rast_db`.
 
-        Returns the number of a triangle that does not exist, or -1.
+        `faces`: scratch by triangle, SUMS_OF_FACE columns. Returns the number of a triangle that does not exist, or -1.
         """
         cdef tl_grad_view view = self.rows(first, end)
-        cdef const void *points = first_of(rast)
-        cdef const void *g_points = first_of(g_rast)
-        cdef const void *g_slopes = first_of(g_db)
+        cdef tl_grad_points p
         cdef int64_t bad
+        p.rast, p.g_rast, p.g_db = first_of(rast), first_of(g_rast), first_of(g_db)
+        p.faces, p.vertices = &faces.sums, &sums.sums
         with nogil:
-            bad = K.grad_points_vjp(&view, points, g_points, g_slopes, &sums.sums)
+            bad = K.grad_points_vjp(&view, &p)
         return bad
 
     def values(self, attr: Array, const int32_t[::1] wanted, arrays: tuple[Array | None, ...], GradientSums sums or None, int64_t first,
@@ -87,7 +89,7 @@ cdef class GradientView:
 
     def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...], GradientSums sums or None,
                int64_t first, int64_t end):
-        """Write rows of a texture, levels (., H, W, C); with sums, of its gradients, which have been 0.
+        """Write rows of a texture, levels (., H, W, C); with sums, of its gradients.
 
         `codes`: of the filter and of what lies beyond the edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out,
         and with sums g_uv, g_uv_da, g_bias; None for what is not there.

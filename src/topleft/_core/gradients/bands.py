@@ -61,11 +61,9 @@ class Bands:
         bad, n_rows, n_columns = -1, out.shape[1], out.shape[2]
 
         def part(bands: list[Band]) -> list[tuple[int, engine.GradientSums, int]]:
-            slots = SCRATCH.constant("gradient slots", n_rows, -1)[:n_rows]
             done = []
             for band in bands:
-                room = min(n_rows, rows_per_px * (band.end - band.first) * self.width)
-                sums = engine.GradientSums(slots, empty((room,), np.int32), empty((room, n_columns), np.float64))
+                sums = sums_of(n_rows, n_columns, band, rows_per_px * self.width)
                 found = work(band, sums)
                 done.append((band.picture, sums, -1 if found is None else found))
             return done
@@ -78,3 +76,10 @@ class Bands:
                 sums.add_to(out[picture if len(out) > 1 else 0])
                 bad = max(bad, found)
         return bad
+
+
+def sums_of(n_rows: int, n_columns: int, band: Band, width: int, name: str = "rows") -> engine.GradientSums:
+    """Return room for the sums of a band that touches at most `width` of `n_rows` rows in each row of pixels."""
+    slots = SCRATCH.constant(f"gradient {name}", n_rows, -1)[:n_rows]
+    room = min(n_rows, (band.end - band.first) * width)
+    return engine.GradientSums(slots, empty((room,), np.int32), empty((room, n_columns), np.float64))

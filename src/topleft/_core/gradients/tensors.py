@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.gradients.bands import Array, Band, Bands
+from topleft._core.base.memory import empty
+from topleft._core.gradients.bands import Array, Band, Bands, sums_of
 
 
 class Filter(IntEnum):
@@ -93,7 +94,7 @@ def points(
     `pos` (B or 1, V, 4). `ids`: of each picture (H, W), and what is added to them; with row 0 on top where they are
     flipped. `rast_db` (B, H, W, 4) is du/dX, du/dY, dv/dX, dv/dY, or has no columns.
     """
-    rast, rast_db = np.zeros(grid.shape(4), pos.dtype), np.zeros(grid.shape(4 if with_db else 0), pos.dtype)
+    rast, rast_db = empty(grid.shape(4), pos.dtype), empty(grid.shape(4 if with_db else 0), pos.dtype)
 
     def work(band: Band) -> None:
         i, (own, first) = band.picture, ids[band.picture]
@@ -111,7 +112,8 @@ def points_vjp(grid: Grid, pos: Array, rast: Array, g_rast: Array, g_db: Array |
     def work(band: Band, sums: engine.GradientSums) -> int:
         i = band.picture
         slopes = None if g_db is None else g_db[i]
-        return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, sums, band.first, band.end)
+        faces = sums_of(len(grid.tri), engine.SUMS_OF_FACE, band, grid.width, "faces")
+        return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, faces, sums, band.first, band.end)
 
     grid.refuse(grid.bands.add_up(work, out, 3))
     return out
@@ -121,8 +123,8 @@ def values(
     grid: Grid, attr: Array, rast: Array, rast_db: Array | None = None, wanted: Sequence[int] = ()
 ) -> tuple[Array, Array]:
     """Return attributes (B or 1, V, K) at pixels (B, H, W, K), and what those `wanted` change by, (B, H, W, 2 N)."""
-    out = np.zeros(grid.shape(attr.shape[2]), attr.dtype)
-    out_da = np.zeros(grid.shape(2 * len(wanted)), attr.dtype)
+    out = empty(grid.shape(attr.shape[2]), attr.dtype)
+    out_da = empty(grid.shape(2 * len(wanted)), attr.dtype)
     view, columns = grid.view(attr[0, :0]), np.asarray(wanted, np.int32)
 
     def work(band: Band) -> int:
@@ -145,8 +147,8 @@ def values_vjp(
     wanted: Sequence[int] = (),
 ) -> tuple[Array, Array, Array | None]:
     """Return the gradients of `attr`, `rast` and `rast_db`, the last None without `g_da`."""
-    g_attr, g_rast = np.zeros(attr.shape, attr.dtype), np.zeros(rast.shape, attr.dtype)
-    g_db = None if g_da is None else np.zeros(rast.shape, attr.dtype)
+    g_attr, g_rast = np.zeros(attr.shape, attr.dtype), empty(rast.shape, attr.dtype)
+    g_db = None if g_da is None else empty(rast.shape, attr.dtype)
     view, columns = grid.view(attr[0, :0]), np.asarray(wanted if g_da is not None else (), np.int32)
 
     def work(band: Band, sums: engine.GradientSums) -> int:
@@ -189,7 +191,7 @@ class Look:
 def texels(look: Look) -> Array:
     """Return a texture at each pixel, (B, H, W, C)."""
     grid, dtype = look.grid, look.uv.dtype
-    out = np.zeros(grid.shape(look.levels[0].shape[-1]), dtype)
+    out = empty(grid.shape(look.levels[0].shape[-1]), dtype)
     view, codes = grid.view(np.empty((0, 4), dtype)), (int(look.filter), int(look.beyond))
 
     def work(band: Band) -> None:
@@ -207,7 +209,7 @@ def texels_vjp(look: Look, g_out: Array) -> tuple[list[Array], Array, Array | No
     n_channels, n_pictures = g_out.shape[3], len(look.levels[0])
     ends = np.cumsum([level[0].size // n_channels if n_channels else 0 for level in look.levels])
     sums_of = np.zeros((n_pictures, ends[-1], n_channels), dtype)
-    g_uv, g_da, g_bias = (None if one is None else np.zeros_like(one) for one in (look.uv, look.uv_da, look.bias))
+    g_uv, g_da, g_bias = (None if one is None else empty(one.shape, dtype) for one in (look.uv, look.uv_da, look.bias))
 
     def work(band: Band, sums: engine.GradientSums) -> None:
         i = band.picture
@@ -222,7 +224,7 @@ def texels_vjp(look: Look, g_out: Array) -> tuple[list[Array], Array, Array | No
 
 def smooth(grid: Grid, rule: Edges, pos: Array, rast: Array, across: NDArray[np.int32], color: Array) -> Array:
     """Return colours (B, H, W, C) with smooth silhouettes; `across` is that of `halves_across`."""
-    out = np.empty(color.shape, color.dtype)
+    out = empty(color.shape, color.dtype)
 
     def work(band: Band) -> None:
         i = band.picture
@@ -238,7 +240,7 @@ def smooth_vjp(
     grid: Grid, rule: Edges, pos: Array, rast: Array, across: NDArray[np.int32], color: Array, g_out: Array
 ) -> tuple[Array, Array]:
     """Return the gradients of the colours and of `pos`."""
-    g_color, g_pos = np.empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)
+    g_color, g_pos = empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)
 
     def work(band: Band, sums: engine.GradientSums) -> None:
         i = band.picture
