@@ -19,6 +19,7 @@ typedef struct {
     const void *pos;    /* (n_vertices, 4): x, y, z, w */
     const int32_t *tri; /* (n_triangles, 3) */
     int64_t n_vertices, n_triangles, width, height, first_row, end_row;
+    double z_most;             /* z/w is clamped to so much on either side of 0 */
     double scale[2], shift[2]; /* the middle of column c has x / w = (2 c + 1) scale[0] + shift[0] */
     int is_f64;
 } tl_grad_view;
@@ -78,5 +79,15 @@ typedef struct {
     const void *g_out; /* backward, NULL forward */
     void *g_color;
 } tl_grad_edges;
+
+/* Areas of triangles in pixels, each times the values of the triangle, NULL for 1. */
+typedef struct {
+    const double *points_px;  /* (n_points, 2), finite */
+    const int32_t *triangles; /* (n_triangles, 3) */
+    int64_t n_triangles, width, height, n_channels;
+    const double *values; /* (n_triangles, n_channels) */
+    const double *grad;   /* (height, width, n_channels) */
+    double *out;          /* (n_points, 2): is added to */
+} tl_grad_area;
 
 #endif

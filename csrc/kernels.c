@@ -37,6 +37,7 @@
 #include "pixels/weights_one.c"
 #include "blend/blend.c"
 #include "blend/fill_few.c"
+#include "grad/area_vjp.c"
 #include "grad/edges.c"
 #include "grad/points.c"
 #include "grad/textures.c"
@@ -157,4 +158,5 @@ const tl_kernels TL_KERNELS = {
     .grad_texels = grad_texels,
     .grad_texels_vjp = grad_texels_vjp,
     .grad_edges = grad_edges,
+    .grad_area = grad_area,
 };

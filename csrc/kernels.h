@@ -402,6 +402,9 @@ typedef struct tl_kernels {
 
     /* A band with smooth silhouettes; or backward the gradients of its colours, and the sums by vertex. */
     void (*grad_edges)(const tl_grad_view *view, const tl_grad_edges *edges, tl_grad_sums *sums);
+
+    /* The gradients of vertices from those of areas. */
+    void (*grad_area)(const tl_grad_area *area);
 } tl_kernels;
 
 #endif

@@ -174,8 +174,10 @@ static int find_silhouette(const tl_grad_view *view, const tl_grad_edges *e, con
  * there; what it changes by with u and with h. */
 TL_INLINE double area_before(double u, double h, double *by_u, double *by_h)
 {
+    *by_u = *by_h = 0.0;
+    if (u <= -h || u >= 1.0 + h)
+        return u > 0.5;
     h = h < 1e-9 ? 1e-9 : h;
-    u = clamped(u, -h, 1.0 + h);
     const double p = h - u > 0.0 ? h - u : 0.0, q = u + h > 1.0 ? u + h - 1.0 : 0.0;
     *by_u = 1.0 - (p + q) / (2.0 * h);
     *by_h = (p * (h + u) - q * (h - u + 1.0)) / (4.0 * h * h);

@@ -11,6 +11,7 @@
 #ifndef TL_GRAD_POINTS_C
 #define TL_GRAD_POINTS_C
 
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -32,7 +33,8 @@ TL_INLINE double middle_at(const tl_grad_view *view, int axis, int64_t i)
     return (2.0 * (double)i + 1.0) * view->scale[axis] + view->shift[axis];
 }
 
-TL_INLINE void load_seen_triangle(const tl_grad_view *view, int32_t id, double x, double y, grad_triangle *t, int is_f64)
+TL_INLINE void load_seen_triangle(const tl_grad_view *view, int32_t id, double x, double y, grad_triangle *t,
+                                  int is_f64)
 {
     t->middle[0] = x, t->middle[1] = y;
     for (int k = 0; k < 3; k++) {
@@ -57,7 +59,7 @@ TL_INLINE void load_seen_triangle(const tl_grad_view *view, int32_t id, double x
 /* A function of X and Y that has these numbers, in the row of the middle. */
 TL_INLINE double plane_at(const double *q, double x) { return q[0] * x + q[2]; }
 
-/* Writes pixel i of a run, X off the first: weights are clamped to a sum of at most 1, z/w to -1..1. */
+/* Writes pixel i of a run, X off the first: weights are clamped to a sum of at most 1, z/w to z_most. */
 TL_INLINE void store_point(const tl_grad_view *view, const grad_triangle *t, const pixel_run *run, int64_t i, double x,
                            void *const *out, int is_f64)
 {
@@ -69,7 +71,8 @@ TL_INLINE void store_point(const tl_grad_view *view, const grad_triangle *t, con
     if (sum > 1.0)
         u_in /= sum, v_in /= sum;
     put_real(out[0], at, u_in, is_f64), put_real(out[0], at + 1, v_in, is_f64);
-    put_real(out[0], at + 2, clamped(plane_at(t->over, x) / (under == 0.0 ? 1.0 : under), -1.0, 1.0), is_f64);
+    put_real(out[0], at + 2, clamped(plane_at(t->over, x) / (under == 0.0 ? 1.0 : under), -view->z_most, view->z_most),
+             is_f64);
     put_id(out[0], run->at + i, run->id, is_f64);
     for (int axis = 0; out[1] && axis < 2; axis++) {
         const double step = 2.0 * view->scale[axis] * r;
@@ -159,7 +162,7 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
     g_a[0] = g_u * r + g_total, g_a[1] = g_v * r + g_total, g_a[2] = g_total;
     if (g->zw != 0.0) {
         const double under = plane_at(t->under, x), zw = plane_at(t->over, x) / (under == 0.0 ? 1.0 : under);
-        const double g_over = under != 0.0 && zw >= -1.0 && zw <= 1.0 ? g->zw / under : 0.0, g_under = -g_over * zw;
+        const double g_over = under != 0.0 && fabs(zw) <= view->z_most ? g->zw / under : 0.0, g_under = -g_over * zw;
         for (int k = 0; k < 3 && g_over != 0.0; k++) {
             g_a[k] += g_over * t->z[k] + g_under * t->w[k];
             s->z[k] += g_over * a[k], s->w[k] += g_under * a[k];

@@ -72,6 +72,7 @@ CALLS = {
     "Rasterizer": (tl.Rasterizer, {"size": SIZE, "threads": None}),
     "Scene": (tl.Scene, {"instances": [CUBE]}),
     "Texture": (tl.Texture, {"image": np.zeros((2, 2), np.uint8), "filter": "nearest", "wrap": "clamp"}),
+    "area_vjp": (tl.area_vjp, {"vertices": POINTS, "triangles": ONE, "size": SIZE, "grad": 1, "colors": None}),
     "as_mesh": (tl.as_mesh, {"subject": CUBE}),
     "bresenham_line": (tl.bresenham_line, {"x0": 0, "y0": 0, "x1": 3, "y1": 2}),
     "choose_detail": (tl.choose_detail, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "tolerance": 0.0,

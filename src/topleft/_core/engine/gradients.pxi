@@ -19,12 +19,13 @@ cdef class GradientView:
     cdef object arrays
 
     def __init__(self, pos: Array, const int32_t[:, ::1] tri, size: tuple[int, int], scale: tuple[float, float],
-                 shift: tuple[float, float]):
+                 shift: tuple[float, float], double z_most):
         """`pos` (V, 4) float32 or float64, the dtype of all tensors; `size` is width and height."""
         self.arrays = (pos, tri)
         self.view.pos, self.view.n_vertices, self.view.is_f64 = first_of(pos), pos.shape[0], pos.dtype == np.float64
         self.view.tri, self.view.n_triangles = &tri[0, 0] if tri.shape[0] else NULL, tri.shape[0]
         self.view.width, self.view.height = size
+        self.view.z_most = z_most
         self.view.scale[0], self.view.scale[1] = scale
         self.view.shift[0], self.view.shift[1] = shift
 
@@ -169,3 +170,16 @@ cdef class GradientSums:
                         (<double *>rows)[at + c] += self.sums.sums[i * n_columns + c]
                     else:
                         (<float *>rows)[at + c] = <float>((<float *>rows)[at + c] + self.sums.sums[i * n_columns + c])
+
+
+def area_vjp(const double[:, ::1] points_px, const int32_t[:, ::1] triangles, const double[:, ::1] values or None,
+             const double[:, :, ::1] grad, double[:, ::1] out):
+    """Add the gradients of points to `out` (V, 2) from those (H, W, C) of areas times the values (T, C), or 1."""
+    cdef tl_grad_area p
+    if not triangles.shape[0] or not grad.shape[0] or not grad.shape[1] or not grad.shape[2]:
+        return
+    p.points_px, p.triangles, p.n_triangles = &points_px[0, 0], &triangles[0, 0], triangles.shape[0]
+    p.height, p.width, p.n_channels = grad.shape[0], grad.shape[1], grad.shape[2]
+    p.values, p.grad, p.out = &values[0, 0] if values is not None else NULL, &grad[0, 0, 0], &out[0, 0]
+    with nogil:
+        K.grad_area(&p)

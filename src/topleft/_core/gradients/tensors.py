@@ -58,7 +58,7 @@ class Grid:
     width: int
     threads: int | None = None
     in_pixels: bool = False
-    """Whether x/w and y/w count pixels; otherwise they run from -1 to 1 across the picture."""
+    """Whether x/w and y/w count pixels; otherwise they run from -1 to 1 across the picture, and z/w is clamped to it."""
 
     @property
     def bands(self) -> Bands:
@@ -69,7 +69,7 @@ class Grid:
         """Return what the engine needs to know of a picture with these vertices (V, 4)."""
         size = self.width, self.height
         scale, shift = ((0.5, 0.5), (0.0, 0.0)) if self.in_pixels else ((1 / self.width, 1 / self.height), (-1.0, -1.0))
-        return engine.GradientView(pos, self.tri, size, scale, shift)
+        return engine.GradientView(pos, self.tri, size, scale, shift, np.inf if self.in_pixels else 1.0)
 
     def shape(self, *columns: int) -> tuple[int, ...]:
         """Return the shape of a tensor of pixels."""
