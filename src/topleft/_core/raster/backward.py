@@ -67,7 +67,9 @@ class Backward:
         if self.given.transform is None and self.vertices.shape[1] < 4:
             return np.stack([g_x, g_y, g_z], axis=-1)[:, : self.vertices.shape[1]]
         width, height = self.given.viewport
-        of_clip = np.stack([g_x * (width / 2), -g_y * (height / 2), g_z, g_w + g_x * (width / 2) + g_y * (height / 2)], -1)
+        of_clip = np.stack(
+            [g_x * (width / 2), -g_y * (height / 2), g_z, g_w + g_x * (width / 2) + g_y * (height / 2)], -1
+        )
         if self.given.transform is None:
             return of_clip
         matrix = np.asarray(as_array("transform", self.given.transform), np.float64)
@@ -99,7 +101,9 @@ class Backward:
     def smooth(self, picture: ArrayLike, edges: EdgesOption) -> NDArray[Any]:
         """Return a picture with smooth silhouettes."""
         given, color = self.as_picture(picture)
-        out = tensors.smooth(self.grid, as_rule(edges), self.pos, self.rast, tensors.halves_across(self.grid.tri), color)
+        out = tensors.smooth(
+            self.grid, as_rule(edges), self.pos, self.rast, tensors.halves_across(self.grid.tri), color
+        )
         return out.reshape(given.shape).astype(np.float32 if given.dtype == np.float32 else np.float64, copy=False)
 
     def smooth_vjp(self, picture: ArrayLike, grad: ArrayLike, edges: EdgesOption) -> tuple[Floats, Floats]:
@@ -115,7 +119,9 @@ class Backward:
         given = np.asarray(as_array("picture", picture))
         shape = self.grid.shape()[1:]
         if given.shape[:2] != shape or given.ndim not in (2, 3) or given.dtype.kind not in "biuf":
-            raise ValueError(f"picture must be real, of shape {shape} or {(*shape, 'C')}, got {given.dtype} {given.shape}")
+            raise ValueError(
+                f"picture must be real, of shape {shape} or {(*shape, 'C')}, got {given.dtype} {given.shape}"
+            )
         return given, np.ascontiguousarray(given, np.float64).reshape(1, *shape, -1)
 
     def as_grad(self, name: str, grad: ArrayLike, *columns: int) -> Floats:
