@@ -47,7 +47,7 @@ TL_INLINE cube_point meet_cube(const double *direction, const double *by)
     return p;
 }
 
-/* Gradients of the direction (3), and of what it changes by (3, 2), or NULL, from those of u and v and of the slopes. */
+/* Gradients of the direction (3), and of what it changes by (3, 2), or NULL, from those of u, v and the slopes. */
 TL_INLINE void pull_cube(const cube_point *p, const double *g_uv, const double *g_slopes, double *g_direction,
                          double *g_by)
 {

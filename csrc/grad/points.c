@@ -2,8 +2,9 @@
  * and backwards, from gradients of these to sums of gradients by vertex.
  * In: ids of a picture.  Out: `rast`, `rast_db`; backward: sums of x, y, z, w.
  *
- * With X, Y a pixel's middle, about that of the first pixel that shows the triangle, and x' = x - X0 w, y' = y - Y0 w of
- * its corners, a_k = q_k . (X, Y, 1) with q_k the cross product of the other two corners (x', y', w).  Weights are
+ * With X, Y a pixel's middle, about that (X0, Y0) of the first pixel that shows the triangle, and x' = x - X0 w,
+ * y' = y - Y0 w of its corners, a_k = q_k . (X, Y, 1) with q_k the cross product of the other two corners (x', y', w).
+ * Weights are
  * a_k / (a_0 + a_1 + a_2), so backward a triangle needs the sums of the gradients of a_k times X, Y and 1: those of its
  * corners follow from them at once.  What the weights change by has the first two numbers of q_k alone.
  *

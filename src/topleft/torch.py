@@ -25,7 +25,7 @@ from topleft._core.base.arrays import as_pair, check_rows
 from topleft._core.base.threads import parse_threads
 from topleft._core.gradients import tensors
 from topleft._core.gradients.bands import MIN_PX_PER_THREAD
-from topleft._core.gradients.tensors import Beyond, Edges, Filter, Grid, Look
+from topleft._core.gradients.tensors import Beyond, EdgeRule, Look, PixelGrid, TexelFilter
 from topleft._core.raster.peel import DepthLayers, peel
 from topleft._core.raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
@@ -355,8 +355,8 @@ def texture(
         is_cube = boundary_mode == "cube"
         made = texture_construct_mip(tex, max_mip_level, is_cube) if mip is None else as_mip(tex, mip, max_mip_level)
     at, footprint, bias, *levels = same_dtype(uv, uv_da if made else None, mip_level_bias if made else None, tex, *made)
-    how = Filter[filter_mode.replace("-", "_").upper()] if made else Filter.LINEAR
-    how = Filter.NEAREST if filter_mode == "nearest" else how
+    how = TexelFilter[filter_mode.replace("-", "_").upper()] if made else TexelFilter.LINEAR
+    how = TexelFilter.NEAREST if filter_mode == "nearest" else how
     beyond = Beyond[boundary_mode.upper()]
     return look_up(levels, at, footprint, bias, int(how), int(beyond))
 
@@ -500,7 +500,7 @@ def antialias(
     if across.shape != tri.shape:
         raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(across.shape)}")
     given, points_of, vertices = same_dtype(color, (rast, len(tri)), pos)
-    rule, mesh = Edges[edges.replace("-", "_").upper()], vertices if vertices.ndim == 3 else vertices[None]
+    rule, mesh = EdgeRule[edges.replace("-", "_").upper()], vertices if vertices.ndim == 3 else vertices[None]
     out = smooth(given, points_of, mesh, tri, across, int(rule), float(pos_gradient_boost))
     return out.to(color.dtype)
 
@@ -558,10 +558,10 @@ def triangles_of(tri: Tensor, n_vertices: int) -> NDArray[np.int32]:
     return array
 
 
-def grid_of(tri: Tensor, pixels: Tensor, n_vertices: int) -> Grid:
+def grid_of(tri: Tensor, pixels: Tensor, n_vertices: int) -> PixelGrid:
     """Return the pictures (B, H, W, ...) of triangles."""
     b, h, w = pixels.shape[:3]
-    return Grid(triangles_of(tri, n_vertices), b, h, w, threads_of(0, b * h * w))
+    return PixelGrid(triangles_of(tri, n_vertices), b, h, w, threads_of(0, b * h * w))
 
 
 def each(pos: Tensor, tri: Tensor, ranges: Tensor | None) -> list[tuple[Any, Any]]:
@@ -713,7 +713,7 @@ def look_of(
     """Return what the engine looks up."""
     where = numpy_of(uv), numpy_of(uv_da), numpy_of(bias)
     return Look(
-        [numpy_of(one) for one in levels], Filter(how), Beyond(beyond), *where, threads_of(0, uv[..., 0].numel())
+        [numpy_of(one) for one in levels], TexelFilter(how), Beyond(beyond), *where, threads_of(0, uv[..., 0].numel())
     )
 
 
@@ -781,7 +781,7 @@ def smooth(
     """Return the picture with smooth silhouettes."""
     grid = grid_of(tri, rast, pos.shape[1])
     arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color))
-    return torch.from_numpy(tensors.smooth(grid, Edges(rule), *arrays))
+    return torch.from_numpy(tensors.smooth(grid, EdgeRule(rule), *arrays))
 
 
 @operator(
@@ -794,7 +794,7 @@ def smooth_vjp(
     """Return the gradients of the colours and of `pos`."""
     grid = grid_of(tri, rast, pos.shape[1])
     arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color, g_out))
-    g_color, g_pos = tensors.smooth_vjp(grid, Edges(rule), *arrays)
+    g_color, g_pos = tensors.smooth_vjp(grid, EdgeRule(rule), *arrays)
     return torch.from_numpy(g_color), torch.from_numpy(g_pos)
 
 

@@ -5,6 +5,7 @@ import re
 import typing
 from typing import get_args
 
+import numpy as np
 import pytest
 
 import topleft as tl
@@ -61,6 +62,7 @@ FLAT = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]], [[0, 1, 2]]
 
 #: Options whose check reads the type: a call of each.
 READ = {
+    "EdgesOption": lambda word: tl.rasterize(*FLAT, (4, 4)).antialias(np.ones((4, 4)), edges=word),
     "FitOption": lambda word: tl.Camera.framing(CUBE, fit=word),
     "SurfaceOption": lambda word: tl.height_map(([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]]), 1.0, surface=word),
     "UpOption": lambda word: tl.Camera.framing(CUBE, up=word),

@@ -36,7 +36,7 @@ cdef class GradientView:
 
     def points(self, const int32_t[:, ::1] ids, bint is_flipped, int64_t first_id, rast: Array, rast_db: Array | None,
                int64_t first, int64_t end):
-        """Write rows of `rast` and, unless it is None, `rast_db` (H, W, 4), from ids whose row 0 is on top if flipped."""
+        """Write rows of `rast` and, unless it is None, `rast_db` (H, W, 4), from ids; flipped: row 0 is on top."""
         cdef tl_grad_view view = self.rows(first, end)
         cdef void *out = <void *>first_of(rast)
         cdef void *out_db = <void *>first_of(rast_db)
@@ -65,8 +65,8 @@ cdef class GradientView:
             bad = K.grad_points_vjp(&view, &p)
         return bad
 
-    def values(self, attr: Array, const int32_t[::1] wanted, arrays: tuple[Array | None, ...], GradientSums sums or None, int64_t first,
-               int64_t end) -> int:
+    def values(self, attr: Array, const int32_t[::1] wanted, arrays: tuple[Array | None, ...],
+               GradientSums sums or None, int64_t first, int64_t end) -> int:
         """Write rows of attributes (V, K); with sums, of their gradients. Returns as `points_vjp` does.
 
         `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for what is not there.
@@ -88,8 +88,8 @@ cdef class GradientView:
             bad = K.grad_values_vjp(&view, &v, &sums.sums)
         return bad
 
-    def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...], GradientSums sums or None,
-               int64_t first, int64_t end):
+    def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...],
+               GradientSums sums or None, int64_t first, int64_t end):
         """Write rows of a texture, levels (., H, W, C); with sums, of its gradients.
 
         `codes`: of the filter and of what lies beyond the edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out,

@@ -7,6 +7,7 @@ the height of a picture alone, so every number of threads gives the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,19 +61,19 @@ class Bands:
         """
         bad, n_rows, n_columns = -1, out.shape[1], out.shape[2]
 
-        def part(bands: list[Band]) -> list[tuple[int, engine.GradientSums, int]]:
+        def part(first: int, end: int) -> list[tuple[int, engine.GradientSums, int]]:
             done = []
-            for band in bands:
+            for band in some[first:end]:
                 sums = sums_of(n_rows, n_columns, band, rows_per_px * self.width)
                 found = work(band, sums)
                 done.append((band.picture, sums, -1 if found is None else found))
             return done
 
+        some: list[Band] = []
         at_a_time = self.threads * WAITING_BANDS if self.threads > 1 else 1
         for start in range(0, len(self.all), at_a_time):
             some = self.all[start : start + at_a_time]
-            parts = run_parts(lambda first, end, some=some: part(some[first:end]), len(some), self.threads)
-            for picture, sums, found in (one for done in parts for one in done):
+            for picture, sums, found in chain.from_iterable(run_parts(part, len(some), self.threads)):
                 sums.add_to(out[picture if len(out) > 1 else 0])
                 bad = max(bad, found)
         return bad

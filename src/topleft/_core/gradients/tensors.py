@@ -22,7 +22,7 @@ from topleft._core.base.memory import empty
 from topleft._core.gradients.bands import Array, Band, Bands, sums_of
 
 
-class Filter(IntEnum):
+class TexelFilter(IntEnum):
     """How a texture is looked up: `tl_texel_filter`."""
 
     NEAREST = 0
@@ -40,7 +40,7 @@ class Beyond(IntEnum):
     CUBE = 3
 
 
-class Edges(IntEnum):
+class EdgeRule(IntEnum):
     """Which rule makes silhouettes smooth: `tl_pair_rule`."""
 
     SILHOUETTE = 0
@@ -49,7 +49,7 @@ class Edges(IntEnum):
 
 
 @dataclass(frozen=True)
-class Grid:
+class PixelGrid:
     """Pictures (B, H, W) of triangles (T, 3), int32, whose vertices and attributes have rows below `n_rows`."""
 
     tri: NDArray[np.int32]
@@ -58,7 +58,7 @@ class Grid:
     width: int
     threads: int | None = None
     in_pixels: bool = False
-    """Whether x/w and y/w count pixels; otherwise they run from -1 to 1 across the picture, and z/w is clamped to it."""
+    """Whether x/w and y/w count pixels; otherwise they run from -1 to 1 across the picture, as z/w does."""
 
     @property
     def bands(self) -> Bands:
@@ -87,7 +87,7 @@ def of(arrays: Array, picture: int) -> Array:
 
 
 def points(
-    grid: Grid, pos: Array, ids: Sequence[tuple[NDArray[np.int32], int]], *, is_flipped: bool, with_db: bool
+    grid: PixelGrid, pos: Array, ids: Sequence[tuple[NDArray[np.int32], int]], *, is_flipped: bool, with_db: bool
 ) -> tuple[Array, Array]:
     """Return `rast` (B, H, W, 4): weights of the first two corners, z/w and the id plus 1; and `rast_db`.
 
@@ -105,7 +105,7 @@ def points(
     return rast, rast_db
 
 
-def points_vjp(grid: Grid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
+def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
     """Return the gradient of `pos`."""
     out = np.zeros(pos.shape, pos.dtype)
 
@@ -120,7 +120,7 @@ def points_vjp(grid: Grid, pos: Array, rast: Array, g_rast: Array, g_db: Array |
 
 
 def values(
-    grid: Grid, attr: Array, rast: Array, rast_db: Array | None = None, wanted: Sequence[int] = ()
+    grid: PixelGrid, attr: Array, rast: Array, rast_db: Array | None = None, wanted: Sequence[int] = ()
 ) -> tuple[Array, Array]:
     """Return attributes (B or 1, V, K) at pixels (B, H, W, K), and what those `wanted` change by, (B, H, W, 2 N)."""
     out = empty(grid.shape(attr.shape[2]), attr.dtype)
@@ -138,7 +138,7 @@ def values(
 
 
 def values_vjp(
-    grid: Grid,
+    grid: PixelGrid,
     attr: Array,
     rast: Array,
     g_out: Array,
@@ -166,7 +166,7 @@ class Look:
     """How a texture is looked up, and where: levels (B or 1, ...); uv (B, H, W, 2 or 3), footprints, biases."""
 
     levels: Sequence[Array]
-    filter: Filter
+    filter: TexelFilter
     beyond: Beyond
     uv: Array
     uv_da: Array | None = None
@@ -179,9 +179,10 @@ class Look:
         return one if self.beyond is Beyond.CUBE else [level[None] for level in one]
 
     @property
-    def grid(self) -> Grid:
+    def grid(self) -> PixelGrid:
         """The pixels that look."""
-        return Grid(np.empty((0, 3), np.int32), *self.uv.shape[:3], self.threads)
+        b, h, w = self.uv.shape[:3]
+        return PixelGrid(np.empty((0, 3), np.int32), b, h, w, self.threads)
 
     def arrays(self, picture: int, *more: Array | None) -> tuple[Array | None, ...]:
         """Return what the engine takes of a picture."""
@@ -216,13 +217,13 @@ def texels_vjp(look: Look, g_out: Array) -> tuple[list[Array], Array, Array | No
         arrays = look.arrays(i, g_out, g_uv, g_da, g_bias)
         view.texels(look.of_picture(i), codes, arrays, sums, band.first, band.end)
 
-    grid.bands.add_up(work, sums_of, 4 if look.filter < Filter.LINEAR_MIPMAP_LINEAR else 8)
+    grid.bands.add_up(work, sums_of, 4 if look.filter < TexelFilter.LINEAR_MIPMAP_LINEAR else 8)
     parts = np.split(sums_of, ends[:-1], axis=1)
     g_levels = [part.reshape(level.shape) for part, level in zip(parts, look.levels, strict=True)]
     return g_levels, g_uv, g_da, g_bias  # type: ignore[return-value]
 
 
-def smooth(grid: Grid, rule: Edges, pos: Array, rast: Array, across: NDArray[np.int32], color: Array) -> Array:
+def smooth(grid: PixelGrid, rule: EdgeRule, pos: Array, rast: Array, across: NDArray[np.int32], color: Array) -> Array:
     """Return colours (B, H, W, C) with smooth silhouettes; `across` is that of `halves_across`."""
     out = empty(color.shape, color.dtype)
 
@@ -237,7 +238,7 @@ def smooth(grid: Grid, rule: Edges, pos: Array, rast: Array, across: NDArray[np.
 
 
 def smooth_vjp(
-    grid: Grid, rule: Edges, pos: Array, rast: Array, across: NDArray[np.int32], color: Array, g_out: Array
+    grid: PixelGrid, rule: EdgeRule, pos: Array, rast: Array, across: NDArray[np.int32], color: Array, g_out: Array
 ) -> tuple[Array, Array]:
     """Return the gradients of the colours and of `pos`."""
     g_color, g_pos = empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)

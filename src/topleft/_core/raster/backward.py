@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import as_array, as_checked_triangles, as_size
+from topleft._core.base.arrays import as_array, as_checked_triangles, as_real, as_size, shown
 from topleft._core.gradients import tensors
-from topleft._core.gradients.tensors import Edges, Grid
+from topleft._core.gradients.tensors import EdgeRule, PixelGrid
 from topleft.typing import EdgesOption
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ class Given(Protocol):
     origin: tuple[int, int]
 
 
-class Shown(Protocol):
+class ShownMesh(Protocol):
     """A visibility buffer: `Fragments`."""
 
     @property
@@ -44,12 +44,12 @@ class Backward:
     given: Given
     vertices: Floats
     pos: Floats
-    grid: Grid
+    grid: PixelGrid
     rast: Floats
     rast_db: Floats
 
     @classmethod
-    def of(cls, frags: Shown) -> Backward:
+    def of(cls, frags: ShownMesh) -> Backward:
         """Return where the pixels of a visibility buffer lie in the triangles."""
         given: Given | None = frags.corners
         if given is None:
@@ -57,7 +57,9 @@ class Backward:
         vertices = np.asarray(as_array("vertices", given.vertices), np.float64)
         pos = in_pixels(given, vertices)
         ids = np.require(frags.triangle, np.int32, ["C", "A"])
-        grid = Grid(as_checked_triangles(given.triangles, len(vertices)), 1, *ids.shape, in_pixels=True)
+        tri = as_checked_triangles(given.triangles, len(vertices))
+        grid = PixelGrid(tri, 1, len(ids), ids.shape[1], in_pixels=True)
+        )
         return cls(given, vertices, pos, grid, *tensors.points(grid, pos, [(ids, 0)], is_flipped=False, with_db=True))
 
     def to_vertices(self, g_pos: Floats) -> Floats:
@@ -89,7 +91,7 @@ class Backward:
         n = values.shape[-1] if values.ndim > 1 else 1
         attr = np.ascontiguousarray(values, np.float64).reshape(1, -1, n)
         tri = np.arange(len(attr[0]), dtype=np.int32).reshape(-1, 3) if values.ndim == 3 else self.grid.tri
-        grid = Grid(tri, *self.grid.shape(), in_pixels=True)
+        grid = replace(self.grid, tri=tri)
         columns = (n,) if values.ndim > 1 else ()
         g_out, g_da = self.as_grad("grad", grad, *columns).reshape(*grid.shape(), n), None
         if grad_derivatives is not None:
@@ -118,19 +120,23 @@ class Backward:
         """Return a picture as it is, and as (1, H, W, C) float64."""
         given = np.asarray(as_array("picture", picture))
         shape = self.grid.shape()[1:]
-        if given.shape[:2] != shape or given.ndim not in (2, 3) or given.dtype.kind not in "biuf":
-            raise ValueError(
-                f"picture must be real, of shape {shape} or {(*shape, 'C')}, got {given.dtype} {given.shape}"
-            )
-        return given, np.ascontiguousarray(given, np.float64).reshape(1, *shape, -1)
+        if given.shape[:2] != shape or given.ndim not in (2, 3):
+            raise ValueError(f"picture must have shape {shape} or {(*shape, 'C')}, got {given.shape}")
+        return given, as_pixels("picture", given).reshape(1, *shape, -1)
 
     def as_grad(self, name: str, grad: ArrayLike, *columns: int) -> Floats:
         """Return a gradient by pixel as (1, H, W, *columns) float64."""
-        given = np.asarray(as_array(name, grad))
+        given = as_pixels(name, grad)
         shape = (*self.grid.shape()[1:], *columns)
-        if given.shape != shape or given.dtype.kind not in "biuf":
-            raise ValueError(f"{name} must be real, of shape {shape}, got {given.dtype} {given.shape}")
-        return np.ascontiguousarray(given, np.float64)[None]
+        if given.shape != shape:
+            raise ValueError(f"{name} must have shape {shape}, got {given.shape}")
+        return given[None]
+
+
+def as_pixels(name: str, values: ArrayLike) -> Floats:
+    """Return real numbers, or a mask, as contiguous float64."""
+    array = as_array(name, values)
+    return np.ascontiguousarray(array if array.dtype == np.bool_ else as_real(name, array), np.float64)
 
 
 def in_pixels(given: Given, vertices: Floats) -> Floats:
@@ -150,11 +156,11 @@ def in_pixels(given: Given, vertices: Floats) -> Floats:
     return pos[None]
 
 
-def as_rule(edges: object) -> Edges:
+def as_rule(edges: object) -> EdgeRule:
     """Return the rule of a word."""
-    if edges not in get_args(EdgesOption):
-        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
-    return Edges[str(edges).replace("-", "_").upper()]
+    if not isinstance(edges, str) or edges not in get_args(EdgesOption):
+        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {shown(edges)}")
+    return EdgeRule[str(edges).replace("-", "_").upper()]
 
 
 def area_vjp(
@@ -165,7 +171,7 @@ def area_vjp(
     *,
     colors: ArrayLike | None = None,
 ) -> Floats:
-    """Return the gradient of vertices from that of exact areas, those of ``sampling="area"``: a vector-Jacobian product.
+    """Return the gradient of vertices from that of exact areas, as ``sampling="area"`` has them.
 
     Parameters
     ----------
@@ -207,21 +213,21 @@ def area_vjp(
            [ 2.,  0.],
            [ 0.,  2.]])
     """
-    points = np.asarray(as_array("vertices", vertices))
-    if points.ndim != 2 or points.shape[1] not in (2, 3) or points.dtype.kind not in "biuf":
-        raise ValueError(f"vertices must be real, of shape (V, 2) or (V, 3), got {points.dtype} {points.shape}")
-    points_px = np.ascontiguousarray(points[:, :2], np.float64)
+    points = as_real("vertices", vertices)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"vertices must have shape (V, 2) or (V, 3), got {points.shape}")
+    points_px = np.ascontiguousarray(points[:, :2])
     if not np.isfinite(points_px).all():
         raise ValueError(f"vertices must be finite, row {np.argwhere(~np.isfinite(points_px))[0][0]} is not")
     rows = as_checked_triangles(triangles, len(points))
     width, height = as_size(size)
     of_triangles = None
     if colors is not None:
-        of_triangles = np.ascontiguousarray(as_array("colors", colors), np.float64)
+        of_triangles = np.ascontiguousarray(as_real("colors", colors))
         if of_triangles.ndim != 2 or len(of_triangles) != len(rows):
             raise ValueError(f"colors must have shape ({len(rows)}, C), got {of_triangles.shape}")
     shape = (height, width) if of_triangles is None else (height, width, of_triangles.shape[1])
-    given = np.ascontiguousarray(as_array("grad", grad), np.float64)
+    given = as_pixels("grad", grad)
     if given.shape != shape:
         raise ValueError(f"grad must have shape {shape}, got {given.shape}")
     out = np.zeros(points_px.shape)
