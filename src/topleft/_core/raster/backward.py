@@ -59,7 +59,6 @@ class Backward:
         ids = np.require(frags.triangle, np.int32, ["C", "A"])
         tri = as_checked_triangles(given.triangles, len(vertices))
         grid = PixelGrid(tri, 1, len(ids), ids.shape[1], in_pixels=True)
-        )
         return cls(given, vertices, pos, grid, *tensors.points(grid, pos, [(ids, 0)], is_flipped=False, with_db=True))
 
     def to_vertices(self, g_pos: Floats) -> Floats:
