@@ -71,7 +71,7 @@ typedef struct {
     const void *rast;
     const int32_t *across; /* (n_triangles, 3): of the edge opposite to a corner 3 * the other triangle + its corner */
     uint8_t *known;        /* (n_triangles): what has been found of a triangle, 0 before */
-    int32_t *ids;          /* (2, width): scratch */
+    int32_t *labels;       /* (2, width): scratch */
     tl_pair_rule rule;
     const void *color;
     int64_t n_channels;

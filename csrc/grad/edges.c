@@ -18,7 +18,7 @@
 #include "grad/pairs.c"
 #include "grad/pixels.h"
 
-#define TL_COMPARED 16 /* ids at a time */
+#define TL_COMPARED 16 /* labels at a time */
 
 /* Adds share * (colour of `from` - colour of `to`). */
 TL_INLINE void take_color(const tl_grad_edges *e, int64_t to, int64_t from, double share, int is_f64)
@@ -112,7 +112,7 @@ typedef struct {
     tl_grad_sums *sums;
     int64_t row;
     int axis; /* 0: columns meet */
-    const int32_t *ids, *others;
+    const int32_t *labels, *others;
 } meeting;
 
 /* Whether the surface plainly runs on from one triangle to the other. */
@@ -131,9 +131,8 @@ static void meet(const meeting *m, int64_t x)
     const tl_grad_edges *e = m->edges;
     const int is_f64 = view->is_f64;
     const int64_t first = m->row * view->width + x, second = first + (m->axis ? view->width : 1);
-    const int32_t id = m->ids[x], other = m->others[x];
-    if ((id >= 0 && !has_corners(view, view->n_vertices, id)) ||
-        (other >= 0 && !has_corners(view, view->n_vertices, other)))
+    const int32_t id = id_of_label(m->labels[x], is_f64), other = id_of_label(m->others[x], is_f64);
+    if (id == other || (id >= 0 && !is_there(view, e, id)) || (other >= 0 && !is_there(view, e, other)))
         return;
     const int is_flipped =
         id < 0 || (other >= 0 && get_real(e->rast, 4 * second + 2, is_f64) < get_real(e->rast, 4 * first + 2, is_f64));
@@ -146,6 +145,8 @@ static void meet(const meeting *m, int64_t x)
                     {(double)x + 0.5, (double)m->row + 0.5}};
     pair.middle[m->axis] += is_flipped;
     tl_pair_edge edge;
+    if (e->rule == TL_PAIR_SILHOUETTE && !silhouettes_of(view, e, is_flipped ? other : id))
+        return;
     if (e->rule == TL_PAIR_STRAIGHT) {
         pull_straight(view, e, &pair, m->sums);
         return;
@@ -163,29 +164,34 @@ static void meet(const meeting *m, int64_t x)
         take_color(e, pair.far, pair.near, edge.far, is_f64);
 }
 
-/* The pairs of n columns; ids are compared some at a time. */
+/* The pairs of n columns; labels are compared some at a time. */
 static void meet_row(const meeting *m, int64_t n)
 {
     for (int64_t x = 0; x < n;) {
         int32_t differs = 0;
         if (x + TL_COMPARED <= n) {
             for (int k = 0; k < TL_COMPARED; k++)
-                differs |= m->ids[x + k] ^ m->others[x + k];
+                differs |= m->labels[x + k] ^ m->others[x + k];
             if (!differs) {
                 x += TL_COMPARED;
                 continue;
             }
         }
         for (const int64_t end = n - x < TL_COMPARED ? n : x + TL_COMPARED; x < end; x++)
-            if (m->ids[x] != m->others[x])
+            if (m->labels[x] != m->others[x])
                 meet(m, x);
     }
 }
 
-TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *ids)
+TL_INLINE void load_labels(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *labels)
 {
-    for (int64_t x = 0; x < view->width; x++)
-        ids[x] = get_id(e->rast, row * view->width + x, view->is_f64);
+    const int64_t first = row * view->width;
+    if (view->is_f64)
+        for (int64_t x = 0; x < view->width; x++)
+            labels[x] = get_label(e->rast, first + x, 1);
+    else
+        for (int64_t x = 0; x < view->width; x++)
+            labels[x] = get_label(e->rast, first + x, 0);
 }
 
 /* See kernels.h. */
@@ -198,12 +204,12 @@ static void grad_edges(const tl_grad_view *view, const tl_grad_edges *e, tl_grad
     const char *source = (const char *)(e->g_out ? e->g_out : e->color) + view->first_row * size;
     memcpy(target, source, (size_t)((view->end_row - view->first_row) * size));
     for (int64_t row = bottom; row < top && (e->g_out || e->rule != TL_PAIR_STRAIGHT); row++) {
-        const int32_t *ids = e->ids + row % 2 * width, *below = e->ids + (row + 1) % 2 * width;
-        load_ids(view, e, row, e->ids + row % 2 * width);
+        const int32_t *labels = e->labels + row % 2 * width, *below = e->labels + (row + 1) % 2 * width;
+        load_labels(view, e, row, e->labels + row % 2 * width);
         if (row > bottom)
-            meet_row(&(meeting){view, e, sums, row - 1, 1, below, ids}, width);
+            meet_row(&(meeting){view, e, sums, row - 1, 1, below, labels}, width);
         if (row >= view->first_row && row < view->end_row)
-            meet_row(&(meeting){view, e, sums, row, 0, ids, ids + 1}, width - 1);
+            meet_row(&(meeting){view, e, sums, row, 0, labels, labels + 1}, width - 1);
     }
     if (e->g_out)
         leave_band(sums);

@@ -80,7 +80,7 @@ static int is_silhouette(const tl_grad_view *view, const tl_grad_edges *e, int32
     return is_reversed ? is_turned : is_same;
 }
 
-/* The silhouettes of a triangle, bit by bit. */
+/* The silhouettes of a triangle, bit by bit; none of one that does not exist. */
 TL_INLINE int silhouettes_of(const tl_grad_view *view, const tl_grad_edges *e, int32_t id)
 {
     if (!(e->known[id] & TL_HAS_EDGES)) {
@@ -90,6 +90,12 @@ TL_INLINE int silhouettes_of(const tl_grad_view *view, const tl_grad_edges *e, i
         e->known[id] |= (uint8_t)found;
     }
     return e->known[id] & TL_KNOWN_EDGES;
+}
+
+/* Whether a triangle exists, and its corners do. */
+TL_INLINE int is_there(const tl_grad_view *view, const tl_grad_edges *e, int32_t id)
+{
+    return id < view->n_triangles && (e->known[id] & TL_HAS_EDGES || has_corners(view, view->n_vertices, id));
 }
 
 /* Where a vertex is: pixels of the picture. */

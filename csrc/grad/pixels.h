@@ -26,21 +26,28 @@ TL_INLINE void put_real(void *p, int64_t i, double value, int is_f64)
         ((float *)p)[i] = (float)value;
 }
 
-/* The number of the triangle that a pixel shows, -1 for none. */
-TL_INLINE int32_t get_id(const void *rast, int64_t pixel, int is_f64)
+/* What stands for a triangle: the bits of float32, or the integer that a float64 is; the same for the same triangle. */
+TL_INLINE int32_t get_label(const void *rast, int64_t pixel, int is_f64)
 {
     if (is_f64) {
         const double id = ((const double *)rast)[4 * pixel + 3];
-        return id >= 1.0 ? id < 0x1p31 ? (int32_t)(id - 1.0) : INT32_MAX : -1;
+        return id >= 1.0 ? id < 0x1p31 ? (int32_t)id : INT32_MAX : 0;
     }
-    const float id = ((const float *)rast)[4 * pixel + 3];
+    int32_t bits;
+    memcpy(&bits, (const float *)rast + 4 * pixel + 3, sizeof bits);
+    return bits;
+}
+
+/* The number of the triangle, -1 for none. */
+TL_INLINE int32_t id_of_label(int32_t label, int is_f64)
+{
+    float id;
+    if (is_f64)
+        return label - 1;
+    memcpy(&id, &label, sizeof id);
     if (!(id >= 1.0f))
         return -1;
-    if (id <= TL_LAST_EXACT_ID)
-        return (int32_t)id - 1;
-    int32_t bits;
-    memcpy(&bits, &id, sizeof bits);
-    return bits - TL_BITS_OF_LAST + TL_LAST_EXACT_ID - 1;
+    return id <= TL_LAST_EXACT_ID ? (int32_t)id - 1 : label - TL_BITS_OF_LAST + TL_LAST_EXACT_ID - 1;
 }
 
 TL_INLINE void put_id(void *rast, int64_t pixel, int32_t id, int is_f64)
@@ -82,12 +89,15 @@ TL_INLINE int next_shown(const tl_grad_view *view, const void *rast, int64_t n_r
     for (; row < view->end_row; row++, column = 0) {
         const int64_t first = row * view->width;
         while (column < view->width) {
-            const int32_t id = get_id(rast, first + column, is_f64);
+            const int32_t label = get_label(rast, first + column, is_f64);
             const int64_t begin = column++;
+            if (!label)
+                continue;
+            while (column < view->width && get_label(rast, first + column, is_f64) == label)
+                column++;
+            const int32_t id = id_of_label(label, is_f64);
             if (id < 0)
                 continue;
-            while (column < view->width && get_id(rast, first + column, is_f64) == id)
-                column++;
             if (id == run->id || has_corners(view, n_rows, id)) {
                 run->id = id, run->row = row, run->column = begin, run->at = first + begin, run->n = column - begin;
                 return 1;

@@ -23,9 +23,8 @@
 /* A triangle about a pixel. */
 typedef struct {
     double x[3], y[3], z[3], w[3];
-    double q[3][3];           /* q[k]: by X, by Y, and there */
-    double sum[3];            /* of q[0], q[1], q[2] */
-    double over[3], under[3]; /* z/w as a quotient: sums of z q and of w q */
+    double q[3][3]; /* q[k]: by X, by Y, and there */
+    double sum[3];  /* of q[0], q[1], q[2] */
     double middle[2];
 } grad_triangle;
 
@@ -50,11 +49,8 @@ TL_INLINE void load_seen_triangle(const tl_grad_view *view, int32_t id, double x
         t->q[k][1] = t->w[i] * t->x[j] - t->x[i] * t->w[j];
         t->q[k][2] = t->x[i] * t->y[j] - t->y[i] * t->x[j];
     }
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++)
         t->sum[c] = t->q[0][c] + t->q[1][c] + t->q[2][c];
-        t->over[c] = t->z[0] * t->q[0][c] + t->z[1] * t->q[1][c] + t->z[2] * t->q[2][c];
-        t->under[c] = t->w[0] * t->q[0][c] + t->w[1] * t->q[1][c] + t->w[2] * t->q[2][c];
-    }
 }
 
 /* A function of X and Y that has these numbers, in the row of the middle. */
@@ -65,15 +61,16 @@ TL_INLINE void store_point(const tl_grad_view *view, const grad_triangle *t, con
                            void *const *out, int is_f64)
 {
     const int64_t at = 4 * (run->at + i);
-    const double total = plane_at(t->sum, x), under = plane_at(t->under, x), r = total == 0.0 ? 1.0 : 1.0 / total;
-    const double u = plane_at(t->q[0], x) * r, v = plane_at(t->q[1], x) * r;
+    const double a[3] = {plane_at(t->q[0], x), plane_at(t->q[1], x), plane_at(t->q[2], x)};
+    const double total = plane_at(t->sum, x), r = total == 0.0 ? 1.0 : 1.0 / total, u = a[0] * r, v = a[1] * r;
+    const double over = t->z[0] * a[0] + t->z[1] * a[1] + t->z[2] * a[2];
+    const double under = t->w[0] * a[0] + t->w[1] * a[1] + t->w[2] * a[2];
     double u_in = clamped(u, 0.0, 1.0), v_in = clamped(v, 0.0, 1.0);
     const double sum = u_in + v_in;
     if (sum > 1.0)
         u_in /= sum, v_in /= sum;
     put_real(out[0], at, u_in, is_f64), put_real(out[0], at + 1, v_in, is_f64);
-    put_real(out[0], at + 2, clamped(plane_at(t->over, x) / (under == 0.0 ? 1.0 : under), -view->z_most, view->z_most),
-             is_f64);
+    put_real(out[0], at + 2, clamped(over / (under == 0.0 ? 1.0 : under), -view->z_most, view->z_most), is_f64);
     put_id(out[0], run->at + i, run->id, is_f64);
     for (int axis = 0; out[1] && axis < 2; axis++) {
         const double step = 2.0 * view->scale[axis] * r;
@@ -162,7 +159,8 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
     g_total -= (g_u * u + g_v * v) * r;
     g_a[0] = g_u * r + g_total, g_a[1] = g_v * r + g_total, g_a[2] = g_total;
     if (g->zw != 0.0) {
-        const double under = plane_at(t->under, x), zw = plane_at(t->over, x) / (under == 0.0 ? 1.0 : under);
+        const double under = t->w[0] * a[0] + t->w[1] * a[1] + t->w[2] * a[2];
+        const double zw = (t->z[0] * a[0] + t->z[1] * a[1] + t->z[2] * a[2]) / (under == 0.0 ? 1.0 : under);
         const double g_over = under != 0.0 && fabs(zw) <= view->z_most ? g->zw / under : 0.0, g_under = -g_over * zw;
         for (int k = 0; k < 3 && g_over != 0.0; k++) {
             g_a[k] += g_over * t->z[k] + g_under * t->w[k];

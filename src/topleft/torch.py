@@ -25,7 +25,7 @@ from topleft._core.base.arrays import as_pair, check_rows
 from topleft._core.base.threads import parse_threads
 from topleft._core.gradients import tensors
 from topleft._core.gradients.bands import MIN_PX_PER_THREAD
-from topleft._core.gradients.tensors import Beyond, EdgeRule, Look, PixelGrid, TexelFilter
+from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
 from topleft._core.raster.peel import DepthLayers, peel
 from topleft._core.raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
@@ -357,7 +357,7 @@ def texture(
     at, footprint, bias, *levels = same_dtype(uv, uv_da if made else None, mip_level_bias if made else None, tex, *made)
     how = TexelFilter[filter_mode.replace("-", "_").upper()] if made else TexelFilter.LINEAR
     how = TexelFilter.NEAREST if filter_mode == "nearest" else how
-    beyond = Beyond[boundary_mode.upper()]
+    beyond = TexelsBeyond[boundary_mode.upper()]
     return look_up(levels, at, footprint, bias, int(how), int(beyond))
 
 
@@ -709,11 +709,15 @@ def interpolate_vjp(
 
 def look_of(
     levels: Sequence[Tensor], uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, how: int, beyond: int
-) -> Look:
+) -> TexelLook:
     """Return what the engine looks up."""
     where = numpy_of(uv), numpy_of(uv_da), numpy_of(bias)
-    return Look(
-        [numpy_of(one) for one in levels], TexelFilter(how), Beyond(beyond), *where, threads_of(0, uv[..., 0].numel())
+    return TexelLook(
+        [numpy_of(one) for one in levels],
+        TexelFilter(how),
+        TexelsBeyond(beyond),
+        *where,
+        threads_of(0, uv[..., 0].numel()),
     )
 
 

@@ -131,7 +131,7 @@ cdef class GradientView:
         e.rast, e.color, e.n_channels = first_of(arrays[0]), first_of(arrays[1]), arrays[1].shape[2]
         if across.shape[0]:
             e.across, e.known = &across[0, 0], &known[0]
-        e.ids, e.rule = &scratch[0, 0], <tl_pair_rule>rule
+        e.labels, e.rule = &scratch[0, 0], <tl_pair_rule>rule
         if sums is None:
             e.out = <void *>first_of(arrays[2])
             with nogil:

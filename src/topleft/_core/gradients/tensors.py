@@ -31,7 +31,7 @@ class TexelFilter(IntEnum):
     LINEAR_MIPMAP_LINEAR = 3
 
 
-class Beyond(IntEnum):
+class TexelsBeyond(IntEnum):
     """What lies beyond the edges of a texture: `tl_texel_edge`."""
 
     WRAP = 0
@@ -162,12 +162,12 @@ def values_vjp(
 
 
 @dataclass(frozen=True)
-class Look:
+class TexelLook:
     """How a texture is looked up, and where: levels (B or 1, ...); uv (B, H, W, 2 or 3), footprints, biases."""
 
     levels: Sequence[Array]
     filter: TexelFilter
-    beyond: Beyond
+    beyond: TexelsBeyond
     uv: Array
     uv_da: Array | None = None
     bias: Array | None = None
@@ -176,7 +176,7 @@ class Look:
     def of_picture(self, picture: int) -> list[Array]:
         """Return the levels of a picture as the engine takes them, (1 or 6, H, W, C)."""
         one = [of(level, picture) for level in self.levels]
-        return one if self.beyond is Beyond.CUBE else [level[None] for level in one]
+        return one if self.beyond is TexelsBeyond.CUBE else [level[None] for level in one]
 
     @property
     def grid(self) -> PixelGrid:
@@ -189,7 +189,7 @@ class Look:
         return tuple(None if one is None else one[picture] for one in (self.uv, self.uv_da, self.bias, *more))
 
 
-def texels(look: Look) -> Array:
+def texels(look: TexelLook) -> Array:
     """Return a texture at each pixel, (B, H, W, C)."""
     grid, dtype = look.grid, look.uv.dtype
     out = empty(grid.shape(look.levels[0].shape[-1]), dtype)
@@ -203,7 +203,7 @@ def texels(look: Look) -> Array:
     return out
 
 
-def texels_vjp(look: Look, g_out: Array) -> tuple[list[Array], Array, Array | None, Array | None]:
+def texels_vjp(look: TexelLook, g_out: Array) -> tuple[list[Array], Array, Array | None, Array | None]:
     """Return the gradients of the levels, of uv, of the footprints and of the biases."""
     grid, dtype = look.grid, look.uv.dtype
     view, codes = grid.view(np.empty((0, 4), dtype)), (int(look.filter), int(look.beyond))
