@@ -4,7 +4,7 @@ Each function is one call of the engine through `jax.pure_callback`, so `jax.jit
 gradients are first derivatives, with the same bits in every run. Needs JAX: ``pip install 'topleft[jax]'``.
 
 Row 0 is the bottom row, resolutions are (height, width), ids are 1 more and stand in a channel of floats, depth is z/w
-in -1..1, and row 0 of a texture is v = 0. Shapes are those of `topleft.torch`, with a batch of B pictures; a wrong shape
+in -1..1, and row 0 of a texture is v = 0. Shapes are those of `topleft.torch`, with a batch of B pictures; a wrong one
 raises an error there, an index that does not exist when the call runs.
 """
 
