@@ -44,8 +44,10 @@ __all__ = [
     "RasterizeGLContext",
     "antialias",
     "antialias_construct_topology_hash",
+    "get_log_level",
     "interpolate",
     "rasterize",
+    "set_log_level",
     "texture",
     "texture_construct_mip",
 ]
@@ -70,12 +72,14 @@ class RasterizeContext:
     output_db : bool
         Whether `rasterize` returns the derivatives of the weights, too.
     threads : int or None
-        How many threads draw; None: as many as the process may use. Never changes a bit.
+        How many threads draw; None: as many as PyTorch uses, where they pay. Never changes a bit.
+    mode : "automatic" or "manual"
+        For programs that call `set_context` and `release_context`, which do nothing: there is no context of a display.
 
     Raises
     ------
     ValueError
-        For another device, or a number of threads below 1.
+        For another device or mode, or a number of threads below 1.
 
     Examples
     --------
@@ -83,14 +87,38 @@ class RasterizeContext:
     True
     """
 
-    def __init__(self, device: object = None, *, output_db: bool = True, threads: int | None = None) -> None:
+    def __init__(
+        self, device: object = None, *, output_db: bool = True, threads: int | None = None, mode: str = "automatic"
+    ) -> None:
         if device is not None and torch.device(device).type != "cpu":
             raise ValueError(f"device must be 'cpu' or None, got {str(device)!r}: topleft draws on the CPU alone")
+        if mode not in ("automatic", "manual"):
+            raise ValueError(f"mode must be 'automatic' or 'manual', got {mode!r}")
         self.output_db = bool(output_db)
         self.threads = parse_threads(threads)
 
+    def set_context(self) -> None:
+        """Do nothing, for programs that hold a context of OpenGL."""
+
+    def release_context(self) -> None:
+        """Do nothing, as `set_context`."""
+
 
 RasterizeCudaContext = RasterizeGLContext = RasterizeContext
+
+
+#: What `set_log_level` was given.
+log_level = [1]
+
+
+def get_log_level() -> int:
+    """Return the number that `set_log_level` was given, 1 before: topleft writes no log."""
+    return log_level[0]
+
+
+def set_log_level(level: int) -> None:
+    """Keep a number for `get_log_level`, for programs that call it: topleft writes no log."""
+    log_level[0] = int(level)
 
 
 def rasterize(
