@@ -52,6 +52,9 @@
 #include "shade/alpha_test.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
+#include "grid/atlas.c"
+#include "grid/viewshed.c"
+#include "grid/voxels.c"
 #include "tiles/corners.c"
 #include "tiles/merge.c"
 #include "tiles/spans.c"
@@ -159,4 +162,16 @@ const tl_kernels TL_KERNELS = {
     .grad_texels_vjp = grad_texels_vjp,
     .grad_edges = grad_edges,
     .grad_area = grad_area,
+    .touch_texels = touch_texels,
+    .average_texels = average_texels,
+    .find_in_rows = find_in_rows,
+    .find_gutter = find_gutter,
+    .copy_texels = copy_texels,
+    .add_taken = add_taken,
+    .view_heights = view_heights,
+    .fill_columns = fill_columns,
+    .expand_columns = expand_columns,
+    .count_columns = count_columns,
+    .scatter_columns = scatter_columns,
+    .touch_voxels = touch_voxels,
 };

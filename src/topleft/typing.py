@@ -10,6 +10,8 @@ from typing import Literal, TypeAlias
 __all__ = [
     "AlphaModeOption",
     "AlphaOption",
+    "BakeOption",
+    "BakeRuleOption",
     "BlendOption",
     "BoundaryOption",
     "ClipDepthOption",
@@ -37,8 +39,10 @@ __all__ = [
     "ShadingOption",
     "SpaceOption",
     "SurfaceOption",
+    "TakenOption",
     "TiffCompressionOption",
     "UpOption",
+    "VoxelRuleOption",
     "WindingOption",
     "WrapOption",
     "YOption",
@@ -83,6 +87,10 @@ ResolveOption: TypeAlias = Literal["values", "linear"]
 RuleOption: TypeAlias = Literal["evenodd", "nonzero"]
 SamplesOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16"]
 SamplingOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner"]
+BakeOption: TypeAlias = Literal["position", "normal", "tangent_normal", "color", "triangle"]
+BakeRuleOption: TypeAlias = Literal["center", "touched", "area"]
+TakenOption: TypeAlias = Literal["best", "mean"]
+VoxelRuleOption: TypeAlias = Literal["center", "touched"]
 WindingOption: TypeAlias = Literal["either", "clockwise", "counter-clockwise"]
 
 # Grids and cameras
@@ -96,7 +104,7 @@ YOption: TypeAlias = Literal["up", "down"]
 
 AlphaModeOption: TypeAlias = Literal["opaque", "mask", "blend"]
 EncodingOption: TypeAlias = Literal["srgb", "linear"]
-FilterOption: TypeAlias = Literal["trilinear", "bilinear", "nearest"]
+FilterOption: TypeAlias = Literal["trilinear", "bilinear", "nearest", "pixelated"]
 LightKindOption: TypeAlias = Literal["directional", "point"]
 PointUnitOption: TypeAlias = Literal["px", "world"]
 ShadingOption: TypeAlias = Literal["smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"]
