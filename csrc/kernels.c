@@ -37,6 +37,11 @@
 #include "pixels/weights_one.c"
 #include "blend/blend.c"
 #include "blend/fill_few.c"
+#include "grad/area_vjp.c"
+#include "grad/edges.c"
+#include "grad/points.c"
+#include "grad/textures.c"
+#include "grad/values.c"
 #include "lines/edges.c"
 #include "lines/lines.c"
 #include "polygons/labels.c"
@@ -149,6 +154,14 @@ const tl_kernels TL_KERNELS = {
     .take_corners = take_corners,
     .merge_fragments = merge_fragments,
     .name_triangles = name_triangles,
+    .grad_points = grad_points,
+    .grad_points_vjp = grad_points_vjp,
+    .grad_values = grad_values,
+    .grad_values_vjp = grad_values_vjp,
+    .grad_texels = grad_texels,
+    .grad_texels_vjp = grad_texels_vjp,
+    .grad_edges = grad_edges,
+    .grad_area = grad_area,
     .touch_texels = touch_texels,
     .average_texels = average_texels,
     .find_in_rows = find_in_rows,

@@ -379,6 +379,33 @@ typedef struct tl_kernels {
     /* Ids [first, end) become names[1 + id]. */
     void (*name_triangles)(int32_t *ids, int64_t first, int64_t end, const int32_t *names);
 
+    /* Where the pixels of a band lie in the triangles that they show: `ids` is its picture's lowest row, -1 for none,
+     * the next one stands `step` numbers on, and first_id is added.  rast_db may be NULL. */
+    void (*grad_points)(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
+                        void *rast_db);
+
+    /* The sums by vertex of what the gradients of `rast` and of `rast_db` give in a band.  Returns, as the next two do,
+     * the number of a triangle that does not exist, or -1. */
+    int64_t (*grad_points_vjp)(const tl_grad_view *view, const tl_grad_points *points);
+
+    /* Attributes in a band, and what they change by. */
+    int64_t (*grad_values)(const tl_grad_view *view, const tl_grad_values *values);
+
+    /* Their gradients: sums by row of attributes, and those of `rast` and `rast_db`. */
+    int64_t (*grad_values_vjp)(const tl_grad_view *view, const tl_grad_values *values, tl_grad_sums *sums);
+
+    /* A texture at the pixels of a band. */
+    void (*grad_texels)(const tl_grad_view *view, const tl_grad_texture *texture);
+
+    /* Its gradients: sums by texel, and those of where it is looked at. */
+    void (*grad_texels_vjp)(const tl_grad_view *view, const tl_grad_texture *texture, tl_grad_sums *sums);
+
+    /* A band with smooth silhouettes; or backward the gradients of its colours, and the sums by vertex. */
+    void (*grad_edges)(const tl_grad_view *view, const tl_grad_edges *edges, tl_grad_sums *sums);
+
+    /* The gradients of vertices from those of areas. */
+    void (*grad_area)(const tl_grad_area *area);
+
     /* Rows [first, end) of an atlas, (rows of) width texels.  Where an id is -1, that of the nearest triangle that
      * meets the texel, and its values there; `squared` has a number a texel of these rows, INFINITY.  Or means over
      * what triangles cover: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */

@@ -492,6 +492,7 @@ typedef struct {
 
 #include "clusters.h"
 #include "exact.h"
+#include "grad.h"
 #include "polygons.h"
 #include "shading.h"
 #include "kernels.h"

@@ -1,8 +1,9 @@
 """PyTorch tensors on the CPU, in the calls and the conventions of nvdiffrast: `import topleft.torch as dr`.
 
-In and out: tensors of float32 (or float64) on the CPU, read without a copy. Which triangle shows in a pixel is decided
-by the engine; what follows from it is computed by PyTorch, so gradients reach every input that nvdiffrast gives
-gradients to. Needs PyTorch: ``pip install 'topleft[torch]'``.
+In and out: tensors of float32 (or float64) on the CPU, read without a copy. Each function is one call of the engine,
+which also computes its gradients, in float64, with the same bits for every number of threads. They are custom operators
+of PyTorch (``torch.ops.topleft``), so `torch.compile` and `torch.vmap` take them. Needs PyTorch 2.5:
+``pip install 'topleft[torch]'``.
 
 What differs from the rest of `topleft`: row 0 is the bottom row, resolutions are (height, width), ids are 1 more and
 stand in a channel of floats, depth is z/w in -1..1, and row 0 of a texture is v = 0.
@@ -13,18 +14,22 @@ High-Performance Differentiable Rendering", ACM Transactions on Graphics, 2020.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, get_args
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
-from topleft._core.base.arrays import as_checked_triangles, as_pair
-from topleft._core.base.memory import empty
+from topleft._core.base.arrays import as_pair, check_rows
 from topleft._core.base.threads import parse_threads
+from topleft._core.gradients import tensors
+from topleft._core.gradients.bands import MIN_PX_PER_THREAD
+from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
 from topleft._core.raster.peel import DepthLayers, peel
 from topleft._core.raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
-from topleft.typing import BoundaryOption, FilterModeOption
+from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption
 
 try:
     import torch
@@ -39,8 +44,10 @@ __all__ = [
     "RasterizeGLContext",
     "antialias",
     "antialias_construct_topology_hash",
+    "get_log_level",
     "interpolate",
     "rasterize",
+    "set_log_level",
     "texture",
     "texture_construct_mip",
 ]
@@ -48,9 +55,6 @@ __all__ = [
 #: The largest id that float32 counts up to; the bits of larger ones are counted on from there.
 LAST_EXACT_ID = 1 << 24
 BITS_OF_LAST = 0x4B800000
-
-#: How far, in pixels, an edge may pass by a pair of pixels that it has separated: what the snap may have moved.
-CROSSING_SLACK = 1 / 16
 
 #: `DepthPeeler` draws so many layers at first, and doubles them up to what `topleft.peel` keeps.
 FIRST_LAYERS, MOST_LAYERS = 4, 16
@@ -68,12 +72,14 @@ class RasterizeContext:
     output_db : bool
         Whether `rasterize` returns the derivatives of the weights, too.
     threads : int or None
-        How many threads draw; None: as many as the process may use. Never changes a bit.
+        How many threads draw; None: as many as PyTorch uses, where they pay. Never changes a bit.
+    mode : "automatic" or "manual"
+        For programs that call `set_context` and `release_context`, which do nothing: there is no context of a display.
 
     Raises
     ------
     ValueError
-        For another device, or a number of threads below 1.
+        For another device or mode, or a number of threads below 1.
 
     Examples
     --------
@@ -81,14 +87,38 @@ class RasterizeContext:
     True
     """
 
-    def __init__(self, device: object = None, *, output_db: bool = True, threads: int | None = None) -> None:
+    def __init__(
+        self, device: object = None, *, output_db: bool = True, threads: int | None = None, mode: str = "automatic"
+    ) -> None:
         if device is not None and torch.device(device).type != "cpu":
             raise ValueError(f"device must be 'cpu' or None, got {str(device)!r}: topleft draws on the CPU alone")
+        if mode not in ("automatic", "manual"):
+            raise ValueError(f"mode must be 'automatic' or 'manual', got {mode!r}")
         self.output_db = bool(output_db)
         self.threads = parse_threads(threads)
 
+    def set_context(self) -> None:
+        """Do nothing, for programs that hold a context of OpenGL."""
+
+    def release_context(self) -> None:
+        """Do nothing, as `set_context`."""
+
 
 RasterizeCudaContext = RasterizeGLContext = RasterizeContext
+
+
+#: What `set_log_level` was given.
+log_level = [1]
+
+
+def get_log_level() -> int:
+    """Return the number that `set_log_level` was given, 1 before: topleft writes no log."""
+    return log_level[0]
+
+
+def set_log_level(level: int) -> None:
+    """Keep a number for `get_log_level`, for programs that call it: topleft writes no log."""
+    log_level[0] = int(level)
 
 
 def rasterize(
@@ -149,13 +179,10 @@ def rasterize(
     >>> rast_db[0, 0, 0]
     tensor([-0.2500, -0.2500,  0.2500,  0.0000])
     """
-    meshes = as_meshes(glctx, pos, tri, ranges)
+    check_mesh(glctx, pos, tri, ranges)
     height, width = as_pair("resolution", resolution)
-    ids = empty((len(meshes.slices), height, width), np.int32)
-    for picture, vertices, first, triangles in meshes.each():
-        shown = draw(vertices, triangles, (width, height), threads=glctx.threads).triangle[::-1]
-        np.add(shown, np.where(shown < 0, 0, first), out=ids[picture])
-    return points_of_ids(glctx, meshes, ids, grad_db=grad_db)
+    ids = draw_ids(pos.detach(), tri, ranges, height, width, glctx.threads or 0)
+    return points(glctx, pos, tri, ranges, ids, grad_db=grad_db)
 
 
 class DepthPeeler:
@@ -188,7 +215,8 @@ class DepthPeeler:
         ranges: Tensor | None = None,
         grad_db: bool = True,
     ) -> None:
-        self._context, self._meshes, self._grad_db = glctx, as_meshes(glctx, pos, tri, ranges), grad_db
+        check_mesh(glctx, pos, tri, ranges)
+        self._context, self._mesh, self._grad_db = glctx, (pos, tri, ranges), grad_db
         self._resolution = as_pair("resolution", resolution)
         self._layers: list[DepthLayers] = []
         self._n_shown = 0
@@ -206,14 +234,15 @@ class DepthPeeler:
         if k == MOST_LAYERS:
             raise ValueError(f"a DepthPeeler has at most {MOST_LAYERS} layers")
         if k >= (len(self._layers[0]) if self._layers else 0):
-            options: Any = {"layers": max(FIRST_LAYERS, 2 * k), "threads": self._context.threads}
-            self._layers = [peel(v, t, (width, height), **options) for _, v, _, t in self._meshes.each()]
-        ids = empty((len(self._meshes.slices), height, width), np.int32)
-        for (picture, _, first, _), layers in zip(self._meshes.each(), self._layers, strict=True):
-            shown = layers.triangle[::-1, :, k]
-            np.add(shown, np.where(shown < 0, 0, first), out=ids[picture])
+            options: Any = {
+                "layers": max(FIRST_LAYERS, 2 * k),
+                "threads": threads_of(self._context.threads, width * height),
+            }
+            pos, tri, ranges = self._mesh
+            self._layers = [peel(v, t, (width, height), **options) for v, t in each(pos.detach(), tri, ranges)]
+        ids = torch.from_numpy(joined([layers.planes[0][k] for layers in self._layers], (height, width)))
         self._n_shown += 1
-        return points_of_ids(self._context, self._meshes, ids, grad_db=self._grad_db)
+        return points(self._context, *self._mesh, ids, grad_db=self._grad_db)
 
 
 def interpolate(
@@ -264,34 +293,21 @@ def interpolate(
               [3.]]]]), tensor([[[[2., 0.],
               [2., 0.]]]]))
     """
-    check("attr", attr, "(V, K), (1, V, K) or (B, V, K)", attr_is := is_tensor(attr) and attr.ndim in (2, 3))
+    check("attr", attr, "(V, K), (1, V, K) or (B, V, K)", attr_is := is_tensor(attr) and attr.ndim in (2, 3), KINDS)
     check("rast", rast, "(B, H, W, 4)", is_tensor(rast) and rast.ndim == 4 and rast.shape[3] == 4)
-    n_pictures, height, width = rast.shape[:3]
-    check("attr", attr, f"(V, K), (1, V, K) or ({n_pictures}, V, K)", attr_is and len_of(attr) in (1, n_pictures))
-    n_vertices, n_attrs = attr.shape[-2:]
-    corners_of = as_tri(tri, n_vertices)
-    wanted = as_diff_attrs(diff_attrs, n_attrs)
+    n_pictures = rast.shape[0]
+    check(
+        "attr", attr, f"(V, K), (1, V, K) or ({n_pictures}, V, K)", attr_is and len_of(attr) in (1, n_pictures), KINDS
+    )
+    check_tri(tri)
+    wanted = as_diff_attrs(diff_attrs, attr.shape[-1])
     if wanted and (rast_db is None or rast_db.shape != rast.shape):
         got = "None" if rast_db is None else tuple(rast_db.shape)
         raise ValueError(f"rast_db must have shape {tuple(rast.shape)} when diff_attrs is given, got {got}")
-
-    id_plus_1 = ids_of(rast).reshape(-1)
-    pixels = id_plus_1.nonzero().squeeze(1)
-    i_tri = id_plus_1[pixels] - 1
-    if len(i_tri) and not 0 <= int(i_tri.min()) <= int(i_tri.max()) < len(tri):
-        raise IndexError(f"rast must hold ids of the {len(tri)} triangles of tri plus 1, got {int(i_tri.max()) + 1}")
-    rows = corners_of[i_tri].long()
-    if len_of(attr) > 1:
-        rows = rows + (pixels // (height * width) * n_vertices)[:, None]
-    a0, a1, a2 = attr.reshape(-1, n_attrs)[rows].unbind(1)
-    u, v, _, _ = rast.reshape(-1, 4)[pixels].split(1, 1)
-    out = spread(a2 + u * (a0 - a2) + v * (a1 - a2), pixels, (n_pictures, height, width))
-    if not wanted or rast_db is None:
-        return out, out.new_zeros((n_pictures, height, width, 0))
-    by_u, by_v = (a0 - a2)[:, wanted, None], (a1 - a2)[:, wanted, None]
-    du, dv = rast_db.reshape(-1, 2, 2)[pixels].unbind(1)
-    out_da = (by_u * du[:, None] + by_v * dv[:, None]).flatten(1)
-    return out, spread(out_da, pixels, (n_pictures, height, width))
+    given, points_of, slopes = same_dtype(attr, (rast, len(tri)), rast_db if wanted else None)
+    attrs = given if given.ndim == 3 else given[None]
+    out, out_da = interpolate_values(attrs, points_of, tri, slopes, wanted)
+    return out, out_da
 
 
 def texture(
@@ -351,7 +367,7 @@ def texture(
     >>> texture(tex, torch.stack([u, u], -1).reshape(1, 1, 4, 2)).flatten()
     tensor([0., 2., 4., 2.])
     """
-    n_pictures = check_texture(tex, uv, uv_da, mip_level_bias, boundary_mode)
+    check_texture(tex, uv, uv_da, mip_level_bias, boundary_mode)
     has_level = uv_da is not None or mip_level_bias is not None
     if filter_mode == "auto":
         filter_mode = "linear-mipmap-linear" if has_level else "linear"
@@ -360,29 +376,17 @@ def texture(
             "filter_mode must be 'auto', 'nearest', 'linear', 'linear-mipmap-nearest' or 'linear-mipmap-linear', "
             f"got {filter_mode!r}"
         )
-    shape = (*uv.shape[:3], tex.shape[-1])
-    picture = torch.arange(n_pictures).repeat_interleave(uv.shape[1] * uv.shape[2])
-    picture = torch.zeros_like(picture) if len(tex) == 1 else picture
-    points, footprint = uv.reshape(-1, uv.shape[3]), uv_da
-    if boundary_mode == "cube":
-        picture, points, footprint = face_points(picture, points, uv_da)
-    if filter_mode in ("nearest", "linear"):
-        return look_up(tex, picture, points, boundary_mode, nearest=filter_mode == "nearest").reshape(shape)
-    if not has_level:
-        raise ValueError(f"filter_mode={filter_mode!r} needs uv_da or mip_level_bias")
-    is_cube = boundary_mode == "cube"
-    made = texture_construct_mip(tex, max_mip_level, is_cube) if mip is None else as_mip(tex, mip, max_mip_level)
-    levels = [tex, *made]
-    level = mip_level(tex, footprint, mip_level_bias).clamp(0, len(levels) - 1)
-    if filter_mode == "linear-mipmap-nearest":
-        level = level.round()
-    out = torch.zeros((len(points), tex.shape[-1]), dtype=torch.result_type(tex, uv))
-    for k, texels in enumerate(levels):
-        share = 1 - (level - k).abs()
-        near = (share > 0).nonzero().squeeze(1)
-        found = look_up(texels, picture[near], points[near], boundary_mode, nearest=False)
-        out = out.index_add(0, near, (share[near, None] * found).to(out.dtype))
-    return out.reshape(shape)
+    made: Sequence[Tensor] = ()
+    if filter_mode not in ("nearest", "linear"):
+        if not has_level:
+            raise ValueError(f"filter_mode={filter_mode!r} needs uv_da or mip_level_bias")
+        is_cube = boundary_mode == "cube"
+        made = texture_construct_mip(tex, max_mip_level, is_cube) if mip is None else as_mip(tex, mip, max_mip_level)
+    at, footprint, bias, *levels = same_dtype(uv, uv_da if made else None, mip_level_bias if made else None, tex, *made)
+    how = TexelFilter[filter_mode.replace("-", "_").upper()] if made else TexelFilter.LINEAR
+    how = TexelFilter.NEAREST if filter_mode == "nearest" else how
+    beyond = TexelsBeyond[boundary_mode.upper()]
+    return look_up(levels, at, footprint, bias, int(how), int(beyond))
 
 
 def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mode: bool = False) -> list[Tensor]:
@@ -415,9 +419,9 @@ def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mo
     [(1, 1, 4, 3), (1, 1, 2, 3), (1, 1, 1, 3)]
     """
     if cube_mode:
-        check("tex", tex, "(B, 6, N, N, C)", is_cube_map(tex))
+        check("tex", tex, "(B, 6, N, N, C)", is_cube_map(tex), KINDS)
     else:
-        check("tex", tex, "(B, Ht, Wt, C)", is_tensor(tex) and tex.ndim == 4 and 0 not in tex.shape[1:])
+        check("tex", tex, "(B, Ht, Wt, C)", is_tensor(tex) and tex.ndim == 4 and 0 not in tex.shape[1:], KINDS)
     if max_mip_level is not None and max_mip_level < 0:
         raise ValueError(f"max_mip_level must be at least 0, got {max_mip_level}")
     levels: list[Tensor] = []
@@ -442,6 +446,8 @@ def antialias(
     tri: Tensor,
     topology_hash: Tensor | None = None,
     pos_gradient_boost: float = 1.0,
+    *,
+    edges: EdgesOption = "silhouette",
 ) -> Tensor:
     """Return a picture with smooth silhouettes, which lets gradients of a silhouette reach `pos`.
 
@@ -459,6 +465,10 @@ def antialias(
         Of `antialias_construct_topology_hash`, for the same `tri`; saves its time.
     pos_gradient_boost : float
         Multiplies the gradients of `pos`.
+    edges : {"silhouette", "area", "straight-through"}
+        "silhouette": the rule of nvdiffrast. "area": by the exact area of pixels, at all edges where a surface ends or
+        folds, those of triangles below a pixel, too. "straight-through": the picture stays as it is, and gradients are
+        those of Pidhorskyi et al.
 
     Returns
     -------
@@ -481,7 +491,22 @@ def antialias(
     than 45 degrees for neighbours in a row (flatter for a column), and pass between the two centres. With t the way
     from the centre of the nearer triangle's pixel to the edge, in pixels, the other pixel takes the share t - 1/2 of
     the nearer's colour; below 1/2 the nearer's pixel takes 1/2 - t of the other's. A triangle with a corner behind the
-    eye is left as it is; an edge of three or more triangles counts as that of the first two.
+    eye is left as it is; at an edge of three or more triangles each looks at the next.
+
+    With "area" a walk from the nearer centre towards the other goes from triangle to triangle until the surface ends or
+    folds; each of the two pixels takes the exact share of it that lies beyond the line of that edge, and gradients are
+    those of that share. Near 45 degrees rows and columns share an edge, by a weight that counts as constant.
+    `docs/design/gradients.md` tells what is exact and what is not.
+
+    With "straight-through" a triangle that hangs over its neighbour gets (gA + gB) (A - B) / 2 as the gradient of its
+    point at the pixel's centre, A and B being the colours of the two pixels, gA and gB their gradients; where two
+    triangles cut each other it gets none.
+
+    References
+    ----------
+    S. Laine et al., Modular Primitives for High-Performance Differentiable Rendering, 2020; S. Pidhorskyi et al.,
+    Rasterized Edge Gradients, 2024; T. Auzinger, M. Guthe, S. Jeschke, Analytic Anti-Aliasing of Linear Functions on
+    Polytopes, 2012.
 
     Examples
     --------
@@ -491,29 +516,27 @@ def antialias(
     >>> antialias((rast[..., 3:] > 0).float(), rast, pos, tri).flatten()
     tensor([1.0000, 1.0000, 0.5000, 0.0000])
     """
-    check("color", color, "(B, H, W, C)", is_tensor(color) and color.ndim == 4)
+    check("color", color, "(B, H, W, C)", is_tensor(color) and color.ndim == 4, KINDS)
     wish = (*color.shape[:3], 4)
     check("rast", rast, str(tuple(wish)), is_tensor(rast) and tuple(rast.shape) == wish)
     fits = is_tensor(pos) and pos.ndim in (2, 3) and pos.shape[-1] == 4 and len_of(pos) in (1, len(color))
     check("pos", pos, f"(V, 4), (1, V, 4) or ({len(color)}, V, 4)", fits)
-    corners_of = as_tri(tri, pos.shape[-2])
-    opposite_of = antialias_construct_topology_hash(tri) if topology_hash is None else topology_hash
-    if opposite_of.shape != tri.shape:
-        raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(opposite_of.shape)}")
-    boosted = pos.detach() + pos_gradient_boost * (pos - pos.detach()) if pos.requires_grad else pos
-    vertices = boosted.reshape(-1, pos.shape[-2], 4)
-    ids, depth = ids_of(rast), rast[..., 2].detach()
-    out = flat = color.reshape(-1, color.shape[3])
-    for is_column in (False, True):
-        pairs = find_pairs(ids, depth, is_column=is_column)
-        share, keeps = blend_shares(pairs, vertices, corners_of, opposite_of, ids.shape, is_column=is_column)
-        target, source = (torch.where(keeps, *two) for two in ((pairs.far, pairs.near), (pairs.near, pairs.far)))
-        out = out.index_add(0, target, (share[:, None] * (flat[source] - flat[target])).to(out.dtype))
-    return out.reshape(color.shape)
+    check_tri(tri)
+    if edges not in get_args(EdgesOption):
+        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
+    across = halves_across(tri) if topology_hash is None else topology_hash
+    if across.shape != tri.shape:
+        raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(across.shape)}")
+    given, points_of, vertices = same_dtype(color, (rast, len(tri)), pos)
+    rule, mesh = EdgeRule[edges.replace("-", "_").upper()], vertices if vertices.ndim == 3 else vertices[None]
+    out = smooth(given, points_of, mesh, tri, across, int(rule), float(pos_gradient_boost))
+    return out.to(color.dtype)
 
 
 def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
-    """Return the vertex across each edge of each triangle, for `topology_hash` of `antialias`.
+    """Return which triangle lies across each edge of each triangle, for `topology_hash` of `antialias`.
+
+    Without it `antialias` looks whether it knows `tri`: it keeps those of the last few.
 
     Parameters
     ----------
@@ -522,8 +545,9 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
 
     Returns
     -------
-    tensor of int64, shape (T, 3)
-        Column i belongs to the edge that corner i is not on: the third corner of the other triangle there, -1 if none.
+    tensor of int32, shape (T, 3)
+        Column i belongs to the edge that corner i is not on: 3 times the other triangle there plus its corner that is
+        not on it, -1 if there is none.
 
     Raises
     ------
@@ -533,341 +557,358 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
     Examples
     --------
     >>> antialias_construct_topology_hash(torch.tensor([[0, 1, 2], [2, 1, 3]]))
-    tensor([[ 3, -1, -1],
-            [-1, -1,  0]])
+    tensor([[ 5, -1, -1],
+            [-1, -1,  0]], dtype=torch.int32)
     """
-    corners = as_tri(tri, None).numpy().astype(np.int64)
-    ends = np.sort(np.stack([np.roll(corners, -1, 1), np.roll(corners, -2, 1)], -1).reshape(-1, 2), axis=1)
-    key = ends[:, 0] << 32 | ends[:, 1]
-    order = np.argsort(key, kind="stable")
-    key, corner = key[order], corners.reshape(-1)[order]
-    is_same = np.concatenate([key[1:] == key[:-1], [False]])[: len(key)]
-    across = np.full(len(key), -1)
-    before = np.roll(is_same, 1)
-    across[before] = np.roll(corner, 1)[before]
-    across[is_same] = np.roll(corner, -1)[is_same]  # the first of several edges looks to the second
-    found = np.empty_like(across)
-    found[order] = across
-    return torch.from_numpy(found.reshape(corners.shape))
+    check_tri(tri)
+    return halves_across(tri)
 
 
-# What is drawn
+# Operators: tensors to the engine and back. `threads` is that of a context, 0 where PyTorch's number counts.
 
 
-class Meshes(NamedTuple):
-    """Checked `pos`, `tri` and `ranges`, and the triangles of each picture as a slice of `tri`."""
-
-    pos: Tensor
-    tri: Tensor
-    slices: list[slice]
-
-    def each(self) -> list[tuple[int, Any, int, Any]]:
-        """Return of each picture its number, vertices, first triangle and triangles; arrays share the memory."""
-        pos, triangles = self.pos.detach().numpy(), self.tri.numpy()
-        vertices = [pos] * len(self.slices) if pos.ndim == 2 else pos
-        return [(i, vertices[i], part.start, triangles[part]) for i, part in enumerate(self.slices)]
+def threads_of(threads: int | None, n_px: int) -> int:
+    """Return how many threads draw some pixels: those asked for, or as many of PyTorch's as pay."""
+    return threads or max(1, min(torch.get_num_threads(), n_px // MIN_PX_PER_THREAD))
 
 
-def as_meshes(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> Meshes:
-    """Check what `rasterize` is given."""
-    if not isinstance(glctx, RasterizeContext):
-        raise TypeError(f"glctx must be a RasterizeContext, got {type(glctx).__name__}")
+def numpy_of(tensor: Tensor | None) -> Any:
+    """Return the array that a tensor is, contiguous; None for None."""
+    return None if tensor is None else tensor.detach().resolve_neg().contiguous().numpy()
+
+
+def triangles_of(tri: Tensor, n_vertices: int) -> NDArray[np.int32]:
+    """Return triangles whose vertices exist."""
+    if tri.dtype == torch.int64 and tri.numel() and not -(2**31) <= int(tri.min()) <= int(tri.max()) < 2**31:
+        raise IndexError(f"triangles must hold indices in [0, {n_vertices}), got {int(tri.min())} to {int(tri.max())}")
+    array: NDArray[np.int32] = numpy_of(tri.to(torch.int32))
+    check_rows(array, n_vertices)
+    return array
+
+
+def grid_of(tri: Tensor, pixels: Tensor, n_vertices: int) -> PixelGrid:
+    """Return the pictures (B, H, W, ...) of triangles."""
+    b, h, w = pixels.shape[:3]
+    return PixelGrid(triangles_of(tri, n_vertices), b, h, w, threads_of(0, b * h * w))
+
+
+def each(pos: Tensor, tri: Tensor, ranges: Tensor | None) -> list[tuple[Any, Any]]:
+    """Return of each picture its vertices and triangles; arrays share the memory of the tensors."""
+    vertices, triangles = numpy_of(pos), numpy_of(tri)
     if ranges is None:
-        check("pos", pos, "(B, V, 4), or (V, 4) with ranges", is_tensor(pos) and pos.ndim == 3 and pos.shape[2] == 4)
-        return Meshes(pos, as_tri(tri, None), [slice(0, len(tri))] * len(pos))
-    check("pos", pos, "(V, 4) with ranges", is_tensor(pos) and pos.ndim == 2 and pos.shape[1] == 4)
-    corners = as_tri(tri, None)
-    check("ranges", ranges, "(B, 2)", is_tensor(ranges) and ranges.ndim == 2 and ranges.shape[1] == 2, is_int=True)
-    slices = [slice(first, first + count) for first, count in ranges.tolist()]
-    for i, part in enumerate(slices):
-        if not 0 <= part.start <= part.stop <= len(tri):
-            raise ValueError(f"ranges must lie within the {len(tri)} triangles, row {i} is {ranges[i].tolist()}")
-    return Meshes(pos, corners, slices)
+        return [(one, triangles) for one in vertices]
+    return [(vertices, triangles[first : first + count]) for first, count in ranges.tolist()]
 
 
-def points_of_ids(glctx: RasterizeContext, meshes: Meshes, ids: Any, *, grad_db: bool) -> tuple[Tensor, Tensor]:
-    """Return `rast` and `rast_db` of ids (B, H, W), -1 for none."""
-    height, width = ids.shape[1:]
-    flat = torch.from_numpy(ids).reshape(-1)
-    pixels = (flat >= 0).nonzero().squeeze(1)
-    i_tri = flat[pixels].long()
-    corners = meshes.tri[i_tri].long().T
-    if meshes.pos.ndim == 3:
-        corners = corners + pixels // (height * width) * meshes.pos.shape[1]
-    x, y, z, w = meshes.pos.reshape(-1, 4)[corners].double().movedim(2, 0).contiguous()  # each (3, N)
-    x_ndc = ((pixels % width).double() * 2 + 1) / width - 1
-    y_ndc = ((pixels // width % height).double() * 2 + 1) / height - 1
-    x, y = x - x_ndc * w, y - y_ndc * w
-
-    # Twice the areas, times w, between the eye's ray and two corners, and how they change across the picture.
-    (x1, y1, w1), (x2, y2, w2) = ([one.roll(-k, 0) for one in (x, y, w)] for k in (1, 2))
-    area = x1 * y2 - y1 * x2
-    total = nonzero(area.sum(0))
-    weights = area / total
-    zw = ((z * area).sum(0) / nonzero((w * area).sum(0))).clamp(-1, 1)
-    uv = weights[:2].clamp(0, 1)
-    uv = uv / uv.sum(0).clamp(min=1)
-    channel = torch.from_numpy(floats_of_ids(i_tri.numpy() + 1, np.dtype(str(meshes.pos.dtype).split(".")[1])))
-    rows = [*(one.to(meshes.pos.dtype) for one in (*uv, zw)), channel]
-    rast = spread(torch.stack(rows, 1), pixels, ids.shape)
-    if not glctx.output_db:
-        return rast, rast.new_zeros((*ids.shape, 0))
-    by_x, by_y = (2 / width) * (y1 * w2 - w1 * y2), (2 / height) * (w1 * x2 - x1 * w2)
-    (u_x, v_x), (u_y, v_y) = ((by[:2] - weights[:2] * by.sum(0)) / total for by in (by_x, by_y))
-    rows = [one.to(meshes.pos.dtype) for one in (u_x, u_y, v_x, v_y)]
-    rast_db = spread(torch.stack(rows, 1), pixels, ids.shape)
-    return rast, rast_db if grad_db else rast_db.detach()
+def joined(pictures: list[NDArray[np.int32]], shape: tuple[int, ...]) -> NDArray[np.int32]:
+    """Return pictures as one array; of one picture itself."""
+    return (
+        pictures[0][None] if len(pictures) == 1 else np.stack(pictures) if pictures else np.empty((0, *shape), np.int32)
+    )
 
 
-def nonzero(values: Tensor) -> Tensor:
-    """Return the values, 1 for 0."""
-    return torch.where(values == 0, torch.ones_like(values), values)
+def operator(signature: str, fake: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
+    """Make an operator of a function; `fake` tells the shapes of its results. A sample of `torch.vmap` is a call."""
+
+    def made(function: Callable[..., Any]) -> Any:
+        op = torch.library.custom_op(f"topleft::{function.__name__}", function, mutates_args=(), schema=signature)
+        op.register_fake(fake)
+
+        def one_by_one(info: Any, in_dims: Sequence[Any], *args: Any) -> tuple[Any, Any]:
+            found = [op(*sample(args, in_dims, i)) for i in range(info.batch_size)]
+            if isinstance(found[0], Tensor):
+                return torch.stack(found), 0
+            return type(found[0])(map(torch.stack, zip(*found, strict=True))), type(found[0])(0 for _ in found[0])
+
+        op.register_vmap(one_by_one)
+        return op
+
+    return made
 
 
-def floats_of_ids(id_plus_1: Any, dtype: Any) -> Any:
-    """Return ids as floats: their values up to 2**24, and from there on, in float32, counted bits."""
-    floats = id_plus_1.astype(dtype)
-    if dtype == np.float32 and id_plus_1.max(initial=0) > LAST_EXACT_ID:
-        large = id_plus_1 > LAST_EXACT_ID
-        floats.view(np.int32)[large] = id_plus_1[large] - LAST_EXACT_ID + BITS_OF_LAST
-    return floats
+def sample(args: Sequence[Any], dims: Sequence[Any], i: int) -> list[Any]:
+    """Return the arguments of one sample of a batch."""
+    return [
+        sample(arg, dim, i) if isinstance(arg, list | tuple) and isinstance(dim, list | tuple)
+        else arg if dim is None else arg.select(dim, i)
+        for arg, dim in zip(args, dims, strict=True)
+    ]  # fmt: skip
 
 
-def ids_of(rast: Tensor) -> Tensor:
-    """Return the ids plus 1 of the last channel, int64 (B, H, W)."""
-    floats = rast[..., 3].detach().contiguous()
-    ids = floats.long()
-    if floats.dtype == torch.float32 and floats.numel() and float(floats.max()) > LAST_EXACT_ID:
-        bits = floats.view(torch.int32).long() - BITS_OF_LAST + LAST_EXACT_ID
-        ids = torch.where(floats > LAST_EXACT_ID, bits, ids)
-    return ids
+def once(*_: Any) -> None:
+    """Refuse gradients of gradients."""
+    raise NotImplementedError("topleft.torch has first derivatives: gradients of its gradients are not computed")
 
 
-def spread(rows: Tensor, pixels: Tensor, shape: Sequence[int]) -> Tensor:
-    """Return a picture (*shape, K) that has these rows at these pixels, and 0 elsewhere."""
-    n_pixels = int(np.prod(shape))
-    if len(pixels) == n_pixels:
-        return rows.reshape(*shape, rows.shape[1])
-    return rows.new_zeros((n_pixels, rows.shape[1])).index_copy(0, pixels, rows).reshape(*shape, rows.shape[1])
+def like(tensor: Tensor | None, other: Tensor) -> Tensor:
+    """Return memory as a tensor has it, or none."""
+    return other.new_empty(0) if tensor is None else torch.empty_like(tensor, memory_format=torch.contiguous_format)
 
 
-# Textures
+def tensor_of(array: Any, other: Tensor) -> Tensor:
+    """Return the tensor that an array is, without elements for None."""
+    return other.new_empty(0) if array is None else torch.from_numpy(array)
 
 
-def mip_level(tex: Tensor, uv_da: Tensor | None, bias: Tensor | None) -> Tensor:
-    """Return the level of each pixel, flat and not clamped: log2 of the longer axis of its footprint in texels."""
-    if uv_da is None:
-        return bias.reshape(-1)  # type: ignore[union-attr]
-    height, width = tex.shape[-3:-1]
-    s_x, s_y, t_x, t_y = (uv_da.reshape(-1, 4) * torch.tensor([width, width, height, height])).unbind(1)
-    a, b, c = s_x**2 + t_x**2, s_y**2 + t_y**2, s_x * s_y + t_x * t_y
-    major_squared = (a + b) / 2 + (((a - b) / 2) ** 2 + c**2).clamp(min=1e-30).sqrt()
-    level = 0.5 * major_squared.clamp(min=1e-30).log2()
-    return level if bias is None else level + bias.reshape(-1)
-
-
-def look_up(tex: Tensor, picture: Tensor, uv: Tensor, boundary: str, *, nearest: bool) -> Tensor:
-    """Return (N, C): a level (B, H, W, C) at points (N, 2) of the pictures (N,); of a cube map of its faces."""
-    if boundary == "cube":
-        return look_up_cube(tex, picture, uv, nearest=nearest)
-    size = torch.tensor([tex.shape[2], tex.shape[1]])
-    uv = torch.nan_to_num(uv, 0.0, 0.0, 0.0)
-    if boundary == "wrap":
-        uv = uv - uv.detach().floor()
-    at = uv * size if nearest else uv * size - 0.5
-    if boundary == "clamp":
-        at = torch.minimum(at.clamp(min=0), (size - 1).to(at.dtype))
-    elif boundary == "zero":
-        at = torch.minimum(at.clamp(min=-2), (size + 1).to(at.dtype))
-    low = at.detach().floor()
-    first, texels = low.long(), tex.reshape(-1, tex.shape[3])
-
-    def texel(dx: int, dy: int) -> Tensor:
-        x_y = first + torch.tensor([dx, dy])
-        inside = ((x_y >= 0) & (x_y < size)).all(1)
-        x_y = x_y % size if boundary == "wrap" else x_y.minimum(size - 1).clamp(min=0)
-        found = texels[(picture * size[1] + x_y[:, 1]) * size[0] + x_y[:, 0]]
-        return found * inside[:, None] if boundary == "zero" else found
-
-    if nearest:
-        return texel(0, 0)
-    right, up = (at - low).split(1, 1)
-    below = torch.lerp(*same_dtype(texel(0, 0), texel(1, 0), right))
-    above = torch.lerp(*same_dtype(texel(0, 1), texel(1, 1), right))
-    return torch.lerp(*same_dtype(below, above, up))
-
-
-#: The axes of each face of a cube, as rows: of u (its columns), of v (its rows), and from the middle to the face.
-CUBE_FRAMES = (
-    ((0, 0, -1), (0, -1, 0), (1, 0, 0)),
-    ((0, 0, 1), (0, -1, 0), (-1, 0, 0)),
-    ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
-    ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
-    ((1, 0, 0), (0, -1, 0), (0, 0, 1)),
-    ((-1, 0, 0), (0, -1, 0), (0, 0, -1)),
+@operator(
+    "(Tensor pos, Tensor tri, Tensor? ranges, int height, int width, int threads) -> Tensor",
+    lambda pos, tri, ranges, height, width, threads: pos.new_empty(  # noqa: ARG005
+        (len(pos if ranges is None else ranges), height, width), dtype=torch.int32
+    ),
 )
+def draw_ids(pos: Tensor, tri: Tensor, ranges: Tensor | None, height: int, width: int, threads: int) -> Tensor:
+    """Return which triangle of its range shows in each pixel, int32 (B, H, W), -1 for none; row 0 on top."""
+    n = threads_of(threads, height * width)
+    drawn = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, ranges)]
+    return torch.from_numpy(joined(drawn, (height, width)))
 
 
-def face_of(directions: Tensor) -> Tensor:
-    """Return the face (N,) of a cube that each direction (N, 3) meets."""
-    x, y, z = directions.detach().abs().unbind(1)
-    axis = torch.where(z > torch.maximum(x, y), 2, torch.where(y > x, 1, 0))
-    return 2 * axis + (directions.detach().gather(1, axis[:, None])[:, 0] < 0)
+@operator(
+    "(Tensor pos, Tensor tri, Tensor ids, Tensor? ranges, bool with_db) -> (Tensor, Tensor)",
+    lambda pos, tri, ids, ranges, with_db: (  # noqa: ARG005
+        pos.new_empty((*ids.shape, 4)),
+        pos.new_empty((*ids.shape, 4 if with_db else 0)),
+    ),
+)
+def points_of_ids(pos: Tensor, tri: Tensor, ids: Tensor, ranges: Tensor | None, with_db: bool) -> tuple[Tensor, Tensor]:
+    """Return `rast` and `rast_db`."""
+    grid = grid_of(tri, ids, pos.shape[-2])
+    firsts = [0] * len(ids) if ranges is None else ranges[:, 0].tolist()
+    vertices = numpy_of(pos if ranges is None else pos[None])
+    pictures = list(zip(numpy_of(ids), firsts, strict=True))
+    rast, rast_db = tensors.points(grid, vertices, pictures, is_flipped=True, with_db=with_db)
+    return torch.from_numpy(rast), torch.from_numpy(rast_db)
 
 
-def face_points(picture: Tensor, directions: Tensor, xyz_da: Tensor | None) -> tuple[Tensor, Tensor, Tensor | None]:
-    """Return of directions the faces (N,), counted through the pictures, u and v on them (N, 2), and their `uv_da`.
-
-    What meets no face gets -1.
-    """
-    face = face_of(directions)
-    frames = torch.tensor(CUBE_FRAMES, dtype=directions.dtype)[face]
-    along = (frames * directions[:, None]).sum(2)  # (N, 3): along u, along v, towards the face
-    is_met = torch.isfinite(along).all(1) & (along[:, 2] > 0)
-    along = torch.where(is_met[:, None], along, torch.ones_like(along))
-    depth = along[:, 2:]
-    uv = (along[:, :2] / depth / 2 + 0.5).clamp(0, 1)
-    number = torch.where(is_met, 6 * picture + face, torch.full_like(face, -1))
-    if xyz_da is None:
-        return number, uv, None
-    by = (frames[..., None] * xyz_da.reshape(-1, 1, 3, 2)).sum(2)  # (N, 3, 2): what `along` changes by
-    slopes = (by[:, :2] - (along[:, :2] / depth)[..., None] * by[:, 2:]) / depth[..., None] / 2
-    return number, uv, torch.where(is_met[:, None, None], slopes, torch.zeros_like(slopes)).reshape(-1, 4)
+@operator(
+    "(Tensor pos, Tensor tri, Tensor rast, Tensor g_rast, Tensor? g_db) -> Tensor",
+    lambda pos, tri, rast, g_rast, g_db: like(pos, pos),  # noqa: ARG005
+)
+def points_vjp(pos: Tensor, tri: Tensor, rast: Tensor, g_rast: Tensor, g_db: Tensor | None) -> Tensor:
+    """Return the gradient of `pos`."""
+    vertices = pos if pos.ndim == 3 else pos[None]
+    slopes = numpy_of(g_db) if g_db is not None and g_db.numel() else None
+    grid = grid_of(tri, rast, pos.shape[-2])
+    found = tensors.points_vjp(grid, numpy_of(vertices), numpy_of(rast), numpy_of(g_rast), slopes)
+    return torch.from_numpy(found).reshape(pos.shape)
 
 
-def look_up_cube(tex: Tensor, number: Tensor, uv: Tensor, *, nearest: bool) -> Tensor:
-    """Return (N, C): a level (B, 6, N, N, C) at points (N, 2) of its faces (N,), 0 for face -1."""
-    n, texels = tex.shape[2], tex.reshape(-1, tex.shape[4])
-    is_met = (number >= 0)[:, None]
-    number = number.clamp(min=0)
-    at = uv * n if nearest else uv * n - 0.5
-    low = at.detach().floor()
-    first = low.long()
-
-    def texel(dx: int, dy: int) -> tuple[Tensor, Tensor]:
-        x_y, own = first + torch.tensor([dx, dy]), number
-        is_beyond = (x_y < 0) | (x_y >= n)
-        (beyond,) = (is_beyond.any(1) & ~is_beyond.all(1)).nonzero(as_tuple=True)
-        if len(beyond):  # where the plane of the face runs on, seen from the middle of the cube, lies the next one
-            middle = 2 * (x_y[beyond].double() + 0.5) / n - 1
-            frames = torch.tensor(CUBE_FRAMES, dtype=torch.float64)[own[beyond] % 6]
-            directions = (torch.cat([middle, torch.ones_like(middle[:, :1])], 1)[..., None] * frames).sum(1)
-            next_face, next_uv, _ = face_points(own[beyond] // 6, directions, None)
-            own = own.index_copy(0, beyond, next_face)
-            x_y[beyond] = (next_uv * n).long().clamp(max=n - 1)
-        x_y = x_y.clamp(0, n - 1)
-        return texels[(own * n + x_y[:, 1]) * n + x_y[:, 0]], is_beyond.all(1, keepdim=True)
-
-    if nearest:
-        x_y = first.clamp(0, n - 1)
-        return texels[(number * n + x_y[:, 1]) * n + x_y[:, 0]] * is_met
-    quad, corners = (torch.stack(one) for one in zip(*(texel(k % 2, k // 2) for k in range(4)), strict=True))
-    quad = torch.where(corners, torch.zeros_like(quad), quad)
-    quad = torch.where(corners, quad.sum(0) / 3, quad)
-    right, down = (at - low).split(1, 1)
-    upper = torch.lerp(*same_dtype(quad[0], quad[1], right))
-    lower = torch.lerp(*same_dtype(quad[2], quad[3], right))
-    return torch.lerp(*same_dtype(upper, lower, down)) * is_met
-
-
-def same_dtype(*tensors: Tensor) -> list[Tensor]:
-    """Return tensors in the widest of their dtypes."""
-    dtype = torch.float64 if any(one.dtype == torch.float64 for one in tensors) else torch.float32
-    return [one.to(dtype) for one in tensors]
-
-
-def check_texture(tex: Tensor, uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, boundary_mode: str) -> int:
-    """Check what `texture` is given; returns the number of pictures."""
-    if boundary_mode not in get_args(BoundaryOption):
-        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
-    is_cube = boundary_mode == "cube"
-    n_axes = 3 if is_cube else 2
-    check("uv", uv, f"(B, H, W, {n_axes})", is_tensor(uv) and uv.ndim == 4 and uv.shape[3] == n_axes)
-    n_pictures = len(uv)
-    if is_cube:
-        wish = f"(1, 6, N, N, C) or ({n_pictures}, 6, N, N, C) with boundary_mode 'cube'"
-        fits = is_cube_map(tex) and len(tex) in (1, n_pictures)
-    else:
-        wish = f"(1, Ht, Wt, C) or ({n_pictures}, Ht, Wt, C)"
-        fits = is_tensor(tex) and tex.ndim == 4 and len(tex) in (1, n_pictures) and 0 not in tex.shape[1:]
-    check("tex", tex, wish, fits)
-    of_uv_da = (*uv.shape[:3], 2 * n_axes)
-    for name, given, shape in (("uv_da", uv_da, of_uv_da), ("mip_level_bias", bias, tuple(uv.shape[:3]))):
-        if given is not None:
-            check(name, given, str(tuple(shape)), is_tensor(given) and tuple(given.shape) == tuple(shape))
-    return n_pictures
-
-
-def as_mip(tex: Tensor, mip: Sequence[Tensor], max_mip_level: int | None) -> Sequence[Tensor]:
-    """Check the levels after a texture."""
-    height, width = tex.shape[-3:-1]
-    for k, level in enumerate(mip):
-        height, width = max(1, height // 2), max(1, width // 2)
-        wish = (*tex.shape[:-3], height, width, tex.shape[-1])
-        check(f"mip[{k}]", level, str(wish), is_tensor(level) and tuple(level.shape) == wish)
-    return mip[:max_mip_level]
-
-
-# Silhouettes
-
-
-class Pairs(NamedTuple):
-    """Neighbours that show different triangles.
-
-    Pixels (N,) of the whole batch on the near and on the far side, the near triangle (N,), and whether the far pixel
-    is the left (or lower) one.
-    """
-
-    near: Tensor
-    far: Tensor
-    i_tri: Tensor
-    is_mirrored: Tensor
-
-
-def find_pairs(ids: Tensor, depth: Tensor, *, is_column: bool) -> Pairs:
-    """Return the neighbours in rows, or in columns, of ids plus 1 (B, H, W) that differ."""
-    step = ids.shape[2] if is_column else 1
-    first, second = (ids[:, :-1], ids[:, 1:]) if is_column else (ids[..., :-1], ids[..., 1:])
-    b, i, j = (first != second).nonzero(as_tuple=True)
-    pixel = (b * ids.shape[1] + i) * ids.shape[2] + j
-    other = pixel + step
-    flat, z = ids.reshape(-1), depth.reshape(-1)
-    is_mirrored = (flat[pixel] == 0) | ((flat[other] != 0) & (z[other] < z[pixel]))
-    near, far = torch.where(is_mirrored, other, pixel), torch.where(is_mirrored, pixel, other)
-    return Pairs(near, far, flat[near] - 1, is_mirrored)
-
-
-def blend_shares(
-    pairs: Pairs, vertices: Tensor, tri: Tensor, opposite_of: Tensor, shape: Sequence[int], *, is_column: bool
+@operator(
+    "(Tensor attr, Tensor rast, Tensor tri, Tensor? rast_db, int[] wanted) -> (Tensor, Tensor)",
+    lambda attr, rast, tri, rast_db, wanted: (  # noqa: ARG005
+        attr.new_empty((*rast.shape[:3], attr.shape[2])),
+        attr.new_empty((*rast.shape[:3], 2 * len(wanted))),
+    ),
+)
+def interpolate_values(
+    attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Tensor | None, wanted: list[int]
 ) -> tuple[Tensor, Tensor]:
-    """Return of each pair the share (N,) of the other colour, and whether it is the far pixel that takes it."""
-    _, height, width = shape
-    picture = pairs.near // (height * width) if len(vertices) > 1 else torch.zeros_like(pairs.near)
-    corners = vertices[picture[:, None], tri[pairs.i_tri].long()].double()
-    across = opposite_of[pairs.i_tri]
-    opposite = vertices[picture[:, None], across.clamp(min=0)].double().detach()
-    own, x_y_w = corners.detach()[..., [0, 1, 3]], corners[..., [0, 1, 3]]
-    ends = own.roll(-1, 1), own.roll(-2, 1)
-    side, other_side = (torch.linalg.cross(*ends).mul(p).sum(2) for p in (own, opposite[..., [0, 1, 3]]))
-    is_silhouette = (across < 0) | (side * other_side > 0)
+    """Return attributes, and what they change by."""
+    grid = grid_of(tri, rast, attr.shape[1])
+    out, out_da = tensors.values(grid, numpy_of(attr), numpy_of(rast), numpy_of(rast_db), wanted)
+    return torch.from_numpy(out), torch.from_numpy(out_da)
 
-    # In pixels from the near centre, the first axis towards the far centre.
-    half = torch.tensor([width, height]).double() / 2
-    center = torch.stack([pairs.near % width, pairs.near // width % height], 1).double() + 0.5
-    w = nonzero(x_y_w[..., 2:])
-    px = (x_y_w[..., :2] / w + 1) * half - center[:, None]
-    along, beside = (px[..., 1], px[..., 0]) if is_column else (px[..., 0], px[..., 1])
-    along = torch.where(pairs.is_mirrored[:, None], -along, along)
-    (p1, q1), (p2, q2) = ([one.roll(-k, 1) for one in (along, beside)] for k in (1, 2))
-    rise = q2 - q1
-    run = (p2 - p1).abs()
-    is_steep = rise.abs() > run if is_column else rise.abs() >= run  # at 45 degrees rows alone
-    counts = is_silhouette & is_steep & ((q1 <= 0) != (q2 <= 0)) & (corners[..., 3] > 0).all(1, keepdim=True)
-    crossing = torch.where(counts, p1 - q1 * (p2 - p1) / nonzero(rise), torch.full_like(rise, -1e9))
-    t = crossing.amax(1)
-    meets = (t > -CROSSING_SLACK) & (t < 1 + CROSSING_SLACK)
-    shift = torch.where(meets, t.clamp(0, 1) - 0.5, torch.zeros_like(t))
-    return shift.abs(), shift > 0
+
+@operator(
+    "(Tensor attr, Tensor rast, Tensor tri, Tensor? rast_db, int[] wanted, Tensor g_out, Tensor? g_da)"
+    " -> (Tensor, Tensor, Tensor)",
+    lambda attr, rast, tri, rast_db, wanted, g_out, g_da: (  # noqa: ARG005
+        like(attr, attr),
+        like(rast, attr),
+        like(rast if g_da is not None else None, attr),
+    ),
+)
+def interpolate_vjp(
+    attr: Tensor,
+    rast: Tensor,
+    tri: Tensor,
+    rast_db: Tensor | None,
+    wanted: list[int],
+    g_out: Tensor,
+    g_da: Tensor | None,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return the gradients of `attr`, `rast` and `rast_db`."""
+    grid = grid_of(tri, rast, attr.shape[1])
+    slopes = numpy_of(rast_db if g_da is not None else None)
+    given = numpy_of(attr), numpy_of(rast), numpy_of(g_out), slopes, numpy_of(g_da)
+    g_attr, g_rast, g_db = tensors.values_vjp(grid, *given, wanted)
+    return torch.from_numpy(g_attr), torch.from_numpy(g_rast), tensor_of(g_db, attr)
+
+
+def look_of(
+    levels: Sequence[Tensor], uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, how: int, beyond: int
+) -> TexelLook:
+    """Return what the engine looks up."""
+    where = numpy_of(uv), numpy_of(uv_da), numpy_of(bias)
+    return TexelLook(
+        [numpy_of(one) for one in levels],
+        TexelFilter(how),
+        TexelsBeyond(beyond),
+        *where,
+        threads_of(0, uv[..., 0].numel()),
+    )
+
+
+@operator(
+    "(Tensor[] levels, Tensor uv, Tensor? uv_da, Tensor? bias, int how, int beyond) -> Tensor",
+    lambda levels, uv, uv_da, bias, how, beyond: uv.new_empty((*uv.shape[:3], levels[0].shape[-1])),  # noqa: ARG005
+)
+def look_up(
+    levels: Sequence[Tensor], uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, how: int, beyond: int
+) -> Tensor:
+    """Return a texture at each pixel."""
+    return torch.from_numpy(tensors.texels(look_of(levels, uv, uv_da, bias, how, beyond)))
+
+
+@operator(
+    "(Tensor[] levels, Tensor uv, Tensor? uv_da, Tensor? bias, int how, int beyond, Tensor g_out) -> Tensor[]",
+    lambda levels, uv, uv_da, bias, how, beyond, g_out: [  # noqa: ARG005
+        *(like(one, uv) for one in levels), like(uv, uv), like(uv_da, uv), like(bias, uv)
+    ],
+)  # fmt: skip
+def look_up_vjp(
+    levels: Sequence[Tensor],
+    uv: Tensor,
+    uv_da: Tensor | None,
+    bias: Tensor | None,
+    how: int,
+    beyond: int,
+    g_out: Tensor,
+) -> list[Tensor]:
+    """Return the gradients of the levels, of uv, of the footprints and of the biases."""
+    look = look_of(levels, uv, uv_da, bias, how, beyond)
+    g_levels, *where = tensors.texels_vjp(look, numpy_of(g_out))
+    return [*map(torch.from_numpy, g_levels), *(tensor_of(one, uv) for one in where)]
+
+
+#: Triangles, and what lies across their edges, of the last calls.
+known: deque[tuple[NDArray[np.int32], NDArray[np.int32]]] = deque(maxlen=4)
+
+
+@operator("(Tensor tri) -> Tensor", lambda tri: tri.new_empty(tri.shape, dtype=torch.int32))
+def halves_across(tri: Tensor) -> Tensor:
+    """Return the triangle across each edge."""
+    own = numpy_of(tri.to(torch.int32))
+    for triangles, across in list(known):
+        if triangles.shape == own.shape and np.array_equal(triangles, own):
+            return torch.from_numpy(across.copy())
+    found = tensors.halves_across(own)
+    known.append((own.copy(), found))
+    return torch.from_numpy(found.copy())
+
+
+@operator(
+    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor across, int rule, float boost) -> Tensor",
+    lambda color, rast, pos, tri, across, rule, boost: like(color, color),  # noqa: ARG005
+)
+def smooth(
+    color: Tensor,
+    rast: Tensor,
+    pos: Tensor,
+    tri: Tensor,
+    across: Tensor,
+    rule: int,
+    boost: float,  # noqa: ARG001
+) -> Tensor:
+    """Return the picture with smooth silhouettes."""
+    grid = grid_of(tri, rast, pos.shape[1])
+    arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color))
+    return torch.from_numpy(tensors.smooth(grid, EdgeRule(rule), *arrays))
+
+
+@operator(
+    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor across, int rule, Tensor g_out) -> (Tensor, Tensor)",
+    lambda color, rast, pos, tri, across, rule, g_out: (like(color, color), like(pos, pos)),  # noqa: ARG005
+)
+def smooth_vjp(
+    color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, across: Tensor, rule: int, g_out: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Return the gradients of the colours and of `pos`."""
+    grid = grid_of(tri, rast, pos.shape[1])
+    arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color, g_out))
+    g_color, g_pos = tensors.smooth_vjp(grid, EdgeRule(rule), *arrays)
+    return torch.from_numpy(g_color), torch.from_numpy(g_pos)
+
+
+# What backward calls
+
+
+def filled(gradient: Tensor | None, shape: Sequence[int], other: Tensor) -> Tensor:
+    """Return a gradient, zeros for None."""
+    return other.new_zeros(shape) if gradient is None else gradient
+
+
+def keep_points(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:
+    """Keep what `points_vjp` takes."""
+    ctx.set_materialize_grads(False)
+    ctx.save_for_backward(inputs[0], inputs[1], output[0])
+
+
+def pull_points(ctx: Any, g_rast: Tensor | None, g_db: Tensor | None) -> tuple[Any, ...]:
+    """Return the gradients of what `points_of_ids` takes."""
+    pos, tri, rast = ctx.saved_tensors
+    return points_vjp(pos, tri, rast, filled(g_rast, rast.shape, rast), g_db), None, None, None, None
+
+
+def keep_values(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:  # noqa: ARG001
+    """Keep what `interpolate_vjp` takes."""
+    ctx.set_materialize_grads(False)
+    attr, rast, tri, rast_db, ctx.wanted = inputs
+    ctx.save_for_backward(attr, rast, tri, rast_db)
+
+
+def pull_values(ctx: Any, g_out: Tensor | None, g_da: Tensor | None) -> tuple[Any, ...]:
+    """Return the gradients of what `interpolate_values` takes."""
+    attr, rast, tri, rast_db = ctx.saved_tensors
+    given = filled(g_out, (*rast.shape[:3], attr.shape[2]), attr)
+    has_da = g_da is not None and len(ctx.wanted) > 0
+    g_attr, g_rast, g_db = interpolate_vjp(attr, rast, tri, rast_db, ctx.wanted, given, g_da if has_da else None)
+    return g_attr, g_rast, None, g_db if has_da else None, None
+
+
+def keep_look(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
+    """Keep what `look_up_vjp` takes."""
+    levels, uv, uv_da, bias, ctx.how, ctx.beyond = inputs
+    ctx.n_levels = len(levels)
+    ctx.save_for_backward(uv, uv_da, bias, *levels)
+
+
+def pull_look(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
+    """Return the gradients of what `look_up` takes."""
+    uv, uv_da, bias, *levels = ctx.saved_tensors
+    found = look_up_vjp(levels, uv, uv_da, bias, ctx.how, ctx.beyond, g_out)
+    g_uv, g_da, g_bias = found[ctx.n_levels :]
+    return (
+        found[: ctx.n_levels], g_uv, None if uv_da is None else g_da, None if bias is None else g_bias, None, None
+    )  # fmt: skip
+
+
+def keep_edges(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
+    """Keep what `smooth_vjp` takes."""
+    *kept, ctx.rule, ctx.boost = inputs
+    ctx.save_for_backward(*kept)
+
+
+def pull_edges(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
+    """Return the gradients of what `smooth` takes."""
+    g_color, g_pos = smooth_vjp(*ctx.saved_tensors, ctx.rule, g_out)
+    return g_color, None, g_pos if ctx.boost == 1 else ctx.boost * g_pos, None, None, None, None
+
+
+points_of_ids.register_autograd(pull_points, setup_context=keep_points)
+interpolate_values.register_autograd(pull_values, setup_context=keep_values)
+look_up.register_autograd(pull_look, setup_context=keep_look)
+smooth.register_autograd(pull_edges, setup_context=keep_edges)
+for vjp in (points_vjp, interpolate_vjp, look_up_vjp, smooth_vjp):
+    vjp.register_autograd(once)
+
+
+def points(
+    glctx: RasterizeContext, pos: Tensor, tri: Tensor, ranges: Tensor | None, ids: Tensor, *, grad_db: bool
+) -> tuple[Tensor, Tensor]:
+    """Return `rast` and `rast_db` of ids (B, H, W) with row 0 on top."""
+    rast, rast_db = points_of_ids(pos, tri, ids, ranges, glctx.output_db)
+    return rast, rast_db if grad_db else rast_db.detach()
 
 
 # Checks
@@ -888,29 +929,97 @@ def len_of(tensor: Tensor) -> int:
     return len(tensor) if tensor.ndim == 3 else 1
 
 
-def check(name: str, value: object, wish: str, has_shape: object, *, is_int: bool = False) -> None:
+#: What tensors may hold, and the words for it; those of attributes, textures and colours come in half precision, too.
+FLOATS = (torch.float32, torch.float64), "float32 or float64"
+INTS = (torch.int32, torch.int64), "int32 or int64"
+KINDS = (*FLOATS[0], torch.float16, torch.bfloat16), "float16, bfloat16, float32 or float64"
+
+
+def check(name: str, value: object, wish: str, has_shape: object, kinds: tuple[tuple[Any, ...], str] = FLOATS) -> None:
     """Raise an error unless this is a tensor of numbers on the CPU that has the shape wished for."""
     if not isinstance(value, Tensor):
         raise TypeError(f"{name} must be a torch.Tensor, got {type(value).__name__}")
     if value.device.type != "cpu":
         raise TypeError(f"{name} must be on the CPU, got device {str(value.device)!r}: pass {name}.cpu()")
-    wanted, words = (
-        ((torch.int32, torch.int64), "int32 or int64")
-        if is_int
-        else ((torch.float32, torch.float64), "float32 or float64")
-    )
-    if value.dtype not in wanted:
-        raise TypeError(f"{name} must be {words}, got {value.dtype}")
+    if value.dtype not in kinds[0]:
+        hint = f": pass {name}.float() / 255" if value.dtype == torch.uint8 else ""
+        raise TypeError(f"{name} must be {kinds[1]}, got {value.dtype}{hint}")
     if not has_shape:
         raise ValueError(f"{name} must have shape {wish}, got {tuple(value.shape)}")
 
 
-def as_tri(tri: Tensor, n_vertices: int | None) -> Tensor:
-    """Check triangles, and their indices where the number of vertices is given."""
-    check("tri", tri, "(T, 3)", is_tensor(tri) and tri.ndim == 2 and tri.shape[1] == 3, is_int=True)
-    if n_vertices is not None:
-        as_checked_triangles(tri.numpy(), n_vertices)
-    return tri
+def check_tri(tri: Tensor) -> None:
+    """Check triangles, but for their indices."""
+    check("tri", tri, "(T, 3)", is_tensor(tri) and tri.ndim == 2 and tri.shape[1] == 3, INTS)
+
+
+def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> None:
+    """Check what `rasterize` is given."""
+    if not isinstance(glctx, RasterizeContext):
+        raise TypeError(f"glctx must be a RasterizeContext, got {type(glctx).__name__}")
+    if ranges is None:
+        check("pos", pos, "(B, V, 4), or (V, 4) with ranges", is_tensor(pos) and pos.ndim == 3 and pos.shape[2] == 4)
+        check_tri(tri)
+        return
+    check("pos", pos, "(V, 4) with ranges", is_tensor(pos) and pos.ndim == 2 and pos.shape[1] == 4)
+    check_tri(tri)
+    check("ranges", ranges, "(B, 2)", is_tensor(ranges) and ranges.ndim == 2 and ranges.shape[1] == 2, INTS)
+    for i, (first, count) in enumerate(ranges.tolist()):
+        if not 0 <= first <= first + count <= len(tri):
+            raise ValueError(f"ranges must lie within the {len(tri)} triangles, row {i} is {[first, count]}")
+
+
+def same_dtype(*given: Any) -> list[Any]:
+    """Return tensors in the widest of their dtypes, float32 at least; None stays.
+
+    A pair is `rast` with the number of its triangles, whose ids change with the dtype.
+    """
+    kinds = [one[0].dtype if isinstance(one, tuple) else one.dtype for one in given if one is not None]
+    dtype = torch.float64 if torch.float64 in kinds else torch.float32
+    return [
+        None if one is None else with_ids(one[0], one[1], dtype) if isinstance(one, tuple) else one.to(dtype)
+        for one in given
+    ]
+
+
+def with_ids(rast: Tensor, n_triangles: int, dtype: torch.dtype) -> Tensor:
+    """Return `rast` in another dtype: float32 counts up to 2**24, and from there on its bits are counted."""
+    if rast.dtype == dtype or n_triangles <= LAST_EXACT_ID:
+        return rast.to(dtype)
+    bits = rast[..., 3].detach().contiguous().view(torch.int32).double() - BITS_OF_LAST + LAST_EXACT_ID
+    ids = torch.where(rast[..., 3] > LAST_EXACT_ID, bits, rast[..., 3].double())
+    return torch.cat([rast[..., :3].to(dtype), ids[..., None]], -1)
+
+
+def check_texture(tex: Tensor, uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, boundary_mode: str) -> None:
+    """Check what `texture` is given."""
+    if boundary_mode not in get_args(BoundaryOption):
+        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
+    is_cube = boundary_mode == "cube"
+    n_axes = 3 if is_cube else 2
+    check("uv", uv, f"(B, H, W, {n_axes})", is_tensor(uv) and uv.ndim == 4 and uv.shape[3] == n_axes)
+    n_pictures = len(uv)
+    if is_cube:
+        wish = f"(1, 6, N, N, C) or ({n_pictures}, 6, N, N, C) with boundary_mode 'cube'"
+        fits = is_cube_map(tex) and len(tex) in (1, n_pictures)
+    else:
+        wish = f"(1, Ht, Wt, C) or ({n_pictures}, Ht, Wt, C)"
+        fits = is_tensor(tex) and tex.ndim == 4 and len(tex) in (1, n_pictures) and 0 not in tex.shape[1:]
+    check("tex", tex, wish, fits, KINDS)
+    of_uv_da = (*uv.shape[:3], 2 * n_axes)
+    for name, given, shape in (("uv_da", uv_da, of_uv_da), ("mip_level_bias", bias, tuple(uv.shape[:3]))):
+        if given is not None:
+            check(name, given, str(tuple(shape)), is_tensor(given) and tuple(given.shape) == tuple(shape))
+
+
+def as_mip(tex: Tensor, mip: Sequence[Tensor], max_mip_level: int | None) -> Sequence[Tensor]:
+    """Check the levels after a texture."""
+    height, width = tex.shape[-3:-1]
+    for k, level in enumerate(mip):
+        height, width = max(1, height // 2), max(1, width // 2)
+        wish = (*tex.shape[:-3], height, width, tex.shape[-1])
+        check(f"mip[{k}]", level, str(wish), is_tensor(level) and tuple(level.shape) == wish, KINDS)
+    return mip[:max_mip_level]
 
 
 def as_diff_attrs(diff_attrs: str | Sequence[int] | None, n_attrs: int) -> list[int]:

@@ -17,6 +17,7 @@ __all__ = [
     "ClipDepthOption",
     "CullOption",
     "DepthTestOption",
+    "EdgesOption",
     "EncodingOption",
     "FilterModeOption",
     "FilterOption",
@@ -140,4 +141,5 @@ ZarrCompressionOption: TypeAlias = Literal["gzip", "zstd", "none"]
 # `topleft.torch`, in the words of nvdiffrast
 
 BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero", "cube"]
+EdgesOption: TypeAlias = Literal["silhouette", "area", "straight-through"]
 FilterModeOption: TypeAlias = Literal["auto", "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"]

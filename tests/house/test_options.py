@@ -65,6 +65,7 @@ FLAT = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]], [[0, 1, 2]]
 
 #: Options whose check reads the type: a call of each.
 READ = {
+    "EdgesOption": lambda word: tl.rasterize(*FLAT, (4, 4)).antialias(np.ones((4, 4)), edges=word),
     "BakeOption": lambda word: tl.bake(SQUARE, word, 2, source=SQUARE),
     "BakeRuleOption": lambda word: tl.bake(SQUARE, "position", 2, rule=word),
     "FitOption": lambda word: tl.Camera.framing(CUBE, fit=word),

@@ -125,12 +125,18 @@ def test_rasterize_of_nothing_is_zeros():
     assert not rast.any()
 
 
-def test_ids_beyond_float32_come_back():
-    ids = np.array([1, (1 << 24) - 1, 1 << 24, (1 << 24) + 1, (1 << 24) + 2, 1 << 25, 1 << 29], np.int64)
-    rast = torch.zeros((1, 1, len(ids), 4))
-    rast[0, 0, :, 3] = torch.from_numpy(dr.floats_of_ids(ids, np.dtype("float32")))
-    assert dr.ids_of(rast).flatten().tolist() == ids.tolist()
-    assert rast[0, 0, :3, 3].tolist() == ids[:3].tolist()
+@pytest.mark.parametrize("dtype", [torch.float32, F64])
+def test_ids_beyond_float32_come_back(dtype):
+    n = (1 << 24) + 5
+    tri = torch.tensor([[0, 1, 2]], dtype=torch.int32).expand(n, 3)
+    corners = torch.tensor([[-1.0, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]], dtype=dtype)
+    ranges = torch.tensor([[(1 << 24) - 2, 1], [(1 << 24) - 1, 1], [1 << 24, 1], [n - 1, 1]])
+    rast, _ = dr.rasterize(CTX, corners, tri, (1, 1), ranges=ranges)
+    assert rast[:2, 0, 0, 3].tolist() == [(1 << 24) - 1, 1 << 24]
+    out, _ = dr.interpolate(torch.tensor([[0.0], [8], [0]], dtype=F64), rast, tri)  # which reads the ids
+    assert out.flatten().tolist() == [2.0] * 4
+    with raises(IndexError, f"rast must hold ids of the {n - 1} triangles of tri plus 1, got {n}"):
+        dr.interpolate(torch.zeros(3, 1), rast, tri[1:])
 
 
 def test_peeler_shows_what_is_behind():

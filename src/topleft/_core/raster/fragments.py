@@ -14,8 +14,9 @@ from topleft._core import engine
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_number, as_places, as_values, shown
 from topleft._core.base.memory import empty
 from topleft._core.base.texels import as_levels
+from topleft._core.raster.backward import Backward
 from topleft._core.raster.sampling import SplitSamples
-from topleft.typing import EncodingOption, FilterOption, WrapOption
+from topleft.typing import EdgesOption, EncodingOption, FilterOption, WrapOption
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., engine.SnappedMesh]
@@ -36,6 +37,7 @@ class GivenCorners(NamedTuple):
     triangles: ArrayLike
     transform: ArrayLike | None
     viewport: tuple[int, int]
+    origin: tuple[int, int] = (0, 0)
 
     def homogeneous(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
         """Corners of triangles (N, 3, 3) float64 as (x w, y w, w), x and y in pixels, not snapped."""
@@ -384,6 +386,122 @@ class Fragments:
             raise ValueError("distance needs vertices (V, 3) in the world, drawn with transform= or by rasterize_mesh")
         points = np.asarray(as_array("vertices", self.corners.vertices), np.float64)
         return self.interpolate(-(engine.product(points, view[2, :3]) + view[2, 3]), background=np.inf)
+
+    def interpolate_vjp(
+        self, values: Any, grad: ArrayLike, *, grad_derivatives: ArrayLike | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return gradients of the values and of the vertices from those of `interpolate`: vector-Jacobian products.
+
+        Parameters
+        ----------
+        values : array_like
+            As in `interpolate`.
+        grad : array_like, shape (H, W, K), or (H, W) for values of shape (V,)
+            What some number changes by with what `interpolate` returns.
+        grad_derivatives : array_like, shape (H, W, K, 2), or (H, W, 2), optional
+            What it changes by with the derivatives.
+
+        Returns
+        -------
+        (ndarray of float64, ndarray of float64)
+            What it changes by with the values, in their shape, and with the vertices, in theirs, triangles staying
+            where they show: what edges do is in `antialias_vjp`. 0 for what shows nowhere, and for triangles without
+            area.
+
+        Raises
+        ------
+        ValueError
+            If a shape does not fit, or for layers.
+
+        References
+        ----------
+        S. Laine et al., Modular Primitives for High-Performance Differentiable Rendering, 2020.
+
+        Examples
+        --------
+        >>> import numpy as np, topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+        >>> by_values, by_vertices = frags.interpolate_vjp([0.0, 4.0, 0.0], np.ones((2, 4)))
+        >>> by_values, by_vertices[:, 0]
+        (array([2.25 , 1.625, 1.125]), array([-2.25 , -1.625, -1.125]))
+        """
+        return Backward.of(self).interpolate(self._checked(values), grad, grad_derivatives)
+
+    def barycentric_vjp(self, grad: ArrayLike) -> NDArray[np.float64]:
+        """Return the gradient of the vertices from that of the weights, (H, W, 3), as `interpolate_vjp` does.
+
+        Examples
+        --------
+        >>> import numpy as np, topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (1, 1))
+        >>> frags.barycentric_vjp([[[0, 1, 0]]])
+        array([[-0.1875 ,  0.     ],
+               [-0.03125,  0.     ],
+               [-0.03125,  0.     ]])
+        """
+        return Backward.of(self).weights(grad)
+
+    def antialias(self, picture: ArrayLike, *, edges: EdgesOption = "area") -> NDArray[Any]:
+        """Return a picture of what shows with smooth silhouettes.
+
+        Parameters
+        ----------
+        picture : array_like of real numbers, shape (H, W, C) or (H, W)
+            A colour, or numbers, for each pixel.
+        edges : {"area", "silhouette", "straight-through"}
+            "area": where a surface ends or folds, pixels take the exact share of their square that lies on the other
+            side. "silhouette": the rule of nvdiffrast. "straight-through": the picture as it is.
+
+        Returns
+        -------
+        ndarray of float64, or float32 for float32, shape of `picture`
+            Pixels beside an edge are blended with their neighbour beyond it.
+
+        Raises
+        ------
+        ValueError
+            If the shape does not fit, the option is unknown, or for layers.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, -4], [2.25, -4], [2.25, 8], [0, 8]], [[0, 1, 2], [0, 2, 3]], (4, 1))
+        >>> frags.antialias(frags.mask)
+        array([[1.  , 1.  , 0.25, 0.  ]])
+        """
+        return Backward.of(self).smooth(picture, edges)
+
+    def antialias_vjp(
+        self, picture: ArrayLike, grad: ArrayLike, *, edges: EdgesOption = "area"
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return gradients of the picture and of the vertices from those of `antialias`: vector-Jacobian products.
+
+        Parameters
+        ----------
+        picture, edges
+            As in `antialias`.
+        grad : array_like, shape of `picture`
+            What some number changes by with what `antialias` returns.
+
+        Returns
+        -------
+        (ndarray of float64, ndarray of float64)
+            What it changes by with the picture and with the vertices, in their shapes.
+
+        Raises
+        ------
+        ValueError
+            As in `antialias`.
+
+        Examples
+        --------
+        >>> import numpy as np, topleft as tl
+        >>> frags = tl.rasterize([[0, -4], [2.25, -4], [2.25, 8], [0, 8]], [[0, 1, 2], [0, 2, 3]], (4, 1))
+        >>> by_picture, by_vertices = frags.antialias_vjp(frags.mask, np.ones((1, 4)))
+        >>> by_vertices[:, 0].sum().tolist()  # one more pixel is covered for each that the right edge moves
+        1.0
+        """
+        return Backward.of(self).smooth_vjp(picture, grad, edges)
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""

@@ -257,7 +257,7 @@ def draw_fragments(
     refuse_classic(view, "depth")
     refuse_many(view, "rasterize")
     asked = Asked.parse(depth_test, background_depth, out)
-    corners = GivenCorners(vertices, triangles, view.transform, view.viewport)
+    corners = GivenCorners(vertices, triangles, view.transform, view.viewport, view.origin)
     frags = draw_clusters(memory, vertices, view, asked)
     if frags is not None:
         return frags.drawn_from(corners)

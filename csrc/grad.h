@@ -1,0 +1,93 @@
+/* The contract of gradients: tensors of pixels, and the sums that vertices and texels get of them.
+ *
+ * A tensor holds float32 or float64, all of a call the same; what is computed is float64.  Rows of pixels are those of
+ * one picture: a call takes some of them, a band, and the bands of a picture depend on its height alone.  `rast` has
+ * four numbers a pixel: the weights of the first and the second corner, z/w, and the number of the triangle plus 1. */
+#ifndef TOPLEFT_GRAD_H
+#define TOPLEFT_GRAD_H
+
+#include <stdint.h>
+
+enum { TL_MOST_LEVELS = 32 };
+
+typedef enum { TL_TEXEL_NEAREST, TL_TEXEL_LINEAR, TL_TEXEL_LEVEL, TL_TEXEL_LEVELS } tl_texel_filter;
+typedef enum { TL_EDGE_WRAP, TL_EDGE_CLAMP, TL_EDGE_ZERO, TL_EDGE_CUBE } tl_texel_edge;
+typedef enum { TL_PAIR_SILHOUETTE, TL_PAIR_AREA, TL_PAIR_STRAIGHT } tl_pair_rule;
+
+/* A picture, and what is drawn in it: rows [first_row, end_row) of it are meant. */
+typedef struct {
+    const void *pos;    /* (n_vertices, 4): x, y, z, w */
+    const int32_t *tri; /* (n_triangles, 3) */
+    int64_t n_vertices, n_triangles, width, height, first_row, end_row;
+    double z_most;             /* z/w is clamped to so much on either side of 0 */
+    double scale[2], shift[2]; /* the middle of column c has x / w = (2 c + 1) scale[0] + shift[0] */
+    int is_f64;
+} tl_grad_view;
+
+/* Sums of the rows of a tensor, of those that a band touches, in the order in which it does. */
+typedef struct {
+    int32_t *slot_of; /* of each row of the tensor its place here; -1 before and after */
+    int32_t *rows;
+    double *sums; /* (n, n_columns) */
+    int64_t n, n_columns;
+} tl_grad_sums;
+
+/* The numbers that a triangle sums up: X0, Y0; gradients of q_k by X, by Y, and there; of z; of w. */
+enum { TL_SUMS_OF_FACE = 17 };
+
+/* Gradients of where pixels lie in triangles.  g_db may be NULL. */
+typedef struct {
+    const void *rast, *g_rast, *g_db;
+    tl_grad_sums *faces;    /* by triangle, TL_SUMS_OF_FACE columns: scratch */
+    tl_grad_sums *vertices; /* x, y, z, w */
+} tl_grad_points;
+
+/* Attributes of vertices.  Backward `out` and `out_da` are gradients, and the last two are written. */
+typedef struct {
+    const void *attr; /* (n_attr, n_columns) */
+    int64_t n_attr, n_columns;
+    const int32_t *wanted; /* (n_wanted): columns whose derivatives are meant */
+    int64_t n_wanted;
+    const void *rast, *rast_db;
+    void *out, *out_da; /* (height, width, n_columns), (height, width, 2 n_wanted) or NULL */
+    void *g_rast, *g_rast_db;
+} tl_grad_values;
+
+/* A texture with its halvings, and where it is looked at.  Backward `out` is a gradient, and the last are written. */
+typedef struct {
+    const void *levels[TL_MOST_LEVELS];
+    int64_t widths[TL_MOST_LEVELS], heights[TL_MOST_LEVELS];
+    int64_t first_texels[TL_MOST_LEVELS]; /* the rows of level k in the sums begin there */
+    int64_t n_levels, n_channels;
+    tl_texel_filter filter;
+    tl_texel_edge edge;
+    const void *uv, *uv_da, *bias; /* the last two or NULL */
+    void *out;
+    void *g_uv, *g_uv_da, *g_bias; /* or NULL */
+} tl_grad_texture;
+
+/* Pairs of neighbours across silhouettes. */
+typedef struct {
+    const void *rast;
+    const int32_t *across; /* (n_triangles, 3): of the edge opposite to a corner 3 * the other triangle + its corner */
+    uint8_t *known;        /* (n_triangles): what has been found of a triangle, 0 before */
+    int32_t *labels;       /* (2, width): scratch */
+    tl_pair_rule rule;
+    const void *color;
+    int64_t n_channels;
+    void *out;         /* forward */
+    const void *g_out; /* backward, NULL forward */
+    void *g_color;
+} tl_grad_edges;
+
+/* Areas of triangles in pixels, each times the values of the triangle, NULL for 1. */
+typedef struct {
+    const double *points_px;  /* (n_points, 2), finite */
+    const int32_t *triangles; /* (n_triangles, 3) */
+    int64_t n_triangles, width, height, n_channels;
+    const double *values; /* (n_triangles, n_channels) */
+    const double *grad;   /* (height, width, n_channels) */
+    double *out;          /* (n_points, 2): is added to */
+} tl_grad_area;
+
+#endif

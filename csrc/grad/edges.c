@@ -1,0 +1,218 @@
+/* Pictures whose silhouettes are smooth, and backwards: gradients of colours, and sums by vertex of those of edges.
+ * In: `rast`, colours, which triangle lies across each edge.  Out: colours.
+ *
+ * Each pair of neighbours that show different triangles is looked at once in each band that has a pixel of it.  A pixel
+ * takes its pairs in an order of rows: with the row below, its own row, with the row above.
+ *
+ * The straight-through rule leaves the picture as it is.  What a triangle that hangs over its neighbour would do to the
+ * two pixels if it moved by a pixel is the gradient of its point there, by finite differences of colours: Pidhorskyi,
+ * S. et al., "Rasterized Edge Gradients: Handling Discontinuities Differentiably", 2024.  */
+#ifndef TL_GRAD_EDGES_C
+#define TL_GRAD_EDGES_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/inline.h"
+#include "grad/pairs.c"
+#include "grad/pixels.h"
+
+#define TL_COMPARED 16 /* labels at a time */
+
+/* Adds share * (colour of `from` - colour of `to`). */
+TL_INLINE void take_color(const tl_grad_edges *e, int64_t to, int64_t from, double share, int is_f64)
+{
+    for (int64_t c = 0; c < e->n_channels; c++) {
+        const double step =
+            get_real(e->color, e->n_channels * from + c, is_f64) - get_real(e->color, e->n_channels * to + c, is_f64);
+        const int64_t at = e->n_channels * to + c;
+        put_real(e->out, at, get_real(e->out, at, is_f64) + share * step, is_f64);
+    }
+}
+
+/* Whether a pixel lies in the band. */
+TL_INLINE int in_band(const tl_grad_view *view, int64_t pixel)
+{
+    return pixel >= view->first_row * view->width && pixel < view->end_row * view->width;
+}
+
+/* Gradients of the two colours of a pair, and of its edge. */
+TL_INLINE void pull_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair,
+                         const tl_pair_edge *edge, tl_grad_sums *sums, int is_f64)
+{
+    double g_near = 0.0, g_far = 0.0;
+    const int64_t near = e->n_channels * pair->near, far = e->n_channels * pair->far;
+    const int has_near = in_band(view, pair->near), has_far = in_band(view, pair->far);
+    for (int64_t c = 0; c < e->n_channels; c++) {
+        const double a = get_real(e->g_out, near + c, is_f64), b = get_real(e->g_out, far + c, is_f64);
+        const double step = get_real(e->color, far + c, is_f64) - get_real(e->color, near + c, is_f64);
+        const double moved = edge->far * b - edge->near * a;
+        g_near += a * step, g_far -= b * step;
+        if (has_near)
+            put_real(e->g_color, near + c, get_real(e->g_color, near + c, is_f64) + moved, is_f64);
+        if (has_far)
+            put_real(e->g_color, far + c, get_real(e->g_color, far + c, is_f64) - moved, is_f64);
+    }
+    if (in_band(view, pair->near < pair->far ? pair->near : pair->far))
+        pull_edge(view, pair, edge, g_near, g_far, sums);
+}
+
+/* The weights of a triangle at the middle of a pixel, perspective-correct; 0 when it lies outside. */
+static int weights_of_middle(const tl_grad_view *view, int32_t id, int64_t pixel, double *weights)
+{
+    double p[3][3], a[3];
+    const double x = (2.0 * (double)(pixel % view->width) + 1.0) * view->scale[0] + view->shift[0];
+    const double y = (2.0 * (double)(pixel / view->width) + 1.0) * view->scale[1] + view->shift[1];
+    for (int k = 0; k < 3; k++) {
+        const int64_t at = 4 * (int64_t)view->tri[3 * (int64_t)id + k];
+        const double w = get_real(view->pos, at + 3, view->is_f64);
+        p[k][0] = get_real(view->pos, at, view->is_f64) - x * w;
+        p[k][1] = get_real(view->pos, at + 1, view->is_f64) - y * w;
+    }
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        a[k] = p[i][0] * p[j][1] - p[i][1] * p[j][0];
+    }
+    const double total = a[0] + a[1] + a[2];
+    for (int k = 0; k < 3; k++)
+        weights[k] = total == 0.0 ? -1.0 : a[k] / total;
+    return weights[0] >= 0.0 && weights[1] >= 0.0 && weights[2] >= 0.0;
+}
+
+/* The straight-through rule: of the triangle that hangs over its neighbour, where no other cuts it. */
+static void pull_straight(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, tl_grad_sums *sums)
+{
+    double weights[3], step = 0.0, other[3];
+    const int hangs = pair->far_id < 0 || weights_of_middle(view, pair->far_id, pair->near, other);
+    const int is_hung_over = pair->far_id >= 0 && weights_of_middle(view, pair->id, pair->far, other);
+    if (hangs == is_hung_over || !in_band(view, pair->near < pair->far ? pair->near : pair->far))
+        return;
+    const int64_t pixel = hangs ? pair->near : pair->far;
+    const int32_t id = hangs ? pair->id : pair->far_id;
+    weights_of_middle(view, id, pixel, weights);
+    for (int64_t c = 0; c < e->n_channels; c++) {
+        const int64_t near = e->n_channels * pair->near + c, far = e->n_channels * pair->far + c;
+        const double both = get_real(e->g_out, near, view->is_f64) + get_real(e->g_out, far, view->is_f64);
+        step += (get_real(e->color, near, view->is_f64) - get_real(e->color, far, view->is_f64)) * 0.5 * both;
+    }
+    for (int k = 0; k < 3; k++) {
+        double g_px[2] = {0};
+        const int32_t vertex = view->tri[3 * (int64_t)id + k];
+        g_px[pair->axis] = pair->flip * step * weights[k];
+        if (get_real(view->pos, 4 * (int64_t)vertex + 3, view->is_f64) > 0.0)
+            pull_vertex(view, sums, vertex, g_px);
+    }
+}
+
+/* Two rows of pixels that meet, or one whose columns do: first the lower row, or the left columns. */
+typedef struct {
+    const tl_grad_view *view;
+    const tl_grad_edges *edges;
+    tl_grad_sums *sums;
+    int64_t row;
+    int axis; /* 0: columns meet */
+    const int32_t *labels, *others;
+} meeting;
+
+/* Whether the surface plainly runs on from one triangle to the other. */
+TL_INLINE int runs_on(const tl_grad_view *view, const tl_grad_edges *e, int32_t id, int32_t other)
+{
+    if (other < 0 || silhouettes_of(view, e, id) || silhouettes_of(view, e, other))
+        return 0;
+    const int32_t *across = e->across + 3 * (int64_t)id;
+    return across[0] / 3 == other || across[1] / 3 == other || across[2] / 3 == other;
+}
+
+/* What the pixels of a column do. */
+static void meet(const meeting *m, int64_t x)
+{
+    const tl_grad_view *view = m->view;
+    const tl_grad_edges *e = m->edges;
+    const int is_f64 = view->is_f64;
+    const int64_t first = m->row * view->width + x, second = first + (m->axis ? view->width : 1);
+    const int32_t id = id_of_label(m->labels[x], is_f64), other = id_of_label(m->others[x], is_f64);
+    if (id == other || (id >= 0 && !is_there(view, e, id)) || (other >= 0 && !is_there(view, e, other)))
+        return;
+    const int is_flipped =
+        id < 0 || (other >= 0 && get_real(e->rast, 4 * second + 2, is_f64) < get_real(e->rast, 4 * first + 2, is_f64));
+    tl_pair pair = {is_flipped ? second : first,
+                    is_flipped ? first : second,
+                    is_flipped ? other : id,
+                    is_flipped ? id : other,
+                    m->axis,
+                    is_flipped ? -1.0 : 1.0,
+                    {(double)x + 0.5, (double)m->row + 0.5}};
+    pair.middle[m->axis] += is_flipped;
+    tl_pair_edge edge;
+    if (e->rule == TL_PAIR_SILHOUETTE && !silhouettes_of(view, e, is_flipped ? other : id))
+        return;
+    if (e->rule == TL_PAIR_STRAIGHT) {
+        pull_straight(view, e, &pair, m->sums);
+        return;
+    }
+    if (e->rule == TL_PAIR_AREA ? runs_on(view, e, pair.id, pair.far_id) || !find_area_edge(view, e, &pair, &edge)
+                                : !find_silhouette(view, e, &pair, &edge))
+        return;
+    if (e->g_out) {
+        pull_pair(view, e, &pair, &edge, m->sums, is_f64);
+        return;
+    }
+    if (in_band(view, pair.near) && edge.near != 0.0)
+        take_color(e, pair.near, pair.far, edge.near, is_f64);
+    if (in_band(view, pair.far) && edge.far != 0.0)
+        take_color(e, pair.far, pair.near, edge.far, is_f64);
+}
+
+/* The pairs of n columns; labels are compared some at a time. */
+static void meet_row(const meeting *m, int64_t n)
+{
+    for (int64_t x = 0; x < n;) {
+        int32_t differs = 0;
+        if (x + TL_COMPARED <= n) {
+            for (int k = 0; k < TL_COMPARED; k++)
+                differs |= m->labels[x + k] ^ m->others[x + k];
+            if (!differs) {
+                x += TL_COMPARED;
+                continue;
+            }
+        }
+        for (const int64_t end = n - x < TL_COMPARED ? n : x + TL_COMPARED; x < end; x++)
+            if (m->labels[x] != m->others[x])
+                meet(m, x);
+    }
+}
+
+TL_INLINE void load_labels(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *labels)
+{
+    const int64_t first = row * view->width;
+    if (view->is_f64)
+        for (int64_t x = 0; x < view->width; x++)
+            labels[x] = get_label(e->rast, first + x, 1);
+    else
+        for (int64_t x = 0; x < view->width; x++)
+            labels[x] = get_label(e->rast, first + x, 0);
+}
+
+/* See kernels.h. */
+static void grad_edges(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums)
+{
+    const int64_t width = view->width, size = (view->is_f64 ? 8 : 4) * e->n_channels * width;
+    const int64_t top = view->end_row < view->height ? view->end_row + 1 : view->height;
+    const int64_t bottom = view->first_row > 0 ? view->first_row - 1 : 0;
+    char *target = (char *)(e->g_out ? e->g_color : e->out) + view->first_row * size;
+    const char *source = (const char *)(e->g_out ? e->g_out : e->color) + view->first_row * size;
+    memcpy(target, source, (size_t)((view->end_row - view->first_row) * size));
+    for (int64_t row = bottom; row < top && (e->g_out || e->rule != TL_PAIR_STRAIGHT); row++) {
+        const int32_t *labels = e->labels + row % 2 * width, *below = e->labels + (row + 1) % 2 * width;
+        load_labels(view, e, row, e->labels + row % 2 * width);
+        if (row > bottom)
+            meet_row(&(meeting){view, e, sums, row - 1, 1, below, labels}, width);
+        if (row >= view->first_row && row < view->end_row)
+            meet_row(&(meeting){view, e, sums, row, 0, labels, labels + 1}, width - 1);
+    }
+    if (e->g_out)
+        leave_band(sums);
+}
+
+#endif

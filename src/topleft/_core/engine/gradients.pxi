@@ -1,0 +1,185 @@
+# Tensors of pixels and their gradients. Included by kernels.pyx.
+
+MOST_LEVELS = TL_MOST_LEVELS
+SUMS_OF_FACE = TL_SUMS_OF_FACE
+
+
+cdef const void *first_of(array: object):
+    """Return where the numbers of a contiguous array begin, NULL for None; the caller holds the array."""
+    if array is None:
+        return NULL
+    cdef const uint8_t[::1] flat = as_bytes(array)
+    return data(flat)
+
+
+cdef class GradientView:
+    """A picture, and what is drawn in it: `tl_grad_view`."""
+
+    cdef tl_grad_view view
+    cdef object arrays
+
+    def __init__(self, pos: Array, const int32_t[:, ::1] tri, size: tuple[int, int], scale: tuple[float, float],
+                 shift: tuple[float, float], double z_most):
+        """`pos` (V, 4) float32 or float64, the dtype of all tensors; `size` is width and height."""
+        self.arrays = (pos, tri)
+        self.view.pos, self.view.n_vertices, self.view.is_f64 = first_of(pos), pos.shape[0], pos.dtype == np.float64
+        self.view.tri, self.view.n_triangles = &tri[0, 0] if tri.shape[0] else NULL, tri.shape[0]
+        self.view.width, self.view.height = size
+        self.view.z_most = z_most
+        self.view.scale[0], self.view.scale[1] = scale
+        self.view.shift[0], self.view.shift[1] = shift
+
+    cdef tl_grad_view rows(self, int64_t first, int64_t end) noexcept:
+        cdef tl_grad_view view = self.view
+        view.first_row, view.end_row = first, end
+        return view
+
+    def points(self, const int32_t[:, ::1] ids, bint is_flipped, int64_t first_id, rast: Array, rast_db: Array | None,
+               int64_t first, int64_t end):
+        """Write rows of `rast` and, unless it is None, `rast_db` (H, W, 4), from ids; flipped: row 0 is on top."""
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef void *out = <void *>first_of(rast)
+        cdef void *out_db = <void *>first_of(rast_db)
+        cdef int64_t step = view.width
+        cdef const int32_t *lowest
+        if first >= end or view.width == 0:
+            return
+        lowest = &ids[0, 0]
+        if is_flipped:
+            lowest, step = &ids[ids.shape[0] - 1, 0], -step
+        with nogil:
+            K.grad_points(&view, lowest, step, first_id, out, out_db)
+
+    def points_vjp(self, rast: Array, g_rast: Array, g_db: Array | None, GradientSums faces, GradientSums sums,
+                   int64_t first, int64_t end) -> int:
+        """Sum up gradients of vertices from rows of those of `rast` and, unless None, of `rast_db`.
+
+        `faces`: scratch by triangle, SUMS_OF_FACE columns. Returns the number of a triangle that does not exist, or -1.
+        """
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef tl_grad_points p
+        cdef int64_t bad
+        p.rast, p.g_rast, p.g_db = first_of(rast), first_of(g_rast), first_of(g_db)
+        p.faces, p.vertices = &faces.sums, &sums.sums
+        with nogil:
+            bad = K.grad_points_vjp(&view, &p)
+        return bad
+
+    def values(self, attr: Array, const int32_t[::1] wanted, arrays: tuple[Array | None, ...],
+               GradientSums sums or None, int64_t first, int64_t end) -> int:
+        """Write rows of attributes (V, K); with sums, of their gradients. Returns as `points_vjp` does.
+
+        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for what is not there.
+        """
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef tl_grad_values v
+        cdef int64_t bad
+        memset(&v, 0, sizeof(v))
+        v.attr, v.n_attr, v.n_columns = first_of(attr), attr.shape[0], attr.shape[1]
+        v.wanted, v.n_wanted = &wanted[0] if wanted.shape[0] else NULL, wanted.shape[0]
+        v.rast, v.rast_db = first_of(arrays[0]), first_of(arrays[1])
+        v.out, v.out_da = <void *>first_of(arrays[2]), <void *>first_of(arrays[3])
+        if sums is None:
+            with nogil:
+                bad = K.grad_values(&view, &v)
+            return bad
+        v.g_rast, v.g_rast_db = <void *>first_of(arrays[4]), <void *>first_of(arrays[5])
+        with nogil:
+            bad = K.grad_values_vjp(&view, &v, &sums.sums)
+        return bad
+
+    def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...],
+               GradientSums sums or None, int64_t first, int64_t end):
+        """Write rows of a texture, levels (., H, W, C); with sums, of its gradients.
+
+        `codes`: of the filter and of what lies beyond the edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out,
+        and with sums g_uv, g_uv_da, g_bias; None for what is not there.
+        """
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef tl_grad_texture t
+        cdef int64_t n_texels = 0
+        cdef int k
+        memset(&t, 0, sizeof(t))
+        t.n_levels, t.n_channels = len(levels), levels[0].shape[3]
+        for k in range(len(levels)):
+            t.levels[k], t.heights[k], t.widths[k] = first_of(levels[k]), levels[k].shape[1], levels[k].shape[2]
+            t.first_texels[k] = n_texels
+            n_texels += levels[k].shape[0] * levels[k].shape[1] * levels[k].shape[2]
+        t.filter, t.edge = <tl_texel_filter><int>codes[0], <tl_texel_edge><int>codes[1]
+        t.uv, t.uv_da, t.bias = first_of(arrays[0]), first_of(arrays[1]), first_of(arrays[2])
+        t.out = <void *>first_of(arrays[3])
+        if sums is None:
+            with nogil:
+                K.grad_texels(&view, &t)
+            return
+        t.g_uv, t.g_uv_da = <void *>first_of(arrays[4]), <void *>first_of(arrays[5])
+        t.g_bias = <void *>first_of(arrays[6])
+        with nogil:
+            K.grad_texels_vjp(&view, &t, &sums.sums)
+
+    def edges(self, const int32_t[:, ::1] across, uint8_t[::1] known, int32_t[:, ::1] scratch, int rule,
+              arrays: tuple[Array | None, ...], GradientSums sums or None, int64_t first, int64_t end):
+        """Write rows of a picture with smooth silhouettes; with sums, of the gradients of its colours.
+
+        `scratch`: (2, W). `arrays`: rast, color, out; with sums rast, color, gradients of out, gradients of color.
+        """
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef tl_grad_edges e
+        memset(&e, 0, sizeof(e))
+        if first >= end or view.width == 0:
+            return
+        e.rast, e.color, e.n_channels = first_of(arrays[0]), first_of(arrays[1]), arrays[1].shape[2]
+        if across.shape[0]:
+            e.across, e.known = &across[0, 0], &known[0]
+        e.labels, e.rule = &scratch[0, 0], <tl_pair_rule>rule
+        if sums is None:
+            e.out = <void *>first_of(arrays[2])
+            with nogil:
+                K.grad_edges(&view, &e, NULL)
+            return
+        e.g_out, e.g_color = first_of(arrays[2]), <void *>first_of(arrays[3])
+        with nogil:
+            K.grad_edges(&view, &e, &sums.sums)
+
+
+cdef class GradientSums:
+    """Sums of rows of a tensor, of those that a band touches."""
+
+    cdef tl_grad_sums sums
+    cdef object arrays
+
+    def __init__(self, int32_t[::1] slot_of, int32_t[::1] rows, double[:, ::1] sums):
+        """`slot_of`: -1 for each row of the tensor; room for the rows that a band may touch, and for their sums."""
+        self.arrays = (slot_of, rows, sums)
+        self.sums.slot_of = &slot_of[0] if slot_of.shape[0] else NULL
+        self.sums.rows = &rows[0] if rows.shape[0] else NULL
+        self.sums.sums = &sums[0, 0] if sums.shape[0] and sums.shape[1] else NULL
+        self.sums.n, self.sums.n_columns = 0, sums.shape[1]
+
+    def add_to(self, out: Array):
+        """Add the sums to the rows (N, K) that they belong to."""
+        cdef int64_t i, c, n_columns = self.sums.n_columns
+        cdef void *rows = <void *>first_of(out)
+        cdef bint is_f64 = out.dtype == np.float64
+        cdef int64_t at
+        with nogil:
+            for i in range(self.sums.n):
+                at = self.sums.rows[i] * n_columns
+                for c in range(n_columns):
+                    if is_f64:
+                        (<double *>rows)[at + c] += self.sums.sums[i * n_columns + c]
+                    else:
+                        (<float *>rows)[at + c] = <float>((<float *>rows)[at + c] + self.sums.sums[i * n_columns + c])
+
+
+def area_vjp(const double[:, ::1] points_px, const int32_t[:, ::1] triangles, const double[:, ::1] values or None,
+             const double[:, :, ::1] grad, double[:, ::1] out):
+    """Add the gradients of points to `out` (V, 2) from those (H, W, C) of areas times the values (T, C), or 1."""
+    cdef tl_grad_area p
+    if not triangles.shape[0] or not grad.shape[0] or not grad.shape[1] or not grad.shape[2]:
+        return
+    p.points_px, p.triangles, p.n_triangles = &points_px[0, 0], &triangles[0, 0], triangles.shape[0]
+    p.height, p.width, p.n_channels = grad.shape[0], grad.shape[1], grad.shape[2]
+    p.values, p.grad, p.out = &values[0, 0] if values is not None else NULL, &grad[0, 0, 0], &out[0, 0]
+    with nogil:
+        K.grad_area(&p)

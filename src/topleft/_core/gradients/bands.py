@@ -1,0 +1,87 @@
+"""Pictures in bands of rows, which threads take, and sums that do not depend on who took which.
+
+A band sums up what its pixels give, in their order, in float64; bands are added in theirs. Where bands end depends on
+the size of a picture alone, so every number of threads gives the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import chain
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft._core import engine
+from topleft._core.base.memory import SCRATCH, empty
+from topleft._core.base.threads import available_threads, parse_threads, run_parts
+
+#: Pixels of a band, which has whole rows: a call of the engine costs 30 us more than its pixels.
+BAND_PX = 1 << 16
+
+#: Pixels that are worth a thread, and bands of a thread whose sums wait for those before them.
+MIN_PX_PER_THREAD = 1 << 15
+WAITING_BANDS = 4
+
+Array = NDArray[Any]
+
+
+class Band(NamedTuple):
+    """Rows [first, end) of a picture."""
+
+    picture: int
+    first: int
+    end: int
+
+
+class Bands:
+    """The bands of some pictures of one size."""
+
+    def __init__(self, n_pictures: int, height: int, width: int, threads: int | None = None) -> None:
+        rows = max(1, BAND_PX // max(1, width))
+        self.all = [
+            Band(picture, first, min(first + rows, height))
+            for picture in range(n_pictures if width else 0)
+            for first in range(0, height, rows)
+        ]
+        self.width = width
+        n_px = n_pictures * height * width
+        most = parse_threads(threads) or min(available_threads(), max(1, n_px // MIN_PX_PER_THREAD))
+        self.threads = max(1, min(most, len(self.all)))
+
+    def run(self, work: Callable[[Band], int | None]) -> int:
+        """Call `work` of each band; returns the largest number that one returned, or -1."""
+        parts = run_parts(lambda first, end: [work(b) for b in self.all[first:end]], len(self.all), self.threads)
+        return max((bad for part in parts for bad in part if bad is not None), default=-1)
+
+    def add_up(self, work: Callable[[Band, engine.GradientSums], int | None], out: Array, rows_per_px: int) -> int:
+        """Add what `work` sums up in each band to `out` (B or 1, N, K), whose rows it numbers; returns as `run` does.
+
+        rows_per_px: how many rows a pixel has a share in at most.
+        """
+        bad, n_rows, n_columns = -1, out.shape[1], out.shape[2]
+
+        def part(first: int, end: int) -> list[tuple[int, engine.GradientSums, int]]:
+            done = []
+            for band in some[first:end]:
+                sums = sums_of(n_rows, n_columns, band, rows_per_px * self.width)
+                found = work(band, sums)
+                done.append((band.picture, sums, -1 if found is None else found))
+            return done
+
+        some: list[Band] = []
+        at_a_time = self.threads * WAITING_BANDS if self.threads > 1 else 1
+        for start in range(0, len(self.all), at_a_time):
+            some = self.all[start : start + at_a_time]
+            for picture, sums, found in chain.from_iterable(run_parts(part, len(some), self.threads)):
+                sums.add_to(out[picture if len(out) > 1 else 0])
+                bad = max(bad, found)
+        return bad
+
+
+def sums_of(n_rows: int, n_columns: int, band: Band, width: int, name: str = "rows") -> engine.GradientSums:
+    """Return room for the sums of a band that touches at most `width` of `n_rows` rows in each row of pixels."""
+    slots = SCRATCH.constant(f"gradient {name}", n_rows, -1)[:n_rows]
+    room = min(n_rows, (band.end - band.first) * width)
+    return engine.GradientSums(slots, empty((room,), np.int32), empty((room, n_columns), np.float64))

@@ -1,0 +1,271 @@
+"""What a visibility buffer says of pixels, attributes and textures there, smooth silhouettes; and backward.
+
+Arrays are contiguous, float32 or float64, all of a call the same; shapes are checked by who calls. B pictures; an array
+of vertices, attributes or texels may have one for all of them. A function with `_vjp` returns the products of a
+gradient of the results with the Jacobian: gradients of what was given, float32 or float64 as that was.
+
+Based on: Laine, S., Hellsten, J., Karras, T., Seol, Y., Lehtinen, J., Aila, T., "Modular Primitives for
+High-Performance Differentiable Rendering", ACM Transactions on Graphics, 2020.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft._core import engine
+from topleft._core.base.memory import empty
+from topleft._core.gradients.bands import Array, Band, Bands, sums_of
+
+
+class TexelFilter(IntEnum):
+    """How a texture is looked up: `tl_texel_filter`."""
+
+    NEAREST = 0
+    LINEAR = 1
+    LINEAR_MIPMAP_NEAREST = 2
+    LINEAR_MIPMAP_LINEAR = 3
+
+
+class TexelsBeyond(IntEnum):
+    """What lies beyond the edges of a texture: `tl_texel_edge`."""
+
+    WRAP = 0
+    CLAMP = 1
+    ZERO = 2
+    CUBE = 3
+
+
+class EdgeRule(IntEnum):
+    """Which rule makes silhouettes smooth: `tl_pair_rule`."""
+
+    SILHOUETTE = 0
+    AREA = 1
+    STRAIGHT_THROUGH = 2
+
+
+@dataclass(frozen=True)
+class PixelGrid:
+    """Pictures (B, H, W) of triangles (T, 3), int32, whose vertices and attributes have rows below `n_rows`."""
+
+    tri: NDArray[np.int32]
+    n_pictures: int
+    height: int
+    width: int
+    threads: int | None = None
+    in_pixels: bool = False
+    """Whether x/w and y/w count pixels; otherwise they run from -1 to 1 across the picture, as z/w does."""
+
+    @property
+    def bands(self) -> Bands:
+        """The bands of all pictures."""
+        return Bands(self.n_pictures, self.height, self.width, self.threads)
+
+    def view(self, pos: Array) -> engine.GradientView:
+        """Return what the engine needs to know of a picture with these vertices (V, 4)."""
+        size = self.width, self.height
+        scale, shift = ((0.5, 0.5), (0.0, 0.0)) if self.in_pixels else ((1 / self.width, 1 / self.height), (-1.0, -1.0))
+        return engine.GradientView(pos, self.tri, size, scale, shift, np.inf if self.in_pixels else 1.0)
+
+    def shape(self, *columns: int) -> tuple[int, ...]:
+        """Return the shape of a tensor of pixels."""
+        return (self.n_pictures, self.height, self.width, *columns)
+
+    def refuse(self, bad: int) -> None:
+        """Raise an error for the number of a triangle that does not exist."""
+        if bad >= 0:
+            raise IndexError(f"rast must hold ids of the {len(self.tri)} triangles of tri plus 1, got {bad + 1}")
+
+
+def of(arrays: Array, picture: int) -> Array:
+    """Return the array of a picture, where there may be one for all."""
+    return arrays[picture if len(arrays) > 1 else 0]
+
+
+def points(
+    grid: PixelGrid, pos: Array, ids: Sequence[tuple[NDArray[np.int32], int]], *, is_flipped: bool, with_db: bool
+) -> tuple[Array, Array]:
+    """Return `rast` (B, H, W, 4): weights of the first two corners, z/w and the id plus 1; and `rast_db`.
+
+    `pos` (B or 1, V, 4). `ids`: of each picture (H, W), and what is added to them; with row 0 on top where they are
+    flipped. `rast_db` (B, H, W, 4) is du/dX, du/dY, dv/dX, dv/dY, or has no columns.
+    """
+    rast, rast_db = empty(grid.shape(4), pos.dtype), empty(grid.shape(4 if with_db else 0), pos.dtype)
+
+    def work(band: Band) -> None:
+        i, (own, first) = band.picture, ids[band.picture]
+        slopes = rast_db[i] if with_db else None
+        grid.view(of(pos, i)).points(own, is_flipped, first, rast[i], slopes, band.first, band.end)
+
+    grid.bands.run(work)
+    return rast, rast_db
+
+
+def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
+    """Return the gradient of `pos`."""
+    out = np.zeros(pos.shape, pos.dtype)
+
+    def work(band: Band, sums: engine.GradientSums) -> int:
+        i = band.picture
+        slopes = None if g_db is None else g_db[i]
+        faces = sums_of(len(grid.tri), engine.SUMS_OF_FACE, band, grid.width, "faces")
+        return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, faces, sums, band.first, band.end)
+
+    grid.refuse(grid.bands.add_up(work, out, 3))
+    return out
+
+
+def values(
+    grid: PixelGrid, attr: Array, rast: Array, rast_db: Array | None = None, wanted: Sequence[int] = ()
+) -> tuple[Array, Array]:
+    """Return attributes (B or 1, V, K) at pixels (B, H, W, K), and what those `wanted` change by, (B, H, W, 2 N)."""
+    out = empty(grid.shape(attr.shape[2]), attr.dtype)
+    out_da = empty(grid.shape(2 * len(wanted)), attr.dtype)
+    view, columns = grid.view(attr[0, :0]), np.asarray(wanted, np.int32)
+
+    def work(band: Band) -> int:
+        i = band.picture
+        slopes = (None, None) if rast_db is None else (rast_db[i], out_da[i])
+        arrays = rast[i], slopes[0], out[i], slopes[1]
+        return view.values(of(attr, i), columns, arrays, None, band.first, band.end)
+
+    grid.refuse(grid.bands.run(work))
+    return out, out_da
+
+
+def values_vjp(
+    grid: PixelGrid,
+    attr: Array,
+    rast: Array,
+    g_out: Array,
+    rast_db: Array | None = None,
+    g_da: Array | None = None,
+    wanted: Sequence[int] = (),
+) -> tuple[Array, Array, Array | None]:
+    """Return the gradients of `attr`, `rast` and `rast_db`, the last None without `g_da`."""
+    g_attr, g_rast = np.zeros(attr.shape, attr.dtype), empty(rast.shape, attr.dtype)
+    g_db = None if g_da is None else empty(rast.shape, attr.dtype)
+    view, columns = grid.view(attr[0, :0]), np.asarray(wanted if g_da is not None else (), np.int32)
+
+    def work(band: Band, sums: engine.GradientSums) -> int:
+        i = band.picture
+        db, da, g = (None if one is None else one[i] for one in (rast_db, g_da, g_db))
+        arrays = rast[i], db, g_out[i], da, g_rast[i], g
+        return view.values(of(attr, i), columns, arrays, sums, band.first, band.end)
+
+    grid.refuse(grid.bands.add_up(work, g_attr, 3))
+    return g_attr, g_rast, g_db
+
+
+@dataclass(frozen=True)
+class TexelLook:
+    """How a texture is looked up, and where: levels (B or 1, ...); uv (B, H, W, 2 or 3), footprints, biases."""
+
+    levels: Sequence[Array]
+    filter: TexelFilter
+    beyond: TexelsBeyond
+    uv: Array
+    uv_da: Array | None = None
+    bias: Array | None = None
+    threads: int | None = None
+
+    def of_picture(self, picture: int) -> list[Array]:
+        """Return the levels of a picture as the engine takes them, (1 or 6, H, W, C)."""
+        one = [of(level, picture) for level in self.levels]
+        return one if self.beyond is TexelsBeyond.CUBE else [level[None] for level in one]
+
+    @property
+    def grid(self) -> PixelGrid:
+        """The pixels that look."""
+        b, h, w = self.uv.shape[:3]
+        return PixelGrid(np.empty((0, 3), np.int32), b, h, w, self.threads)
+
+    def arrays(self, picture: int, *more: Array | None) -> tuple[Array | None, ...]:
+        """Return what the engine takes of a picture."""
+        return tuple(None if one is None else one[picture] for one in (self.uv, self.uv_da, self.bias, *more))
+
+
+def texels(look: TexelLook) -> Array:
+    """Return a texture at each pixel, (B, H, W, C)."""
+    grid, dtype = look.grid, look.uv.dtype
+    out = empty(grid.shape(look.levels[0].shape[-1]), dtype)
+    view, codes = grid.view(np.empty((0, 4), dtype)), (int(look.filter), int(look.beyond))
+
+    def work(band: Band) -> None:
+        i = band.picture
+        view.texels(look.of_picture(i), codes, look.arrays(i, out), None, band.first, band.end)
+
+    grid.bands.run(work)
+    return out
+
+
+def texels_vjp(look: TexelLook, g_out: Array) -> tuple[list[Array], Array, Array | None, Array | None]:
+    """Return the gradients of the levels, of uv, of the footprints and of the biases."""
+    grid, dtype = look.grid, look.uv.dtype
+    view, codes = grid.view(np.empty((0, 4), dtype)), (int(look.filter), int(look.beyond))
+    n_channels, n_pictures = g_out.shape[3], len(look.levels[0])
+    ends = np.cumsum([level[0].size // n_channels if n_channels else 0 for level in look.levels])
+    sums_of = np.zeros((n_pictures, ends[-1], n_channels), dtype)
+    g_uv, g_da, g_bias = (None if one is None else empty(one.shape, dtype) for one in (look.uv, look.uv_da, look.bias))
+
+    def work(band: Band, sums: engine.GradientSums) -> None:
+        i = band.picture
+        arrays = look.arrays(i, g_out, g_uv, g_da, g_bias)
+        view.texels(look.of_picture(i), codes, arrays, sums, band.first, band.end)
+
+    grid.bands.add_up(work, sums_of, 4 if look.filter < TexelFilter.LINEAR_MIPMAP_LINEAR else 8)
+    parts = np.split(sums_of, ends[:-1], axis=1)
+    g_levels = [part.reshape(level.shape) for part, level in zip(parts, look.levels, strict=True)]
+    return g_levels, g_uv, g_da, g_bias  # type: ignore[return-value]
+
+
+def smooth(grid: PixelGrid, rule: EdgeRule, pos: Array, rast: Array, across: NDArray[np.int32], color: Array) -> Array:
+    """Return colours (B, H, W, C) with smooth silhouettes; `across` is that of `halves_across`."""
+    out = empty(color.shape, color.dtype)
+
+    def work(band: Band) -> None:
+        i = band.picture
+        known, scratch = np.zeros(len(grid.tri), np.uint8), np.empty((2, grid.width), np.int32)
+        arrays = rast[i], color[i], out[i]
+        grid.view(of(pos, i)).edges(across, known, scratch, int(rule), arrays, None, band.first, band.end)
+
+    grid.bands.run(work)
+    return out
+
+
+def smooth_vjp(
+    grid: PixelGrid, rule: EdgeRule, pos: Array, rast: Array, across: NDArray[np.int32], color: Array, g_out: Array
+) -> tuple[Array, Array]:
+    """Return the gradients of the colours and of `pos`."""
+    g_color, g_pos = empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)
+
+    def work(band: Band, sums: engine.GradientSums) -> None:
+        i = band.picture
+        known, scratch = np.zeros(len(grid.tri), np.uint8), np.empty((2, grid.width), np.int32)
+        arrays = rast[i], color[i], g_out[i], g_color[i]
+        grid.view(of(pos, i)).edges(across, known, scratch, int(rule), arrays, sums, band.first, band.end)
+
+    grid.bands.add_up(work, g_pos, 6)
+    return g_color, g_pos
+
+
+def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return of each edge 3 * the triangle across it + the corner there that it is opposite to, int32 (T, 3); -1: none.
+
+    Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next.
+    """
+    ends = np.sort(np.stack([np.roll(tri, -1, 1), np.roll(tri, -2, 1)], -1).reshape(-1, 2).astype(np.int64), axis=1)
+    key = ends[:, 0] << 32 | ends[:, 1]
+    order = np.argsort(key, kind="stable")
+    sorted_key = key[order]
+    starts = np.flatnonzero(np.concatenate([[True], sorted_key[1:] != sorted_key[:-1]])) if len(key) else key
+    sizes = np.diff(np.append(starts, len(key)))
+    following = np.arange(1, len(key) + 1)
+    following[starts + sizes - 1] = np.where(sizes > 1, starts, -1)
+    found = np.empty(len(key), np.int32)
+    found[order] = np.where(following < 0, -1, order[following])
+    return found.reshape(tri.shape)

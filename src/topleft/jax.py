@@ -1,0 +1,340 @@
+"""Arrays of JAX on the CPU, with gradients, in the conventions of `topleft.torch`: `import topleft.jax as dr`.
+
+Each function is one call of the engine through `jax.pure_callback`, so `jax.jit`, `jax.grad` and `jax.vmap` take it;
+gradients are first derivatives, with the same bits in every run. Needs JAX: ``pip install 'topleft[jax]'``.
+
+Row 0 is the bottom row, resolutions are (height, width), ids are 1 more and stand in a channel of floats, depth is z/w
+in -1..1, and row 0 of a texture is v = 0. Shapes are those of `topleft.torch`, with a batch of B pictures; a wrong one
+raises an error there, an index that does not exist when the call runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, get_args
+
+import numpy as np
+
+from topleft._core.base.arrays import as_checked_triangles, as_pair
+from topleft._core.gradients import tensors
+from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
+from topleft._core.raster.verbs import rasterize as draw
+from topleft.errors import MissingPackageError
+from topleft.typing import BoundaryOption, EdgesOption
+
+try:
+    import jax
+    import jax.numpy as jnp
+except ImportError:
+    raise MissingPackageError("topleft.jax needs JAX: pip install 'topleft[jax]'") from None
+
+__all__ = ["antialias", "interpolate", "rasterize", "texture"]
+
+Array = Any
+
+
+def call(function: Callable[..., Any], shapes: Any, *args: Array) -> Any:
+    """Call the engine with NumPy arrays; a sample of `jax.vmap` is a call."""
+
+    def on_arrays(*given: Any) -> Any:
+        return function(*(np.ascontiguousarray(one) for one in given))
+
+    return jax.pure_callback(on_arrays, shapes, *args, vmap_method="sequential")
+
+
+def shape_of(dtype: Any, *shape: int) -> Any:
+    """Return what JAX knows of a result."""
+    return jax.ShapeDtypeStruct(shape, dtype)
+
+
+def like(*arrays: Array) -> Any:
+    """Return the same of arrays that results look like."""
+    found = tuple(shape_of(one.dtype, *one.shape) for one in arrays)
+    return found if len(found) > 1 else found[0]
+
+
+def grid_of(tri: Any, pixels: Any, n_vertices: int) -> PixelGrid:
+    """Return the pictures (B, H, W, ...) of triangles."""
+    b, h, w = pixels.shape[:3]
+    return PixelGrid(as_checked_triangles(tri, n_vertices), b, h, w)
+
+
+def check(name: str, array: Array, wish: str, fits: object) -> None:
+    """Raise an error unless an array is float32 or float64 and has the shape wished for."""
+    if array.dtype not in (np.float32, np.float64):
+        raise TypeError(f"{name} must be float32 or float64, got {array.dtype}")
+    if not fits:
+        raise ValueError(f"{name} must have shape {wish}, got {array.shape}")
+
+
+def no_gradient(array: Array) -> Any:
+    """Return the gradient of integers, as JAX has it."""
+    return np.zeros(array.shape, jax.dtypes.float0)
+
+
+def rasterize(pos: Array, tri: Array, resolution: Sequence[int]) -> tuple[Array, Array]:
+    """Return which triangle shows in each pixel, where in it the pixel lies, and the derivatives of that.
+
+    Parameters
+    ----------
+    pos : array of float32 or float64, shape (B, V, 4)
+        Clip space, y up, -w <= z <= w.
+    tri : array of int32, shape (T, 3)
+        Indices of vertices.
+    resolution : (int, int)
+        Height and width.
+
+    Returns
+    -------
+    (array, array), shapes (B, H, W, 4)
+        Weights u and v of the first two corners, z/w, and the id plus 1, 0 where nothing is; and du/dX, du/dY, dv/dX,
+        dv/dY. Gradients of both reach `pos`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a wrong dtype or shape.
+    """
+    check("pos", pos, "(B, V, 4)", pos.ndim == 3 and pos.shape[2] == 4)
+    height, width = as_pair("resolution", resolution)
+    found: tuple[Array, Array] = points((height, width), pos, tri)
+    return found
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def points(size: tuple[int, int], pos: Array, tri: Array) -> Any:
+    """Return `rast` and `rast_db`."""
+
+    def run(pos: Any, tri: Any) -> Any:
+        grid = PixelGrid(as_checked_triangles(tri, pos.shape[1]), len(pos), *size)
+        ids = [(draw(one, tri, size[::-1]).triangle, 0) for one in pos]
+        return tensors.points(grid, pos, ids, is_flipped=True, with_db=True)
+
+    return call(run, (shape_of(pos.dtype, len(pos), *size, 4),) * 2, pos, tri)
+
+
+def points_forward(size: tuple[int, int], pos: Array, tri: Array) -> Any:
+    """Return the same, and what backward takes."""
+    rast, rast_db = points(size, pos, tri)
+    return (rast, rast_db), (pos, tri, rast)
+
+
+def points_backward(size: tuple[int, int], kept: Any, g: Any) -> Any:  # noqa: ARG001
+    """Return the gradients of `pos` and of `tri`."""
+
+    def run(pos: Any, tri: Any, rast: Any, g_rast: Any, g_db: Any) -> Any:
+        return tensors.points_vjp(grid_of(tri, rast, pos.shape[1]), pos, rast, g_rast, g_db)
+
+    return call(run, like(kept[0]), *kept, *g), no_gradient(kept[1])
+
+
+points.defvjp(points_forward, points_backward)
+
+
+def interpolate(attr: Array, rast: Array, tri: Array, rast_db: Array | None = None) -> tuple[Array, Array]:
+    """Return attributes of the vertices at each pixel, and how they change from pixel to pixel.
+
+    Parameters
+    ----------
+    attr : array of float32 or float64, shape (V, K), (1, V, K) or (B, V, K)
+        A row a vertex.
+    rast, rast_db : arrays, shape (B, H, W, 4)
+        What `rasterize` returned; without `rast_db` there are no derivatives.
+    tri : array of int32, shape (T, 3)
+        Indices of rows of `attr`.
+
+    Returns
+    -------
+    (array, array), shapes (B, H, W, K) and (B, H, W, 2 K)
+        Perspective-correct, 0 where there is no triangle; dA/dX and dA/dY of each attribute, or no columns.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a wrong dtype or shape.
+    """
+    check("rast", rast, "(B, H, W, 4)", rast.ndim == 4 and rast.shape[3] == 4)
+    rows = attr if attr.ndim == 3 else attr[None]
+    fits = attr.ndim in (2, 3) and len(rows) in (1, len(rast))
+    check("attr", attr, f"(V, K), (1, V, K) or ({len(rast)}, V, K)", fits)
+    dtype = jnp.result_type(rows, rast)
+    slopes = jnp.zeros((*rast.shape[:3], 0), dtype) if rast_db is None else rast_db.astype(dtype)
+    found: tuple[Array, Array] = values(rows.astype(dtype), rast.astype(dtype), tri, slopes)
+    return found
+
+
+@partial(jax.custom_vjp)
+def values(attr: Array, rast: Array, tri: Array, rast_db: Array) -> Any:
+    """Return attributes, and what they change by."""
+    n, has_db = attr.shape[2], rast_db.shape[3] > 0
+
+    def run(attr: Any, rast: Any, tri: Any, rast_db: Any) -> Any:
+        grid = grid_of(tri, rast, attr.shape[1])
+        return tensors.values(grid, attr, rast, rast_db if has_db else None, range(n) if has_db else ())
+
+    shapes = shape_of(attr.dtype, *rast.shape[:3], n), shape_of(attr.dtype, *rast.shape[:3], 2 * n * has_db)
+    return call(run, shapes, attr, rast, tri, rast_db)
+
+
+def values_forward(*given: Array) -> Any:
+    """Return the same, and what backward takes."""
+    return values(*given), given
+
+
+def values_backward(kept: Any, g: Any) -> Any:
+    """Return the gradients of what `values` takes."""
+    attr, rast, tri, rast_db = kept
+    n, has_db = attr.shape[2], rast_db.shape[3] > 0
+
+    def run(attr: Any, rast: Any, tri: Any, rast_db: Any, g_out: Any, g_da: Any) -> Any:
+        grid = grid_of(tri, rast, attr.shape[1])
+        slopes = (rast_db, g_da, range(n)) if has_db else ()
+        g_attr, g_rast, g_db = tensors.values_vjp(grid, attr, rast, g_out, *slopes)
+        return g_attr, g_rast, np.zeros_like(rast_db) if g_db is None else g_db
+
+    g_attr, g_rast, g_db = call(run, like(attr, rast, rast_db), *kept, *g)
+    return g_attr, g_rast, no_gradient(tri), g_db
+
+
+values.defvjp(values_forward, values_backward)
+
+
+def texture(tex: Array, uv: Array, filter_mode: str = "linear", boundary_mode: BoundaryOption = "wrap") -> Array:
+    """Return what a texture is at each pixel.
+
+    Parameters
+    ----------
+    tex : array of float32 or float64, shape (B or 1, Ht, Wt, C); of a cube map (B or 1, 6, N, N, C)
+        Row 0 is at v = 0.
+    uv : array, shape (B, H, W, 2); of a cube map directions (B, H, W, 3)
+        Where to look.
+    filter_mode : "nearest" or "linear"
+        The nearest texel, or the four next to a point.
+    boundary_mode : "wrap", "clamp", "zero" or "cube"
+        What lies beyond 0 and 1.
+
+    Returns
+    -------
+    array, shape (B, H, W, C)
+        Gradients reach `tex` and `uv`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a wrong dtype or shape, or an unknown mode.
+    """
+    if filter_mode not in ("nearest", "linear"):
+        raise ValueError(f"filter_mode must be 'nearest' or 'linear', got {filter_mode!r}")
+    if boundary_mode not in get_args(BoundaryOption):
+        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
+    n_axes = 3 if boundary_mode == "cube" else 2
+    check("uv", uv, f"(B, H, W, {n_axes})", uv.ndim == 4 and uv.shape[3] == n_axes)
+    fits = tex.ndim == n_axes + 2 and len(tex) in (1, len(uv)) and 0 not in tex.shape[1:]
+    if n_axes == 3 and fits:
+        fits = tex.shape[1] == 6 and tex.shape[2] == tex.shape[3]
+    check("tex", tex, f"(1 or {len(uv)}, {'6, N, N' if n_axes == 3 else 'Ht, Wt'}, C)", fits)
+    dtype = jnp.result_type(tex, uv)
+    return texels((filter_mode, boundary_mode), tex.astype(dtype), uv.astype(dtype))
+
+
+def look_of(modes: tuple[str, str], tex: Any, uv: Any) -> TexelLook:
+    """Return what the engine looks up."""
+    return TexelLook([tex], TexelFilter[modes[0].upper()], TexelsBeyond[modes[1].upper()], uv)
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def texels(modes: tuple[str, str], tex: Array, uv: Array) -> Any:
+    """Return a texture at each pixel."""
+    shape = shape_of(uv.dtype, *uv.shape[:3], tex.shape[-1])
+    return call(lambda tex, uv: tensors.texels(look_of(modes, tex, uv)), shape, tex, uv)
+
+
+def texels_forward(modes: tuple[str, str], tex: Array, uv: Array) -> Any:
+    """Return the same, and what backward takes."""
+    return texels(modes, tex, uv), (tex, uv)
+
+
+def texels_backward(modes: tuple[str, str], kept: Any, g: Array) -> Any:
+    """Return the gradients of what `texels` takes."""
+
+    def run(tex: Any, uv: Any, g: Any) -> Any:
+        (g_tex,), g_uv, _, _ = tensors.texels_vjp(look_of(modes, tex, uv), g)
+        return g_tex, g_uv
+
+    return call(run, like(*kept), *kept, g)
+
+
+texels.defvjp(texels_forward, texels_backward)
+
+
+def antialias(color: Array, rast: Array, pos: Array, tri: Array, *, edges: EdgesOption = "silhouette") -> Array:
+    """Return a picture with smooth silhouettes, which lets gradients of a silhouette reach `pos`.
+
+    Parameters
+    ----------
+    color : array of float32 or float64, shape (B, H, W, C)
+        The picture.
+    rast : array, shape (B, H, W, 4)
+        What `rasterize` returned.
+    pos : array, shape (B, V, 4) or (1, V, 4)
+        What was drawn.
+    tri : array of int32, shape (T, 3)
+        What was drawn.
+    edges : {"silhouette", "area", "straight-through"}
+        As in `topleft.torch.antialias`; "area" for meshes of small triangles.
+
+    Returns
+    -------
+    array, shape (B, H, W, C)
+        Gradients reach `color` and `pos`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a wrong dtype or shape, or an unknown rule.
+    """
+    check("color", color, "(B, H, W, C)", color.ndim == 4)
+    check("rast", rast, f"{(*color.shape[:3], 4)}", rast.shape == (*color.shape[:3], 4))
+    fits = pos.ndim == 3 and pos.shape[2] == 4 and len(pos) in (1, len(color))
+    check("pos", pos, f"(1, V, 4) or ({len(color)}, V, 4)", fits)
+    if edges not in get_args(EdgesOption):
+        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
+    dtype = jnp.result_type(color, rast, pos)
+    return smooth(edges, color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)
+
+
+def rule_of(edges: str) -> EdgeRule:
+    """Return the rule of a word."""
+    return EdgeRule[edges.replace("-", "_").upper()]
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def smooth(edges: str, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
+    """Return the picture with smooth silhouettes."""
+
+    def run(color: Any, rast: Any, pos: Any, tri: Any) -> Any:
+        grid = grid_of(tri, rast, pos.shape[1])
+        return tensors.smooth(grid, rule_of(edges), pos, rast, tensors.halves_across(grid.tri), color)
+
+    return call(run, like(color), color, rast, pos, tri)
+
+
+def smooth_forward(edges: str, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
+    """Return the same, and what backward takes."""
+    return smooth(edges, color, rast, pos, tri), (color, rast, pos, tri)
+
+
+def smooth_backward(edges: str, kept: Any, g: Array) -> Any:
+    """Return the gradients of what `smooth` takes."""
+    color, rast, pos, tri = kept
+
+    def run(color: Any, rast: Any, pos: Any, tri: Any, g: Any) -> Any:
+        grid = grid_of(tri, rast, pos.shape[1])
+        return tensors.smooth_vjp(grid, rule_of(edges), pos, rast, tensors.halves_across(grid.tri), color, g)
+
+    g_color, g_pos = call(run, like(color, pos), *kept, g)
+    return g_color, jnp.zeros_like(rast), g_pos, no_gradient(tri)
+
+
+smooth.defvjp(smooth_forward, smooth_backward)

@@ -1,0 +1,78 @@
+"""Run a program for nvdiffrast on the CPU as it is: `python -m topleft.nvdiffrast script.py ...`.
+
+`import nvdiffrast.torch` gives it `topleft.torch`, and what it asks of a device "cuda" is done on the CPU: tensors that
+it makes there or moves there, `.cuda()`, and the calls of `torch.cuda` that wait, seed or empty. It says so once.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import torch
+from torch.overrides import TorchFunctionMode
+
+import topleft.torch
+
+__all__ = ["main"]
+
+#: Functions of `torch.cuda` that then do nothing.
+WITHOUT_DEVICE = (
+    "synchronize",
+    "empty_cache",
+    "manual_seed",
+    "manual_seed_all",
+    "set_device",
+    "reset_peak_memory_stats",
+)
+
+
+def on_cpu(value: Any) -> Any:
+    """Return an argument with the CPU for a device of CUDA."""
+    if isinstance(value, torch.device) and value.type == "cuda":
+        return torch.device("cpu")
+    is_name = isinstance(value, str) and (value == "cuda" or value.startswith("cuda:"))
+    return "cpu" if is_name else value
+
+
+class OnCpu(TorchFunctionMode):  # type: ignore[misc]
+    """While it is entered, functions of PyTorch take the CPU for a device of CUDA."""
+
+    def __torch_function__(
+        self, func: Callable[..., Any], types: Any, args: Sequence[Any] = (), kwargs: Mapping[str, Any] | None = None
+    ) -> Any:
+        """Call a function with the CPU."""
+        if func is torch.Tensor.cuda:
+            return args[0]
+        return func(*map(on_cpu, args), **{name: on_cpu(value) for name, value in (kwargs or {}).items()})
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program that the first argument names, with the others; returns the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if not given or given[0] in ("-h", "--help"):
+        sys.stderr.write("usage: python -m topleft.nvdiffrast script.py [arguments of the script]\n")
+        return 0 if given else 2
+    if not Path(given[0]).is_file():
+        sys.stderr.write(f"topleft.nvdiffrast: there is no file {given[0]!r}\n")
+        return 2
+    package = ModuleType("nvdiffrast")
+    package.torch = topleft.torch  # type: ignore[attr-defined]
+    sys.modules.update({"nvdiffrast": package, "nvdiffrast.torch": topleft.torch})
+    for name in WITHOUT_DEVICE:
+        setattr(torch.cuda, name, lambda *_, **__: None)
+    torch.nn.Module.cuda = lambda module, device=None: module  # noqa: ARG005
+    sys.argv = given
+    sys.path.insert(0, str(Path(given[0]).resolve().parent))
+    sys.stderr.write("topleft.nvdiffrast: what asks for 'cuda' runs on the CPU\n")
+    with OnCpu():
+        runpy.run_path(given[0], run_name="__main__")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

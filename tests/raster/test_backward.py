@@ -1,0 +1,276 @@
+"""Gradients of a visibility buffer beside differences, and exact areas beside a clipper."""
+
+import re
+
+import numpy as np
+import pytest
+from engine_cases import ON_EACH_ISA, on
+
+import topleft as tl
+from topleft._core.raster.backward import in_pixels
+
+RNG = np.random.default_rng(7)
+
+
+def by_differences(function, at, step=1e-5):
+    """Central differences of a number."""
+    found = np.zeros(at.shape)
+    for place in np.ndindex(at.shape):
+        values = []
+        for sign in (1, -1):
+            moved = at.astype(np.float64)
+            moved[place] += sign * step
+            values.append(function(moved))
+        found[place] = (values[0] - values[1]) / (2 * step)
+    return found
+
+
+def clip_scene(seed=0):
+    """Two triangles in clip space, of which one hides a part of the other."""
+    rng = np.random.default_rng(seed)
+    corners = np.array([[-0.7, -0.8, 0.1, 1], [0.9, -0.5, 0.2, 1], [0.0, 0.9, 0.1, 1],
+                        [-0.9, 0.3, 0.5, 1], [0.8, 0.6, 0.5, 1], [0.1, -0.9, 0.6, 1]])  # fmt: skip
+    return corners * rng.uniform(0.7, 1.5, (6, 1)), np.array([[0, 1, 2], [5, 4, 3]])
+
+
+def attribute(frags, vertices, values):
+    """An attribute and its derivatives in float64, of triangles that stay where they show."""
+    pos = in_pixels(frags.corners._replace(vertices=vertices), vertices)[0]
+    out, slopes = np.zeros((*frags.mask.shape, values.shape[1])), np.zeros((*frags.mask.shape, values.shape[1], 2))
+    for y, x in np.argwhere(frags.mask):
+        row = frags.corners.triangles[frags.triangle[y, x]]
+        planes = np.linalg.inv(pos[row][:, [0, 1, 3]].T)
+        parts = planes @ [x + 0.5, y + 0.5, 1]
+        weights = parts / parts.sum()
+        out[y, x] = weights @ values[row]
+        by = (planes[:, :2] - np.outer(weights, planes[:, :2].sum(0))) / parts.sum()
+        slopes[y, x] = values[row].T @ by
+    return out, slopes
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("transform", [None, np.diag([0.9, 1.1, 1.0, 1.2]) + 0.05])
+@pytest.mark.parametrize("origin", [(0, 0), (3, 2)])
+def test_interpolate_vjp_is_differences(isa, transform, origin):
+    vertices, triangles = clip_scene()
+    if transform is not None:
+        vertices = vertices[:, :3]
+    with on(isa):
+        options = {"transform": transform, "origin": origin, "viewport": (14, 11), "subpixel_bits": 16}
+        frags = tl.rasterize(vertices, triangles, (9, 8), **options)
+        values = RNG.normal(size=(6, 2))
+        g, g_slopes = RNG.normal(size=(8, 9, 2)), RNG.normal(size=(8, 9, 2, 2))
+        by_values, by_vertices = frags.interpolate_vjp(values, g, grad_derivatives=g_slopes)
+
+    def number(vertices, values):
+        out, slopes = attribute(frags, vertices, values)
+        return (g * out).sum() + (g_slopes * slopes).sum()
+
+    assert set(np.unique(frags.triangle)) == {-1, 0, 1}
+    np.testing.assert_allclose(attribute(frags, vertices, values)[0], frags.interpolate(values), atol=0.02)  # the snap
+    np.testing.assert_allclose(by_values, by_differences(lambda v: number(vertices, v), values), rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(by_vertices, by_differences(lambda v: number(v, values), vertices), rtol=1e-6, atol=1e-6)
+
+
+def test_interpolate_vjp_of_corners_and_of_one_attribute():
+    vertices, triangles = clip_scene()
+    frags = tl.rasterize(vertices, triangles, (12, 10))
+    values, g = RNG.normal(size=6), RNG.normal(size=(10, 12))
+    by_values, by_vertices = frags.interpolate_vjp(values, g)
+    by_corners, same = frags.interpolate_vjp(values[triangles][..., None], g[..., None])
+    np.testing.assert_allclose(same, by_vertices, rtol=1e-12)
+    np.testing.assert_allclose(np.bincount(triangles.ravel(), by_corners.ravel()), by_values, rtol=1e-12)
+
+
+def test_barycentric_vjp_is_that_of_an_attribute():
+    vertices, triangles = clip_scene()
+    frags, g = tl.rasterize(vertices, triangles, (12, 10)), RNG.normal(size=(10, 12, 3))
+    corners = np.tile(np.eye(3), (2, 1, 1))
+    np.testing.assert_allclose(frags.barycentric_vjp(g), frags.interpolate_vjp(corners, g)[1], rtol=1e-9, atol=1e-12)
+
+
+def test_gradients_of_triangles_without_area_are_0():
+    vertices = np.array([[0.0, 0], [8, 0], [0, 8], [2, 2], [4, 4], [6, 6]])
+    frags = tl.rasterize(vertices, [[0, 1, 2], [3, 4, 5]], (8, 8))
+    _, by_vertices = frags.interpolate_vjp(RNG.normal(size=6), np.ones((8, 8)))
+    assert not by_vertices[3:].any()
+    assert by_vertices[:3].any()
+    assert not tl.area_vjp(vertices, [[3, 4, 5]], (8, 8), np.ones((8, 8))).any()
+
+
+# silhouettes
+
+
+def clip_area(polygon, x, y):
+    """The area of a polygon in the unit square at (x, y)."""
+    points = np.asarray(polygon, float) - (x, y)
+    for axis, limit, sign in ((0, 0, 1), (0, 1, -1), (1, 0, 1), (1, 1, -1)):
+        if not len(points):
+            return 0.0
+        depth = sign * (points[:, axis] - limit)
+        kept = []
+        for i, j in zip(range(len(points)), [*range(1, len(points)), 0], strict=True):
+            if depth[i] >= 0:
+                kept.append(points[i])
+            if (depth[i] >= 0) != (depth[j] >= 0):
+                kept.append(points[i] + (points[j] - points[i]) * (depth[i] / (depth[i] - depth[j])))
+        points = np.array(kept)
+    x, y = points.T if len(points) else (np.zeros(0), np.zeros(0))
+    return 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def areas(points, size):
+    """Areas of a polygon by pixel."""
+    return np.array([[clip_area(points, x, y) for x in range(size)] for y in range(size)])
+
+
+@pytest.mark.parametrize("degrees", [0, 1e-5, 30, 44, 45 - 1e-6, 45, 45 + 1e-6, 46, 90, 211.3])
+def test_antialias_of_a_long_edge_is_its_exact_area(degrees):
+    along = np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))])
+    middle, across = np.array([12.3, 11.8]), np.array([-along[1], along[0]])
+    points = np.array([middle - 60 * along, middle + 60 * along, middle + 70 * across])
+    frags = tl.rasterize(points, [[0, 1, 2]], (24, 24), subpixel_bits=16)
+    smooth, inner = frags.antialias(frags.mask), (slice(1, -1), slice(1, -1))
+    np.testing.assert_allclose(smooth[inner], areas(points, 24)[inner], rtol=0, atol=1e-10)
+    g = np.pad(RNG.normal(size=(22, 22)), 1)
+    _, by_points = frags.antialias_vjp(frags.mask, g)
+    expected = by_differences(lambda ends: (g * areas([*ends, points[2]], 24)).sum(), points[:2], 1e-4)
+    np.testing.assert_allclose(by_points[:2], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_antialias_of_a_crease_of_flat_colours_is_exact():
+    points = np.array([[-50.0, -31], [70, 55], [50, -70], [-40, 90]])
+    triangles = np.array([[0, 1, 2], [1, 0, 3]])
+    frags = tl.rasterize(np.column_stack([points, [0, 0, 5, 5.0]]), triangles, (24, 24), subpixel_bits=16)
+    colours = np.array([1.0, 0.25])[frags.triangle]
+    inner = (slice(1, -1), slice(1, -1))
+    flat = frags.antialias(colours)
+    assert np.array_equal(flat, colours)  # the surface runs on: no silhouette
+    apart = tl.rasterize(np.column_stack([points[triangles.ravel()], np.zeros(6)]), [[0, 1, 2], [3, 4, 5]], (24, 24),
+                         subpixel_bits=16)  # fmt: skip
+    exact = areas(points[triangles[0]], 24) + 0.25 * areas(points[triangles[1]], 24)
+    np.testing.assert_allclose(apart.antialias(colours)[inner], exact[inner], rtol=0, atol=1e-10)
+
+
+def sphere(level, radius=13.0, middle=(18.2, 17.7)):
+    """A sphere of triangles below a pixel, in pixels and depth."""
+    vertices, triangles = tl.scenes.icosphere(level)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    unit = vertices @ turn
+    return np.column_stack([unit[:, :2] * radius + middle, unit[:, 2]]), triangles, unit
+
+
+@pytest.mark.parametrize("level", [3, 4])
+def test_antialias_of_a_fine_sphere_moves_with_its_radius(level):
+    # 1,280 and 5,120 triangles: all of the rim is corners. Silhouettes of the triangles seen alone give 0.01 to 0.15.
+    points, triangles, unit = sphere(level)
+    frags = tl.rasterize(points, triangles, (36, 36), subpixel_bits=16)
+    smooth = frags.antialias(frags.mask)
+    y, x = np.mgrid[:36, :36] + 0.5
+    error = np.abs(smooth - np.clip(13.5 - np.hypot(x - 18.2, y - 17.7), 0, 1))
+    assert error[error > 0].mean() < 0.05  # from a circle, which the triangles do not fill
+    assert smooth.sum() == pytest.approx(np.pi * 13**2, rel=0.01)
+    by = {}
+    for edges in ("area", "silhouette"):
+        _, by_points = frags.antialias_vjp(frags.mask, np.ones((36, 36)), edges=edges)
+        by[edges] = (by_points[:, :2] * unit[:, :2]).sum() / (2 * np.pi * 13)
+    assert by["area"] == pytest.approx(1, abs=0.03)
+    assert by["silhouette"] < 0.5
+
+
+def test_straight_through_leaves_the_picture_and_moves_the_triangle_in_front():
+    points = np.array([[4.0, -20, 0], [12.25, 8, 0], [4, 36, 0], [-90, -90, 1], [90, -90, 1], [0, 90, 1]])
+    frags = tl.rasterize(points, [[0, 1, 2], [3, 4, 5]], (16, 16))
+    picture = np.where(frags.triangle == 0, 1.0, 0.25)
+    assert np.array_equal(frags.antialias(picture, edges="straight-through"), picture)
+    g = RNG.normal(size=(16, 16))
+    by_picture, by_points = frags.antialias_vjp(picture, g, edges="straight-through")
+    assert np.array_equal(by_picture, g)
+    assert not by_points[3:].any()
+    expected = 0.0
+    for y in range(16):
+        for x in range(15):
+            if frags.triangle[y, x] != frags.triangle[y, x + 1]:
+                sign = 1 if frags.triangle[y, x] == 0 else -1
+                expected += sign * 0.75 * (g[y, x] + g[y, x + 1]) / 2
+    np.testing.assert_allclose(by_points[:, 0].sum(), expected, rtol=1e-12)
+
+
+# areas
+
+
+@ON_EACH_ISA
+def test_area_vjp_is_that_of_a_clipper(isa):
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        points = rng.uniform(-3, 15, (3, 2))
+        if rng.random() < 0.3:
+            points = np.round(points)
+        g = rng.normal(size=(12, 12))
+        with on(isa):
+            found = tl.area_vjp(points, [[0, 1, 2]], (12, 12), g)
+        # A line of the grid that an edge lies on is between two derivatives: central differences give their mean.
+        if (points == np.round(points)).any():
+            continue
+        expected = by_differences(lambda p, g=g: (g * areas(p, 12)).sum(), points, 1e-5)
+        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
+
+
+def test_area_vjp_with_colours_is_the_sum_over_channels():
+    points, triangles = RNG.uniform(0, 10, (6, 2)), np.array([[0, 1, 2], [3, 4, 5]])
+    colours, g = RNG.random((2, 3)), RNG.normal(size=(10, 10, 3))
+    found = tl.area_vjp(points, triangles, (10, 10), g, colors=colours)
+    parts = [tl.area_vjp(points, [row], (10, 10), g @ colour) for row, colour in zip(triangles, colours, strict=True)]
+    np.testing.assert_allclose(found, sum(parts), rtol=1e-12)
+
+
+def test_area_vjp_of_overdraw_on_the_grid_of_the_snap():
+    points = np.round(RNG.uniform(1, 11, (3, 2)) * 2**16) / 2**16
+    g, step = RNG.normal(size=(12, 12)), 2.0**-9
+
+    def number(p):
+        return (g * tl.overdraw(p, [[0, 1, 2]], (12, 12), sampling="area", subpixel_bits=16).astype(float)).sum()
+
+    found = tl.area_vjp(points, [[0, 1, 2]], (12, 12), g)
+    np.testing.assert_allclose(found, by_differences(number, points, step), atol=1e-2)
+
+
+def test_area_vjp_of_huge_triangles_ends():
+    points = np.array([[-1e9, -1e9], [1e9, 3.5], [-1e9, 1e12]])
+    found = tl.area_vjp(points, [[0, 1, 2]], (8, 8), np.ones((8, 8)))
+    assert np.isfinite(found).all()
+
+
+# what is refused
+
+
+FRAGS = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [
+        (lambda: FRAGS.interpolate_vjp([1, 2, 3], np.ones((4, 2))), ValueError, "grad must have shape (2, 4)"),
+        (lambda: FRAGS.interpolate_vjp([1, 2, 3], np.ones((2, 4)), grad_derivatives=np.ones((2, 4))), ValueError,
+         "grad_derivatives must have shape (2, 4, 2)"),
+        (lambda: FRAGS.barycentric_vjp(np.ones((2, 4))), ValueError, "grad must have shape (2, 4, 3)"),
+        (lambda: FRAGS.antialias(np.ones((3, 4))), ValueError, "picture must have shape (2, 4) or (2, 4, 'C')"),
+        (lambda: FRAGS.antialias(np.ones((2, 4)), edges="all"), ValueError, "edges must be 'silhouette', 'area' or"),
+        (lambda: tl.area_vjp(np.ones((3, 4)), [[0, 1, 2]], 4, np.ones((4, 4))), ValueError, "vertices must have shape"),
+        (lambda: tl.area_vjp([[0, 0], [np.nan, 0], [0, 1]], [[0, 1, 2]], 4, np.ones((4, 4))), ValueError,
+         "vertices must be finite, row 1 is not"),
+        (lambda: tl.area_vjp([[0, 0], [1, 0], [0, 1]], [[0, 1, 3]], 4, np.ones((4, 4))), IndexError, "[0, 3)"),
+        (lambda: tl.area_vjp([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], 4, np.ones(4)), ValueError, "grad must have shape"),
+        (lambda: tl.area_vjp([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], 4, np.ones((4, 4)), colors=[1]), ValueError,
+         "colors must have shape (1, C), got (1,)"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_raise(call, kind, message):
+    with pytest.raises(kind, match=re.escape(message)):
+        call()
+
+
+def test_layers_have_no_gradients():
+    layers = tl.peel([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]], (4, 4))
+    with pytest.raises(ValueError, match="gradients are those of rasterize and rasterize_mesh, not of layers"):
+        layers.layer(0).antialias(np.ones((4, 4)))

@@ -1,0 +1,31 @@
+"""The programs of docs/guide/fit.md find what they look for."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PROGRAMS = re.findall(
+    r"```python\n(.*?)```",
+    Path(__file__).parents[2].joinpath("docs/guide/fit.md").read_text(encoding="utf-8"),
+    re.DOTALL,
+)
+
+
+def test_a_sphere_becomes_what_eight_silhouettes_show(tmp_path, monkeypatch):
+    pytest.importorskip("torch")
+    monkeypatch.chdir(tmp_path)
+    smaller = PROGRAMS[0].replace("= 192, 8,", "= 96, 8,").replace("range(200)", "range(100)")
+    assert smaller.count("= 96, 8,") == smaller.count("range(100)") == 1
+    found = {}
+    exec(smaller, found)
+    assert (found["both"] / found["either"]).item() >= 0.985
+
+
+def test_scipy_finds_a_quad_by_its_areas():
+    pytest.importorskip("scipy")
+    found = {}
+    exec(PROGRAMS[1], found)
+    expected = [[6, 5], [25, 9], [27, 24], [8, 26]]
+    np.testing.assert_allclose(found["found"].x.reshape(4, 2), expected, atol=0.01)

@@ -1,0 +1,109 @@
+"""`topleft.jax` beside `topleft._core.gradients`, in jit, grad and vmap."""
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+jax = pytest.importorskip("jax")
+
+import jax.numpy as jnp  # noqa: E402 (JAX may be missing)
+
+import topleft.jax as dr  # noqa: E402
+from topleft import scenes  # noqa: E402
+
+SIZE = (40, 52)
+
+
+def sphere(n_pictures=2):
+    """Spheres in clip space, and colours."""
+    vertices, triangles = scenes.icosphere(2)
+    moved = [vertices + [0.1 * k, 0.05, -2.5] for k in range(n_pictures)]
+    pos = np.stack([np.column_stack([1.7 * v[:, :2], -1.2 * v[:, 2] - 2, -v[:, 2]]) for v in moved]).astype(np.float32)
+    colours = np.random.default_rng(1).random((len(vertices), 3), np.float32)
+    return jnp.asarray(pos), jnp.asarray(triangles, jnp.int32), jnp.asarray(colours)
+
+
+TEX = jnp.asarray(np.random.default_rng(2).random((1, 8, 8, 3), np.float32))
+
+
+def picture(pos, colours, tex, tri):
+    """All of the functions on the way to a picture."""
+    rast, rast_db = dr.rasterize(pos, tri, SIZE)
+    out, out_da = dr.interpolate(colours, rast, tri, rast_db)
+    out = out * dr.texture(tex, out[..., :2]) + 0.1 * out_da[..., :3]
+    return dr.antialias(out, rast, pos, tri, edges="area")
+
+
+def number(*given):
+    out = picture(*given)
+    return (out * jnp.sin(jnp.arange(out.size, dtype=out.dtype)).reshape(out.shape)).sum()
+
+
+def test_jit_gives_the_same_picture():
+    pos, tri, colours = sphere()
+    found, expected = jax.jit(picture)(pos, colours, TEX, tri), picture(pos, colours, TEX, tri)
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)  # XLA rounds sums of products once
+
+
+def test_gradients_are_those_of_torch():
+    torch = pytest.importorskip("torch")
+    from topleft import torch as of_torch
+
+    pos, tri, colours = sphere()
+    found = jax.grad(number, argnums=(0, 1, 2))(pos, colours, TEX, tri)
+    given = [torch.tensor(np.asarray(one), requires_grad=True) for one in (pos, colours, TEX)]
+    triangles, context = torch.tensor(np.asarray(tri)), of_torch.RasterizeContext()
+    rast, rast_db = of_torch.rasterize(context, given[0], triangles, SIZE)
+    out, out_da = of_torch.interpolate(given[1], rast, triangles, rast_db, "all")
+    out = out * of_torch.texture(given[2], out[..., :2]) + 0.1 * out_da[..., :3]
+    out = of_torch.antialias(out, rast, given[0], triangles, edges="area")
+    weights = torch.tensor(np.asarray(jnp.sin(jnp.arange(out.numel(), dtype=jnp.float32)))).reshape(out.shape)
+    expected = torch.autograd.grad((out * weights).sum(), given)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other.numpy(), rtol=1e-4, atol=1e-4 * np.abs(other.numpy()).max())
+
+
+def test_vmap_is_one_sample_after_the_other():
+    pos, tri, colours = sphere(3)
+    found = jax.vmap(lambda p: jax.grad(number)(p[None], colours, TEX, tri))(pos)
+    for k in range(3):
+        np.testing.assert_array_equal(found[k], jax.grad(number)(pos[k : k + 1], colours, TEX, tri))
+
+
+def test_attributes_without_derivatives_have_no_columns():
+    pos, tri, colours = sphere(1)
+    rast, _ = dr.rasterize(pos, tri, SIZE)
+    out, out_da = dr.interpolate(colours, rast, tri)
+    assert (out.shape, out_da.shape) == ((1, *SIZE, 3), (1, *SIZE, 0))
+    g = jax.grad(lambda c: dr.interpolate(c, rast, tri)[0].sum())(colours)
+    np.testing.assert_allclose(g.sum(), 3 * (rast[..., 3] > 0).sum(), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [
+        (lambda pos, tri, c: dr.rasterize(pos[0], tri, SIZE), ValueError, "pos must have shape (B, V, 4), got"),
+        (lambda pos, tri, c: dr.rasterize(pos.astype(int), tri, SIZE), TypeError, "pos must be float32 or float64"),
+        (lambda pos, tri, c: dr.interpolate(c, pos, tri), ValueError, "rast must have shape (B, H, W, 4), got"),
+        (lambda pos, tri, c: dr.texture(c, pos), ValueError, "uv must have shape (B, H, W, 2), got"),
+        (lambda pos, tri, c: dr.texture(c, pos, "cubic"), ValueError, "filter_mode must be 'nearest' or 'linear', got"),
+        (
+            lambda pos, tri, c: dr.texture(c, pos, boundary_mode="a"),
+            ValueError,
+            "boundary_mode must be 'wrap', 'clamp'",
+        ),
+        (lambda pos, tri, c: dr.antialias(c, pos, pos, tri), ValueError, "color must have shape (B, H, W, C), got"),
+    ],
+)
+def test_wrong_arguments_raise(call, kind, message):
+    with pytest.raises(kind, match=re.escape(message)):
+        call(*sphere(1))
+
+
+def test_import_without_jax_says_how_to_get_it():
+    code = "import sys; sys.modules['jax'] = None\ntry: import topleft.jax\nexcept ImportError as e: print(e)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "topleft.jax needs JAX: pip install 'topleft[jax]'\n"

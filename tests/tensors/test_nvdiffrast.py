@@ -1,0 +1,50 @@
+"""Programs for nvdiffrast that name CUDA run as they are."""
+
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("torch")
+
+PROGRAM = """
+import sys
+import torch
+import nvdiffrast.torch as dr
+
+device = torch.device("cuda:0")
+dr.set_log_level(2)
+glctx = dr.RasterizeGLContext(output_db=True, mode="manual", device="cuda")
+glctx.set_context()
+pos = torch.tensor([[[-0.8, -0.8, 0, 1], [0.8, -0.8, 0, 1], [-0.8, 0.8, 0, 1]]], device="cuda")
+tri = torch.tensor([[0, 1, 2]], dtype=torch.int32).cuda()
+colors = torch.nn.Parameter(torch.eye(3, device=device))
+rast, _ = dr.rasterize(glctx, pos.to("cuda"), tri, resolution=[16, 16])
+out, _ = dr.interpolate(colors.cuda(), rast, tri)
+net = torch.nn.Linear(3, 1).cuda().to(device)
+net(out).sum().backward()
+torch.cuda.synchronize()
+glctx.release_context()
+print(sys.argv[1:], dr.get_log_level(), int((rast[..., 3] > 0).sum()), bool(colors.grad.any()), colors.device)
+"""
+
+
+def run(*arguments):
+    return subprocess.run([sys.executable, "-m", "topleft.nvdiffrast", *arguments], capture_output=True, text=True)
+
+
+def test_program_that_names_cuda_runs(tmp_path):
+    tmp_path.joinpath("program.py").write_text(PROGRAM)
+    done = run(str(tmp_path / "program.py"), "--steps", "3")
+    assert done.stderr == "topleft.nvdiffrast: what asks for 'cuda' runs on the CPU\n"
+    assert done.stdout == "['--steps', '3'] 2 66 True cpu\n"
+
+
+def test_program_that_is_not_there_is_named():
+    done = run("nothing.py")
+    assert (done.returncode, done.stderr) == (2, "topleft.nvdiffrast: there is no file 'nothing.py'\n")
+
+
+def test_without_a_program_says_how_it_is_used():
+    assert run().returncode == 2
+    assert run("--help").stderr.startswith("usage: python -m topleft.nvdiffrast script.py")

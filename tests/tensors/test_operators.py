@@ -1,0 +1,203 @@
+"""`topleft.torch` as operators of PyTorch: compiled, over batches, on any memory, with any number of threads."""
+
+import hashlib
+import re
+
+import numpy as np
+import pytest
+from engine_cases import ON_EACH_ISA, on
+
+torch = pytest.importorskip("torch")
+
+import topleft.torch as dr  # noqa: E402 (imports torch)
+from topleft import scenes  # noqa: E402
+
+CTX = dr.RasterizeContext()
+EDGES = ("silhouette", "area", "straight-through")
+
+
+def sphere(n_pictures=1, dtype=torch.float32, level=3):
+    """Spheres in clip space, seen from near by, and colours."""
+    vertices, triangles = scenes.icosphere(level)
+    moved = [vertices + [0.1 * k, 0.05, -2.5] for k in range(n_pictures)]
+    pos = np.stack([np.column_stack([1.7 * v[:, :2], -1.2 * v[:, 2] - 2, -v[:, 2]]) for v in moved])
+    colours = np.random.default_rng(1).random((len(vertices), 3))
+    return (
+        torch.tensor(pos, dtype=dtype),
+        torch.tensor(triangles, dtype=torch.int32),
+        torch.tensor(colours, dtype=dtype),
+    )
+
+
+def picture(pos, tri, colours, tex=None, edges="area", size=(70, 150)):
+    """All of the functions on the way to a picture."""
+    rast, rast_db = dr.rasterize(CTX, pos, tri, size)
+    out, out_da = dr.interpolate(colours, rast, tri, rast_db, [0, 1])
+    if tex is not None:
+        out = out * dr.texture(tex, out[..., :2], out_da)
+    return dr.antialias(out, rast, pos, tri, edges=edges)
+
+
+def gradients(pos, tri, colours, tex, **options):
+    """The gradients of some number that the picture gives."""
+    given = [one.clone().requires_grad_() for one in (pos, colours, tex)]
+    out = picture(given[0], tri, *given[1:], **options)
+    weights = torch.sin(torch.arange(out.numel(), dtype=out.dtype)).reshape(out.shape)
+    return out, *torch.autograd.grad((out * weights).sum(), given)
+
+
+@pytest.fixture
+def threads():
+    """Sets the number of threads of PyTorch until the test has ended."""
+    before = torch.get_num_threads()
+    yield torch.set_num_threads
+    torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize("edges", EDGES)
+def test_every_number_of_threads_gives_the_same_bits(threads, edges):
+    pos, tri, colours = sphere(2)
+    tex, found = torch.rand(1, 16, 16, 3, generator=torch.Generator().manual_seed(1)), []
+    for n in (1, 2, 5):
+        threads(n)
+        found.append(gradients(pos, tri, colours, tex, edges=edges, size=(200, 180)))
+    for one in found[1:]:
+        assert all(torch.equal(a, b) for a, b in zip(one, found[0], strict=True))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("edges", EDGES)
+def test_every_instruction_set_gives_the_same_bits(isa, edges):
+    pos, tri, colours = sphere()
+    tex = torch.linspace(0, 1, 16 * 16 * 3).reshape(1, 16, 16, 3)
+    hashes = []
+    for name in ("scalar", isa):
+        with on(name):
+            parts = gradients(pos, tri, colours, tex, edges=edges)
+        hashes.append([hashlib.sha256(one.detach().numpy().tobytes()).hexdigest() for one in parts])
+    assert hashes[0] == hashes[1]
+
+
+def test_gradients_are_those_of_one_picture_after_the_other():
+    pos, tri, colours = sphere(3)
+    tex = torch.rand(1, 8, 8, 3, generator=torch.Generator().manual_seed(2))
+    _, g_pos, _, _ = gradients(pos, tri, colours, tex)
+    out = picture(pos, tri, colours, tex)
+    weights = torch.sin(torch.arange(out.numel(), dtype=out.dtype)).reshape(out.shape)
+    for k in range(3):
+        own = pos[k : k + 1].clone().requires_grad_()
+        (g_own,) = torch.autograd.grad((picture(own, tri, colours, tex) * weights[k : k + 1]).sum(), own)
+        assert torch.equal(g_own[0], g_pos[k])
+
+
+@pytest.mark.parametrize("edges", EDGES[:2])
+def test_gradients_of_float64_are_differences(edges):
+    pos, tri, colours = sphere(1, torch.float64, level=1)
+    tex = torch.rand(1, 8, 8, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
+    rast, rast_db = dr.rasterize(CTX, pos, tri, (12, 14))
+    given = [one.clone().requires_grad_() for one in (colours, tex)]
+
+    def run(colours, tex):
+        out, out_da = dr.interpolate(colours, rast, tri, rast_db, [0, 1])
+        return dr.antialias(out * dr.texture(tex, out[..., :2], out_da), rast, pos, tri, edges=edges)
+
+    assert torch.autograd.gradcheck(run, given)
+
+
+def test_compile_takes_the_whole_graph():
+    pos, tri, colours = sphere()
+    tex = torch.rand(1, 8, 8, 3, generator=torch.Generator().manual_seed(2))
+    compiled = torch.compile(picture, fullgraph=True, backend="aot_eager")
+    own, same = pos.clone().requires_grad_(), pos.clone().requires_grad_()
+    one, other = picture(own, tri, colours, tex), compiled(same, tri, colours, tex)
+    assert torch.equal(one, other)
+    one.square().sum().backward()
+    other.square().sum().backward()
+    assert torch.equal(own.grad, same.grad)
+
+
+def test_vmap_is_one_sample_after_the_other():
+    pos, tri, colours = sphere(3)
+    found = torch.vmap(lambda p: picture(p[None], tri, colours))(pos)
+    assert torch.equal(found, torch.stack([picture(p[None], tri, colours) for p in pos]))
+
+
+def test_gradients_of_gradients_are_refused():
+    pos, tri, colours = sphere(level=1)
+    pos.requires_grad_()
+    (g,) = torch.autograd.grad(picture(pos, tri, colours).square().sum(), pos, create_graph=True)
+    with pytest.raises(NotImplementedError, match="gradients of its gradients are not computed"):
+        g.sum().backward()
+
+
+def test_memory_may_lie_anyhow():
+    pos, tri, colours = sphere(2)
+    expected = gradients(pos, tri, colours, torch.ones(1, 2, 2, 3))
+    strided = torch.stack([pos, pos], -1)[..., 0]
+    columns, colours_too = tri.T.contiguous().T, torch.stack([colours, colours], 1)[:, 1]
+    found = gradients(strided, columns.long(), colours_too, torch.ones(1, 1, 1, 1).expand(1, 2, 2, 3))
+    assert all(torch.equal(a, b) for a, b in zip(expected, found, strict=True))
+    rast, _ = dr.rasterize(CTX, pos, tri, (20, 20))
+    colours.requires_grad_()
+    out, _ = dr.interpolate(colours, rast, tri)
+    out.sum().backward()  # whose gradient is one number, expanded
+    covered = (rast[..., 3] > 0).sum()
+    torch.testing.assert_close(colours.grad.sum(), 3.0 * covered)
+
+
+def test_half_precision_is_taken_as_float32():
+    pos, tri, colours = sphere()
+    rast, _ = dr.rasterize(CTX, pos, tri, (20, 20))
+    half = colours.half()
+    out, _ = dr.interpolate(half, rast, tri)
+    assert torch.equal(out, dr.interpolate(half.float(), rast, tri)[0])
+    assert dr.antialias(out.bfloat16(), rast, pos, tri).dtype == torch.bfloat16
+
+
+def test_bytes_of_a_texture_are_refused_with_what_to_write():
+    message = "tex must be float16, bfloat16, float32 or float64, got torch.uint8: pass tex.float() / 255"
+    with pytest.raises(TypeError, match=re.escape(message)):
+        dr.texture(torch.zeros(1, 2, 2, 3, dtype=torch.uint8), torch.zeros(1, 1, 1, 2))
+
+
+def test_triangles_behind_the_eye_and_without_area_get_finite_gradients():
+    pos = torch.tensor(
+        [[[-1.0, -1, 0, 1], [3, -1, 0, -1], [-1, 3, 0, 1], [0, 0, 0, 1], [0.5, 0.5, 0, 1], [1, 1, 0, 1]]]
+    )
+    tri = torch.tensor([[0, 1, 2], [3, 4, 5]])
+    for edges in EDGES:
+        _, *found = gradients(pos, tri, torch.eye(6)[:, :3].contiguous(), torch.ones(1, 2, 2, 3), edges=edges)
+        assert all(torch.isfinite(one).all() for one in found)
+        assert not found[0][0, 3:].any()
+
+
+def test_vertices_that_are_not_finite_are_refused():
+    pos, tri, _ = sphere(level=1)
+    pos[0, 3, 1] = torch.nan
+    with pytest.raises(ValueError, match="finite"):
+        dr.rasterize(CTX, pos, tri, (8, 8))
+
+
+@pytest.mark.parametrize("index", [-1, 5, 2**40])
+def test_indices_of_no_vertex_are_refused(index):
+    tri = torch.tensor([[0, 1, index]])
+    with pytest.raises(IndexError, match=re.escape("triangles must hold indices in [0, 3)")):
+        dr.interpolate(torch.zeros(3, 2), torch.zeros(1, 2, 2, 4), tri)
+
+
+def test_rast_of_other_programs_may_hold_anything():
+    rast = torch.full((1, 2, 2, 4), torch.nan)
+    out, _ = dr.interpolate(torch.ones(3, 1), rast, torch.tensor([[0, 1, 2]]))
+    assert not out.any()
+    rast[..., 3] = torch.inf
+    with pytest.raises(IndexError, match="rast must hold ids of the 1 triangles"):
+        dr.interpolate(torch.ones(3, 1), rast, torch.tensor([[0, 1, 2]]))
+    assert torch.equal(dr.antialias(torch.ones(1, 2, 2, 1), rast, torch.ones(1, 3, 4), torch.tensor([[0, 1, 2]])),
+                       torch.ones(1, 2, 2, 1))  # fmt: skip
+
+
+def test_unknown_rules_are_refused():
+    with pytest.raises(ValueError, match="edges must be 'silhouette', 'area' or 'straight-through', got 'all'"):
+        dr.antialias(
+            torch.ones(1, 2, 2, 1), torch.zeros(1, 2, 2, 4), torch.ones(3, 4), torch.tensor([[0, 1, 2]]), edges="all"
+        )
