@@ -60,6 +60,8 @@
 #include "lanes/lanes_avx512.h"
 #elif defined(__AVX2__) && defined(__FMA__) && defined(__BMI2__)
 #include "lanes/lanes_avx2.h"
+#elif defined(TL_USE_128)
+#include "lanes/lanes_128.h"
 #else
 #include "lanes/lanes_scalar.h"
 #endif
