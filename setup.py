@@ -61,7 +61,8 @@ FLAGS_CYTHON = [
 FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-fno-math-errno"]
 # For findings of a sanitizer: where they are, and integers whose overflow the language does not define.
 FLAGS_SANITIZED = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"]
-FLAGS_SSE41 = ["-msse4.1", "-mpopcnt"]
+# gcc 12 moves halves of vectors through a register of MMX, and leaves the floating point of x87 in ruins.
+FLAGS_SSE41 = ["-msse4.1", "-mpopcnt", "-mno-mmx"]
 FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
 FLAGS_AVX512 = [
     *FLAGS_AVX2,

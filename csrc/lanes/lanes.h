@@ -9,6 +9,7 @@
  *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
+ * v?_load_some(m, p, has_room) the lanes in m; with room for a whole vector the others are read, too, or are anything
  * v?_store_some(p, m, a, has_room) the lanes in m; with room for a whole vector the others may be written as they are
  *   vi_gather(m, p, i)      p[i] in the lanes of m
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
@@ -64,6 +65,20 @@
 #include "lanes/lanes_128.h"
 #else
 #include "lanes/lanes_scalar.h"
+#endif
+
+/* Where memory cannot be masked, a masked load takes a branch a lane. */
+TL_INLINE vi vi_load_some(vm m, const int32_t *p, int has_room)
+{
+    return TL_LANES == 4 && has_room ? vi_load(p) : vi_load_masked(m, p);
+}
+TL_INLINE vf vf_load_some(vm m, const float *p, int has_room)
+{
+    return TL_LANES == 4 && has_room ? vf_load(p) : vf_load_masked(m, p);
+}
+#if TL_HALF_LANES
+TL_INLINE hi hi_load_some(hm m, const int32_t *p, int has_room) { return (void)has_room, hi_load_masked(m, p); }
+TL_INLINE hf hf_load_some(hm m, const float *p, int has_room) { return (void)has_room, hf_load_masked(m, p); }
 #endif
 
 /* Stores lanes that are then read one by one.  Compilers that see both take them out of the vector, one shuffle each,

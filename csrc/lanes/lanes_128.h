@@ -262,10 +262,7 @@ TL_INLINE v2d v2d_min(v2d a, v2d b) { return (v2d)_mm_min_pd((__m128d)a, (__m128
 TL_INLINE v2d v2d_max(v2d a, v2d b) { return (v2d)_mm_max_pd((__m128d)a, (__m128d)b); }
 TL_INLINE vf vf_from_vi(vi a) { return (vf)_mm_cvtepi32_ps((__m128i)a); }
 /* the upper half scales without loss, so the sum is the only rounding */
-TL_INLINE vf vf_from_unsigned(vi a)
-{
-    return vf_from_vi((vi)((v4u)a >> 16)) * 65536.0f + vf_from_vi(a & 0xffff);
-}
+TL_INLINE vf vf_from_unsigned(vi a) { return vf_from_vi((vi)((v4u)a >> 16)) * 65536.0f + vf_from_vi(a & 0xffff); }
 TL_INLINE vd vd_from_vi(vi a)
 {
     return (vd){(v2d)_mm_cvtepi32_pd((__m128i)a), (v2d)_mm_cvtepi32_pd(_mm_shuffle_epi32((__m128i)a, 0xee))};
@@ -274,20 +271,14 @@ TL_INLINE vd vd_from_vf(vf a)
 {
     return (vd){(v2d)_mm_cvtps_pd((__m128)a), (v2d)_mm_cvtps_pd(_mm_movehl_ps((__m128)a, (__m128)a))};
 }
-TL_INLINE vf vf_from_vd(vd a)
-{
-    return (vf)_mm_movelh_ps(_mm_cvtpd_ps((__m128d)a.lo), _mm_cvtpd_ps((__m128d)a.hi));
-}
+TL_INLINE vf vf_from_vd(vd a) { return (vf)_mm_movelh_ps(_mm_cvtpd_ps((__m128d)a.lo), _mm_cvtpd_ps((__m128d)a.hi)); }
 TL_INLINE vi vi_floor(vf a) { return (vi)_mm_cvtps_epi32(_mm_floor_ps((__m128)a)); }
 TL_INLINE vi vi_rint(vf a) { return (vi)_mm_cvtps_epi32((__m128)a); }
 TL_INLINE vi vi_round(vd a)
 {
     return (vi)_mm_unpacklo_epi64(_mm_cvtpd_epi32((__m128d)a.lo), _mm_cvtpd_epi32((__m128d)a.hi));
 }
-TL_INLINE vi vi_ceil(vd a)
-{
-    return vi_round((vd){(v2d)_mm_ceil_pd((__m128d)a.lo), (v2d)_mm_ceil_pd((__m128d)a.hi)});
-}
+TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){(v2d)_mm_ceil_pd((__m128d)a.lo), (v2d)_mm_ceil_pd((__m128d)a.hi)}); }
 #endif
 
 /* ---- numbers and masks ------------------------------------------------------------------------------------------- */
@@ -337,8 +328,6 @@ TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
         vi_store_masked(p, m, a);
 }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return (vf)vi_load_masked(m, (const int32_t *)p); }
-TL_INLINE vi vi_load_some(vm m, const int32_t *p, int has_room) { return has_room ? vi_load(p) : vi_load_masked(m, p); }
-TL_INLINE vf vf_load_some(vm m, const float *p, int has_room) { return (vf)vi_load_some(m, (const int32_t *)p, has_room); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { vi_store_masked((int32_t *)p, m, (vi)a); }
 TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { vi_store_some((int32_t *)p, m, (vi)a, has_room); }
 TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
@@ -351,14 +340,14 @@ TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
     return (vi){a[0], a[1], a[2], a[3]};
 }
 static const uint8_t compress_order[16][16] __attribute__((aligned(16))) = {
-    {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},         {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},
-    {4, 5, 6, 7, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},         {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 0, 1, 2, 3},
-    {8, 9, 10, 11, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},       {0, 1, 2, 3, 8, 9, 10, 11, 0, 1, 2, 3, 0, 1, 2, 3},
-    {4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 0, 1, 2, 3},       {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3},
-    {12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},     {0, 1, 2, 3, 12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3},
-    {4, 5, 6, 7, 12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3},     {0, 1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15, 0, 1, 2, 3},
-    {8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3},   {0, 1, 2, 3, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3},
-    {4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3},   {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15},
+    {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},       {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},
+    {4, 5, 6, 7, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},       {0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 0, 1, 2, 3},
+    {8, 9, 10, 11, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},     {0, 1, 2, 3, 8, 9, 10, 11, 0, 1, 2, 3, 0, 1, 2, 3},
+    {4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 0, 1, 2, 3},     {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3},
+    {12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3},   {0, 1, 2, 3, 12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3},
+    {4, 5, 6, 7, 12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3},   {0, 1, 2, 3, 4, 5, 6, 7, 12, 13, 14, 15, 0, 1, 2, 3},
+    {8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3}, {0, 1, 2, 3, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3},
+    {4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3}, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15},
 };
 TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
 {
@@ -459,11 +448,12 @@ TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 #if defined(TL_ON_WASM) /* the one byte in which bit n is */
 TL_INLINE vi power_of_two(vi n)
 {
-    const v16u every = (v16u)wasm_i8x16_shuffle((v128_t)n, (v128_t)n, 0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12);
+    const v16u every =
+        (v16u)wasm_i8x16_shuffle((v128_t)n, (v128_t)n, 0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12);
     const v16u table = {1, 2, 4, 8, 16, 32, 64, 128}, before = {0, 8, 16, 24, 0, 8, 16, 24, 0, 8, 16, 24, 0, 8, 16, 24};
     return (vi)v16_swizzle(table, every - before);
 }
-#else /* as a float: 2^31, out of range, becomes INT32_MIN, whose bits are the same */
+#else                   /* as a float: 2^31, out of range, becomes INT32_MIN, whose bits are the same */
 TL_INLINE vi power_of_two(vi n) { return (vi)_mm_cvttps_epi32((__m128)((n + 127) << 23)); }
 #endif
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
@@ -622,7 +612,8 @@ TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
 TL_INLINE void columns_of_rows(const double *const *row, vd *c)
 {
     for (int k = 0; k < 4; k += 2) {
-        const v2d a = v2d_load(row[0] + k), b = v2d_load(row[1] + k), d = v2d_load(row[2] + k), e = v2d_load(row[3] + k);
+        const v2d a = v2d_load(row[0] + k), b = v2d_load(row[1] + k), d = v2d_load(row[2] + k),
+                  e = v2d_load(row[3] + k);
         c[k] = (vd){low_two(a, b), low_two(d, e)}, c[k + 1] = (vd){high_two(a, b), high_two(d, e)};
     }
 }

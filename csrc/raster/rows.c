@@ -119,14 +119,24 @@ TL_INLINE void find_rows_of_one(tl_geometry g, const row_edges *r, int k, vm thi
         *first = vi_max(*first, zero), *end = vi_min(*end, vi_set1(n_cols));
 }
 
-/* ---- boxes of up to 16 rows and TL_LANES columns --------------------------------------------------------- */
+/* ---- boxes of up to 16 rows and 16 or 31 columns --------------------------------------------------------- */
 
-/* Rows of a block of at most TL_LANES columns; the depth of a sample is the sum of its row's and its column's. */
+TL_INLINE void put_lanes(const tl_target *target, tl_sink sink, int64_t at, vm m, vd z_row, vd z_col, int32_t id)
+{
+    if (sink_has_depth(sink))
+        put_depths(target, sink, at, m, sum_depth(z_row, z_col), id);
+    else
+        put_numbers(target, sink, at, m, vi_set1(id));
+}
+
+/* Rows of a block of at most TL_BLOCK_COLS columns, of a mask TL_BIT_COLS; the depth of a sample is the sum of its row's
+ * and its column's. */
 TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row,
-                          int stride_of_rows, int64_t at, int n_rows, int is_half, vd z_col, int32_t id)
+                          int stride_of_rows, int64_t at, int n_rows, int is_half, const double *z_cols, int32_t id)
 {
     const int64_t stride = target->stride_px;
-    (void)is_half;
+    const vd z_col = vd_load(z_cols);
+    (void)is_half, (void)z_col;
 #if TL_HALF_LANES
     if (is_half && sink_has_depth(sink) && sink != TL_SINK_PEEL) {
         for (int row = 0; row < n_rows; row++, at += stride)
@@ -136,14 +146,22 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
     }
 #endif
     for (int row = 0; row < n_rows; row++, at += stride) {
-        const unsigned drawn = (unsigned)bits[row * stride_of_rows];
-        const vm m = vm_from_bits(drawn);
-        if (sink == TL_SINK_MASK)
+        unsigned drawn = (unsigned)bits[row * stride_of_rows];
+        if (sink == TL_SINK_MASK) {
             cover(target, at, drawn);
-        else if (sink_has_depth(sink))
-            put_depths(target, sink, at, m, sum_depth(vd_set1(z_row[row * stride_of_rows]), z_col), id);
-        else
-            put_numbers(target, sink, at, m, vi_set1(id));
+            continue;
+        }
+        if (TL_BLOCK_COLS == TL_LANES) {
+            const vd z = vd_set1(sink_has_depth(sink) ? z_row[row * stride_of_rows] : 0.0);
+            put_lanes(target, sink, at, vm_from_bits(drawn), z, z_col, id);
+            continue;
+        }
+        for (int col = 0; drawn; drawn >>= TL_LANES, col += TL_LANES) {
+            const int skipped = __builtin_ctz(drawn);
+            const vd z = vd_set1(sink_has_depth(sink) ? z_row[row * stride_of_rows] : 0.0);
+            col += skipped, drawn >>= skipped;
+            put_lanes(target, sink, at + col, vm_from_bits(drawn), z, vd_load(z_cols + col), id);
+        }
     }
 }
 
@@ -164,10 +182,11 @@ TL_INLINE void draw_middle(const tl_snapped *snapped, const tl_target *shared, c
     for (; live; live &= live - 1) {
         const int k = __builtin_ctz(live);
         const int32_t size = q->size[i + k];
-        vd z_cols = vd_set1(0);
-        if (sink_has_depth(sink)) {
-            const vd x = vd_sub(vd_add(vd_set1(m->x[k]), ramp(m->step)), vd_set1(m->x0[k]));
-            z_cols = vd_mul(vd_set1(m->slope_x[k]), x);
+        double z_cols[TL_BLOCK_COLS + TL_LANES];
+        for (int col = 0; sink_has_depth(sink) && col < (TL_BLOCK_COLS == TL_LANES ? 1 : size & 0xffff);
+             col += TL_LANES) {
+            const vd x = vd_sub(vd_add(vd_set1(m->x[k] + col * m->step), ramp(m->step)), vd_set1(m->x0[k]));
+            vd_store(z_cols + col, vd_mul(vd_set1(m->slope_x[k]), x));
         }
         draw_block(&target, sink, &m->bits[0][k], &m->z[0][k], TL_MAX_LANES, (uint32_t)m->sample[k], size >> 16,
                    (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(snapped, q->id[i + k]));
@@ -225,7 +244,7 @@ TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Triangle k of those at i in the queue, in blocks of TL_LANES x TL_LANES samples.  With an int for k, gcc spills a
+/* Triangle k of those at i in the queue, in blocks of TL_LANES rows.  With an int for k, gcc spills a
  * register more of the mask's copy: 3 % of its time on AVX-512. */
 TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
                          const lane_exact *t, int i, int64_t k)
@@ -233,7 +252,7 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
     const double unit = plane_step(s, g);
     const box_queue *q = &s->rows;
     const int32_t size = q->size[i + k], id = name_of(s->snapped, q->id[i + k]), sample = r->sample[k];
-    const int n_cols = size & 0xffff, n_rows = size >> 16;
+    const int n_cols = size & 0xffff, n_rows = size >> 16, n_block = sink == TL_SINK_MASK ? TL_BIT_COLS : TL_BLOCK_COLS;
     const vi zero = vi_set1(0);
     const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[k]));
     const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[k]));
@@ -257,22 +276,23 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
             const vd from = g == TL_FIXED ? y : vd_sub(y, vd_set1(r->y0[k]));
             vd_store(z_row, vd_add(vd_set1(r->z0[k]), vd_mul(vd_set1(r->slope_y[k]), from)));
         }
-        for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
-            const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
+        for (int col0 = 0; col0 < n_cols; col0 += n_block) {
+            const int width = n_cols - col0 < n_block ? n_cols - col0 : n_block;
             const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
                                               vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
             const unsigned drawn = vm_bits(vi_gt(in_block, zero));
             if (!drawn)
                 continue;
             const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            vd z_col = vd_set1(0);
-            if (sink_has_depth(sink)) {
-                const vd x = vd_add(vd_set1(r->x[k] + col0 * unit), steps);
-                z_col = vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
+            double z_cols[TL_BLOCK_COLS + TL_LANES];
+            for (int col = 0; sink_has_depth(sink) && col < (TL_BLOCK_COLS == TL_LANES ? 1 : width); col += TL_LANES) {
+                const vd x = vd_add(vd_set1(r->x[k] + (col0 + col) * unit), steps);
+                vd_store(z_cols + col,
+                         vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k]))));
             }
             vi_store(bits, in_block);
             draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
-                       width <= TL_HALF_LANES, z_col, id);
+                       width <= TL_HALF_LANES, z_cols, id);
         }
     }
 }
