@@ -72,7 +72,7 @@ FLAGS_VBMI = [*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2"]
 
 CPUS_OF_WINDOWS = {"win-amd64": "x86_64", "win-arm64": "aarch64", "win32": "i686"}
 
-# What a compiler has to accept before a unit is built, beside the macro of its target. Scalar: C11, no excess precision.
+# What a compiler has to accept before a unit is built, if it has the target. Scalar: C11, no excess precision.
 PROBE_SCALAR = """
 #include <float.h>
 #if FLT_EVAL_METHOD != 0
@@ -113,7 +113,7 @@ class Isa:
     is_built_unasked: bool = True
 
 
-# Vectors of 128 bits on x86-64 are for tests: nearly every machine that has SSE4.1 has AVX2, and a wheel would gain 0.7 MB.
+# On x86-64 vectors of 128 bits are for tests: a wheel would grow by 0.7 MB, and nearly every machine has AVX2.
 ISAS = [
     Isa("scalar", "__STDC__", [], PROBE_SCALAR),
     Isa("simd128", "__aarch64__", [], PROBE_SIMD128),
@@ -289,7 +289,7 @@ class BuildTopleft(build_ext):
         return chosen
 
     def can_build(self, isa: Isa) -> bool:
-        """Whether the compiler builds for the target of a unit, which may be another than this machine, and the unit."""
+        """Whether the compiler builds for the target of a unit, which may be no machine like this, and the unit."""
         if not self.accepts(FLAGS_C, f"#ifndef {isa.target}\n#error another target\n#endif\n"):
             return False
         if not self.accepts(FLAGS_C + isa.flags, isa.probe):

@@ -20,7 +20,7 @@
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   vf_fma(a, b, c)         a * b + c, rounded once
  *   vf_min, vf_max          the second number when one is NaN
- *   vf_min_size(a, b)       the lesser of a >= 0 and |b|
+ *   vf_min_size(a, b)       the lesser of a >= 0 and |b|, which are numbers
  *   v?_lookup(table, i)     table[i & 15] of sixteen numbers
  *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
  *   vi_prefix_count(bits)   how many of the bits [0, k] are set
@@ -33,8 +33,8 @@
  *   vd_store_places(base, x, y, z, a, b)          the same, TL_LANES of them one after the other
  *   vi_ceil(vd)             the next integer that is not less
  *   vi_low_bits(vd)         the last 32 bits of each number
- *   vf_off_integer, vd_off_integer    a number less the nearest integer
- *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8
+ *   vf_off_integer, vd_off_integer    a finite number less the nearest integer; the sign of 0 may be either
+ *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8; the sign of 0 may be either
  *   vd_or(a, b)             the bits of both: 0 where both are
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
  * vi_load_records(base, scale, i, c), vf_load_pairs 16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
@@ -61,8 +61,8 @@
 #include "lanes/lanes_avx512.h"
 #elif defined(__AVX2__) && defined(__FMA__) && defined(__BMI2__)
 #include "lanes/lanes_avx2.h"
-#elif defined(TL_USE_128)
-#include "lanes/lanes_128.h"
+#elif defined(TL_USE_SIMD128)
+#include "lanes/lanes_simd128.h"
 #else
 #include "lanes/lanes_scalar.h"
 #endif

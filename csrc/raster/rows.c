@@ -129,8 +129,8 @@ TL_INLINE void put_lanes(const tl_target *target, tl_sink sink, int64_t at, vm m
         put_numbers(target, sink, at, m, vi_set1(id));
 }
 
-/* Rows of a block of at most TL_BLOCK_COLS columns, of a mask TL_BIT_COLS; the depth of a sample is the sum of its row's
- * and its column's. */
+/* Rows of a block of at most TL_BLOCK_COLS columns, of a mask TL_BIT_COLS; the depth of a sample is the sum of its
+ * row's and its column's. */
 TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row,
                           int stride_of_rows, int64_t at, int n_rows, int is_half, const double *z_cols, int32_t id)
 {

@@ -1,9 +1,9 @@
 /* Four lanes in 128 bits, masks as whole vectors of ones: NEON of aarch64, SIMD128 of WebAssembly, SSE4.1.
  *
- * Arithmetic, comparisons and shuffles are vectors of gcc and clang, the same text for all three; intrinsics stand where
- * the three differ: minima, masks to bits, tables of bytes, roundings and conversions. */
-#ifndef TL_LANES_128_H
-#define TL_LANES_128_H
+ * Arithmetic, comparisons and shuffles are vectors of gcc and clang, the same text for all three; intrinsics stand
+ * where the three differ: minima, masks to bits, tables of bytes, roundings and conversions. */
+#ifndef TL_LANES_SIMD128_H
+#define TL_LANES_SIMD128_H
 
 #include <stdint.h>
 #include <string.h>
@@ -246,16 +246,9 @@ TL_INLINE vi vi_min_bytes(vi a, vi b) { return (vi)_mm_min_epu8((__m128i)a, (__m
 TL_INLINE vf vf_sqrt(vf a) { return (vf)_mm_sqrt_ps((__m128)a); }
 TL_INLINE v2d v2d_sqrt(v2d a) { return (v2d)_mm_sqrt_pd((__m128d)a); }
 TL_INLINE v2d v2d_floor(v2d a) { return (v2d)_mm_floor_pd((__m128d)a); }
-TL_INLINE v2d v2d_nearest(v2d a)
-{
-    enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
-    return (v2d)_mm_round_pd((__m128d)a, nearest);
-}
-TL_INLINE vf vf_nearest(vf a)
-{
-    enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC };
-    return (vf)_mm_round_ps((__m128)a, nearest);
-}
+enum { TL_NEAREST = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
+TL_INLINE v2d v2d_nearest(v2d a) { return (v2d)_mm_round_pd((__m128d)a, TL_NEAREST); }
+TL_INLINE vf vf_nearest(vf a) { return (vf)_mm_round_ps((__m128)a, TL_NEAREST); }
 TL_INLINE vf vf_min(vf a, vf b) { return (vf)_mm_min_ps((__m128)a, (__m128)b); }
 TL_INLINE vf vf_max(vf a, vf b) { return (vf)_mm_max_ps((__m128)a, (__m128)b); }
 TL_INLINE v2d v2d_min(v2d a, v2d b) { return (v2d)_mm_min_pd((__m128d)a, (__m128d)b); }
@@ -363,7 +356,6 @@ TL_INLINE v4 v4_load(const int32_t *p) { return vi_load(p); }
 TL_INLINE void v4_store(int32_t *p, v4 a) { vi_store(p, a); }
 TL_INLINE v4 v4_add(v4 a, v4 b) { return vi_add(a, b); }
 TL_INLINE v4 v4_or(v4 a, v4 b) { return a | b; }
-/* its own inverse */
 TL_INLINE void transpose_quads(const vi *a, vi *b)
 {
     const v2l low01 = (v2l)TL_SHUFFLE(a[0], a[1], 0, 4, 1, 5), high01 = (v2l)TL_SHUFFLE(a[0], a[1], 2, 6, 3, 7);
@@ -525,7 +517,7 @@ TL_INLINE v2d sum_to_odd(v2d a, v2d b)
 {
     const v2d sum = a + b, rest = sum - a, error = (a - (sum - rest)) + (b - rest);
     const v2u bits = (v2u)sum, away = (((v2u)error ^ bits) >> 63) * 2; /* 0: the exact sum is farther from zero */
-    const v2u is_odd = (v2u)(v2l)(error != 0) & ((bits & 1) - 1);
+    const v2u is_odd = (v2u)((v2l)(error < 0) | (v2l)(error > 0)) & ((bits & 1) - 1); /* of infinities it is NaN */
     return (v2d)(bits + ((1 - away) & is_odd));
 }
 /* Once in 2^29 the sum in float64 lies in the middle between two float32; below 2^-126 the middles lie elsewhere. */
@@ -545,26 +537,16 @@ TL_INLINE vf vf_fma(vf a, vf b, vf c)
 
 /* ---- tables and memory ------------------------------------------------------------------------------------------- */
 
-TL_INLINE vi vi_lookup(const int32_t *table, vi i)
-{
-    i &= 15;
-    return (vi){table[i[0]], table[i[1]], table[i[2]], table[i[3]]};
-}
-TL_INLINE vf vf_lookup(const float *table, vi i)
-{
-    i &= 15;
-    return (vf){table[i[0]], table[i[1]], table[i[2]], table[i[3]]};
-}
-TL_INLINE vf vf_pick(const float *p, vi i)
-{
-    i &= 3;
-    return (vf){p[i[0]], p[i[1]], p[i[2]], p[i[3]]};
-}
-TL_INLINE vi vi_pick(const int32_t *p, vi i)
-{
-    i &= 3;
-    return (vi){p[i[0]], p[i[1]], p[i[2]], p[i[3]]};
-}
+#define TL_PICK(NAME, V, NUMBER, LAST)                  \
+    TL_INLINE V NAME(const NUMBER *p, vi i)             \
+    {                                                   \
+        i &= LAST;                                      \
+        return (V){p[i[0]], p[i[1]], p[i[2]], p[i[3]]}; \
+    }
+TL_PICK(vi_lookup, vi, int32_t, 15)
+TL_PICK(vf_lookup, vf, float, 15)
+TL_PICK(vf_pick, vf, float, 3)
+TL_PICK(vi_pick, vi, int32_t, 3)
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
     i &= 3;
