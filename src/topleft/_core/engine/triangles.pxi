@@ -53,6 +53,11 @@ cdef class SnappedMesh:
         raise TypeError("what has been drawn refers to memory of this process and is not pickled or copied deeply: take "
                         "its arrays, such as .triangle and .depth")
 
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of the mesh, before any of them is cut."""
+        return self.snapped.n_triangles
+
     def seen_from(self, int32_t x_fx, int32_t y_fx) -> SnappedMesh:
         """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
         cdef SnappedMesh seen = self.copy()

@@ -6,9 +6,8 @@ In: meshes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and 
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Unpack
+from collections.abc import Callable, Sequence
+from typing import NoReturn, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +21,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.sampling import bits_of_bands
-from topleft._core.raster.snap import Snapped, snap_mesh
+from topleft._core.raster.snap import Snapped, refuse_changed, snap_mesh
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption
 
@@ -160,7 +159,7 @@ def peel(
     n, is_farthest = check_peel(checked, layers, depth_test)
     # Layers refer to what they were drawn from, so nothing of it can be reused.
     snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
-    ids, depth = peel_meshes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
+    ids, depth = peel_meshes(SCRATCH, [snapped.mesh], checked, n, is_farthest=is_farthest, refuse=snapped.refuse)
     return DepthLayers(ids, depth, snapped)
 
 
@@ -185,18 +184,20 @@ def as_layers(layers: object) -> int:
 
 def peel_meshes(
     memory: Memory,
-    meshes: Sequence[Snapped],
+    meshes: Sequence[engine.SnappedMesh],
     view: View,
     n_layers: int,
     *,
     is_farthest: bool,
     at_fx: tuple[int, int] = (0, 0),
+    refuse: Callable[[], NoReturn] = refuse_changed,
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids.
 
-    `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre.
+    `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre. `refuse` raises
+    the error for an index outside the vertices.
     """
-    meshes = [replace(snapped, mesh=snapped.mesh.seen_from(*at_fx)) for snapped in meshes] if any(at_fx) else meshes
+    meshes = [mesh.seen_from(*at_fx) for mesh in meshes] if any(at_fx) else meshes
     reach_fx = max(map(abs, at_fx))
     width, height = view.size
     check_fits((n_layers, height, width), np.int32, np.float32)
@@ -204,33 +205,28 @@ def peel_meshes(
     depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
     if 0 in view.size:
         return ids, depth
-    n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
+    n_threads = min(height, count_threads(view.threads, sum(mesh.n_triangles for mesh in meshes)))
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
     n_pixels = BAND_BYTES // (8 * n_layers) if choices.can_share(view) else min(height * width, 2**31 - 1)
     band_bits = bits_of_bands((height, width), n_pixels, n_threads)
-    bins = [bins_of(memory, snapped, view, band_bits, reach_fx) for snapped in meshes]
+    bins = [bins_of(memory, mesh, view, band_bits, reach_fx) for mesh in meshes]
     n_bands = -(-height >> band_bits)
 
     def peel_bands(first: int, end: int) -> int:
-        drawn = [snapped.mesh for snapped in meshes]
-        return engine.peel(drawn, bins, ids, depth, is_farthest, band_bits, first, end)
+        return engine.peel(meshes, bins, ids, depth, is_farthest, band_bits, first, end)
 
-    if max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
-        for snapped in meshes:
-            snapped.given.check_indices()
-        meshes[0].refuse()
+    is_bad = any(one is not None and one.bad_row >= 0 for one in bins)
+    if is_bad or max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
+        refuse()
     return ids, depth
 
 
-def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int, reach_fx: int) -> engine.Bins | None:
+def bins_of(memory: Memory, mesh: engine.SnappedMesh, view: View, band_bits: int, reach_fx: int) -> engine.Bins | None:
     """Return the triangles of each band of rows; None where every band looks at all of them."""
-    width, height = view.size
-    if not (snapped.n_triangles and choices.can_share(view)):
+    if not (mesh.n_triangles and choices.can_share(view)):
         return None
-    bins = engine.Bins(
-        snapped.mesh, height, width, reach_fx, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
-    )
-    if bins.bad_row >= 0:
-        snapped.refuse()
-    bins.fill(np.empty(bins.n_listed + 1, np.int32))
+    room = memory.empty("bins", (3, mesh.n_triangles + 16), np.int32)
+    bins = engine.Bins(mesh, *view.size[::-1], reach_fx, band_bits, room)
+    if bins.bad_row < 0:
+        bins.fill(np.empty(bins.n_listed + 1, np.int32))
     return bins

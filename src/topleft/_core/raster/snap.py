@@ -73,10 +73,15 @@ class Snapped:
         self.given.check_indices()
         if self.mesh.exact is not None:  # whose vertices were not looked at before
             check_finite(self.given.points, self.given.triangles, with_depth=False)
-        raise IndexError(
-            "triangles must hold indices of vertices while they are drawn, got some that did not, and now do: nobody "
-            "may write to them during a call"
-        )
+        refuse_changed()
+
+
+def refuse_changed() -> NoReturn:
+    """Raise the error for an index that was none of a vertex while it was drawn, and now is."""
+    raise IndexError(
+        "triangles must hold indices of vertices while they are drawn, got some that did not, and now do: nobody may "
+        "write to them during a call"
+    )
 
 
 class Vertices(NamedTuple):

@@ -252,8 +252,8 @@ def detailed(
     sight = sight_of(camera, size, options.get("viewport"), options.get("origin", (0, 0)))
     matrices = mesh.clip_from_objects(sight.clip_from_world)
     meshes = meshes_of(mesh)
-    for one, at in mesh.meshes.values():
-        if not why_whole(one, camera, tolerance, options.get("cull"), options.get("material")):
+    for one, material, at in mesh.looks(options.get("material")):
+        if not why_whole(one, camera, tolerance, options.get("cull"), material):
             levels = levels_of(one)
             for i, level in zip(at.tolist(), sight.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
                 meshes[i] = levels[level].mesh if level else one

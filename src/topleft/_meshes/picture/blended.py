@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core import engine
 from topleft._core.base.array_types import F32, U8
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.fragments import SeenSamples
 from topleft._core.raster.peel import peel_meshes
 from topleft._core.raster.rasterize import refuse_many
-from topleft._core.raster.snap import Snapped
 from topleft._core.raster.view import View
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import AlphaMode, Material
@@ -35,7 +35,7 @@ from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place
 from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
+from topleft._meshes.scene.scene import Scene, collapsed, meshes_in_places, scene_of
 
 Mask = npt.NDArray[np.bool_]
 
@@ -75,7 +75,7 @@ def blended_masks(subject: Mesh | Scene, options: ShadingOptions) -> list[Mask |
     """The blended triangles of each instance; None where there are none, or a picture does not tell them apart."""
     if options.mode not in BLENDING:
         return None
-    masks = [blended_triangles(mesh, options.material) for mesh in meshes_of(subject)]
+    masks = [blended_triangles(one.mesh, one.material) for one in meshes_in_places(subject, options.material)]
     return None if all(mask is None for mask in masks) else masks
 
 
@@ -119,7 +119,7 @@ class Glass:
         return self.whole.of(collapsed(self.whole.scene, inverse, keeps_others=False))
 
     @cached_property
-    def snapped(self) -> list[Snapped]:
+    def snapped(self) -> list[engine.SnappedMesh]:
         """The same, ready to be peeled."""
         return [self.blended.snap(i) for i, mask in enumerate(self.masks) if mask is not None]
 
@@ -131,7 +131,8 @@ class Glass:
         shown = []
         for i, one in zip(some, self.snapped, strict=True):
             mesh = self.scene[i].mesh if bent is None else bent[i].mesh_of(self.scene[i].mesh)
-            shown.append(ShownInstance(one.mesh, mesh, int(first_ids[i]), self.scene[i].transform))
+            own = self.scene[i]
+            shown.append(ShownInstance(one, mesh, int(first_ids[i]), own.transform, own.material))
         return Lit(shown, self.camera, self.view.size, self.options)
 
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:

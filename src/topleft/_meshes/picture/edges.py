@@ -38,7 +38,7 @@ def draw_all_edges(
     for instance in scene_of(subject):
         own_camera = camera.placed(instance.transform)
         vertices, triangles = instance.mesh.vertices, instance.mesh.triangles
-        is_single = None if cull is not None else instance.mesh.single_sided(options.material)
+        is_single = None if cull is not None else instance.mesh.single_sided(options.material or instance.material)
         kinds = [(triangles, cull_of(cull or "none", instance))]
         if is_single is not None:  # of some the edges of what shows its front
             kinds = [(triangles[is_single == 0], "none"), (triangles[is_single == 1], cull_of("back", instance))]

@@ -76,14 +76,14 @@ def parts_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[VisiblePart]:
     """What each instance shows that shows anything, of the mesh or scene that was drawn; a mesh shows one part."""
     parts: Sequence[Part] = getattr(frags, "parts", [Part(0, WHOLE, frags)])
     placed = meshes_in_places(subject)
-    return [VisiblePart(part.i, part.box, part.frags, *placed[part.i]) for part in parts]
+    return [VisiblePart(part.i, part.box, part.frags, *placed[part.i][:2]) for part in parts]
 
 
 def shown_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[ShownInstance]:
     """The instances that some sample sees, as they are shaded, of the mesh or scene that was drawn."""
     placed = meshes_in_places(subject)
     return [
-        ShownInstance(snapped, frags._parts_of(i, placed[i][0]), first, placed[i][1])
+        ShownInstance(snapped, frags._parts_of(i, placed[i].mesh), first, *placed[i][1:])
         for i, snapped, first in frags._drawn()
     ]
 

@@ -28,7 +28,7 @@ from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.fragments import BentFragments, SceneFragments
 from topleft._meshes.picture.instances import PlacedScene
 from topleft._meshes.picture.look import ShadingInputs, Surface
-from topleft._meshes.scene.scene import Scene, collapsed, meshes_of, scene_of
+from topleft._meshes.scene.scene import Scene, collapsed, meshes_in_places, scene_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
 
 def cuts_of(subject: Mesh | Scene, material: Material | None) -> list[Cut | None]:
     """What materials, or this one, cut out of the mesh of each instance."""
-    return [cut_of(mesh, material) for mesh in meshes_of(subject)]
+    return [cut_of(one.mesh, one.material) for one in meshes_in_places(subject, material)]
 
 
 def without_holes(
@@ -180,7 +180,7 @@ def draw_holed(
 ) -> None:
     """Draw the triangles with holes over the planes of what one sample sees (1, H, W), or over layers (K, H, W)."""
     for i, mesh, camera, cut in holed:
-        scene = placed.snap(i).mesh.seen_from(*at)
+        scene = placed.snap(i).seen_from(*at)
         draw_cut(scene, mesh, camera, cut, ids, depth, is_peeled=is_peeled, threads=threads)
 
 

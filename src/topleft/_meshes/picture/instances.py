@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, set_aligned
 from topleft._core.base.memory import FRESH, SCRATCH, KeptMemory, Memory, check_fits, empty
-from topleft._core.base.options import DepthTest, Sampling, Sink, parse
+from topleft._core.base.options import Cull, DepthTest, Sampling, Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.classic import refuse_classic
@@ -26,8 +26,8 @@ from topleft._core.raster.fragments import GivenCorners
 from topleft._core.raster.peel import check_peel, peel_meshes
 from topleft._core.raster.rasterize import canvas_of, refuse_many
 from topleft._core.raster.sampling import sample_positions, sum_areas
-from topleft._core.raster.snap import Snapped, snap_mesh
-from topleft._core.raster.view import View, ViewOptions
+from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.view import CULL_CODES, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
 from topleft._meshes.picture.fragments import Ids, SceneDepthLayers, SceneFragments
@@ -86,7 +86,7 @@ class PlacedScene:
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
-        self._kept: dict[int, Snapped] = {}
+        self._kept: dict[int, engine.SnappedMesh] = {}
         self._n_kept = 0  # vertices of these
         self._last: tuple[int, View] | None = None  # the instance that was last asked for: often thrice in turn
 
@@ -109,21 +109,69 @@ class PlacedScene:
         wholes = np.concatenate([*(one.source + first for one, first in firsts), [-1]]).astype(np.int32)
         return wholes[ids]  # part -1, none, is the last
 
-    def snap(self, i: int) -> Snapped:
+    def snap(self, i: int) -> engine.SnappedMesh:
         """Return an instance, snapped; in shared buffers it draws its own range of ids. Small scenes are kept."""
         kept = self._kept.get(i)
-        if kept is not None:
-            return kept
-        snapped = self._snap(i)
+        return self._snap(i, i + 1)[0] if kept is None else kept
+
+    def _snap(self, first: int, end: int) -> list[engine.SnappedMesh]:
+        """Return instances [first, end) in the same way: those in one call that need no closer look."""
+        view, n = self._view, end - first
+        firsts = self._first_vertices[first : end + 1] - self._first_vertices[first]
+        found: list[engine.SnappedMesh | None] = [None] * n
+        if view.plan is None and view.grid_bits == view.subpixel_bits and 0 not in view.size:
+            points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
+            shape = int(firsts[-1]) * engine.VERTEX_BYTES
+            room = FRESH.empty("records", (shape,), np.uint8) if points is None else points
+            meshes = [(one.mesh.vertices, one.mesh.triangles) for one in self.scene.instances[first:end]]
+            culls, numbers = self._sides[0][first:end], self._numbers[first:end]
+            given = meshes, self._clip_from_objects[first:end], culls, numbers, view.engine_viewport(), view.how
+            n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
+            parts = run_parts(lambda k, end: engine.project_instances(*given, room, firsts, k, end), n, n_threads)
+            found = [mesh for part in parts for mesh in part]
+        has_some_sides = self._sides[1]
+        for k, mesh in enumerate(found):
+            i = first + k
+            if mesh is None or has_some_sides[i]:
+                found[k] = self._snap_alone(i)
+        snapped = cast("list[engine.SnappedMesh]", found)
         if self._n_kept < VERTICES_AT_ONCE:
-            self._kept[i], self._n_kept = snapped, self._n_kept + snapped.n_vertices
+            self._kept.update(zip(range(first, end), snapped, strict=True))
+            self._n_kept += int(firsts[-1])
         return snapped
 
-    def _snap(self, i: int) -> Snapped:
+    def _snap_alone(self, i: int) -> engine.SnappedMesh:
         mesh = self.scene[i].mesh
-        view, with_depth = self._view_of(i), self._with_depth
-        snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
-        return replace(snapped, mesh=snapped.mesh.numbered_from(self._number(i)))
+        snapped = snap_mesh(
+            FRESH, mesh.vertices, mesh.triangles, self._view_of(i), with_depth=self._with_depth, out=None
+        )
+        return snapped.mesh.numbered_from(int(self._numbers[i]))
+
+    @cached_property
+    def _first_vertices(self) -> NDArray[np.int64]:
+        """Where the vertices of each instance begin when all are counted, and the number of all: (N + 1,)."""
+        return np.cumsum([0, *(len(one.mesh.vertices) for one in self.scene.instances)], dtype=np.int64)
+
+    @cached_property
+    def _numbers(self) -> NDArray[np.int64]:
+        """What triangle 0 of each instance is called."""
+        has_ids = self._with_depth and self.scene.n_triangles <= INT32_MAX
+        return self.first_ids[:-1] + self._first_id if has_ids else np.zeros(len(self.scene), np.int64)
+
+    @cached_property
+    def _sides(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """The `tl_cull` of each instance, and which have triangles with two sides beside others with one."""
+        is_mirrored = np.array([one.is_mirrored for one in self.scene.instances], np.bool_)
+        culls = np.where(is_mirrored, MIRRORED[self._view.cull], self._view.cull).astype(np.int32)
+        is_mixed = np.zeros(len(culls), np.bool_)
+        for mesh, material, at in self.whole.looks(self._material) if self._view.sides_by_material else ():
+            is_single = mesh.single_sided(material)
+            if is_single is None:
+                continue
+            is_mixed[at] = not is_single.all()
+            if not is_mixed[at[0]]:
+                culls[at] = np.where(is_mirrored[at], CULL_CODES[Cull.FRONT], CULL_CODES[Cull.BACK])
+        return culls, is_mixed
 
     def corners(self, i: int) -> GivenCorners:
         """Return what an instance is drawn from."""
@@ -134,7 +182,7 @@ class PlacedScene:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
         if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
             return ClusteredMesh(*self.clustered(i)).part(triangles())
-        return self.snap(i).mesh
+        return self.snap(i)
 
     def _view_of(self, i: int) -> View:
         last = self._last
@@ -143,34 +191,22 @@ class PlacedScene:
         return last[1]
 
     def _make_view(self, i: int) -> View:
-        instance, view = self.scene[i], self._view
-        cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
-        own = replace(view, transform=self._clip_from_objects[i], cull=cull)
-        is_single = self.whole[i].mesh.single_sided(self._material)
-        if is_single is None:
+        culls, is_mixed = self._sides
+        own = replace(self._view, transform=self._clip_from_objects[i], cull=int(culls[i]))
+        if not is_mixed[i]:
             return own
-        is_single = is_single if self.bent is None else is_single[self.bent[i].source]
-        return own.without_backs(is_single, is_mirrored=instance.is_mirrored)
+        whole = self.whole[i]
+        is_single = whole.mesh.single_sided(whole.material if self._material is None else self._material)
+        is_single = is_single if is_single is None or self.bent is None else is_single[self.bent[i].source]
+        return own.without_backs(is_single, is_mirrored=self.scene[i].is_mirrored)
 
     def _can_cluster(self, sink: Sink) -> bool:
         """Whether clusters may be drawn, which do not know that some triangles are single-sided and others are not."""
-        return self._may_cluster and choices.can_cluster(self._view, sink) and not self._has_sides
-
-    @cached_property
-    def _has_sides(self) -> bool:
-        if not self._view.sides_by_material:
-            return False
-        masks = (mesh.single_sided(self._material) for mesh, _ in self.whole.meshes.values())
-        return any(mask is not None and not mask.all() for mask in masks)
+        return self._may_cluster and choices.can_cluster(self._view, sink) and not self._sides[1].any()
 
     def clustered(self, i: int) -> tuple[Clusters, View, int]:
         """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
-        return self.scene[i].mesh.clusters, self._view_of(i), self._number(i)
-
-    def _number(self, i: int) -> int:
-        """What triangle 0 of an instance is called in a buffer of ids, if there is one, and int32 counts them."""
-        has_ids = self._with_depth and self.scene.n_triangles <= INT32_MAX
-        return int(self.first_ids[i]) + self._first_id if has_ids else 0
+        return self.scene[i].mesh.clusters, self._view_of(i), int(self._numbers[i])
 
     def groups(self) -> Iterator[tuple[int, PlacedScene]]:
         """Yield parts of the scene whose triangles int32 counts from 1 on, each with where its own ids begin."""
@@ -241,18 +277,15 @@ class PlacedScene:
             is_float32[at] = mesh.clusters.points.dtype == np.float32
         return is_float32
 
-    def chunks(self) -> Iterator[list[Snapped]]:
+    def chunks(self) -> Iterator[list[engine.SnappedMesh]]:
         """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
-        chunk: list[Snapped] = []
-        n_vertices = 0
-        for i in range(len(self.scene)):
-            chunk.append(self.snap(i))
-            n_vertices += chunk[-1].n_vertices
-            if n_vertices >= VERTICES_AT_ONCE:
-                yield chunk
-                chunk, n_vertices = [], 0
-        if chunk:
-            yield chunk
+        first, firsts = 0, self._first_vertices
+        while first < len(self.scene):
+            end = int(np.searchsorted(firsts, firsts[first] + VERTICES_AT_ONCE))
+            end = min(max(end, first + 1), len(self.scene))
+            is_kept = len(self._kept) == len(self.scene)
+            yield [self._kept[i] for i in range(first, end)] if is_kept else self._snap(first, end)
+            first = end
 
     def draw(
         self, targets: list[engine.Target], positions: Sequence[tuple[int, int]], height: int, *, is_first: bool = True
@@ -277,7 +310,7 @@ class PlacedScene:
         for chunk in self.chunks():
             n_left -= len(chunk)
             for target, at in zip(targets, positions, strict=True):
-                scenes = [snapped.mesh.seen_from(*at) for snapped in chunk]
+                scenes = [mesh.seen_from(*at) for mesh in chunk]
                 run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
             is_first = False
 
@@ -493,8 +526,8 @@ def peel_scene(
     scene.check_counted("a scene that is peeled")
     placed, view = place(scene, camera, size, options, material=material)
     n, is_farthest = check_peel(view, layers, depth_test)
-    snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
-    return SceneDepthLayers(*peel_meshes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
+    meshes = [mesh for chunk in placed.chunks() for mesh in chunk]  # a band of rows is drawn once, with all instances
+    return SceneDepthLayers(*peel_meshes(SCRATCH, meshes, view, n, is_farthest=is_farthest), placed)
 
 
 def draw_scene_coverage(
@@ -543,8 +576,8 @@ def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> N
     canvas[...] = 0
     own = empty(canvas.shape, np.float32)
     for chunk in placed.chunks():
-        for snapped in chunk:
-            n_threads = count_threads(view.threads, snapped.n_triangles)
-            sum_areas(SCRATCH, snapped.mesh, snapped.n_triangles, own, n_threads, is_clamped=True)
+        for mesh in chunk:
+            n_threads = count_threads(view.threads, mesh.n_triangles)
+            sum_areas(SCRATCH, mesh, mesh.n_triangles, own, n_threads, is_clamped=True)
             canvas += own
     np.minimum(canvas, 1, out=canvas)

@@ -39,8 +39,8 @@ LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in
 
 EYE = np.eye(4)
 
-MOST_TABLES = 4
-"""Tables that are kept of a mesh: what differs is the material, or whether faces are flat, lit, mirrored."""
+MOST_TABLES = 256
+"""Tables that are kept of a mesh: instances differ in material, and whether faces are flat, lit, mirrored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,8 @@ class ShadingMesh:
         self._triangles = mesh.triangles
         self.normal_of_corner = None if corners is None else corners.of_corner
         self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
-        low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
+        box = box_of_triangles(self.positions, self._triangles) if len(mesh.triangles) else np.zeros((2, 3))
+        low, high = box.astype(self.positions.dtype)
         self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
         self.tables: dict[tuple[object, ...], tuple[Sequence[Material], engine.ShadingTable]] = {}  # see `table_of`

@@ -147,6 +147,8 @@ class ShownInstance(NamedTuple):
     """What its triangle 0 is called in the ids."""
     place: F64 | None = None
     """World from object, (4, 4); None: the world is the space of the mesh."""
+    material: Material | None = None
+    """What goes before the materials of the mesh."""
 
 
 def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
@@ -250,7 +252,8 @@ def look_of(
 ) -> ShadingInputs:
     """What kernels read of an instance that is seen by `view`, eye from object."""
     mesh = shown.mesh
-    own = (options.material,) if options.material is not None else mesh.materials
+    material = shown.material if options.material is None else options.material
+    own = mesh.materials if material is None else (material,)
     own = own or (plain_material(options.color if mesh.colors is None else None),)
     surface = Surface(
         own,

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +19,10 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
+from topleft._core.base.color import ColorLike
 from topleft._core.raster.clusters import Backoff
 from topleft._meshes.io.load import load
+from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
@@ -38,13 +40,18 @@ class Instance:
         World from object, with last row [0, 0, 0, 1] and not singular. One that mirrors turns the winding over, and
         what `cull` leaves out with it, so that the outside stays outside.
     name : str, optional
+    material : Material, optional
+        For all triangles, instead of those of the mesh; `render(material=)` goes before it.
+    color : str, integers of 0 to 255 or floats of 0 to 1, optional
+        sRGB, as for `Material`: short for ``material=Material(color)``.
 
     Raises
     ------
     ValueError
-        If the matrix has another shape or last row, is singular, or holds a number that is not finite.
+        If the matrix has another shape or last row, is singular, or holds a number that is not finite; if both a colour
+        and a material are given.
     TypeError
-        If `mesh` is none.
+        If `mesh` or `material` is none.
 
     Examples
     --------
@@ -61,18 +68,33 @@ class Instance:
     mesh: Mesh
     transform: F64 = field(default_factory=lambda: np.eye(4))
     name: str | None = None
+    material: Material | None = None
+    color: InitVar[ColorLike | None] = None
 
     if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
 
-        def __init__(self, mesh: Mesh, transform: npt.ArrayLike = ..., name: str | None = None) -> None: ...
+        def __init__(
+            self,
+            mesh: Mesh,
+            transform: npt.ArrayLike = ...,
+            name: str | None = None,
+            material: Material | None = None,
+            color: ColorLike | None = None,
+        ) -> None: ...
 
     __setstate__ = set_read_only
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, color: ColorLike | None) -> None:
         if not isinstance(self.mesh, Mesh):
             raise TypeError(f"mesh must be a Mesh, got {shown(self.mesh)}: topleft.as_mesh makes one of others")
         if not isinstance(self.name, str | None):
             raise TypeError(f"name must be a str or None, got {shown(self.name)}")
+        if not isinstance(self.material, Material | None):
+            raise TypeError(f"material must be a Material or None, got {shown(self.material)}")
+        if color is not None:
+            if self.material is not None:
+                raise ValueError("an instance takes a colour or a material, got both: Material(color, ...) has one")
+            object.__setattr__(self, "material", Material(color))
         matrix = as_square("transform", self.transform, 4)
         if not np.array_equal(matrix[3], [0, 0, 0, 1]):
             raise ValueError(f"the last row of transform must be [0, 0, 0, 1], got {matrix[3].tolist()}")
@@ -203,6 +225,16 @@ class Scene:
             found.setdefault(id(instance.mesh), []).append(i)
         return {key: (self.instances[at[0]].mesh, np.array(at, np.intp)) for key, at in found.items()}
 
+    def looks(self, material: Material | None) -> list[tuple[Mesh, Material | None, npt.NDArray[np.intp]]]:
+        """The different meshes, each with this material or that of its instances, and which instances these are."""
+        if material is not None or all(one.material is None for one in self.instances):
+            return [(mesh, material, at) for mesh, at in self.meshes.values()]
+        found: dict[tuple[int, int], list[int]] = {}
+        for i, one in enumerate(self.instances):
+            found.setdefault((id(one.mesh), id(one.material)), []).append(i)
+        firsts = [(self.instances[at[0]], at) for at in found.values()]
+        return [(one.mesh, one.material, np.array(at, np.intp)) for one, at in firsts]
+
     @cached_property
     def boxes(self) -> F64:
         """The `vertex_box` of the mesh of each instance, (N, 6); NaN where a vertex is not finite."""
@@ -325,11 +357,21 @@ def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
     return given if isinstance(given, Scene) else as_mesh(given)
 
 
-def meshes_in_places(subject: Mesh | Scene) -> list[tuple[Mesh, F64 | None]]:
-    """The mesh of each instance and world from object; None for a mesh alone, which stands where its vertices are."""
+class Placed(NamedTuple):
+    """A mesh of a subject, as it is shaded."""
+
+    mesh: Mesh
+    transform: F64 | None
+    """World from object; None for a mesh alone, which stands where its vertices are."""
+    material: Material | None
+    """What goes before the materials of the mesh."""
+
+
+def meshes_in_places(subject: Mesh | Scene, material: Material | None = None) -> list[Placed]:
+    """The mesh of each instance; `material` goes before those of instances."""
     if isinstance(subject, Mesh):
-        return [(subject, None)]
-    return [(instance.mesh, instance.transform) for instance in subject]
+        return [Placed(subject, None, material)]
+    return [Placed(one.mesh, one.transform, one.material if material is None else material) for one in subject]
 
 
 def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
@@ -344,17 +386,17 @@ def scene_of(subject: Mesh | Scene) -> Scene:
 
 def collapsed(scene: Scene, masks: Sequence[npt.NDArray[np.bool_] | None], *, keeps_others: bool = True) -> Scene:
     """The scene with these triangles collapsed to points, so ids stay; other instances whole, or all of them."""
-    made: dict[int, Mesh] = {}
+    made: dict[tuple[int, int], Mesh] = {}
     instances = []
     for instance, mask in zip(scene, masks, strict=True):
-        mesh = instance.mesh
+        mesh, key = instance.mesh, (id(instance.mesh), id(instance.material))
         if mask is None and keeps_others:
             instances.append(instance)
             continue
-        if id(mesh) not in made:
+        if key not in made:
             if mask is None:
-                made[id(mesh)] = Mesh(mesh.vertices[mesh.triangles[:1, 0]], np.zeros_like(mesh.triangles))
+                made[key] = Mesh(mesh.vertices[mesh.triangles[:1, 0]], np.zeros_like(mesh.triangles))
             else:
-                made[id(mesh)] = Mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
-        instances.append(Instance(made[id(mesh)], instance.transform))
+                made[key] = Mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
+        instances.append(instance.with_mesh(made[key]))
     return Scene(instances)
