@@ -24,7 +24,16 @@ from benchmarks.report.study import Study
 from benchmarks.report.tables import facts_text, number, table
 
 HERE = Path(__file__).parent
-FLAGS = "-std=c11 -DNDEBUG -O3 -g0 -ffp-contract=off -fno-fast-math -fno-math-errno -D_GNU_SOURCE".split()
+FLAGS = [
+    "-std=c11",
+    "-DNDEBUG",
+    "-O3",
+    "-g0",
+    "-ffp-contract=off",
+    "-fno-fast-math",
+    "-fno-math-errno",
+    "-D_GNU_SOURCE",
+]
 SSE41 = "-msse4.1 -mpopcnt -mno-mmx"
 AVX2 = "-mavx2 -mfma -mbmi -mbmi2 -mlzcnt -mpopcnt"
 AVX512 = f"{AVX2} -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512cd -mprefer-vector-width=512"
