@@ -526,9 +526,9 @@ TL_INLINE vf vf_fma(vf a, vf b, vf c)
     const vd product = vd_mul(vd_from_vf(a), vd_from_vf(b)), addend = vd_from_vf(c);
     vd sum = vd_add(product, addend);
     const vi low = TL_SHUFFLE((vi)sum.lo, (vi)sum.hi, 0, 2, 4, 6);
-    const vi high = TL_SHUFFLE((vi)sum.lo, (vi)sum.hi, 1, 3, 5, 7) & INT32_MAX;
+    const v4u high = (v4u)TL_SHUFFLE((vi)sum.lo, (vi)sum.hi, 1, 3, 5, 7);
     const vm is_middle = (vm)((low & 0x1fffffff) == 0x10000000);
-    const vm is_tiny = (vm)(high < 0x38100000) & (vm)(high != 0);
+    const vm is_tiny = (vm)((vi)(high + high + INT32_MAX) < INT32_MIN + 0x701fffff); /* 0 < 2 * high < 0x70200000 */
     if (__builtin_expect(vm_any(is_middle | is_tiny), 0))
         sum = (vd){sum_to_odd(product.lo, addend.lo), sum_to_odd(product.hi, addend.hi)};
     return vf_from_vd(sum);
