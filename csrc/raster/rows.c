@@ -244,21 +244,74 @@ TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Triangle k of those at i in the queue, in blocks of TL_LANES rows.  With an int for k, gcc spills a
- * register more of the mask's copy: 3 % of its time on AVX-512. */
+/* Whether rows are drawn as spans, one after the other: of masks, whose samples are bits, and where a block of columns
+ * would be as narrow as the rows of middle boxes.  Else in blocks of TL_LANES rows and columns. */
+#define TL_BY_SPANS(sink) (TL_LANES == 4 || (sink) == TL_SINK_MASK)
+
+/* The depths of columns from col0 on, as sums with those of rows have them. */
+TL_INLINE vd depths_of_columns(tl_geometry g, const row_edges *r, int64_t k, int col0, double unit)
+{
+    const vd x = vd_add(vd_set1(r->x[k] + col0 * unit), ramp(unit));
+    return vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
+}
+
+/* The samples [first, end) of up to TL_LANES rows, where there are some. */
+TL_INLINE void draw_spans(const tl_target *target, tl_sink sink, vi first, vi end, int n_rows, const double *z_row,
+                          int64_t at, const double *z_cols, int32_t id)
+{
+    int32_t firsts[TL_MAX_LANES], lengths[TL_MAX_LANES];
+    vi_store(firsts, first), vi_store(lengths, vi_sub(end, first));
+    for (int row = 0; row < n_rows; row++, at += target->stride_px) {
+        const int n = lengths[row], from = firsts[row];
+        if (n <= 0)
+            continue;
+        if (sink == TL_SINK_MASK) {
+            cover(target, at + from, ~0ull >> (64 - n));
+            continue;
+        }
+        const vd z = vd_set1(sink_has_depth(sink) ? z_row[row] : 0.0);
+        for (int col = from; col < from + n; col += TL_LANES)
+            put_lanes(target, sink, at + col, vm_first(from + n - col), z, vd_load(z_cols + col), id);
+    }
+}
+
+/* The same in blocks of TL_LANES columns. */
+TL_INLINE void draw_blocks(tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r, int64_t k,
+                           vi first, vi end, int n_cols, const double *z_row, int64_t at, double unit, int32_t id)
+{
+    const vi zero = vi_set1(0);
+    int32_t bits[TL_MAX_LANES];
+    for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
+        const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
+        const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
+                                          vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
+        const unsigned drawn = vm_bits(vi_gt(in_block, zero));
+        if (!drawn)
+            continue;
+        const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
+        double z_cols[TL_LANES];
+        vd_store(z_cols, sink_has_depth(sink) ? depths_of_columns(g, r, k, col0, unit) : vd_set1(0));
+        vi_store(bits, in_block);
+        draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
+                   width <= TL_HALF_LANES, z_cols, id);
+    }
+}
+
+/* Triangle k of those at i in the queue, TL_LANES rows at a time.  With an int for k, gcc spills a register more of the
+ * mask's copy: 3 % of its time on AVX-512. */
 TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
                          const lane_exact *t, int i, int64_t k)
 {
     const double unit = plane_step(s, g);
     const box_queue *q = &s->rows;
     const int32_t size = q->size[i + k], id = name_of(s->snapped, q->id[i + k]), sample = r->sample[k];
-    const int n_cols = size & 0xffff, n_rows = size >> 16, n_block = sink == TL_SINK_MASK ? TL_BIT_COLS : TL_BLOCK_COLS;
+    const int n_cols = size & 0xffff, n_rows = size >> 16;
     const vi zero = vi_set1(0);
     const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[k]));
     const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[k]));
-    int32_t bits[TL_MAX_LANES];
-    double z_row[TL_MAX_LANES];
-    const vd steps = ramp(unit);
+    double z_row[TL_MAX_LANES], z_cols[TL_MAX_BOX_PX + TL_MAX_LANES];
+    for (int col = 0; TL_BY_SPANS(sink) && sink_has_depth(sink) && col < n_cols; col += TL_LANES)
+        vd_store(z_cols + col, depths_of_columns(g, r, k, col, unit));
     for (int row0 = 0; row0 < n_rows; row0 += TL_LANES) {
         const int64_t at = (uint32_t)sample + row0 * target->stride_px;
         vm doubted = vm_first(0);
@@ -270,29 +323,17 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
             refine_row_ends(s, i, (int)k, t, row0, vm_bits(doubted), &ends);
             first = vi_load(ends.first), end = vi_load(ends.end);
         }
-        end = vi_select(vm_first(n_rows - row0), end, zero);
         if (sink_has_depth(sink)) {
-            const vd y = vd_add(vd_set1(r->y[k] + row0 * unit), steps);
+            const vd y = vd_add(vd_set1(r->y[k] + row0 * unit), ramp(unit));
             const vd from = g == TL_FIXED ? y : vd_sub(y, vd_set1(r->y0[k]));
             vd_store(z_row, vd_add(vd_set1(r->z0[k]), vd_mul(vd_set1(r->slope_y[k]), from)));
         }
-        for (int col0 = 0; col0 < n_cols; col0 += n_block) {
-            const int width = n_cols - col0 < n_block ? n_cols - col0 : n_block;
-            const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
-                                              vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
-            const unsigned drawn = vm_bits(vi_gt(in_block, zero));
-            if (!drawn)
-                continue;
-            const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            double z_cols[TL_BLOCK_COLS + TL_LANES];
-            for (int col = 0; sink_has_depth(sink) && col < (TL_BLOCK_COLS == TL_LANES ? 1 : width); col += TL_LANES) {
-                const vd x = vd_add(vd_set1(r->x[k] + (col0 + col) * unit), steps);
-                vd_store(z_cols + col,
-                         vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k]))));
-            }
-            vi_store(bits, in_block);
-            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
-                       width <= TL_HALF_LANES, z_cols, id);
+        if (TL_BY_SPANS(sink)) {
+            const int n = n_rows - row0 < TL_LANES ? n_rows - row0 : TL_LANES;
+            draw_spans(target, sink, vi_max(first, zero), vi_min(end, vi_set1(n_cols)), n, z_row, at, z_cols, id);
+        } else {
+            draw_blocks(g, target, sink, r, k, first, vi_select(vm_first(n_rows - row0), end, zero), n_cols, z_row, at,
+                        unit, id);
         }
     }
 }
