@@ -1,5 +1,6 @@
 """The functions of the lanes give the numbers of scalar on every instruction set, where machines differ most."""
 
+import ctypes
 import platform
 import shutil
 import subprocess
@@ -94,7 +95,67 @@ def test_kernels_leave_the_floating_point_of_the_host_as_it_was(isa):
     camera = tl.Camera.look_at((0.2, 0.1, 3), near=0.01, far=100)
     mesh = tl.Mesh(vertices.astype(np.float32), triangles)
     with on(isa):
-        for sampling, shading in product(("center", "msaa4", "area"), ("smooth", "ids")):
+        for sampling, shading in product(("center", "msaa4"), ("smooth", "ids")):
             tl.render(mesh, camera, (60, 40), sampling=sampling, shading=shading)
+            tl.fill(*soup_of(40, 1), np.full((40, 4), 99, np.uint8), (60, 40), per="triangle", blend="over")
             assert np.longdouble(7) % np.longdouble(4) == 3
             assert np.isfinite(np.float32([5.5, 6.5, 7.5]) % np.float32(1)).all()
+
+
+def soup_of(n, seed):
+    """Triangles of 1 to 60 pixels, with depth."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(0, 90, (n, 1, 3)) + rng.uniform(-0.5, 0.5, (n, 3, 3)) * rng.uniform(1, 60, (n, 1, 1))
+    return corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3)
+
+
+FLUSH = """
+#if defined(__aarch64__)
+void flush(int is_on)
+{
+    unsigned long word;
+    __asm__ volatile("mrs %0, fpcr" : "=r"(word));
+    word = is_on ? word | 1ul << 24 : word & ~(1ul << 24);
+    __asm__ volatile("msr fpcr, %0" ::"r"(word));
+}
+#else
+#include <xmmintrin.h>
+void flush(int is_on) { _mm_setcsr(is_on ? _mm_getcsr() | 0x8040 : _mm_getcsr() & ~0x8040u); }
+#endif
+"""
+
+
+@pytest.fixture(scope="module")
+def flush(tmp_path_factory):
+    """Sets, as a host library may, that this thread takes numbers below 2^-126, and in float64 2^-1022, for 0."""
+    if not compiler() or platform.machine() not in ("x86_64", "aarch64") or platform.system() != "Linux":
+        pytest.skip("no C compiler, or no machine that this is written for")
+    library = tmp_path_factory.mktemp("flush") / "flush.so"
+    library.with_suffix(".c").write_text(FLUSH, encoding="utf-8")
+    subprocess.run([*compiler(), "-shared", "-fPIC", "-O1", library.with_suffix(".c"), "-o", library], check=True)
+    function = ctypes.CDLL(str(library)).flush
+    yield lambda is_on: function(int(is_on))
+    function(0)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("bits", [8, "exact"])
+def test_host_that_flushes_tiny_numbers_to_zero_gets_the_same_bits(isa, bits, flush):
+    """No kernel makes such numbers on its way; those of the caller, a depth of 1e-40, may become 0."""
+    scene, made = (*soup_of(300, 2), (97, 80)), []
+    mesh = tl.Mesh(*(np.asarray(array) for array in tl.scenes.blob(2000)))
+    camera = tl.Camera.look_at((0.2, 0.1, 3), near=0.01, far=100)
+    for is_on in (False, True):
+        flush(is_on)
+        try:
+            assert (np.float32(2e-38) * np.float32(0.25) == 0) == is_on
+            with on(isa):
+                drawn = tl.rasterize(*scene, subpixel_bits=bits)
+                colors = np.linspace(0, 1, 1200, dtype=np.float32).reshape(300, 4)
+                filled = tl.fill(*scene[:2], colors, scene[2], per="triangle", blend="over", subpixel_bits=bits)
+                picture = tl.render(mesh, camera, (60, 40), subpixel_bits=bits)
+                made.append([drawn.triangle, drawn.depth, drawn.barycentric(), filled, picture])
+        finally:
+            flush(False)
+    for got, wanted in zip(made[1], made[0], strict=True):
+        assert_same(got, wanted)
