@@ -63,6 +63,8 @@ FLAGS_CYTHON = [
 FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-fno-math-errno"]
 # For findings of a sanitizer: where they are, and integers whose overflow the language does not define.
 FLAGS_SANITIZED = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"]
+# gcc 12 moves halves of vectors through a register of MMX, and leaves the floating point of x87 in ruins.
+FLAGS_SSE41 = ["-msse4.1", "-mpopcnt", "-mno-mmx"]
 FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
 FLAGS_AVX512 = [
     *FLAGS_AVX2,
@@ -72,7 +74,7 @@ FLAGS_VBMI = [*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2"]
 
 CPUS_OF_WINDOWS = {"win-amd64": "x86_64", "win-arm64": "aarch64", "win32": "i686"}
 
-# What a compiler has to accept before a unit is built. Scalar: C11, no excess precision.
+# What a compiler has to accept before a unit is built, if it has the target. Scalar: C11, no excess precision.
 PROBE_SCALAR = """
 #include <float.h>
 #if FLT_EVAL_METHOD != 0
@@ -80,18 +82,19 @@ PROBE_SCALAR = """
 #endif
 _Static_assert(sizeof(double) == 8, "float64");
 """
+PROBE_SIMD128 = """
+#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "big-endian"
+#endif
+typedef float lanes __attribute__((vector_size(16)));
+lanes probe(lanes a) { return a * a; }
+"""
 PROBE_AVX2 = """
 #include <immintrin.h>
-#if !defined(__x86_64__)
-#error "not x86-64"
-#endif
 int probe(__m256i a) { return (int)_lzcnt_u32((unsigned)_mm256_movemask_epi8(_mm256_abs_epi32(a))); }
 """
 PROBE_AVX512 = """
 #include <immintrin.h>
-#if !defined(__x86_64__)
-#error "not x86-64"
-#endif
 __m512i probe(__m512i a, __mmask64 m) { return _mm512_mask_mullo_epi64(_mm512_lzcnt_epi32(a), (__mmask8)m, a, a); }
 """
 
@@ -103,14 +106,24 @@ __m512i probe(__m512i a, __mmask64 m) { return _mm512_maskz_compress_epi8(m, _mm
 
 @dataclass(frozen=True)
 class Isa:
-    """One kernel unit: `csrc/isa_<name>.c`, its flags, and a file that tells whether the compiler can build it."""
+    """A kernel unit, `csrc/isa_<name>.c`, on one target: a macro of the target's compilers, flags, a text to try."""
 
     name: str
+    target: str
     flags: list[str]
     probe: str
+    is_built_unasked: bool = True
 
 
-ISAS = [Isa("scalar", [], PROBE_SCALAR), Isa("avx2", FLAGS_AVX2, PROBE_AVX2), Isa("avx512", FLAGS_AVX512, PROBE_AVX512)]
+# On x86-64 vectors of 128 bits are for tests: a wheel would grow by 0.7 MB, and nearly every machine has AVX2.
+ISAS = [
+    Isa("scalar", "__STDC__", [], PROBE_SCALAR),
+    Isa("simd128", "__aarch64__", [], PROBE_SIMD128),
+    Isa("simd128", "__wasm__", ["-msimd128"], PROBE_SIMD128),
+    Isa("simd128", "__x86_64__", FLAGS_SSE41, PROBE_SIMD128, is_built_unasked=False),
+    Isa("avx2", "__x86_64__", FLAGS_AVX2, PROBE_AVX2),
+    Isa("avx512", "__x86_64__", FLAGS_AVX512, PROBE_AVX512),
+]
 
 
 def wanted_isas() -> set[str] | None:
@@ -119,7 +132,7 @@ def wanted_isas() -> set[str] | None:
     if not text:
         return None
     names = {name.strip() for name in text.split(",") if name.strip()}
-    known = [isa.name for isa in ISAS]
+    known = list(dict.fromkeys(isa.name for isa in ISAS))
     if unknown := sorted(names - set(known)):
         raise PlatformError(f"TOPLEFT_BUILD_ISA must list some of {', '.join(known)}, got {', '.join(unknown)}")
     return names | {"scalar"}
@@ -270,20 +283,27 @@ class BuildTopleft(build_ext):
     def isas_to_build(self, pool: ThreadPoolExecutor) -> list[Isa]:
         """Return the kernel units to build: those asked for, or all that the compiler can build."""
         wanted = wanted_isas()
-        accepted = pool.map(lambda isa: self.accepts(FLAGS_C + isa.flags, isa.probe), ISAS)
-        chosen = []
-        for isa, is_accepted in zip(ISAS, accepted, strict=True):
-            if wanted is not None and isa.name not in wanted:
-                continue
-            if is_accepted:
-                chosen.append(isa)
-            elif isa.name == "scalar":
-                raise CompileError("topleft needs gcc or clang with C11, and a machine without excess precision")
-            elif wanted is not None:
-                raise CompileError(f"TOPLEFT_BUILD_ISA asks for {isa.name}, which this compiler cannot build")
-            else:
-                self.warn(f"no {isa.name} unit: this compiler cannot build it")
+        accepted = pool.map(self.can_build, ISAS)
+        chosen = [
+            isa
+            for isa, is_accepted in zip(ISAS, accepted, strict=True)
+            if is_accepted and (isa.is_built_unasked if wanted is None else isa.name in wanted)
+        ]
+        names = {isa.name for isa in chosen}
+        if "scalar" not in names:
+            raise CompileError("topleft needs gcc or clang with C11, and a machine without excess precision")
+        if missing := sorted((wanted or names) - names):
+            raise CompileError(f"TOPLEFT_BUILD_ISA asks for {', '.join(missing)}, which this compiler cannot build")
         return chosen
+
+    def can_build(self, isa: Isa) -> bool:
+        """Whether the compiler builds for the target of a unit, which may be no machine like this, and the unit."""
+        if not self.accepts(FLAGS_C, f"#ifndef {isa.target}\n#error another target\n#endif\n"):
+            return False
+        if not self.accepts(FLAGS_C + isa.flags, isa.probe):
+            self.warn(f"no {isa.name} unit: this compiler cannot build it")
+            return False
+        return True
 
     def accepts(self, flags: list[str], text: str) -> bool:
         """Whether the compiler takes the flags and compiles the text."""

@@ -15,6 +15,7 @@ from benchmarks.choices.planner_page import STUDY as PLANNER
 from benchmarks.choices.study import STUDY as CHOICES
 from benchmarks.harness.machine import IMAGES
 from benchmarks.harness.records import Record, write_record, write_text
+from benchmarks.lanes.study import STUDY as LANES
 from benchmarks.levels.study import STUDY as LEVELS
 from benchmarks.peers import PEERS
 from benchmarks.pictures.study import STUDY as PICTURES
@@ -41,7 +42,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, MEMSET, GROWTH, POLYGONS,
-        REAL_FILES, GATE, TILES, EXPLORER, CLUSTER, INSTANCES, GRADIENTS, *PAIRS,
+        REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, INSTANCES, GRADIENTS, *PAIRS,
     )
 }  # fmt: skip
 

@@ -17,6 +17,9 @@
 #ifndef TL_FLAGS_SCALAR
 #define TL_FLAGS_SCALAR ""
 #endif
+#ifndef TL_FLAGS_SIMD128
+#define TL_FLAGS_SIMD128 ""
+#endif
 #ifndef TL_FLAGS_AVX2
 #define TL_FLAGS_AVX2 ""
 #endif
@@ -25,6 +28,12 @@
 #endif
 
 extern const tl_kernels tl_kernels_scalar;
+#ifdef TL_HAVE_SIMD128
+extern const tl_kernels tl_kernels_simd128;
+#define TL_TABLE_SIMD128 (&tl_kernels_simd128)
+#else
+#define TL_TABLE_SIMD128 NULL
+#endif
 #ifdef TL_HAVE_AVX2
 extern const tl_kernels tl_kernels_avx2;
 #define TL_TABLE_AVX2 (&tl_kernels_avx2)
@@ -46,6 +55,7 @@ typedef struct {
 
 static const tl_isa_unit UNITS[TL_N_ISA] = {
     [TL_ISA_SCALAR] = {"scalar", TL_FLAGS_SCALAR, &tl_kernels_scalar},
+    [TL_ISA_SIMD128] = {"simd128", TL_FLAGS_SIMD128, TL_TABLE_SIMD128},
     [TL_ISA_AVX2] = {"avx2", TL_FLAGS_AVX2, TL_TABLE_AVX2},
     [TL_ISA_AVX512] = {"avx512", TL_FLAGS_AVX512, TL_TABLE_AVX512},
 };
@@ -78,6 +88,8 @@ static cpu_words ask_cpu(void)
 static int has(unsigned word, unsigned bits) { return (word & bits) == bits; }
 
 /* Each probe asks for all that its unit is compiled with in setup.py. */
+static int cpu_has_simd128(void) { return has(ask_cpu().ecx_1, bit_SSSE3 | bit_SSE4_1 | bit_POPCNT); }
+
 static int cpu_has_avx2(void)
 {
     const cpu_words cpu = ask_cpu();
@@ -97,7 +109,8 @@ extern const tl_meshlet_kernels tl_meshlets_vbmi;
 
 static int cpu_has_vbmi(void) { return has(ask_cpu().ecx_7, bit_AVX512VBMI | bit_AVX512VBMI2); }
 #endif
-#else
+#else /* every processor has what the unit is compiled for: aarch64, WebAssembly */
+static int cpu_has_simd128(void) { return 1; }
 static int cpu_has_avx2(void) { return 0; }
 static int cpu_has_avx512(void) { return 0; }
 #endif
@@ -123,6 +136,7 @@ int tl_isa_available(int i_isa)
     if (!tl_isa_built(i_isa))
         return 0;
     switch (i_isa) {
+    case TL_ISA_SIMD128: return cpu_has_simd128();
     case TL_ISA_AVX2: return cpu_has_avx2();
     case TL_ISA_AVX512: return cpu_has_avx512();
     default: return 1;

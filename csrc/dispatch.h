@@ -5,7 +5,7 @@
 #include "topleft.h"
 
 /* From the plainest to the widest: the last one that is available is the one to take. */
-enum { TL_ISA_SCALAR, TL_ISA_AVX2, TL_ISA_AVX512, TL_N_ISA };
+enum { TL_ISA_SCALAR, TL_ISA_SIMD128, TL_ISA_AVX2, TL_ISA_AVX512, TL_N_ISA };
 
 /* The name of an instruction set, NULL outside [0, TL_N_ISA). */
 const char *tl_isa_name(int i_isa);

@@ -82,15 +82,16 @@ TL_INLINE void mix_lanes_f32(blend_state *b, float *p, int64_t i, vm m, const fl
 {
     const int n_channels = b->n_channels;
     const float *from = source ? source + i : b->pattern + (n_channels == 3 || TL_LANES == 1 ? i % n_channels : 0);
-    const vf d = vf_load_masked(m, p + i), s = vf_load_masked(vm_all(), from);
+    const int has_room = p >= b->floats && p + i + TL_LANES <= b->floats + b->n_samples * n_channels;
+    const vf d = vf_load_some(m, p + i, has_room), s = vf_load(from);
     f32_alphas a = {s, s, vm_all()};
     if (reads_alpha(mode)) {
         a.s_alpha = source ? alpha_f32(s, from, i, n_channels) : vf_set1(b->pattern[n_channels - 1]);
         a.d_alpha = alpha_f32(d, p + i, i, n_channels);
         a.is_alpha = is_alpha(i, n_channels);
     }
-    const vf out = c ? mix_part_f32(d, s, vf_load_masked(vm_all(), c + i), &a, mode) : mix_whole_f32(d, s, &a, mode);
-    vf_store_some(p + i, m, out, p >= b->floats && p + i + TL_LANES <= b->floats + b->n_samples * n_channels);
+    const vf out = c ? mix_part_f32(d, s, vf_load(c + i), &a, mode) : mix_whole_f32(d, s, &a, mode);
+    vf_store_some(p + i, m, out, has_room);
 }
 
 /* As mix_runs_u8. */
@@ -123,7 +124,7 @@ TL_INLINE void mix_block_f32(blend_state *b, int64_t at, vm m, vi area, tl_mix m
             coverage[k * n_channels + c] = (float)units[k] * (1.0f / TL_WHOLE);
     const int64_t end = (int64_t)TL_LANES * n_channels;
     for (int64_t i = 0; i < end; i += TL_LANES) {
-        const vm on = vf_lt(vf_set1(0.0f), vf_load_masked(vm_all(), coverage + i));
+        const vm on = vf_lt(vf_set1(0.0f), vf_load(coverage + i));
         if (vm_any(on))
             mix_lanes_f32(b, b->floats + at * n_channels, i, on, b->is_flat ? NULL : b->source_f32, coverage, mode);
     }

@@ -169,6 +169,10 @@ TL_INLINE void store_u8(blend_state *b, int64_t at, vm m, vi pixels)
 {
     vi_store_some(b->packed + at, m, pixels, at >= 0 && at + TL_LANES <= b->n_samples);
 }
+TL_INLINE vi load_u8(const blend_state *b, int64_t at, vm m)
+{
+    return vi_load_some(m, b->packed + at, at >= 0 && at + TL_LANES <= b->n_samples);
+}
 
 /* n > 0 pixels of one colour.  A long run is stored in whole vectors: one at its beginning, one at its end, those
  * between at multiples of their size, for a store across two cache lines takes twice as long. */
@@ -204,7 +208,7 @@ TL_INLINE void mix_runs_u8(blend_state *b, const int32_t *first, const int32_t *
             const vm m = vm_first(n[k * step] - i);
             vi d = vi_set1(0);
             if (mode != TL_MIX_REPLACE)
-                d = vi_load_masked(m, b->packed + at + i);
+                d = load_u8(b, at + i, m);
             store_u8(b, at + i, m, mix_whole_u8(d, color, m, mode));
         }
     }
@@ -215,14 +219,14 @@ TL_INLINE void mix_source_u8(blend_state *b, int64_t at, int n, tl_mix mode)
 {
     for (int i = 0; i < n; i += TL_LANES) {
         const vm m = vm_first(n - i);
-        store_u8(b, at + i, m, mix_whole_u8(vi_load_masked(m, b->packed + at + i), vi_load(b->source + i), m, mode));
+        store_u8(b, at + i, m, mix_whole_u8(load_u8(b, at + i, m), vi_load(b->source + i), m, mode));
     }
 }
 
 /* The pixels in m of the TL_LANES from `at` on. */
 TL_INLINE void mix_block_u8(blend_state *b, int64_t at, vm m, vi area, tl_mix mode)
 {
-    const vi d = vi_load_masked(m, b->packed + at), s = b->is_flat ? vi_set1(b->color) : vi_load(b->source);
+    const vi d = load_u8(b, at, m), s = b->is_flat ? vi_set1(b->color) : vi_load(b->source);
     store_u8(b, at, m, mix_area_u8(d, s, area, m, mode, b->whole_mode));
 }
 

@@ -9,6 +9,7 @@
  *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
+ * v?_load_some(m, p, has_room) the lanes in m; with room for a whole vector the others are read, too, or are anything
  * v?_store_some(p, m, a, has_room) the lanes in m; with room for a whole vector the others may be written as they are
  *   vi_gather(m, p, i)      p[i] in the lanes of m
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
@@ -19,7 +20,7 @@
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   vf_fma(a, b, c)         a * b + c, rounded once
  *   vf_min, vf_max          the second number when one is NaN
- *   vf_min_size(a, b)       the lesser of a >= 0 and |b|
+ *   vf_min_size(a, b)       the lesser of a >= 0 and |b|, which are numbers
  *   v?_lookup(table, i)     table[i & 15] of sixteen numbers
  *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
  *   vi_prefix_count(bits)   how many of the bits [0, k] are set
@@ -32,8 +33,8 @@
  *   vd_store_places(base, x, y, z, a, b)          the same, TL_LANES of them one after the other
  *   vi_ceil(vd)             the next integer that is not less
  *   vi_low_bits(vd)         the last 32 bits of each number
- *   vf_off_integer, vd_off_integer    a number less the nearest integer
- *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8
+ *   vf_off_integer, vd_off_integer    a finite number less the nearest integer; the sign of 0 may be either
+ *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8; the sign of 0 may be either
  *   vd_or(a, b)             the bits of both: 0 where both are
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
  * vi_load_records(base, scale, i, c), vf_load_pairs 16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
@@ -60,8 +61,24 @@
 #include "lanes/lanes_avx512.h"
 #elif defined(__AVX2__) && defined(__FMA__) && defined(__BMI2__)
 #include "lanes/lanes_avx2.h"
+#elif defined(TL_USE_SIMD128)
+#include "lanes/lanes_simd128.h"
 #else
 #include "lanes/lanes_scalar.h"
+#endif
+
+/* Where memory cannot be masked, a masked load takes a branch a lane. */
+TL_INLINE vi vi_load_some(vm m, const int32_t *p, int has_room)
+{
+    return TL_LANES == 4 && has_room ? vi_load(p) : vi_load_masked(m, p);
+}
+TL_INLINE vf vf_load_some(vm m, const float *p, int has_room)
+{
+    return TL_LANES == 4 && has_room ? vf_load(p) : vf_load_masked(m, p);
+}
+#if TL_HALF_LANES
+TL_INLINE hi hi_load_some(hm m, const int32_t *p, int has_room) { return (void)has_room, hi_load_masked(m, p); }
+TL_INLINE hf hf_load_some(hm m, const float *p, int has_room) { return (void)has_room, hf_load_masked(m, p); }
 #endif
 
 /* Stores lanes that are then read one by one.  Compilers that see both take them out of the vector, one shuffle each,

@@ -175,8 +175,8 @@ TL_INLINE vf vf_sqrt(vf a) { return sqrtf(a); }
 TL_INLINE vf vf_from_vi(vi a) { return (float)a; }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
 TL_INLINE void vf_store(float *p, vf a) { *p = a; }
-TL_INLINE vi vi_floor(vf a) { return fabsf(a) < 0x1p30f ? (vi)floorf(a) : INT32_MIN; }
-TL_INLINE vi vi_nearest(vf a) { return fabsf(a) < 0x1p30f ? (vi)rintf(a) : INT32_MIN; }
+TL_INLINE vi vi_floor(vf a) { return fabsf(a) < 0x1p31f ? (vi)floorf(a) : INT32_MIN; }
+TL_INLINE vi vi_nearest(vf a) { return fabsf(a) < 0x1p31f ? (vi)rintf(a) : INT32_MIN; }
 TL_INLINE vf vf_last_of(vf a, int n)
 {
     (void)n;
@@ -222,7 +222,11 @@ TL_INLINE vd vd_min(vd a, vd b) { return a < b ? a : b; }
 TL_INLINE vd vd_max(vd a, vd b) { return a > b ? a : b; }
 TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }
-TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN; }
+TL_INLINE vi vi_round(vd a)
+{
+    const vd nearest = rint(a); /* which may be 2^31 where a is less */
+    return fabs(nearest) < 0x1p31 ? (vi)nearest : INT32_MIN;
+}
 TL_INLINE vi vi_low_bits(vd a)
 {
     uint64_t bits;
@@ -358,7 +362,7 @@ TL_INLINE void vd_store_places(double *row, vd x, vd y, vd z, vi a, vi b)
     memcpy(row + 3, &a, sizeof a), memcpy((char *)(row + 3) + sizeof a, &b, sizeof b);
 }
 /* ceil() is a call where there are no lanes */
-TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p30 ? (vi)a + ((double)(vi)a < a) : INT32_MIN; }
+TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p31 ? (vi)((uint32_t)(vi)a + ((double)(vi)a < a)) : INT32_MIN; }
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a) { return a - rintf(a); }
 TL_INLINE vd vd_off_256th(vd a) { return a - ((a + 0x1.8p44) - 0x1.8p44); }

@@ -25,7 +25,7 @@ TL_INLINE void store_span_32(int32_t *out, int64_t n, int32_t value)
     for (; n >= TL_LANES; n -= TL_LANES, out += TL_LANES)
         vi_store(out, v);
     vi_store_masked(out, vm_first(n), v);
-#elif TL_LANES > 4 /* masked stores cost AMD's cores twenty cycles: the last whole vector overlaps the one before */
+#elif TL_LANES > 1 /* masked stores cost AMD's cores twenty cycles: the last whole vector overlaps the one before */
     if (n >= TL_LANES) {
         for (int64_t j = 0; j < n - TL_LANES; j += TL_LANES)
             vi_store(out + j, v);

@@ -218,7 +218,7 @@ TL_INLINE void put_cells(share_output *out, int32_t *cells, int64_t row, int64_t
             const vm inside = vm_first(width - c);
             float *to = job->pixels + index + c;
             const vf share = vf_mul(vf_from_vi(take_cells(cells + c, &carry)), vf_set1(1.0f / TL_WHOLE));
-            const vf sum = vf_add(vf_load_masked(inside, to), share), one = vf_set1(1.0f);
+            const vf sum = vf_add(vf_load_some(inside, to, width - c >= TL_LANES), share), one = vf_set1(1.0f);
             vf_store_some(to, inside, vf_select(vf_lt(one, sum), one, sum), width - c >= TL_LANES);
         }
     }

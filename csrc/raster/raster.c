@@ -139,12 +139,19 @@ TL_INLINE void flush_queue_rows(walk_state *s, tl_geometry g, tl_sink sink)
 /* The triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
 enum { BOX_TINY, BOX_SMALL, BOX_MIDDLE, BOX_ROWS, N_BOXES };
 
-TL_INLINE void sort_boxes(const lane_batch *b, vm *boxes)
+/* The most columns of a middle box.  TL_FLOAT: as TL_NEAR_BAND has it; several samples: TL_MAX_WORDS. */
+TL_INLINE int middle_cols(const walk_state *s, tl_geometry g, tl_sink sink)
+{
+    const int most = sink_of(s->target, s->target->sink) == TL_SINK_MASK ? TL_BIT_COLS : TL_BLOCK_COLS;
+    return (g == TL_FLOAT || sink == TL_SINK_SAMPLES) && most > TL_MIDDLE_BOX ? TL_MIDDLE_BOX : most;
+}
+
+TL_INLINE void sort_boxes(const lane_batch *b, int most_cols, vm *boxes)
 {
     const vi longer = vi_max(b->n_cols, b->n_rows);
     const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
     const vm over = vm_and(b->drawn, over_small);
-    const vm beyond = vm_or(vi_gt(b->n_cols, vi_set1(TL_LANES)), vi_gt(b->n_rows, vi_set1(TL_MIDDLE_BOX)));
+    const vm beyond = vm_or(vi_gt(b->n_cols, vi_set1(most_cols)), vi_gt(b->n_rows, vi_set1(TL_MIDDLE_BOX)));
     boxes[BOX_TINY] = vm_and_not(b->drawn, over_tiny);
     boxes[BOX_SMALL] = vm_and(b->drawn, vm_and_not(over_tiny, over_small));
     boxes[BOX_MIDDLE] = vm_and_not(over, beyond);
@@ -196,7 +203,7 @@ TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int3
     draw_each_single(s, g, sink, b.single, id);
     if (!vm_any(b.drawn))
         return;
-    sort_boxes(&b, boxes);
+    sort_boxes(&b, middle_cols(s, g, sink), boxes);
     if (sink == TL_SINK_CENSUS)
         count_boxes(s->target->census, boxes, b.n_cols, b.n_rows, b.absolute, s->window->subpixel_bits);
     else

@@ -119,14 +119,24 @@ TL_INLINE void find_rows_of_one(tl_geometry g, const row_edges *r, int k, vm thi
         *first = vi_max(*first, zero), *end = vi_min(*end, vi_set1(n_cols));
 }
 
-/* ---- boxes of up to 16 rows and TL_LANES columns --------------------------------------------------------- */
+/* ---- boxes of up to 16 rows and 16 or 31 columns --------------------------------------------------------- */
 
-/* Rows of a block of at most TL_LANES columns; the depth of a sample is the sum of its row's and its column's. */
+TL_INLINE void put_lanes(const tl_target *target, tl_sink sink, int64_t at, vm m, vd z_row, vd z_col, int32_t id)
+{
+    if (sink_has_depth(sink))
+        put_depths(target, sink, at, m, sum_depth(z_row, z_col), id);
+    else
+        put_numbers(target, sink, at, m, vi_set1(id));
+}
+
+/* Rows of a block of at most TL_BLOCK_COLS columns, of a mask TL_BIT_COLS; the depth of a sample is the sum of its
+ * row's and its column's. */
 TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row,
-                          int stride_of_rows, int64_t at, int n_rows, int is_half, vd z_col, int32_t id)
+                          int stride_of_rows, int64_t at, int n_rows, int is_half, const double *z_cols, int32_t id)
 {
     const int64_t stride = target->stride_px;
-    (void)is_half;
+    const vd z_col = vd_load(z_cols);
+    (void)is_half, (void)z_col;
 #if TL_HALF_LANES
     if (is_half && sink_has_depth(sink) && sink != TL_SINK_PEEL) {
         for (int row = 0; row < n_rows; row++, at += stride)
@@ -136,14 +146,22 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
     }
 #endif
     for (int row = 0; row < n_rows; row++, at += stride) {
-        const unsigned drawn = (unsigned)bits[row * stride_of_rows];
-        const vm m = vm_from_bits(drawn);
-        if (sink == TL_SINK_MASK)
+        unsigned drawn = (unsigned)bits[row * stride_of_rows];
+        if (sink == TL_SINK_MASK) {
             cover(target, at, drawn);
-        else if (sink_has_depth(sink))
-            put_depths(target, sink, at, m, sum_depth(vd_set1(z_row[row * stride_of_rows]), z_col), id);
-        else
-            put_numbers(target, sink, at, m, vi_set1(id));
+            continue;
+        }
+        if (TL_BLOCK_COLS == TL_LANES) {
+            const vd z = vd_set1(sink_has_depth(sink) ? z_row[row * stride_of_rows] : 0.0);
+            put_lanes(target, sink, at, vm_from_bits(drawn), z, z_col, id);
+            continue;
+        }
+        for (int col = 0; drawn; drawn >>= TL_LANES, col += TL_LANES) {
+            const int skipped = __builtin_ctz(drawn);
+            const vd z = vd_set1(sink_has_depth(sink) ? z_row[row * stride_of_rows] : 0.0);
+            col += skipped, drawn >>= skipped;
+            put_lanes(target, sink, at + col, vm_from_bits(drawn), z, vd_load(z_cols + col), id);
+        }
     }
 }
 
@@ -164,10 +182,11 @@ TL_INLINE void draw_middle(const tl_snapped *snapped, const tl_target *shared, c
     for (; live; live &= live - 1) {
         const int k = __builtin_ctz(live);
         const int32_t size = q->size[i + k];
-        vd z_cols = vd_set1(0);
-        if (sink_has_depth(sink)) {
-            const vd x = vd_sub(vd_add(vd_set1(m->x[k]), ramp(m->step)), vd_set1(m->x0[k]));
-            z_cols = vd_mul(vd_set1(m->slope_x[k]), x);
+        double z_cols[TL_BLOCK_COLS + TL_LANES];
+        for (int col = 0; sink_has_depth(sink) && col < (TL_BLOCK_COLS == TL_LANES ? 1 : size & 0xffff);
+             col += TL_LANES) {
+            const vd x = vd_sub(vd_add(vd_set1(m->x[k] + col * m->step), ramp(m->step)), vd_set1(m->x0[k]));
+            vd_store(z_cols + col, vd_mul(vd_set1(m->slope_x[k]), x));
         }
         draw_block(&target, sink, &m->bits[0][k], &m->z[0][k], TL_MAX_LANES, (uint32_t)m->sample[k], size >> 16,
                    (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(snapped, q->id[i + k]));
@@ -225,8 +244,61 @@ TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Triangle k of those at i in the queue, in blocks of TL_LANES x TL_LANES samples.  With an int for k, gcc spills a
- * register more of the mask's copy: 3 % of its time on AVX-512. */
+/* Whether rows are drawn as spans, one after the other: of masks, whose samples are bits, and where a block of columns
+ * would be as narrow as the rows of middle boxes.  Else in blocks of TL_LANES rows and columns. */
+#define TL_BY_SPANS(sink) (TL_LANES == 4 || (sink) == TL_SINK_MASK)
+
+/* The depths of columns from col0 on, as sums with those of rows have them. */
+TL_INLINE vd depths_of_columns(tl_geometry g, const row_edges *r, int64_t k, int col0, double unit)
+{
+    const vd x = vd_add(vd_set1(r->x[k] + col0 * unit), ramp(unit));
+    return vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
+}
+
+/* The samples [first, end) of up to TL_LANES rows, where there are some. */
+TL_INLINE void draw_spans(const tl_target *target, tl_sink sink, vi first, vi end, int n_rows, const double *z_row,
+                          int64_t at, const double *z_cols, int32_t id)
+{
+    int32_t firsts[TL_MAX_LANES], lengths[TL_MAX_LANES];
+    vi_store(firsts, first), vi_store(lengths, vi_sub(end, first));
+    for (int row = 0; row < n_rows; row++, at += target->stride_px) {
+        const int n = lengths[row], from = firsts[row];
+        if (n <= 0)
+            continue;
+        if (sink == TL_SINK_MASK) {
+            cover(target, at + from, ~0ull >> (64 - n));
+            continue;
+        }
+        const vd z = vd_set1(sink_has_depth(sink) ? z_row[row] : 0.0);
+        for (int col = from; col < from + n; col += TL_LANES)
+            put_lanes(target, sink, at + col, vm_first(from + n - col), z, vd_load(z_cols + col), id);
+    }
+}
+
+/* The same in blocks of TL_LANES columns. */
+TL_INLINE void draw_blocks(tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r, int64_t k,
+                           vi first, vi end, int n_cols, const double *z_row, int64_t at, double unit, int32_t id)
+{
+    const vi zero = vi_set1(0);
+    int32_t bits[TL_MAX_LANES];
+    for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
+        const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
+        const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
+                                          vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
+        const unsigned drawn = vm_bits(vi_gt(in_block, zero));
+        if (!drawn)
+            continue;
+        const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
+        double z_cols[TL_LANES];
+        vd_store(z_cols, sink_has_depth(sink) ? depths_of_columns(g, r, k, col0, unit) : vd_set1(0));
+        vi_store(bits, in_block);
+        draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
+                   width <= TL_HALF_LANES, z_cols, id);
+    }
+}
+
+/* Triangle k of those at i in the queue, TL_LANES rows at a time.  With an int for k, gcc spills a register more of the
+ * mask's copy: 3 % of its time on AVX-512. */
 TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
                          const lane_exact *t, int i, int64_t k)
 {
@@ -237,9 +309,9 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
     const vi zero = vi_set1(0);
     const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[k]));
     const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[k]));
-    int32_t bits[TL_MAX_LANES];
-    double z_row[TL_MAX_LANES];
-    const vd steps = ramp(unit);
+    double z_row[TL_MAX_LANES], z_cols[TL_MAX_BOX_PX + TL_MAX_LANES];
+    for (int col = 0; TL_BY_SPANS(sink) && sink_has_depth(sink) && col < n_cols; col += TL_LANES)
+        vd_store(z_cols + col, depths_of_columns(g, r, k, col, unit));
     for (int row0 = 0; row0 < n_rows; row0 += TL_LANES) {
         const int64_t at = (uint32_t)sample + row0 * target->stride_px;
         vm doubted = vm_first(0);
@@ -251,28 +323,17 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
             refine_row_ends(s, i, (int)k, t, row0, vm_bits(doubted), &ends);
             first = vi_load(ends.first), end = vi_load(ends.end);
         }
-        end = vi_select(vm_first(n_rows - row0), end, zero);
         if (sink_has_depth(sink)) {
-            const vd y = vd_add(vd_set1(r->y[k] + row0 * unit), steps);
+            const vd y = vd_add(vd_set1(r->y[k] + row0 * unit), ramp(unit));
             const vd from = g == TL_FIXED ? y : vd_sub(y, vd_set1(r->y0[k]));
             vd_store(z_row, vd_add(vd_set1(r->z0[k]), vd_mul(vd_set1(r->slope_y[k]), from)));
         }
-        for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
-            const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
-            const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
-                                              vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
-            const unsigned drawn = vm_bits(vi_gt(in_block, zero));
-            if (!drawn)
-                continue;
-            const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            vd z_col = vd_set1(0);
-            if (sink_has_depth(sink)) {
-                const vd x = vd_add(vd_set1(r->x[k] + col0 * unit), steps);
-                z_col = vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
-            }
-            vi_store(bits, in_block);
-            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
-                       width <= TL_HALF_LANES, z_col, id);
+        if (TL_BY_SPANS(sink)) {
+            const int n = n_rows - row0 < TL_LANES ? n_rows - row0 : TL_LANES;
+            draw_spans(target, sink, vi_max(first, zero), vi_min(end, vi_set1(n_cols)), n, z_row, at, z_cols, id);
+        } else {
+            draw_blocks(g, target, sink, r, k, first, vi_select(vm_first(n_rows - row0), end, zero), n_cols, z_row, at,
+                        unit, id);
         }
     }
 }

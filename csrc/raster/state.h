@@ -19,7 +19,9 @@
 
 #define TL_SMALL_BOX 4
 #define TL_MIDDLE_BOX 16
-#define TL_MAX_BOX_PX 62 /* rows.c: row ends in float32 are exact up to here */
+#define TL_BIT_COLS 31                                         /* of a row that vi_bit_ranges has at a time */
+#define TL_BLOCK_COLS (TL_LANES == 4 ? TL_BIT_COLS : TL_LANES) /* of a row that is drawn at a time, but for masks */
+#define TL_MAX_BOX_PX 62                                       /* rows.c: row ends in float32 are exact up to here */
 #define TL_QUEUE 256
 
 /* Triangles that wait until a vector is full of their kind.  Their vertices are read again then: they are still in the

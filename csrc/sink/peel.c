@@ -72,14 +72,14 @@ static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int3
     vi carried = vi_set1(id);
     if (p->n_layers > 2) { /* 4,000 triangles of 600 px, most behind all of 8 layers: half the time */
         const int64_t last = (p->n_layers - 1) * p->plane_px;
-        const vf old = vf_load_masked(m, depths + last);
+        const vf old = vf_load_some(m, depths + last, has_room);
         m = vm_and_not(m, p->is_farthest ? vf_lt(depth, old) : vf_lt(old, depth));
         if (!vm_any(m))
             return;
     }
     for (int32_t *ids = p->ids + at; ids < end; ids += p->plane_px, depths += p->plane_px) {
-        const vf old = vf_load_masked(m, depths);
-        const vi old_ids = vi_load_masked(m, ids);
+        const vf old = vf_load_some(m, depths, has_room);
+        const vi old_ids = vi_load_some(m, ids, has_room);
         const vm equal = vm_and(vf_eq(depth, old), vi_gt(old_ids, carried));
         const vm wins = vm_and(m, vm_or(p->is_farthest ? vf_lt(old, depth) : vf_lt(depth, old), equal));
         if (!vm_any(wins))

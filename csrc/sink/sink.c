@@ -80,18 +80,19 @@ TL_INLINE int sink_has_depth(tl_sink sink)
     TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)       \
     {                                                                                                \
         int32_t *ids = (int32_t *)target->pixels + at;                                               \
+        const int has_room = at + TL_LANES <= target->n_samples;                                     \
         M wins;                                                                                      \
         if (sink == TL_SINK_PAINT) {                                                                 \
-            wins = P##m_and(m, P##i_gt(id, P##i_load_masked(m, ids)));                               \
+            wins = P##m_and(m, P##i_gt(id, P##i_load_some(m, ids, has_room)));                       \
         } else {                                                                                     \
-            const F old = P##f_load_masked(m, target->depth + at);                                   \
+            const F old = P##f_load_some(m, target->depth + at, has_room);                           \
             const M equal = P##m_and(m, P##f_eq(depth, old));                                        \
             wins = P##m_and(m, sink == TL_SINK_NEAREST ? P##f_lt(depth, old) : P##f_lt(old, depth)); \
             if (__builtin_expect(P##m_any(equal), 0))                                                \
                 wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, ids), id)));    \
         }                                                                                            \
-        P##f_store_some(target->depth + at, wins, depth, at + TL_LANES <= target->n_samples);        \
-        P##i_store_some(ids, wins, id, at + TL_LANES <= target->n_samples);                          \
+        P##f_store_some(target->depth + at, wins, depth, has_room);                                  \
+        P##i_store_some(ids, wins, id, has_room);                                                    \
     }
 TL_PUT_DEPTHS(put_buffers, vm, vf, vi, v)
 #if TL_HALF_LANES
@@ -111,10 +112,11 @@ TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm 
 TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm m, vi id)
 {
     int32_t *pixels = (int32_t *)target->pixels + at;
-    const vi old = vi_load_masked(m, pixels);
+    const int has_room = at + TL_LANES <= target->n_samples;
+    const vi old = vi_load_some(m, pixels, has_room);
     vi_store_some(pixels, m,
                   sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_xor(id, vi_set1(target->flip))),
-                  at + TL_LANES <= target->n_samples);
+                  has_room);
 }
 
 /* Samples of a word, of labels that come from the last triangle to the first: `covered` ones can no longer change. */
@@ -127,8 +129,8 @@ TL_INLINE void put_word(const tl_target *target, int64_t word, uint64_t samples,
     int32_t *const pixels = (int32_t *)target->pixels + (word << 6);
     for (int k = TL_LANES == 1 ? __builtin_ctzll(fresh) : 0; k < 64 && fresh >> k; k += TL_LANES) {
         const vm m = vm_from_bits((unsigned)(fresh >> k) & (unsigned)((1ull << TL_LANES) - 1));
-        vi_store_some(pixels + k, m, vi_max(vi_load_masked(m, pixels + k), name),
-                      (word << 6) + k + TL_LANES <= target->n_samples);
+        const int has_room = (word << 6) + k + TL_LANES <= target->n_samples;
+        vi_store_some(pixels + k, m, vi_max(vi_load_some(m, pixels + k, has_room), name), has_room);
     }
 }
 TL_INLINE void put_uncovered(const tl_target *target, int64_t at, int64_t n, int32_t id)
@@ -168,9 +170,9 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
     const vi name = vi_set1(id ^ target->flip);
     for (int64_t k = 0; k < n; k += TL_LANES) {
         const vm m = vm_first(n - k);
-        const vi old = vi_load_masked(m, pixels + k);
-        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name),
-                      at + k + TL_LANES <= target->n_samples);
+        const int has_room = at + k + TL_LANES <= target->n_samples;
+        const vi old = vi_load_some(m, pixels + k, has_room);
+        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name), has_room);
     }
 }
 
@@ -383,7 +385,7 @@ TL_ONCE void put_weighted(const tl_triangle *t, const tl_window *window, const t
             z[k] = (float)(z0 + (w1[k] * slope1 + w2[k] * slope2)) + 0.0f;
         for (int k = 0; k < n; k += TL_LANES) {
             const vm m = vm_first(n - k);
-            put_depths(target, sink, row * target->stride_px + col + k, m, vf_load_masked(m, z + k), t->id);
+            put_depths(target, sink, row * target->stride_px + col + k, m, vf_load_some(m, z + k, 1), t->id);
         }
     }
 }

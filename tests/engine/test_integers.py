@@ -1,8 +1,6 @@
 """The 128-bit integers of the kernels, the compiler's and the struct of two words, against Python's integers."""
 
-import os
 import random
-import shutil
 import struct
 import subprocess
 from collections.abc import Callable, Iterator
@@ -10,6 +8,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from toolchain import compiler
 
 ROOT = Path(__file__).resolve().parents[2]
 WORD, WHOLE = 2**64, 2**128
@@ -42,14 +41,6 @@ OPERATIONS: dict[str, Callable[[int, int, int], int]] = {
 def signed(a: int, modulus: int) -> int:
     """Return the integer of two's complement that a number is, modulo a power of two."""
     return (a + modulus // 2) % modulus - modulus // 2
-
-
-def compiler() -> list[str]:
-    """Return the command of the C compiler, empty when there is none."""
-    for command in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
-        if command.strip() and shutil.which(command.split()[0]):
-            return command.split()
-    return []
 
 
 def numbers() -> Iterator[int]:

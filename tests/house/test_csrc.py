@@ -3,11 +3,11 @@
 import functools
 import os
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+from toolchain import FLAGS_OF_ISA, compiler
 
 CSRC = Path(__file__).resolve().parents[2] / "csrc"
 FILES = sorted(path.relative_to(CSRC).as_posix() for path in CSRC.rglob("*.[ch]"))
@@ -23,11 +23,6 @@ FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in fo
 
 #: Where lower files declare functions of higher ones: a sink is compiled into the walkers.
 HOOKS = "sink/hooks.h"
-
-FLAGS_AVX2 = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt")
-FLAGS_AVX512 = (*FLAGS_AVX2, "-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd")
-FLAGS_VBMI = (*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2")
-FLAGS = {"avx2": FLAGS_AVX2, "avx512": FLAGS_AVX512, "vbmi": FLAGS_VBMI}
 
 
 def text_of(name: str) -> str:
@@ -88,16 +83,7 @@ def test_functions_are_defined_before_they_are_called(name):
 
 @pytest.mark.parametrize("name", [name for name in FILES if not name.startswith("lanes/")])
 def test_intrinsics_are_in_lanes_alone(name):
-    assert re.findall(r"\b_mm\w*|\b__m(?:128|256|512|mask)\w*|\w*intrin\.h", code_of(name)) == []
-
-
-@functools.cache
-def compiler() -> list[str]:
-    """Return the command of the C compiler, empty when there is none."""
-    for command in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
-        if command.strip() and shutil.which(command.split()[0]):
-            return command.split()
-    return []
+    assert re.findall(r"\b_mm\w*|\b__m(?:128|256|512|mask)\w*|\w*(?:intrin|neon|wasm_simd128)\.h", code_of(name)) == []
 
 
 def check_syntax(path: str | Path, flags: tuple[str, ...]) -> subprocess.CompletedProcess[str]:
@@ -109,7 +95,7 @@ def check_syntax(path: str | Path, flags: tuple[str, ...]) -> subprocess.Complet
 @functools.cache
 def has_instructions(isa: str) -> bool:
     """Whether the compiler knows an instruction set."""
-    command = [*compiler(), "-fsyntax-only", *FLAGS[isa], "-include", "immintrin.h", "-x", "c", os.devnull]
+    command = [*compiler(), "-fsyntax-only", *FLAGS_OF_ISA[isa], "-x", "c", os.devnull]
     return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
@@ -118,9 +104,9 @@ def test_file_compiles_alone(name):
     if not compiler():
         pytest.skip("no C compiler: $CC, cc, gcc or clang")
     isa = "vbmi" if "meshlet" in name or name == "lanes/halves.h" else Path(name).stem.rpartition("_")[2]
-    if isa in FLAGS and not has_instructions(isa):
+    if isa in FLAGS_OF_ISA and not has_instructions(isa):
         pytest.skip(f"{compiler()[0]} does not know {isa}")
-    result = check_syntax(CSRC / name, FLAGS.get(isa, ()))
+    result = check_syntax(CSRC / name, FLAGS_OF_ISA.get(isa, ()))
     assert result.returncode == 0, result.stderr
 
 

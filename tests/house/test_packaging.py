@@ -17,7 +17,7 @@ from packaging.specifiers import SpecifierSet
 import topleft as tl
 
 ROOT = Path(__file__).parents[2]
-ISAS = ["scalar", "avx2", "avx512"]
+ISAS = ["scalar", "simd128", "avx2", "avx512"]
 
 
 def requirements_of(extra: str) -> set[str]:

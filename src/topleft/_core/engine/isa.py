@@ -5,7 +5,7 @@ from typing import Any
 
 from topleft._core.engine import kernels
 
-NAMES = ("scalar", "avx2", "avx512")
+NAMES = ("scalar", "simd128", "avx2", "avx512")
 
 
 def select() -> str:
