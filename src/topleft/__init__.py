@@ -12,6 +12,7 @@ from topleft._core.base.memory import release_memory
 from topleft._core.engine.isa import build_info
 from topleft._core.polygons.overlap import Overlap, overlap
 from topleft._core.polygons.polygons import polygons
+from topleft._core.polygons.rle import to_rle
 from topleft._core.raster.classic import bresenham_line
 from topleft._core.raster.composite import composite
 from topleft._core.raster.fragments import Fragments
@@ -143,6 +144,7 @@ __all__ = [
     "silhouette",
     "simplify",
     "tiles",
+    "to_rle",
     "turntable",
     "viewpoints",
     "visible_layers",
