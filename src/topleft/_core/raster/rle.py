@@ -5,6 +5,7 @@ In: pixels. Out: for each object the counts of pixels outside, inside, outside a
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ class RunTable:
         engine.write_counts(starts, n_counts, counts, text_starts, text)
         places = text_starts.tolist()
         whole = text[: places[-1]].tobytes().decode("ascii")
-        return [{"size": [height, width], "counts": whole[i:j]} for i, j in zip(places, places[1:], strict=False)]
+        return [{"size": [height, width], "counts": whole[i:j]} for i, j in pairwise(places)]
 
 
 def encode_masks(masks: NDArray[Any], *, compressed: bool) -> list[dict[str, Any]]:
