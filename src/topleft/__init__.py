@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from topleft._apps.explore.open import Explorer, explore
     from topleft._apps.tiles.merge import merge
     from topleft._apps.tiles.tiles import Tiles, Window, tiles
+    from topleft._meshes.picture.object_masks import ObjectMasks, object_masks
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
 
@@ -59,11 +60,13 @@ if TYPE_CHECKING:
 _LATE = {
     "Explorer": "topleft._apps.explore.open",
     "Job": "topleft._apps.batch.jobs",
+    "ObjectMasks": "topleft._meshes.picture.object_masks",
     "Tiles": "topleft._apps.tiles.tiles",
     "ViewLayers": "topleft._meshes.picture.view_layers",
     "Window": "topleft._apps.tiles.tiles",
     "explore": "topleft._apps.explore.open",
     "merge": "topleft._apps.tiles.merge",
+    "object_masks": "topleft._meshes.picture.object_masks",
     "pixel_grid": "topleft._apps.diagram.pixel_grid",
     "render_batch": "topleft._apps.batch.batch",
     "render_layers": "topleft._meshes.picture.view_layers",
@@ -96,6 +99,7 @@ __all__ = [
     "MeshError",
     "MeshWarning",
     "MissingPackageError",
+    "ObjectMasks",
     "OpenCVLens",
     "Overlap",
     "Plan",
@@ -124,6 +128,7 @@ __all__ = [
     "load",
     "load_cameras",
     "merge",
+    "object_masks",
     "overdraw",
     "overlap",
     "peel",
