@@ -287,3 +287,33 @@ def test_extent_without_polygons_is_told(files, run):
     status, lines = run("mask", "map.geojson", "-o", "m.png", "--size", "7x4", "--extent", 1000, 1001, 0, 1)
     assert (status, len(lines)) == (0, 1)
     assert "map: no polygon meets a pixel of the grid" in lines[0]
+
+
+def test_json_has_run_lengths_of_each_object_of_coco(files, run):
+    assert run("mask", "coco.json", "-o", "rle.json") == (0, [])
+    content = json.loads(files.joinpath("rle.json").read_text())
+    union = tl.polygons([[part] for part in PARTS], (8, 4))
+    first, second = content["annotations"]
+    assert first["segmentation"] == tl.to_rle(union)
+    assert (first["area"], first["bbox"]) == (int(union.sum()), [0, 0, 5, 3])
+    assert (first["image_id"], first["category_id"], second["image_id"], second["category_id"]) == (5, 2, 6, 9)
+    assert content["images"][0] == {"id": 5, "file_name": "cat", "width": 8, "height": 4}
+    assert {"id": 2, "name": "cat"} in content["categories"]
+    (picture, _) = load_polygons("rle.json")
+    assert (tl.polygons(picture.polygons, (8, 4)) == union).all()
+
+
+def test_json_of_geojson_has_properties_and_the_grid_of_the_mask(files, run):
+    words = "map.geojson", "--size", "7x4", "--extent", 0, 7, 0, 4
+    assert run("mask", *words, "-o", "rle.json") == (0, [])
+    content = json.loads(files.joinpath("rle.json").read_text())
+    drawn = tl.polygons(GEOJSON, tl.Grid((7, 4), (0, 7, 0, 4)), values="index")
+    assert [one["segmentation"] for one in content["annotations"]] == tl.to_rle(drawn, labels=[0, 1])
+    assert [one["attributes"]["zone"] for one in content["annotations"]] == [3, 700]
+
+
+def test_json_goes_with_neither_labels_nor_sampling(files, run):
+    for option in (("--labels", "zone"), ("--sampling", "area")):
+        status, lines = run("mask", "map.geojson", "-o", "rle.json", *option)
+        assert status == 2
+        assert "run lengths are of masks, without --labels and --sampling" in lines[0]

@@ -5,6 +5,7 @@ Input: masks, ids, or rings and a size. Output: a dict for each object, which `p
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -106,16 +107,38 @@ def to_rle(
 
 
 def encode_polygons(
-    rings: Any, size: object, rule: RuleOption, subpixel_bits: object, *, compressed: bool
+    rings: Any,
+    size: object,
+    rule: RuleOption,
+    subpixel_bits: object = 8,
+    *,
+    owners: npt.NDArray[np.int64] | None = None,
+    compressed: bool = True,
 ) -> list[dict[str, Any]]:
-    """Return the run lengths of the mask of each polygon, drawn in its box alone."""
+    """Return the run lengths of the mask of each polygon, drawn in its box alone.
+
+    `owners`: the object that each is part of, ascending from 0 on; then of each object, the union of its parts.
+    """
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
     found, frame = frame_of(as_rings(rings), size, (0, 0), subpixel_bits, 1, 1)  # type: ignore[arg-type]
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
-    table = RunTable(frame.size)
+    table, boxes = RunTable(frame.size), prepared.compiled.boxes_px
     mask: npt.NDArray[np.uint8] = SCRATCH.empty("labels", frame.size[::-1], np.uint8)
-    for i, (left, top, right, bottom) in enumerate(prepared.compiled.boxes_px.tolist()):
-        if left < right and top < bottom:
+    firsts = np.arange(len(found)) if owners is None else np.flatnonzero(np.diff(owners, prepend=-1))
+    for first, end in pairwise([*firsts.tolist(), len(found)]):
+        shown = [i for i in range(first, end) if (boxes[i, :2] < boxes[i, 2:]).all()]
+        if not shown:
+            continue
+        left, top = boxes[shown, :2].min(axis=0).tolist()
+        right, bottom = boxes[shown, 2:].max(axis=0).tolist()
+        union = None
+        for i in shown:
             draw_mask(prepared, mask, is_nonzero=is_nonzero, polygon=i, rows=(top, bottom))
-            table.add(mask[None], box=(left, top, right, bottom), key=i)
-    return table.encode(table.keys.astype(np.int32), len(found), compressed=compressed)
+            if len(shown) > 1:
+                part = mask[top:bottom]
+                union = part.copy() if union is None else np.bitwise_or(union, part, out=union)
+        if union is not None:
+            mask[top:bottom] = union
+        table.add(mask[None], box=(left, top, right, bottom), key=first if owners is None else int(owners[first]))
+    n = len(found) if owners is None else int(owners[-1]) + 1 if len(owners) else 0
+    return table.encode(table.keys.astype(np.int32), n, compressed=compressed)

@@ -125,3 +125,54 @@ def encode_ids(ids: NDArray[Any], labels: ArrayLike, *, compressed: bool) -> lis
         place = np.minimum(np.searchsorted(ascending, keys), len(ascending) - 1)
         objects = np.where(ascending[place] == keys, order[place], -1).astype(np.int32)
     return table.encode(objects, len(wanted), compressed=compressed)
+
+
+def annotation_of(rle: dict[str, Any], own: int, image: int, category: int) -> dict[str, Any]:
+    """Return the annotation of COCO of an object with run lengths: area and box, left, top, width and height, of these.
+
+    Raises
+    ------
+    ValueError
+        If the text is none.
+    """
+    height = rle["size"][0]
+    ends = np.cumsum(
+        read_counts(rle["counts"]) if isinstance(rle["counts"], str) else np.array(rle["counts"], np.int64)
+    )
+    first, last = ends[: len(ends) // 2 * 2 : 2], ends[1::2] - 1
+    box = [0, 0, 0, 0]
+    if len(last):
+        left, right = int(first[0]) // height, int(last[-1]) // height
+        top, bottom = int((first % height).min()), int((last % height).max())
+        if (first // height < last // height).any():  # a run goes on in the next column
+            top, bottom = 0, height - 1
+        box = [left, top, right + 1 - left, bottom + 1 - top]
+    area = int((last + 1 - first).sum())
+    names = {"id": own, "image_id": image, "category_id": category, "iscrowd": 0}
+    return names | {"area": area, "bbox": box, "segmentation": rle}
+
+
+def read_counts(text: str) -> I64:
+    """Return run lengths from a string, as `write_counts` of csrc/pixels/rle.c and pycocotools write them.
+
+    Raises
+    ------
+    ValueError
+        If it is no such text: with the first character that is none, or where it ends.
+    """
+    lengths: list[int] = []
+    value = shift = 0
+    for character in text:
+        bits = ord(character) - 48
+        if not 0 <= bits < 64 or shift > 40:
+            raise ValueError(f"run lengths that are no text of COCO, at {character!r}")
+        value |= (bits & 31) << shift
+        shift += 5
+        if not bits & 32:
+            if bits & 16:
+                value -= 1 << shift
+            lengths.append(value + (lengths[-2] if len(lengths) > 2 else 0))
+            value = shift = 0
+    if shift:
+        raise ValueError("run lengths that end within a number")
+    return np.array(lengths, np.int64)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import F64, I32, I64
 from topleft._core.base.arrays import as_array, as_number
-from topleft._core.raster.rle import RunTable, encode_ids
+from topleft._core.raster.rle import RunTable, annotation_of, encode_ids
 from topleft._meshes.camera.camera import Camera, CameraLike
 from topleft._meshes.camera.matrices import box_corners
 from topleft._meshes.model.normals import moved
@@ -186,20 +186,9 @@ class ObjectMasks:
             raise ValueError(f"category_ids must be {len(self)}, one of each object, got {len(category_ids)}")
         found: list[dict[str, Any]] = []
         for i, rle in enumerate(self.rle(which)):
-            if not self.n_visible[i]:
-                continue
-            box, area = self.boxes_visible[i], int(self.n_visible[i])
-            if which == "full":
-                corner, mask = self._windows[i]
-                left, top, right, bottom = self._inside(corner, mask)
-                box = np.add(box_of(mask[top:bottom, left:right]), [corner[0] + left, corner[1] + top] * 2)
-                area = int(np.count_nonzero(mask[top:bottom, left:right]))
-            left, top, right, bottom = box.tolist()
-            found.append({
-                "id": first_id + len(found), "image_id": image_id, "iscrowd": 0, "area": area,
-                "category_id": 1 if category_ids is None else int(category_ids[i]),
-                "bbox": [left, top, right - left, bottom - top], "segmentation": rle,
-            })  # fmt: skip
+            if self.n_visible[i]:
+                category = 1 if category_ids is None else int(category_ids[i])
+                found.append(annotation_of(rle, first_id + len(found), image_id, category))
         return found
 
     def _checked(self, i: int) -> int:
@@ -293,7 +282,7 @@ def seen_in(scene: Scene, camera: Camera, size: tuple[int, int], options: dict[s
 
 
 def window_of(instance: Instance, camera: Camera, size: tuple[int, int], canvas: Window) -> Window:
-    """The pixels of the canvas that an instance may cover: those round its box, all of them where that reaches the eye."""
+    """The pixels of the canvas that an instance may cover: round its box, or all where that reaches the eye."""
     if not len(instance.mesh.triangles):
         return NO_BOX
     if camera.lens is not None or not instance.mesh.is_finite:
