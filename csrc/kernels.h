@@ -124,8 +124,8 @@ typedef struct tl_kernels {
     void (*find_instances)(const int32_t *ids, int64_t n_rows, int64_t width, const int64_t *first_ids, int64_t n,
                            int32_t *out, int32_t *boxes);
 
-    /* Appends the runs of a window to a table of *n, which has room for n_room; `rows` has TL_RLE_LINE * height numbers.
-     * Returns whether there was room for all. */
+    /* Appends the runs of a window to a table of *n, which has room for n_room; `rows` has TL_RLE_LINE * height
+     * numbers.  Returns whether there was room for all. */
     int (*list_column_runs)(const tl_run_source *source, int32_t *rows, tl_run *runs, int64_t n_room, int64_t *n);
 
     /* The counts of objects from n runs in their order: run i is of object[i], of none where that is below 0.  Then

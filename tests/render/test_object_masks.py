@@ -24,7 +24,7 @@ def strewn(n=12, seed=0, spread=2.5):
 
 
 def bop_info(scene, i, visible):
-    """What calc_gt_info.py of BOP's tools writes: the object alone on a canvas of three widths and heights."""
+    """What BOP's tools write in scene_gt_info.json: the object alone on a canvas of three widths and heights."""
     width, height = SIZE
     shifted = K + [[0, 0, width], [0, 0, height], [0, 0, 0]]
     camera = tl.Camera.from_intrinsics(shifted, POSE, (3 * width, 3 * height))
@@ -149,7 +149,7 @@ def test_view_has_run_lengths_of_every_instance_of_its_scene():
     ("ask", "error", "message"),
     [
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE, beyond=-1), ValueError, "beyond must be a number of pictures"),
-        (lambda: tl.object_masks(strewn(), CAMERA, SIZE).rle("all"), ValueError, "which must be 'visible' or 'full'"),
+        (lambda: tl.object_masks(strewn(), CAMERA, SIZE).rle("all"), ValueError, "which must be"),
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE).full(12), IndexError, "there are 12 objects, got 12"),
         (
             lambda: tl.object_masks(strewn(), CAMERA, SIZE).scene_gt_info(np.ones((2, 2))),
@@ -159,7 +159,7 @@ def test_view_has_run_lengths_of_every_instance_of_its_scene():
         (
             lambda: tl.object_masks(strewn(), CAMERA, SIZE).annotations(0, [1]),
             ValueError,
-            "category_ids must be 12, one of each object, got 1",
+            "category_ids must be 12 integers, one of each object, got shape",
         ),
     ],
 )

@@ -68,7 +68,7 @@ def to_rle(
 
     References
     ----------
-    T.-Y. Lin and others, Microsoft COCO: Common Objects in Context, 2014; the format as in `maskApi.c` of its tools.
+    T.-Y. Lin and others, Microsoft COCO: Common Objects in Context, 2014; the format as its tools have it in C.
 
     Examples
     --------

@@ -10,7 +10,6 @@ PyTorch3D, 2020.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping
@@ -21,7 +20,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_number, as_real, as_size, shown
+from topleft._core.base.arrays import as_number, as_path, as_real, as_size, shown
 from topleft._meshes.camera.lens import FLIP
 from topleft._meshes.camera.matrices import tangent
 from topleft._meshes.model.pose import as_pose, joined_pose, rotation_of_quaternion
@@ -127,17 +126,20 @@ def of_nerfstudio(transforms: Any, i: int, size: object) -> Calibration:
     """The calibration of frame i of a transforms.json; see `Camera.from_nerfstudio`."""
     content = transforms
     if isinstance(transforms, str | os.PathLike):
-        content = json.loads(Path(transforms).read_text(encoding="utf-8"))
+        content = read_json(as_path("transforms", transforms))
     if not isinstance(content, Mapping) or not isinstance(content.get("frames"), list | tuple):
         raise ValueError("transforms must be the content or the path of a transforms.json with frames")
     frame = element("i", content["frames"], i)
+    if not isinstance(frame, Mapping):
+        raise ValueError(f"frame {i} must be a mapping, got {shown(frame)}")
     known = {**content, **frame}
     if "transform_matrix" not in known:
         raise ValueError(f"frame {i} must have a transform_matrix, got {', '.join(frame) or 'nothing'}")
     model = known.get("camera_model", "OPENCV")
     if model not in NERFSTUDIO_MODELS:
         raise ValueError(f"camera_model must be one of {', '.join(NERFSTUDIO_MODELS)}, got {model!r}")
-    width, height = as_size(size or (known.get("w"), known.get("h")), "size (w and h of the file)", smallest=1)
+    given = (known.get("w"), known.get("h")) if size is None else size
+    width, height = as_size(given, "size (w and h of the file)", smallest=1)
     if "fl_x" in known:
         fx = as_number("fl_x", known["fl_x"])
         fy = as_number("fl_y", known.get("fl_y", fx))
@@ -159,6 +161,18 @@ def of_nerfstudio(transforms: Any, i: int, size: object) -> Calibration:
     elif k4:
         raise ValueError(f"k4 of a camera_model {model} must be 0, got {k4}: no lens of a perspective camera has it")
     return Calibration(matrix_of(fx, fy, cx, cy), pose, (width, height), **lens)
+
+
+def read_json(path: Path) -> Any:
+    """What a JSON file holds."""
+    import json  # which only files need
+
+    if not path.is_file():
+        raise FileNotFoundError(f"there is no file {str(path)!r}")
+    try:
+        return json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"cannot read {str(path)!r}: {error}") from None
 
 
 def of_opengl(c2w: Any, name: str = "c2w") -> F64:

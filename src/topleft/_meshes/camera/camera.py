@@ -121,7 +121,10 @@ class Camera:
         except np.linalg.LinAlgError:
             return "Camera(singular view)"
         forward = -self.view[2, :3] / (engine.length(self.view[2, :3]) or 1.0)
-        words = [f"eye=({', '.join(f'{x:.4g}' for x in eye)})", f"forward=({', '.join(f'{x:.3g}' for x in forward)})"]
+        words = [
+            f"eye=({', '.join(f'{x:.4g}' for x in eye)})",
+            f"forward=({', '.join(f'{x + 0.0:.3g}' for x in forward)})",
+        ]
         up = float(self.projection[1, 1])
         if up and self.projection[3, :3].any():
             words.append(f"fov_y_deg={np.degrees(2 * np.arctan(1 / abs(up))):.4g}")
@@ -542,8 +545,10 @@ class Camera:
         Raises
         ------
         ValueError
-            If the file has no frames, focal length or size, or another camera model than OPENCV, OPENCV_FISHEYE and
-            the simpler ones; as `from_intrinsics`.
+            If the file is broken or has no frames, focal length or size, or another camera model than OPENCV,
+            OPENCV_FISHEYE and the simpler ones; as `from_intrinsics`.
+        FileNotFoundError
+            If there is no such file.
         IndexError
             If there is no such frame.
 

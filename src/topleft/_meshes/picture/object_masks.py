@@ -5,7 +5,7 @@ Input: `Scene`, `Camera`. Output: `ObjectMasks`: masks, run lengths, boxes, visi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import operator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, cast
@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import F64, I32, I64
-from topleft._core.base.arrays import as_array, as_number
+from topleft._core.base.arrays import as_array, as_count, as_number, shown
+from topleft._core.base.options import check_choice
 from topleft._core.raster.rle import RunTable, annotation_of, encode_ids
 from topleft._meshes.camera.camera import Camera, CameraLike
 from topleft._meshes.camera.matrices import box_corners
@@ -103,8 +104,7 @@ class ObjectMasks:
         ValueError
             If it is neither.
         """
-        if which not in ("visible", "full"):
-            raise ValueError(f"which must be 'visible' or 'full', got {which!r}")
+        check_choice("which", which, ("visible", "full"))
         if which == "visible":
             return encode_ids(self.instance, np.arange(len(self)), compressed=compressed)
         table = RunTable(self.size)
@@ -160,7 +160,7 @@ class ObjectMasks:
     def annotations(
         self,
         image_id: int = 0,
-        category_ids: Sequence[int] | None = None,
+        category_ids: npt.ArrayLike | None = None,
         *,
         first_id: int = 1,
         which: Literal["visible", "full"] = "visible",
@@ -170,7 +170,7 @@ class ObjectMasks:
         Parameters
         ----------
         image_id : int
-        category_ids : sequence of int, optional
+        category_ids : array_like (N,) of int, optional
             Of each object of the scene; 1 unless given.
         first_id : int
             The id of the first annotation; those of others follow.
@@ -182,19 +182,24 @@ class ObjectMasks:
         ValueError
             If there are not as many categories as objects, or `which` is neither.
         """
-        if category_ids is not None and len(category_ids) != len(self):
-            raise ValueError(f"category_ids must be {len(self)}, one of each object, got {len(category_ids)}")
+        categories = np.ones(len(self), np.int64) if category_ids is None else as_array("category_ids", category_ids)
+        if categories.shape != (len(self),) or (categories.dtype.kind not in "iu" and categories.size):
+            got = f"shape {categories.shape} and dtype {categories.dtype}"
+            raise ValueError(f"category_ids must be {len(self)} integers, one of each object, got {got}")
+        image_id, first_id = as_count("image_id", image_id, 0), as_count("first_id", first_id, 0)
         found: list[dict[str, Any]] = []
         for i, rle in enumerate(self.rle(which)):
             if self.n_visible[i]:
-                category = 1 if category_ids is None else int(category_ids[i])
-                found.append(annotation_of(rle, first_id + len(found), image_id, category))
+                found.append(annotation_of(rle, first_id + len(found), image_id, int(categories[i])))
         return found
 
     def _checked(self, i: int) -> int:
-        if not -len(self) <= i < len(self):
-            raise IndexError(f"there are {len(self)} objects, got {i}")
-        return range(len(self))[i]
+        try:
+            return range(len(self))[operator.index(i)]
+        except TypeError:
+            raise TypeError(f"i must be the index of an object, got {shown(i)}") from None
+        except IndexError:
+            raise IndexError(f"there are {len(self)} objects, got {i}") from None
 
     def _inside(self, corner: tuple[int, int], mask: npt.NDArray[np.bool_]) -> Window:
         """What of a window lies in the picture, from the corner of the window on."""
@@ -245,6 +250,18 @@ def object_masks(
     References
     ----------
     T. Hodan and others, BOP: Benchmark for 6D Object Pose Estimation, 2018.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> ball, far = tl.Mesh(*tl.scenes.icosphere(2)), np.eye(4)
+    >>> far[:3, 3] = 1, 0, -2
+    >>> found = tl.object_masks(tl.Scene([ball, (ball, far)]), tl.Camera.look_at((0, 0, 5)), (64, 48))
+    >>> found
+    ObjectMasks(2 objects, 2 of them show, 64x48)
+    >>> found.scene_gt_info()[1]["bbox_obj"]
+    [32, 15, 18, 17]
     """
     if not 0 <= as_number("beyond", beyond) < np.inf:
         raise ValueError(f"beyond must be a number of pictures, 0 or more, got {beyond}")

@@ -78,12 +78,14 @@ class ViewLayers(Mapping[str, Array]):
             raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
         return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
 
-    def rle(self, layer: str = "instance", *, labels: npt.ArrayLike | None = None, compressed: bool = True) -> Any:
+    def rle(
+        self, layer: LayerOption = "instance", *, labels: npt.ArrayLike | None = None, compressed: bool = True
+    ) -> Any:
         """Run lengths of a layer as `to_rle` returns them, in the format of COCO.
 
         Parameters
         ----------
-        layer : str
+        layer : {"instance", "silhouette", "triangle"}
             "instance": a list with one for each instance of the scene, those that do not show too. "silhouette": one,
             unless it holds shares. "triangle": needs `labels`.
         labels : array_like (N,) of int, optional
@@ -103,9 +105,9 @@ class ViewLayers(Mapping[str, Array]):
         >>> import topleft as tl
         >>> view = tl.render_layers(tl.Mesh(*tl.scenes.shape("cube")), size=(8, 6), layers="instance")
         >>> view.rle("instance", compressed=False)[0]["counts"][:4]
-        [9, 2, 4, 2]
+        [13, 4, 2, 4]
         """
-        if layer not in self:
+        if not (isinstance(layer, str) and layer in self):
             raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
         if layer == "instance" and labels is None and self._n_instances is not None:
             labels = np.arange(self._n_instances)
