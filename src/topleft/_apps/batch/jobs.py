@@ -74,7 +74,7 @@ class Job:
     options: Mapping[str, Any] = field(default_factory=dict)
     destination: str | os.PathLike[str] | None = None
     layers: Sequence[LayerOption | str] = ()
-    scale: float = 1.0
+    scale: float = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.options, Mapping) or not all(isinstance(name, str) for name in self.options):
@@ -128,7 +128,7 @@ def as_job(item: object, index: int) -> Job:
     """
     if isinstance(item, Job):
         return item
-    names = [entry.name for entry in fields(Job)]
+    names = [entry.name for entry in fields(Job) if not entry.kw_only]
     if isinstance(item, tuple) and 1 <= len(item) <= len(names):
         return Job(*item)
     raise TypeError(f"jobs[{index}] must be a Job or a tuple ({', '.join(names)}), got {type(item).__name__}")
