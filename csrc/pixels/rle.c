@@ -29,11 +29,12 @@ TL_INLINE int64_t value_at(const tl_run_source *s, int64_t row, int64_t column)
 TL_INLINE void note_changes(uint64_t differs, int n_bytes, int64_t column, int64_t height, int32_t row, int32_t *rows,
                             int32_t *n_rows)
 {
+    const int shift = n_bytes == 1 ? 3 : 5; /* pixels to bits */
     const uint64_t pixel = n_bytes == 1 ? 0xff : 0xffffffff;
     while (differs) {
-        const int first = __builtin_ctzll(differs) / (8 * n_bytes); /* of the word */
+        const int first = __builtin_ctzll(differs) >> shift; /* of the word */
         rows[(column + first) * height + n_rows[column + first]++] = row;
-        differs &= ~(pixel << (8 * n_bytes * first));
+        differs &= ~(pixel << (first << shift));
     }
 }
 

@@ -317,3 +317,17 @@ def test_json_goes_with_neither_labels_nor_sampling(files, run):
         status, lines = run("mask", "map.geojson", "-o", "rle.json", *option)
         assert status == 2
         assert "run lengths are of masks, without --labels and --sampling" in lines[0]
+
+
+@pytest.mark.parametrize("rule", ["evenodd", "nonzero"])
+def test_json_of_objects_of_many_parts_is_the_union_of_each(files, run, rule):
+    rng = np.random.default_rng(0)
+    parts = [[rng.uniform(-5, 45, 2 * n).round(2).tolist() for n in rng.integers(3, 9, k)] for k in (1, 30, 1, 2)]
+    annotations = [{"id": i, "image_id": 5, "category_id": 1, "segmentation": own} for i, own in enumerate(parts)]
+    content = {"images": [{"id": 5, "file_name": "a.jpg", "width": 40, "height": 33}], "annotations": annotations}
+    files.joinpath("many.json").write_text(json.dumps(content))
+    assert run("mask", "many.json", "-o", "rle.json", "--rule", rule) == (0, [])
+    found = json.loads(files.joinpath("rle.json").read_text())["annotations"]
+    masks = [tl.polygons([[ring] for ring in own], (40, 33), rule=rule) for own in parts]
+    assert [one["segmentation"] for one in found] == tl.to_rle(np.stack(masks))
+    assert [one["area"] for one in found] == [int(mask.sum()) for mask in masks]

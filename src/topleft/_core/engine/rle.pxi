@@ -1,12 +1,15 @@
 # Run lengths of masks and ids, down the columns. Included by kernels.pyx.
 
+RLE_LINE = TL_RLE_LINE
+
 
 def list_runs(pixels: Array, box: tuple[int, int, int, int], corner: tuple[int, int, int], int64_t background,
-              int64_t first_key, int64_t first_picture, int64_t[:, ::1] runs, int64_t n) -> tuple[int, int]:
+              int64_t first_key, int64_t first_picture, int32_t[::1] rows, int64_t[:, ::1] runs,
+              int64_t n) -> tuple[int, int]:
     """Append the runs of pictures (N, H, W), of int32 or bytes, to a table of n: rows (start, end, key).
 
     `box`: left, top, right and bottom of what is looked at of each; `corner`: where pixel (0, 0) of each lies in the
-    frame, x and y, and the height of the frame. The key of int32 pixels is their value, and those of the background are
+    frame, x and y, and the height of the frame. `rows`: RLE_LINE numbers for each row of the box. The key of int32 pixels is their value, and those of the background are
     left out; that of bytes, 0 and 1, is first_key and the number of their picture. Returns the number of runs, and the
     first picture for which there is no room.
     """
@@ -14,7 +17,6 @@ def list_runs(pixels: Array, box: tuple[int, int, int, int], corner: tuple[int, 
     cdef tl_run_source source
     cdef int64_t i, kept, at, n_pictures = pixels.shape[0], n_room = runs.shape[0], height = pixels.shape[1]
     cdef int64_t left = box[0], top = box[1]
-    cdef int32_t[::1] rows
     memset(&source, 0, sizeof(source))
     source.width, source.height, source.n_bytes = box[2] - left, box[3] - top, pixels.itemsize
     if source.width <= 0 or source.height <= 0 or not n_room:
@@ -22,7 +24,6 @@ def list_runs(pixels: Array, box: tuple[int, int, int, int], corner: tuple[int, 
     source.stride, source.is_mask = pixels.shape[2] * source.n_bytes, source.n_bytes == 1
     source.left, source.top, source.frame_height = left + <int64_t>corner[0], top + <int64_t>corner[1], corner[2]
     source.background = background
-    rows = np.empty(TL_RLE_LINE * source.height, np.int32)
     with nogil:
         for i in range(first_picture, n_pictures):
             at = (i * height + top) * source.stride + left * source.n_bytes

@@ -15,7 +15,7 @@ from topleft._core.base.arrays import as_array
 from topleft._core.base.memory import SCRATCH
 from topleft._core.base.options import parse
 from topleft._core.polygons.draw import draw_mask
-from topleft._core.polygons.polygons import Rule, frame_of
+from topleft._core.polygons.polygons import Rule, frame_of, polygons
 from topleft._core.polygons.prepared import prepare
 from topleft._core.polygons.rings import as_rings
 from topleft._core.raster.rle import RunTable, encode_ids, encode_masks
@@ -122,23 +122,22 @@ def encode_polygons(
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
     found, frame = frame_of(as_rings(rings), size, (0, 0), subpixel_bits, 1, 1)  # type: ignore[arg-type]
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
-    table, boxes = RunTable(frame.size), prepared.compiled.boxes_px
+    table, boxes = RunTable(frame.size), prepared.compiled.boxes_px.tolist()
     mask: npt.NDArray[np.uint8] = SCRATCH.empty("labels", frame.size[::-1], np.uint8)
     firsts = np.arange(len(found)) if owners is None else np.flatnonzero(np.diff(owners, prepend=-1))
     for first, end in pairwise([*firsts.tolist(), len(found)]):
-        shown = [i for i in range(first, end) if (boxes[i, :2] < boxes[i, 2:]).all()]
+        shown = [box for box in boxes[first:end] if box[0] < box[2] and box[1] < box[3]]
         if not shown:
             continue
-        left, top = boxes[shown, :2].min(axis=0).tolist()
-        right, bottom = boxes[shown, 2:].max(axis=0).tolist()
-        union = None
-        for i in shown:
-            draw_mask(prepared, mask, is_nonzero=is_nonzero, polygon=i, rows=(top, bottom))
-            if len(shown) > 1:
-                part = mask[top:bottom]
-                union = part.copy() if union is None else np.bitwise_or(union, part, out=union)
-        if union is not None:
-            mask[top:bottom] = union
-        table.add(mask[None], box=(left, top, right, bottom), key=first if owners is None else int(owners[first]))
+        left, top = (min(box[k] for box in shown) for k in (0, 1))
+        right, bottom = (max(box[k] for box in shown) for k in (2, 3))
+        key = first if owners is None else int(owners[first])
+        if end - first == 1:
+            draw_mask(prepared, mask, is_nonzero=is_nonzero, polygon=first, rows=(top, bottom))
+            table.add(mask[None], box=(left, top, right, bottom), key=key)
+        else:  # parts may be thousands: the rectangles of a crowd
+            window: dict[str, Any] = {"origin": (left, top), "subpixel_bits": frame.subpixel_bits, "threads": 1}
+            union = polygons(found.part(first, end), (right - left, bottom - top), rule=rule, **window)
+            table.add(union.view(np.uint8)[None], at=(left, top), key=key)
     n = len(found) if owners is None else int(owners[-1]) + 1 if len(owners) else 0
     return table.encode(table.keys.astype(np.int32), n, compressed=compressed)

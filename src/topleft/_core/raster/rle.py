@@ -29,6 +29,7 @@ class RunTable:
     def __init__(self, size: tuple[int, int]) -> None:
         self.size = size
         self._runs: I64 = empty((0, 3), np.int64)
+        self._rows: I32 = empty((0,), np.int32)  # for a kernel
         self._n = 0
 
     @property
@@ -52,8 +53,11 @@ class RunTable:
         n_pictures, height, width = pixels.shape
         corner = *at, self.size[1]
         look, done = (0, 0, width, height) if box is None else box, 0
+        if len(self._rows) < engine.RLE_LINE * (look[3] - look[1]):
+            self._rows = empty((engine.RLE_LINE * (look[3] - look[1]),), np.int32)
+        how = pixels, look, corner, background, key
         while True:
-            self._n, done = engine.list_runs(pixels, look, corner, background, key, done, self._runs, self._n)
+            self._n, done = engine.list_runs(*how, done, self._rows, self._runs, self._n)
             if done == n_pictures:
                 return
             n_least = RUNS_A_COLUMN * (look[2] - look[0]) * (n_pictures - done)
