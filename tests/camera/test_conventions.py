@@ -338,3 +338,9 @@ FRAME = {"transform_matrix": np.eye(4).tolist()}
 def test_what_is_no_camera_and_no_pose_is_refused(make, error, message):
     with pytest.raises(error, match=message):
         make()
+
+
+def test_a_pose_far_away_is_not_singular():
+    place = np.eye(4)
+    place[:3, 3] = 1e12, -3e9, 5
+    assert (tl.Instance(tl.Mesh(*tl.scenes.cube()), place).transform == place).all()
