@@ -13,7 +13,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_real, as_square, shown
+from topleft._core.base.arrays import as_real, as_square, check_regular, shown
 
 BOP_POSES = (("cam_R_m2c", "cam_t_m2c"), ("cam_R_w2c", "cam_t_w2c"))
 """Rotation, nine numbers row by row, and translation: of a model and of the world, as seen by the camera."""
@@ -55,8 +55,7 @@ def as_pose(name: str, pose: Any) -> F64:
         raise ValueError(f"{name} must hold finite numbers, got {shown(pose)}")
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
         raise ValueError(f"the last row of {name} must be [0, 0, 0, 1], got {matrix[3].tolist()}")
-    if np.linalg.matrix_rank(matrix[:3, :3]) < 3:  # of the whole one a translation of 1e8 would decide
-        raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
+    check_regular(name, matrix)
     return matrix
 
 
