@@ -29,6 +29,7 @@
 #include "pixels/planes.c"
 #include "pixels/points.c"
 #include "pixels/resolve.c"
+#include "pixels/rle.c"
 #include "pixels/slopes.c"
 #include "pixels/split.c"
 #include "pixels/texels.c"
@@ -84,6 +85,9 @@ const tl_kernels TL_KERNELS = {
     .split_pixels = split_pixels,
     .spread_ids = spread_ids,
     .find_instances = find_instances,
+    .list_column_runs = list_column_runs,
+    .count_runs = count_runs,
+    .write_counts = write_counts,
     .draw_area = draw_area,
     .blend = blend,
     .fill_few = fill_few,

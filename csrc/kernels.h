@@ -124,6 +124,15 @@ typedef struct tl_kernels {
     void (*find_instances)(const int32_t *ids, int64_t n_rows, int64_t width, const int64_t *first_ids, int64_t n,
                            int32_t *out, int32_t *boxes);
 
+    /* Appends the runs of a window to a table of *n, which has room for n_room; `rows` has TL_RLE_LINE * height
+     * numbers.  Returns whether there was room for all. */
+    int (*list_column_runs)(const tl_run_source *source, int32_t *rows, tl_run *runs, int64_t n_room, int64_t *n);
+
+    /* The counts of objects from n runs in their order: run i is of object[i], of none where that is below 0.  Then
+     * these as text, that of object k from text_starts[k] to text_starts[k + 1]: room for 13 characters a count. */
+    void (*count_runs)(const tl_run *runs, const int32_t *object, int64_t n, const tl_rles *rles);
+    void (*write_counts)(const tl_rles *rles, int64_t *text_starts, uint8_t *text);
+
     /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as
      * `draw` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
     int64_t (*draw_area)(const tl_snapped *snapped, const tl_window *window, const tl_area *target);

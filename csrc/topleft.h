@@ -490,6 +490,37 @@ typedef struct {
     int64_t n_values;
 } tl_sloped;
 
+/* ---- run lengths --------------------------------------------------------------------------------------- */
+
+#define TL_RLE_LINE 64 /* bytes of a row that are looked at together */
+
+/* A window of a picture whose runs of equal pixels are listed, down its columns. */
+typedef struct {
+    const uint8_t *pixels; /* of a mask uint8, of ids int32 */
+    int n_bytes;           /* of a pixel, 1 or 4 */
+    int64_t stride;        /* bytes */
+    int64_t width, height; /* of the window, less than 2^31 */
+    int64_t left, top;     /* of the window in the picture */
+    int64_t frame_height;  /* of the picture */
+    int64_t background;    /* pixels of this value are in no run */
+    int is_mask;           /* runs get `key`; otherwise the value of their pixels */
+    int64_t key;
+} tl_run_source;
+
+/* Pixels [start, end) of a picture, counted down its columns. */
+typedef struct {
+    int64_t start, end, key;
+} tl_run;
+
+/* Run lengths of n objects: how many pixels are not in the object, how many are, and so on. */
+typedef struct {
+    int64_t n, n_pixels;   /* objects; pixels of the picture */
+    const int64_t *starts; /* where the counts of each begin; room for two a run, and one */
+    int64_t *n_counts;
+    int64_t *ends; /* of the last run of each */
+    int64_t *counts;
+} tl_rles;
+
 #include "clusters.h"
 #include "exact.h"
 #include "grad.h"

@@ -287,6 +287,81 @@ def scipy_interpolator(points: NDArray[Any], _: NDArray[Any], values: NDArray[An
     return lambda: find(x, y)
 
 
+def run_lengths_beside_coco() -> Scenes:
+    """Run lengths of 80 discs and of 80 polygons in a picture of COCO's size, beside pycocotools."""
+    from pycocotools import mask as coco
+
+    import topleft as tl
+
+    rng, (width, height), n = np.random.default_rng(0), (640, 480), 80
+    y, x = np.mgrid[:height, :width]
+    discs = [(rng.uniform(0, width), rng.uniform(0, height), rng.uniform(20, 120)) for _ in range(n)]
+    masks = np.stack([(x - cx) ** 2 + (y - cy) ** 2 < radius**2 for cx, cy, radius in discs])
+    columns = np.asfortranarray(masks.transpose(1, 2, 0).view(np.uint8))
+    ids = np.full((height, width), -1, np.int32)
+    for i, mask in enumerate(masks):
+        ids[mask] = i
+
+    def copied() -> object:
+        return coco.encode(np.asfortranarray(masks.transpose(1, 2, 0).view(np.uint8)))
+
+    yield f"{n} masks, 640x480", {
+        "topleft to_rle": partial(tl.to_rle, masks), "pycocotools, with the copy to columns": copied,
+        "pycocotools, of columns": partial(coco.encode, columns),
+    }  # fmt: skip
+    yield (
+        f"an id map of {n} objects, 640x480",
+        {
+            "topleft to_rle": partial(tl.to_rle, ids, labels=range(n)),
+            "pycocotools, a mask for each": lambda: [coco.encode(np.asfortranarray(ids == i)) for i in range(n)],
+        },
+    )
+    angle = np.sort(rng.uniform(0, 2 * np.pi, (n, 60)), axis=1)
+    reach = rng.uniform(10, 200, (n, 1)) * rng.uniform(0.7, 1, (n, 60))
+    points = np.stack([320 + reach * np.cos(angle), 240 + reach * np.sin(angle)], axis=2)
+    flat = [[own.ravel().tolist()] for own in points]
+    yield (
+        f"{n} polygons of 60 corners, 640x480",
+        {
+            "topleft to_rle": partial(tl.to_rle, flat, (width, height)),
+            "pycocotools frPyObjects": lambda: [coco.frPyObjects(own, height, width) for own in flat],
+        },
+    )
+
+
+def objects_beside_bop() -> Scenes:
+    """The objects of a scene beside the loop of BOP's tools: each alone on nine pictures, then NumPy; same renderer."""
+    import topleft as tl
+
+    rng, (width, height) = np.random.default_rng(0), (640, 480)
+    intrinsics, pose = np.array([[700.0, 0, 319.5], [0, 700.0, 239.5], [0, 0, 1]]), np.eye(4)
+    pose[2, 3] = 4.0
+    mesh, places = tl.Mesh(*tl.scenes.blob(20_000)), np.tile(np.eye(4), (20, 1, 1))
+    places[:, :3, :3] *= 0.4
+    places[:, :3, 3] = rng.uniform(-1.5, 1.5, (20, 3))
+    scene = tl.Scene([(mesh, place) for place in places])
+    camera = tl.Camera.from_intrinsics(intrinsics, pose, (width, height))
+    large = (3 * width, 3 * height)
+    shifted = tl.Camera.from_intrinsics(intrinsics + [[0, 0, width], [0, 0, height], [0, 0, 0]], pose, large)
+
+    def loop() -> object:
+        ids, found = tl.rasterize_mesh(scene, camera, (width, height), threads=1).instance, []
+        for i in range(len(scene)):
+            mask = tl.rasterize_mesh(tl.Scene([scene[i]]), shifted, large, threads=1).mask
+            (rows, columns), seen = mask.nonzero(), ids == i
+            ends = [rows.min(), rows.max(), columns.min(), columns.max()] if len(rows) else []
+            found.append((int(mask.sum()), int(seen.sum()), ends, seen.nonzero()))
+        return found
+
+    yield (
+        "20 objects of 20,000 triangles, 640x480",
+        {
+            "topleft object_masks": lambda: tl.object_masks(scene, camera, (width, height), threads=1).scene_gt_info(),
+            "each on a canvas of 1920x1440": loop,
+        },
+    )
+
+
 OTHER_FIELDS = {
     "matplotlib tripcolor": matplotlib_tripcolor,
     "datashader trimesh": datashader_trimesh,
@@ -357,6 +432,8 @@ PAIRS = {
     "layers": Pairs(layers_beside_picture, "time each layer of a view beside its picture", 40),
     "tolerance": Pairs(levels_beside_whole, "time views with `tolerance=` beside the same without", 31),
     "no-snap": Pairs(unsnapped_beside_snapped, "time vertices that are not snapped beside snapped ones", 10),
+    "rle": Pairs(run_lengths_beside_coco, "time run lengths beside pycocotools", 15),
+    "objects": Pairs(objects_beside_bop, "time full and visible masks of objects beside the loop of BOP's tools", 7),
     "field": Pairs(field_beside_others, "time a field beside matplotlib, datashader and SciPy", 7),
     "grids": Pairs(grids_beside_others, "time voxels, atlases and a viewshed beside other programs", 5),
 }

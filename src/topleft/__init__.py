@@ -12,6 +12,7 @@ from topleft._core.base.memory import release_memory
 from topleft._core.engine.isa import build_info
 from topleft._core.polygons.overlap import Overlap, overlap
 from topleft._core.polygons.polygons import polygons
+from topleft._core.polygons.rle import to_rle
 from topleft._core.raster.backward import area_vjp
 from topleft._core.raster.classic import bresenham_line
 from topleft._core.raster.composite import composite
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from topleft._meshes.grid.bake import Baked, bake
     from topleft._meshes.grid.viewshed import Viewshed, viewshed
     from topleft._meshes.grid.voxels import Voxels, voxelize
+    from topleft._meshes.picture.object_masks import ObjectMasks, object_masks
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
 
@@ -64,6 +66,7 @@ _LATE = {
     "Baked": "topleft._meshes.grid.bake",
     "Explorer": "topleft._apps.explore.open",
     "Job": "topleft._apps.batch.jobs",
+    "ObjectMasks": "topleft._meshes.picture.object_masks",
     "Tiles": "topleft._apps.tiles.tiles",
     "ViewLayers": "topleft._meshes.picture.view_layers",
     "Viewshed": "topleft._meshes.grid.viewshed",
@@ -73,6 +76,7 @@ _LATE = {
     "bake": "topleft._meshes.grid.bake",
     "explore": "topleft._apps.explore.open",
     "merge": "topleft._apps.tiles.merge",
+    "object_masks": "topleft._meshes.picture.object_masks",
     "pixel_grid": "topleft._apps.diagram.pixel_grid",
     "render_batch": "topleft._apps.batch.batch",
     "render_layers": "topleft._meshes.picture.view_layers",
@@ -109,6 +113,7 @@ __all__ = [
     "MeshError",
     "MeshWarning",
     "MissingPackageError",
+    "ObjectMasks",
     "OpenCVLens",
     "Overlap",
     "Plan",
@@ -142,6 +147,7 @@ __all__ = [
     "load",
     "load_cameras",
     "merge",
+    "object_masks",
     "overdraw",
     "overlap",
     "peel",
@@ -162,6 +168,7 @@ __all__ = [
     "silhouette",
     "simplify",
     "tiles",
+    "to_rle",
     "turntable",
     "viewpoints",
     "viewshed",

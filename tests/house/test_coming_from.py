@@ -13,7 +13,8 @@ GUIDE = Path(__file__).parents[2] / "docs" / "guide"
 PAGE = GUIDE.joinpath("coming_from.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"```python[ \w]*\n(.*?)```", re.DOTALL)
 SECTIONS = dict(re.findall(r"^## (\S+)\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL))
-LIBRARIES = ["nvdiffrast", "pytorch3d", "pyrender", "trimesh", "OpenCV", "scikit-image", "rasterio", "datashader"]
+LIBRARIES = ["nvdiffrast", "pytorch3d", "pyrender", "trimesh", "OpenCV", "scikit-image", "rasterio", "pycocotools",
+             "datashader"]  # fmt: skip
 
 
 def rows(text):
@@ -102,6 +103,15 @@ def test_rasterio_draws_the_same_values(names):
     assert np.array_equal(theirs, ours)
     mask = features.geometry_mask(shapes[:1], out_shape=(48, 64), transform=transform)
     assert np.array_equal(mask, ~tl.polygons(names["ring"], grid))
+
+
+def test_pycocotools_writes_the_same_text_and_other_borders(names):
+    coco = pytest.importorskip("pycocotools.mask")
+    mask = names["frags"].mask
+    assert coco.encode(np.asfortranarray(mask.astype(np.uint8)))["counts"].decode() == tl.to_rle(mask)["counts"]
+    theirs = coco.decode(coco.frPyObjects([names["ring"].ravel().tolist()], 48, 64))[..., 0] > 0
+    ours = tl.polygons(names["ring"], (64, 48))
+    assert 0 < (theirs != ours).sum() < 0.2 * ours.sum()
 
 
 def test_matplotlib_interpolates_the_same_numbers(names):

@@ -21,7 +21,10 @@ SECTIONS = [
 #: The programs of the pages for newcomers and for tasks, by page and place.
 STEPS = {
     f"{path.stem} {i}": code
-    for path in [ROOT / "docs/start.md", *sorted(ROOT.glob("docs/tasks/*.md"))]
+    for path in [
+        *(ROOT / f"docs/{name}.md" for name in ("start", "guide/cameras", "guide/masks")),
+        *sorted(ROOT.glob("docs/tasks/*.md")),
+    ]
     for i, code in enumerate(re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), flags=re.DOTALL))
 }
 #: The program of each section that has one, by its heading.

@@ -27,10 +27,14 @@ CLOUD = tl.points(POINTS, SIZE)
 TABLE = tl.overlap([FLAT], SIZE)
 PLAN = tl.plan(POINTS, ONE, SIZE)
 VIEWS = tl.render_layers(CUBE, CAMERA, SIZE, layers=["depth"])
+IDS = tl.render_layers(CUBE, CAMERA, SIZE, layers=["instance"])
+OBJECTS = tl.object_masks(SCENE, CAMERA, SIZE)
 CHART = tl.Mesh(POINTS, ONE, uv=[[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]])
 LEVELS = tl.Levels(CUBE, [tl.Level(tl.Mesh(*tl.scenes.tetrahedron()), 0.5)])
 RASTER = tl.tiles((FLAT, ONE), SIZE, kind="coverage", extent=(0, 8, 0, 6))
 DRAW = tl.Rasterizer(SIZE)
+TRANSFORMS = {"fl_x": 9.0, "frames": [{"transform_matrix": np.eye(4).tolist()}]}
+PYTORCH3D = {"R": np.eye(3)[None], "T": np.zeros((1, 3)), "focal_length": 2.0, "principal_point": np.zeros((1, 2))}
 VIEW = {
     "transform": None, "origin": (0, 0), "viewport": None, "subpixel_bits": 8, "sampling": "center", "method": "auto",
     "cull": "none", "clip_depth": "minus_one_to_one", "threads": None, "plan": None,
@@ -55,6 +59,15 @@ CALLS = {
     "Camera.from_intrinsics": (tl.Camera.from_intrinsics, {"intrinsics": np.eye(3), "camera_from_world": np.eye(4),
                                                            "size": SIZE, "near": 1, "far": 2, "distortion": None,
                                                            "fisheye": None}),
+    "Camera.from_opengl": (tl.Camera.from_opengl, {"c2w": np.eye(4), "intrinsics": np.eye(3), "size": SIZE,
+                                                   "fov_y_deg": None, "pixel_center": 0.5, "near": 1, "far": 2,
+                                                   "distortion": None, "fisheye": None}),
+    "Camera.from_colmap": (tl.Camera.from_colmap, {"camera": "1 PINHOLE 8 6 5 5 4 3", "image": "1 1 0 0 0 0 0 4 1 a",
+                                                   "pixel_center": 0.5, "near": 1, "far": 2}),
+    "Camera.from_nerfstudio": (tl.Camera.from_nerfstudio, {"transforms": TRANSFORMS, "i": 0, "size": SIZE,
+                                                           "pixel_center": 0.5, "near": 1, "far": 2}),
+    "Camera.from_pytorch3d": (tl.Camera.from_pytorch3d, {"cameras": PYTORCH3D, "i": 0, "size": SIZE,
+                                                         "pixel_center": 0.5, "near": 1, "far": 2}),
     "Camera.project": (CAMERA.project, {"points": [[0, 0, 0]], "size": SIZE}),
     "Camera.clip_from_world": (CAMERA.clip_from_world, {"size": SIZE}),
     "FisheyeLens": (tl.FisheyeLens, {"k1": 0.1}),
@@ -141,6 +154,16 @@ CALLS = {
     "polygons": (tl.polygons, {"rings": [FLAT], "size": SIZE, "rule": "evenodd", "values": None, "background": None,
                                "sampling": "center", "origin": (0, 0), "subpixel_bits": 8, "threads": None,
                                "out": None}),
+    "to_rle": (tl.to_rle, {"pixels": [FLAT], "size": SIZE, "labels": None, "rule": "evenodd", "subpixel_bits": 8}),
+    "object_masks": (tl.object_masks, {"scene": SCENE, "camera": CAMERA, "size": SIZE, "beyond": 1.0, "cull": None,
+                                       "subpixel_bits": 8, "threads": None}),
+    "ObjectMasks.visible": (OBJECTS.visible, {"i": 0}),
+    "ObjectMasks.full": (OBJECTS.full, {"i": 0}),
+    "ObjectMasks.rle": (OBJECTS.rle, {"which": "full"}),
+    "ObjectMasks.scene_gt_info": (OBJECTS.scene_gt_info, {"depth": None}),
+    "ObjectMasks.annotations": (OBJECTS.annotations, {"image_id": 0, "category_ids": None, "first_id": 1,
+                                                      "which": "visible"}),
+    "ViewLayers.rle": (IDS.rle, {"layer": "instance", "labels": None}),
     "overlap": (tl.overlap, {"rings": [FLAT], "size": SIZE, "rule": "evenodd", "origin": (0, 0), "subpixel_bits": 8,
                              "threads": None, "out": None}),
     "load_cameras": (tl.load_cameras, {"path": "nothing.gltf"}),
@@ -346,8 +369,8 @@ def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
     made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
             "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
-            "MeshWarning", "Explorer", "Overlap", "Tiles", "Window", "Baked", "Viewshed", "VisibleFaces",
-            "Voxels"}  # fmt: skip
+            "MeshWarning", "Explorer", "ObjectMasks", "Overlap", "Tiles", "Window", "Baked", "Viewshed",
+            "VisibleFaces", "Voxels"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made
 

@@ -376,3 +376,47 @@ def test_vector_file_that_is_broken_is_told_in_one_line(files, run):
 def test_no_data_of_a_mask_is_refused(files, run):
     said = "topleft: --nodata is for --labels: a mask is 0 where nothing is"
     assert run("mask", "map.geojson", "-o", "m.tif", "--nodata", 9) == (2, [said])
+
+
+def test_json_has_run_lengths_of_each_object_of_coco(files, run):
+    assert run("mask", "coco.json", "-o", "rle.json") == (0, [])
+    content = json.loads(files.joinpath("rle.json").read_text())
+    union = tl.polygons([[part] for part in PARTS], (8, 4))
+    first, second = content["annotations"]
+    assert first["segmentation"] == tl.to_rle(union)
+    assert (first["area"], first["bbox"]) == (int(union.sum()), [0, 0, 5, 3])
+    assert (first["image_id"], first["category_id"], second["image_id"], second["category_id"]) == (5, 2, 6, 9)
+    assert content["images"][0] == {"id": 5, "file_name": "cat", "width": 8, "height": 4}
+    assert {"id": 2, "name": "cat"} in content["categories"]
+    (picture, _) = load_polygons("rle.json")
+    assert (tl.polygons(picture.polygons, (8, 4)) == union).all()
+
+
+def test_json_of_geojson_has_properties_and_the_grid_of_the_mask(files, run):
+    words = "map.geojson", "--size", "7x4", "--extent", 0, 7, 0, 4
+    assert run("mask", *words, "-o", "rle.json") == (0, [])
+    content = json.loads(files.joinpath("rle.json").read_text())
+    drawn = tl.polygons(GEOJSON, tl.Grid((7, 4), (0, 7, 0, 4)), values="index")
+    assert [one["segmentation"] for one in content["annotations"]] == tl.to_rle(drawn, labels=[0, 1])
+    assert [one["attributes"]["zone"] for one in content["annotations"]] == [3, 700]
+
+
+def test_json_goes_with_neither_labels_nor_sampling(files, run):
+    for option in (("--labels", "zone"), ("--sampling", "area")):
+        status, lines = run("mask", "map.geojson", "-o", "rle.json", *option)
+        assert status == 2
+        assert "run lengths are of masks, without --labels and --sampling" in lines[0]
+
+
+@pytest.mark.parametrize("rule", ["evenodd", "nonzero"])
+def test_json_of_objects_of_many_parts_is_the_union_of_each(files, run, rule):
+    rng = np.random.default_rng(0)
+    parts = [[rng.uniform(-5, 45, 2 * n).round(2).tolist() for n in rng.integers(3, 9, k)] for k in (1, 30, 1, 2)]
+    annotations = [{"id": i, "image_id": 5, "category_id": 1, "segmentation": own} for i, own in enumerate(parts)]
+    content = {"images": [{"id": 5, "file_name": "a.jpg", "width": 40, "height": 33}], "annotations": annotations}
+    files.joinpath("many.json").write_text(json.dumps(content))
+    assert run("mask", "many.json", "-o", "rle.json", "--rule", rule) == (0, [])
+    found = json.loads(files.joinpath("rle.json").read_text())["annotations"]
+    masks = [tl.polygons([[ring] for ring in own], (40, 33), rule=rule) for own in parts]
+    assert [one["segmentation"] for one in found] == tl.to_rle(np.stack(masks))
+    assert [one["area"] for one in found] == [int(mask.sum()) for mask in masks]

@@ -21,7 +21,7 @@ from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.io.images import save_image
 from topleft._meshes.io.layer_files import layer_paths, save_layers
-from topleft._meshes.io.load import load
+from topleft._meshes.io.load import as_scale, load
 from topleft._meshes.io.notes import listening, tell
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
@@ -57,6 +57,8 @@ class Job:
         `{layer}` in the name stands for the name of a layer. None: the picture is returned.
     layers : sequence of str
         What is wanted besides, or instead of, the picture: names that `render_layers` knows. None: the picture alone.
+    scale : float
+        Of a scene that is a path: what its coordinates are multiplied by; 0.001 makes metres of millimetres.
 
     Examples
     --------
@@ -73,6 +75,7 @@ class Job:
     options: Mapping[str, Any] = field(default_factory=dict)
     destination: str | os.PathLike[str] | None = None
     layers: Sequence[LayerOption | str] = ()
+    scale: float = field(default=1.0, kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.options, Mapping) or not all(isinstance(name, str) for name in self.options):
@@ -81,6 +84,8 @@ class Job:
             raise TypeError(f"camera must be a Camera, a function of the mesh and the size or None, got {self.camera}")
         if self.destination is not None:
             as_place("destination", self.destination)
+        if as_scale(self.scale) != 1 and not isinstance(self.scene, str | os.PathLike):
+            raise TypeError(f"scale is of a scene that is a path, got {shown(self.scene)}: load(path, scale=) has one")
 
     def __repr__(self) -> str:
         """One line: what is drawn, how large, where to."""
@@ -124,7 +129,7 @@ def as_job(item: object, index: int) -> Job:
     """
     if isinstance(item, Job):
         return item
-    names = [entry.name for entry in fields(Job)]
+    names = [entry.name for entry in fields(Job) if not entry.kw_only]
     if isinstance(item, tuple) and 1 <= len(item) <= len(names):
         return Job(*item)
     raise TypeError(f"jobs[{index}] must be a Job or a tuple ({', '.join(names)}), got {type(item).__name__}")
@@ -147,10 +152,11 @@ class MeshFile:
     """A mesh that is in a file."""
 
     path: str
+    scale: float = 1.0
 
     def __call__(self) -> Mesh | Points:
         """Read it."""
-        return load(self.path)
+        return load(self.path, scale=self.scale)
 
 
 class ForeignMesh:
@@ -240,7 +246,7 @@ class JobRunner:
         for file in files:
             if isinstance(file, Path) and not file.parent.is_dir():
                 file.parent.mkdir(parents=True, exist_ok=True)
-        scene = self._scene(job.scene)
+        scene = self._scene(job.scene, job.scale)
         size = as_size(job.size)
         camera = job.camera(scene, size) if callable(job.camera) else job.camera
         options = {"threads": 1, **job.options}
@@ -262,9 +268,9 @@ class JobRunner:
         save_layers(path, arrays, matrix=matrix, background=_opaque(job))
         return None
 
-    def _scene(self, scene: Any) -> Any:
+    def _scene(self, scene: Any, scale: float) -> Any:
         if isinstance(scene, (str, os.PathLike)):
-            scene = MeshFile(os.fspath(scene))
+            scene = MeshFile(os.fspath(scene), scale)
         elif not isinstance(scene, Mesh | Scene | Points) and not callable(scene):
             scene = ForeignMesh(scene)
         return self._cache.get(scene) if callable(scene) else scene

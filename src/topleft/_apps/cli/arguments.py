@@ -14,7 +14,7 @@ from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
 from topleft._meshes.io.images import PICTURE_SUFFIXES, SUFFIXES
 from topleft._meshes.io.limits.budget import LIMITS
-from topleft._meshes.io.load import as_seconds
+from topleft._meshes.io.load import as_scale, as_seconds
 from topleft._meshes.model.mesh import DEFAULT_CREASE, as_crease
 from topleft._meshes.model.points import DEFAULT_POINT_SIZE
 from topleft._meshes.picture.layers import LAYERS, check_layers
@@ -158,6 +158,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N|NAME|all",
         help="which animation --time is of, from 0 (default the first)",
     )
+    add_scale(parser)
     add(
         "--threads",
         type=positive,
@@ -238,6 +239,17 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         add(f"--{option.replace('_', '-')}", type=positive, metavar="N", help=f"refuse files of more {limit.what}")
 
 
+def add_scale(parser: argparse.ArgumentParser) -> None:
+    """Add --scale."""
+    parser.add_argument(
+        "--scale",
+        type=_scale,
+        default=1.0,
+        metavar="X",
+        help="what coordinates of a file are multiplied by: 0.001 makes metres of millimetres (default 1)",
+    )
+
+
 def size(text: str) -> tuple[int, int]:
     """The width and height of a picture."""
     width, cross, height = text.lower().partition("x")
@@ -291,6 +303,13 @@ def _point_size(text: str) -> float:
         return float(as_point_size("--point-size", float(text), 1))
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be a positive number of pixels, got {text!r}") from None
+
+
+def _scale(text: str) -> float:
+    try:
+        return as_scale(float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a positive number, got {text!r}") from None
 
 
 def _seconds(text: str) -> float:

@@ -19,8 +19,11 @@ from topleft._apps.cli.report import complain
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import Grid
 from topleft._core.base.options import Sampling
+from topleft._core.base.whole_file import write_whole
 from topleft._core.polygons.polygons import Rule, polygons
 from topleft._core.polygons.prepared import MAX_CROSSINGS
+from topleft._core.polygons.rle import encode_polygons
+from topleft._core.raster.rle import annotation_of
 from topleft._meshes.io.images import SUFFIXES, save_image
 from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
 
@@ -40,6 +43,9 @@ alphabet, and OUT.legend.json says which is which.
 
 A .tif of polygons on a plane is a GeoTIFF. Its CRS is that of the file (of GeoJSON degrees of WGS84, EPSG:4326), or
 --crs, to which the polygons are then transformed. --like RASTER takes size, extent, CRS and nodata of a raster.
+
+An OUT that ends in .json gets annotations of COCO instead, of all images: each object with the run lengths of its mask,
+its area and its box.
 """
 
 
@@ -50,6 +56,8 @@ def run_mask(options: argparse.Namespace) -> int:
         pictures = [p for p in pictures if options.image in (p.name, f"{p.folder}/{p.name}")]
         if not pictures:
             raise UsageError(f"--image {options.image}: {options.file} has no image of that name")
+    if Path(options.out).suffix.lower() == ".json":
+        return write_annotations(pictures, options)
     if len(pictures) > 1 and "{name}" not in options.out and "{index}" not in options.out:
         raise UsageError(f"{options.file} has {len(pictures)} images: -o needs {{name}}, or --image chooses one")
     if Path(options.out).suffix.lower() not in SUFFIXES:
@@ -72,6 +80,41 @@ def run_mask(options: argparse.Namespace) -> int:
             complain(f"{picture.name}: {picture.n_skipped} objects are no polygons and were left out")
             status = FAILED
     return status
+
+
+def write_annotations(pictures: list[PolygonPicture], options: argparse.Namespace) -> int:
+    """Write run lengths of the objects of all pictures as annotations of COCO."""
+    if options.labels is not None or options.sampling != Sampling.CENTER:
+        raise UsageError(f"-o {options.out}: run lengths are of masks, without --labels and --sampling")
+    status, images = 0, []
+    annotations: list[dict[str, Any]] = []
+    for number, picture in enumerate(pictures, 1):
+        given, frame = frame_of(picture, options)
+        width, height = frame.size if isinstance(frame, Grid) else frame
+        rles = encode_polygons(given, frame, options.rule, owners=picture.owners)
+        own = picture.objects[0].get("image_id", number) if picture.objects else number
+        named = {"id": own, "file_name": (Path(picture.folder) / picture.name).as_posix()}
+        images.append(named | {"width": width, "height": height})
+        for said, rle in zip(picture.objects, rles, strict=True):
+            category = said.get("category_id")
+            made = annotation_of(rle, len(annotations) + 1, own, category if isinstance(category, int) else 1)
+            others = {name: value for name, value in said.items() if name not in (*made, "category")}
+            annotations.append(made | {"iscrowd": said.get("iscrowd", 0)} | ({"attributes": others} if others else {}))
+        if picture.n_skipped:
+            complain(f"{picture.name}: {picture.n_skipped} objects are no polygons and were left out")
+            status = FAILED
+    content = {"images": images, "annotations": annotations, "categories": categories_of(pictures)}
+    path = Path(options.out)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, lambda file: file.write(json.dumps(content).encode()))
+    return status
+
+
+def categories_of(pictures: list[PolygonPicture]) -> list[dict[str, Any]]:
+    """The categories that objects name, by their ids."""
+    names = {said.get("category_id"): said.get("category") for picture in pictures for said in picture.objects}
+    known = {key: name for key, name in names.items() if isinstance(key, int)} or {1: None}
+    return [{"id": key, "name": str(key if name is None else name)} for key, name in sorted(known.items())]
 
 
 def paths_of(pictures: list[PolygonPicture], out: str) -> list[Path]:

@@ -54,6 +54,7 @@ class MeshSource:
     point_size: float = DEFAULT_POINT_SIZE
     time: float | None = None
     clip: int | str | None = None
+    scale: float = 1.0
     limits: tuple[tuple[str, int | None], ...] = ()
 
     def __call__(self) -> Mesh | Points:
@@ -71,10 +72,12 @@ class MeshSource:
         if self.name in SHAPES:
             if self.time is not None:
                 raise UsageError(f"--time needs a file with animations, got the built-in shape {self.name!r}")
-            return Mesh(*shape(self.name), crease=self.crease)
+            vertices, triangles = shape(self.name)
+            return Mesh(vertices * self.scale, triangles, crease=self.crease)
         if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
             raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
-        return load(self.name, crease=self.crease, time=self.time, clip=self.clip, **dict(self.limits))
+        limits = dict(self.limits)
+        return load(self.name, crease=self.crease, time=self.time, clip=self.clip, scale=self.scale, **limits)
 
 
 def read_texture(path: str) -> Texture:
@@ -166,10 +169,13 @@ class FileCamera:
     index: int
     time: float | None = None
     clip: int | str | None = None
+    scale: float = 1.0
 
     def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:  # noqa: ARG002
         """Read it."""
-        cameras = [] if self.path in SHAPES else load_cameras(self.path, time=self.time, clip=self.clip)
+        cameras = (
+            [] if self.path in SHAPES else load_cameras(self.path, time=self.time, clip=self.clip, scale=self.scale)
+        )
         if self.index >= len(cameras):
             raise MeshError(f"--camera {self.index}: {self.path!r} has {len(cameras)} cameras")
         return cameras[self.index]
@@ -204,7 +210,7 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
     folders = folders_of(options.meshes)
     for i_mesh, source in enumerate(options.meshes, start):
         name = names[i_mesh - start]
-        moment = options.time, options.clip
+        moment = options.time, options.clip, options.scale
         mesh = MeshSource(source, options.texture, options.crease, options.point_size, *moment, limits)
         jobs = []
         for i_view in range(options.views):

@@ -325,7 +325,8 @@ def as_square(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
 
 def check_regular(name: str, matrix: NDArray[np.float64]) -> None:
     """Raise a `ValueError` if the matrix is singular."""
-    if np.linalg.matrix_rank(matrix) < len(matrix):
+    is_affine = np.array_equal(matrix[-1], np.eye(len(matrix))[-1])  # a translation of 1e8 would drown the rest
+    if np.linalg.matrix_rank(matrix[:-1, :-1] if is_affine else matrix) < len(matrix) - is_affine:
         raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
 
 

@@ -30,9 +30,18 @@ MAX_LISTED_CROSSINGS = 1 << 22
 TESTS = {"center": 0, "outer": 1, "inner": 2}  # tl_polygon_test in csrc/polygons.h
 
 
-def draw_mask(prepared: Prepared, out: npt.NDArray[np.uint8], *, is_nonzero: bool) -> None:
-    """Write the mask of the first polygon over contiguous (H, W) bytes."""
+def draw_mask(
+    prepared: Prepared,
+    out: npt.NDArray[np.uint8],
+    *,
+    is_nonzero: bool,
+    polygon: int = 0,
+    rows: tuple[int, int] | None = None,
+) -> None:
+    """Write the mask of one polygon, or rows of it, over contiguous (H, W) bytes."""
     compiled, (width, height) = prepared.compiled, prepared.frame.size
+    begin, stop = (0, height) if rows is None else rows
+    height = stop - begin
     stride = engine.polygon_stride(width)
     n_threads = prepared.n_threads
     if is_nonzero:
@@ -41,18 +50,18 @@ def draw_mask(prepared: Prepared, out: npt.NDArray[np.uint8], *, is_nonzero: boo
         def draw_rows(top: int, bottom: int) -> None:
             at = np.empty(bottom - top + 1, np.uint32)
             room = np.empty(n_listed, np.int32), np.zeros(stride, np.int32), np.empty(stride // 64, np.uint64)
-            compiled.mask_nonzero(0, out, top, bottom, at, *room)
+            compiled.mask_nonzero(polygon, out, begin + top, begin + bottom, at, *room)
 
         run_parts(draw_rows, height, n_threads)
         return
     words = stride // 32
     rows_at_once = max(1, min(height, MAX_BITS // stride))
     bits = SCRATCH.constant("polygon bits", words * rows_at_once, 0)
-    for first in range(0, height, rows_at_once):
-        n_rows = min(rows_at_once, height - first)
+    for first in range(begin, stop, rows_at_once):
+        n_rows = min(rows_at_once, stop - first)
 
         def draw_bits(top: int, bottom: int, first: int = first) -> None:
-            compiled.mask_even_odd(0, out, first + top, first + bottom, bits[words * top : words * bottom])
+            compiled.mask_even_odd(polygon, out, first + top, first + bottom, bits[words * top : words * bottom])
 
         run_parts(draw_bits, n_rows, n_threads)
 

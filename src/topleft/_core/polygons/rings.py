@@ -28,6 +28,12 @@ class RingSet:
     def __len__(self) -> int:
         return len(self.polygons) - 1
 
+    def part(self, first: int, end: int) -> RingSet:
+        """Return polygons [first, end)."""
+        rings = self.rings[self.polygons[first] : self.polygons[end] + 1]
+        polygons = self.polygons[first : end + 1]
+        return RingSet(self.points[rings[0] : rings[-1]], rings - rings[0], polygons - polygons[0])
+
     def apart_from(self, out: object) -> RingSet:
         """Return it with copies of what `out` may share memory with."""
         overlap = np.may_share_memory

@@ -6,6 +6,7 @@ Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
@@ -16,6 +17,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import (
     as_array,
+    as_number,
     as_real,
     as_size,
     as_square,
@@ -25,7 +27,8 @@ from topleft._core.base.arrays import (
     shown,
 )
 from topleft._core.base.options import check_choice
-from topleft._meshes.camera.lens import Lens, lens_of_opencv
+from topleft._meshes.camera.calibration import Calibration, of_colmap, of_nerfstudio, of_opengl, of_pytorch3d
+from topleft._meshes.camera.lens import FLIP, Lens, lens_of_opencv
 from topleft._meshes.camera.matrices import (
     THREE_QUARTER_DEG,
     as_framed,
@@ -45,6 +48,7 @@ from topleft._meshes.camera.matrices import (
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
+from topleft._meshes.model.pose import as_pose
 from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import FitOption, UpOption
@@ -117,7 +121,10 @@ class Camera:
         except np.linalg.LinAlgError:
             return "Camera(singular view)"
         forward = -self.view[2, :3] / (engine.length(self.view[2, :3]) or 1.0)
-        words = [f"eye=({', '.join(f'{x:.4g}' for x in eye)})", f"forward=({', '.join(f'{x:.3g}' for x in forward)})"]
+        words = [
+            f"eye=({', '.join(f'{x:.4g}' for x in eye)})",
+            f"forward=({', '.join(f'{x + 0.0:.3g}' for x in forward)})",
+        ]
         up = float(self.projection[1, 1])
         if up and self.projection[3, :3].any():
             words.append(f"fov_y_deg={np.degrees(2 * np.arctan(1 / abs(up))):.4g}")
@@ -343,13 +350,14 @@ class Camera:
     def from_intrinsics(
         cls,
         intrinsics: npt.ArrayLike,
-        camera_from_world: npt.ArrayLike,
+        camera_from_world: npt.ArrayLike | Mapping[str, npt.ArrayLike],
         size: int | tuple[int, int],
         *,
         near: float | None = None,
         far: float | None = None,
         distortion: npt.ArrayLike | None = None,
         fisheye: npt.ArrayLike | None = None,
+        pixel_center: float = 0.0,
     ) -> Camera:
         """The camera of a calibrated photograph, in the convention of OpenCV.
 
@@ -357,8 +365,9 @@ class Camera:
         ----------
         intrinsics : (3, 3) array_like
             `[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`, pixels.
-        camera_from_world : (4, 4) array_like
-            The pose. Camera axes are those of OpenCV: x right, y down, z forward.
+        camera_from_world : (4, 4) or (3, 4) array_like, pair (R, t) or (rvec, tvec), or mapping
+            The pose. Camera axes are those of OpenCV: x right, y down, z forward. A mapping has `cam_R_w2c` and
+            `cam_t_w2c`, or `cam_R_m2c` and `cam_t_m2c`, as BOP has them.
         size : (width, height), pixels
             The picture that the intrinsics belong to. A picture rendered at another size is that one, scaled.
         near, far : float, optional
@@ -370,6 +379,9 @@ class Camera:
             them.
         fisheye : (4,) array_like, optional
             `k1, k2, k3, k4` as `cv2.fisheye.calibrate` returns them. Not together with `distortion`.
+        pixel_center : float
+            Where the source of the intrinsics puts the centre of the top-left pixel, in x and y: 0 as OpenCV and BOP
+            do, 0.5 as COLMAP and nerfstudio, 1 as MATLAB.
 
         Raises
         ------
@@ -379,28 +391,225 @@ class Camera:
         Notes
         -----
         OpenCV puts the centre of the top-left pixel at (0, 0), `topleft` at (0.5, 0.5). So the point that the matrix
-        projects to (u, v) is drawn at x_px = u + 0.5, y_px = v + 0.5: in the same pixel.
+        projects to (u, v) is drawn at x_px = u + 0.5, y_px = v + 0.5: in the same pixel. With another `pixel_center`
+        c it is drawn at u + 0.5 - c, v + 0.5 - c.
         """
         matrix = as_square("intrinsics", intrinsics, 3)
-        pose = as_square("camera_from_world", camera_from_world, 4)
+        pose = as_pose("camera_from_world", camera_from_world)
         width, height = as_size(size, smallest=1)
-        away = float(np.sqrt((pose[:3, 3] ** 2).sum())) or 1.0
-        near = 1e-3 * away if near is None else near
-        far = max(1e3 * max(away, 1.0), 1e3 * near) if far is None else far
-        check_planes(near, far)
+        near, far = planes_for(engine.length(pose[:3, 3]), near, far)
         if not np.array_equal(matrix[2], [0, 0, 1]):
             raise ValueError(f"the last row of intrinsics must be [0, 0, 1], got {matrix[2].tolist()}")
-        if not np.array_equal(pose[3], [0, 0, 0, 1]):
-            raise ValueError(f"the last row of camera_from_world must be [0, 0, 0, 1], got {pose[3].tolist()}")
         check_regular("intrinsics", matrix)
-        check_regular("camera_from_world", pose)
-        px_of_center = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+        shift = 0.5 - as_number("pixel_center", pixel_center)
+        if not np.isfinite(shift):
+            raise ValueError(f"pixel_center must be finite, got {pixel_center}")
+        px_of_center = np.array([[1, 0, shift], [0, 1, shift], [0, 0, 1]])
         ndc_of_px = np.array([[2 / width, 0, -1], [0, -2 / height, 1], [0, 0, 1]])
         eye_of_camera = np.diag([1.0, -1.0, -1.0, 1.0])
         projection = perspective_matrix(90, near, far)
         ndc_of_matrix = engine.product(engine.product(ndc_of_px, px_of_center), matrix)
         projection[:2, :3] = engine.product(ndc_of_matrix[:2], eye_of_camera[:3, :3])
         return cls(engine.product(eye_of_camera, pose), projection, lens=lens_of_opencv(distortion, fisheye))
+
+    @classmethod
+    def from_opengl(
+        cls,
+        c2w: npt.ArrayLike,
+        intrinsics: npt.ArrayLike | None = None,
+        size: int | tuple[int, int] | None = None,
+        *,
+        fov_y_deg: float | None = None,
+        pixel_center: float = 0.5,
+        near: float | None = None,
+        far: float | None = None,
+        distortion: npt.ArrayLike | None = None,
+        fisheye: npt.ArrayLike | None = None,
+    ) -> Camera:
+        """The camera that stands in the world with the axes of OpenGL and Blender: x right, y up, the view along -z.
+
+        Parameters
+        ----------
+        c2w : (4, 4) or (3, 4) array_like, or pair (R, t)
+            World from camera: its columns are the axes of the camera and where it stands.
+        intrinsics : (3, 3) array_like, optional
+            `[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`, pixels from the top-left corner, y down, of a picture of `size`.
+        size : (width, height), pixels
+            The picture that the intrinsics belong to.
+        fov_y_deg : float, optional
+            Without intrinsics: field of view from bottom to top, degrees; 40 unless given.
+        pixel_center : float
+            Where the centre of the top-left pixel is in the intrinsics: 0.5, unless they come of OpenCV, then 0.
+        near, far, distortion, fisheye
+            As for `from_intrinsics`.
+
+        Raises
+        ------
+        ValueError
+            If there are intrinsics and no size, or both intrinsics and a field of view, or as `from_intrinsics` does.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> c2w = np.eye(4)
+        >>> c2w[:3, 3] = 0, 0, 5
+        >>> Camera.from_opengl(c2w)
+        Camera(eye=(0, 0, 5), forward=(0, 0, -1), fov_y_deg=40)
+        """
+        pose = of_opengl(c2w)
+        if intrinsics is None:
+            if not (size is None and distortion is None and fisheye is None):
+                raise ValueError(
+                    "size, distortion and fisheye need intrinsics; without them fov_y_deg says what is seen"
+                )
+            near, far = planes_for(engine.length(pose[:3, 3]), near, far)
+            fov_y_deg = DEFAULT_FOV_Y_DEG if fov_y_deg is None else fov_y_deg
+            return cls.perspective(np.append(FLIP, 1)[:, None] * pose, near=near, far=far, fov_y_deg=fov_y_deg)
+        if fov_y_deg is not None or size is None:
+            raise ValueError("intrinsics need the size of their picture, and no fov_y_deg")
+        return cls.from_intrinsics(
+            intrinsics,
+            pose,
+            size,
+            near=near,
+            far=far,
+            distortion=distortion,
+            fisheye=fisheye,
+            pixel_center=pixel_center,
+        )
+
+    @classmethod
+    def from_colmap(
+        cls, camera: Any, image: Any, *, pixel_center: float = 0.5, near: float | None = None, far: float | None = None
+    ) -> Camera:
+        """The camera of an image of COLMAP.
+
+        Parameters
+        ----------
+        camera : object, mapping or str
+            A camera of `pycolmap` or of COLMAP's `read_write_model`, or whatever has `model`, `width`, `height` and
+            `params`; or its line in cameras.txt. The model is SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV,
+            FULL_OPENCV, SIMPLE_FISHEYE, FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE or OPENCV_FISHEYE.
+        image : object, mapping or str
+            An image of these, with `cam_from_world`, or `qvec` and `tvec`; or its line in images.txt.
+        pixel_center : float
+            Where the centre of the top-left pixel is: COLMAP has it at (0.5, 0.5).
+        near, far : float, optional
+            As for `from_intrinsics`.
+
+        Raises
+        ------
+        ValueError
+            If the model is another one, has other parameters, or the image is of another camera; as `from_intrinsics`.
+        TypeError
+            If something is missing.
+
+        Examples
+        --------
+        >>> Camera.from_colmap("1 SIMPLE_RADIAL 640 480 500 320 240 -0.1", "7 1 0 0 0 0 0 4 1 a.jpg")
+        Camera(eye=(0, 0, -4), forward=(0, 0, 1), fov_y_deg=51.28, lens=OpenCVLens)
+        """
+        return cls._of_calibration(of_colmap(camera, image), pixel_center, near, far)
+
+    @classmethod
+    def from_nerfstudio(
+        cls,
+        transforms: Any,
+        i: int = 0,
+        *,
+        size: int | tuple[int, int] | None = None,
+        pixel_center: float = 0.5,
+        near: float | None = None,
+        far: float | None = None,
+    ) -> Camera:
+        """The camera of a frame of a transforms.json, of nerfstudio, Instant NGP or the Blender scenes of NeRF.
+
+        Parameters
+        ----------
+        transforms : mapping or path
+            The content of the file, or the file. Poses are world from camera with the axes of OpenGL.
+        i : int
+            The frame.
+        size : (width, height), optional
+            Of the picture, where the file has no `w` and `h`.
+        pixel_center : float
+            Where the centre of the top-left pixel is: nerfstudio has it at (0.5, 0.5).
+        near, far : float, optional
+            As for `from_intrinsics`.
+
+        Returns
+        -------
+        Camera
+            In the world of the file: what a data parser of nerfstudio turns, moves and scales besides is not applied.
+
+        Raises
+        ------
+        ValueError
+            If the file is broken or has no frames, focal length or size, or another camera model than OPENCV,
+            OPENCV_FISHEYE and the simpler ones; as `from_intrinsics`.
+        FileNotFoundError
+            If there is no such file.
+        IndexError
+            If there is no such frame.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> file = {"fl_x": 500, "w": 640, "h": 480, "frames": [{"transform_matrix": np.eye(4).tolist()}]}
+        >>> Camera.from_nerfstudio(file, 0)
+        Camera(eye=(0, 0, 0), forward=(0, 0, -1), fov_y_deg=51.28)
+        """
+        return cls._of_calibration(of_nerfstudio(transforms, i, size), pixel_center, near, far)
+
+    @classmethod
+    def from_pytorch3d(
+        cls,
+        cameras: Any,
+        i: int = 0,
+        *,
+        size: int | tuple[int, int] | None = None,
+        pixel_center: float = 0.5,
+        near: float | None = None,
+        far: float | None = None,
+    ) -> Camera:
+        """The camera of a batch of PyTorch3D, as its rasterizer sees it.
+
+        Parameters
+        ----------
+        cameras : PerspectiveCameras or FoVPerspectiveCameras
+            Or whatever has their `R`, `T`, and `focal_length` and `principal_point`, `fov` and `aspect_ratio`, or `K`.
+        i : int
+            Which camera of the batch.
+        size : (width, height), optional
+            Of the picture; the `image_size` of the cameras, which has the height first, unless given.
+        pixel_center : float
+            Where the centre of the top-left pixel is on the screen: PyTorch3D has it at (0.5, 0.5).
+        near, far : float, optional
+            As for `from_intrinsics`; `znear` and `zfar` unless given.
+
+        Raises
+        ------
+        ValueError
+            If the cameras are orthographic or have a lens, or no size is known.
+        IndexError
+            If there is no such camera.
+        TypeError
+            If something is missing.
+
+        Notes
+        -----
+        PyTorch3D multiplies rows by `R`, has x to the left and y up, and counts from -1 to 1 along the shorter side of
+        the picture. A field of view is that of the shorter side.
+        """
+        return cls._of_calibration(of_pytorch3d(cameras, i, size), pixel_center, near, far)
+
+    @classmethod
+    def _of_calibration(cls, own: Calibration, pixel_center: float, near: float | None, far: float | None) -> Camera:
+        return cls.from_intrinsics(
+            own.intrinsics, own.camera_from_world, own.size, near=own.near if near is None else near,
+            far=own.far if far is None else far, distortion=own.distortion, fisheye=own.fisheye,
+            pixel_center=pixel_center,
+        )  # fmt: skip
 
     @classmethod
     def framing(
@@ -453,6 +662,14 @@ class Camera:
         fills = fit == "silhouette"
         matrices = framing_matrices(ends, points, angles, up=up, ortho=ortho, aspect=aspect, fills=fills)
         return cls(*matrices, aspect=1.0)
+
+
+def planes_for(away: float, near: float | None, far: float | None) -> tuple[float, float]:
+    """The planes given, or those for a camera as far as that from the world's origin."""
+    near = 1e-3 * (away or 1.0) if near is None else near
+    far = max(1e3 * max(away or 1.0, 1.0), 1e3 * near) if far is None else far
+    check_planes(near, far)
+    return near, far
 
 
 def pixels_of(points_eye: F64, projection: F64, size: tuple[int, int]) -> F64:

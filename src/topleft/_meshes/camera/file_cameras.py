@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from topleft._core.base.arrays import as_path
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import box_matrix, frustum_matrix, tangent
 from topleft._meshes.io.limits.budget import Budget
-from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, reading
+from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, as_scale, reading
 from topleft._meshes.io.references import InputFile
 from topleft.errors import MeshError
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def load_cameras(
-    path: str | os.PathLike[str], *, time: float | None = None, clip: int | str | None = None
+    path: str | os.PathLike[str], *, time: float | None = None, clip: int | str | None = None, scale: float = 1.0
 ) -> list[Camera]:
     r"""The cameras of a glTF or GLB file, in the order of the nodes that hold them; of other formats none.
 
@@ -36,6 +37,8 @@ def load_cameras(
         The file that `load` reads the mesh from.
     time, clip
         As for `load`: where an animation has the nodes of the cameras at a time.
+    scale : float
+        As for `load`: the cameras see the mesh that is read with it as they see the mesh of the file.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def load_cameras(
     MeshError
         If the file is broken, or a camera of it has numbers that none can have, or there is no such animation.
     ValueError
-        If `time` is negative, infinite or NaN.
+        If `time` is negative, infinite or NaN, or `scale` is not positive and finite.
 
     Examples
     --------
@@ -63,6 +66,7 @@ def load_cameras(
     ...     tl.load_cameras(path)
     []
     """
+    factor = as_scale(scale)
     source = InputFile(as_path("path", path), Budget(os.fspath(path)))
     source.moment = as_moment(time, clip)
 
@@ -71,13 +75,16 @@ def load_cameras(
             return []
         from topleft._meshes.io.gltf.reader import read_cameras  # as late as in `load`
 
-        return [_camera(own, source) for own in read_cameras(source)]
+        return [_camera(own, source, factor) for own in read_cameras(source)]
 
     return reading(source, cameras)
 
 
-def _camera(own: CameraOfFile, source: InputFile) -> Camera:
-    numbers = own.numbers
+LENGTHS = ("znear", "zfar", "xmag", "ymag")
+
+
+def _camera(own: CameraOfFile, source: InputFile, scale: float) -> Camera:
+    numbers = {name: value * (scale if name in LENGTHS else 1) for name, value in own.numbers.items()}
     if not np.isfinite(own.world_from_eye).all() or not np.isfinite(list(numbers.values())).all():
         raise MeshError("a camera of it stands nowhere")
     # A node may be scaled, and the eye is not: its axes keep their directions alone.
@@ -87,16 +94,15 @@ def _camera(own: CameraOfFile, source: InputFile) -> Camera:
         raise MeshError(f"cannot read {str(source.path)!r}: a camera of it stands in a space without a volume")
     rigid = np.eye(4)
     rigid[:3, :3] = axes / lengths
-    rigid[:3, 3] = own.world_from_eye[:3, 3]
+    rigid[:3, 3] = own.world_from_eye[:3, 3] * scale
     view = engine.inverse(rigid.astype(np.float64))
-    return Camera(view, _projection(own), aspect=1.0)
+    return Camera(view, _projection(own.kind, numbers), aspect=1.0)
 
 
-def _projection(own: CameraOfFile) -> F64:
+def _projection(kind: str, numbers: Mapping[str, float]) -> F64:
     """Clip from eye of a picture as wide as it is high."""
-    numbers = own.numbers
     near, far = numbers["znear"], numbers.get("zfar")
-    if own.kind == "orthographic":
+    if kind == "orthographic":
         half = numbers["ymag"]
         return box_matrix(-half, half, -half, half, near, numbers["zfar"])
     half = tangent(math.degrees(numbers["yfov"]) / 2) * near

@@ -10,6 +10,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -42,6 +43,7 @@ def load(
     max_lines: int | None = None,
     max_bytes: int | None = None,
     max_unpacked_bytes: int | None = None,
+    scale: float = 1.0,
 ) -> Mesh | Points:
     r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
 
@@ -73,6 +75,8 @@ def load(
     clip : int or str, optional
         The index or the name of the animation; "all" plays all of them, and where two move the same the first has it.
         Unless given the first one plays, and `MeshWarning` tells of others.
+    scale : float
+        Positive. What coordinates are multiplied by: 0.001 makes metres of a file in millimetres.
 
     Returns
     -------
@@ -91,7 +95,7 @@ def load(
     MeshError
         If the file is broken, has no triangles, or is of an unsupported format, or has no such animation.
     ValueError
-        If `time` is negative, infinite or NaN.
+        If `time` is negative, infinite or NaN, or `scale` is not positive and finite.
     MissingPackageError
         If trimesh, or a package that it needs for this format, is not installed.
 
@@ -117,7 +121,7 @@ def load(
     >>> mesh.triangles.tolist()
     [[0, 1, 2]]
     """
-    crease = as_crease(crease)
+    crease, scale = as_crease(crease), as_scale(scale)
     checked = as_path("path", path)
     budget = Budget(
         str(checked), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels, max_triangles=max_triangles,
@@ -127,7 +131,25 @@ def load(
     source.moment = as_moment(time, clip)
     mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
-    return mesh
+    return mesh if scale == 1 else scaled(mesh, scale)
+
+
+def as_scale(scale: object) -> float:
+    """A scale, if it is one."""
+    factor = as_number("scale", scale)
+    if not 0 < factor < np.inf:
+        raise ValueError(f"scale must be a positive number, got {scale!r}")
+    return factor
+
+
+def scaled(mesh: Mesh | Points, scale: float) -> Mesh | Points:
+    """What was read with coordinates times a scale, rounded once to their own type."""
+    with np.errstate(over="ignore"):
+        if isinstance(mesh, Points):
+            positions = mesh.positions
+            return replace(mesh, positions=np.multiply(positions, scale, dtype=np.float64).astype(positions.dtype))
+        vertices = np.multiply(mesh.vertices, scale, dtype=np.float64).astype(mesh.vertices.dtype)
+    return replace(mesh, vertices=vertices)
 
 
 def as_moment(time: float | None, clip: int | str | None) -> Moment | None:

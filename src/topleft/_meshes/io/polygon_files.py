@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.georeference import WGS84
+from topleft._core.raster.rle import read_counts
 from topleft.errors import MeshError, MissingPackageError
 
 
@@ -183,27 +184,11 @@ class ContentError(ValueError):
 
 
 def _read_counts(text: str, name: object) -> npt.NDArray[np.int64]:
-    """Return run lengths from a string, as pycocotools writes it.
-
-    Five bits a character, the lower first, and a sixth one that says that more follow; from the fourth number on the
-    difference from the last but one.
-    """
-    lengths: list[int] = []
-    value = shift = 0
-    for character in text:
-        bits = ord(character) - 48
-        if not 0 <= bits < 64 or shift > 40:
-            raise ContentError(f"annotation {name} has run lengths that are no text of COCO, at {character!r}")
-        value |= (bits & 31) << shift
-        shift += 5
-        if not bits & 32:
-            if bits & 16:
-                value -= 1 << shift
-            lengths.append(value + (lengths[-2] if len(lengths) > 2 else 0))
-            value = shift = 0
-    if shift:
-        raise ContentError(f"annotation {name} has run lengths that end within a number")
-    return np.array(lengths, np.int64)
+    """Return run lengths from a string, as pycocotools writes it."""
+    try:
+        return read_counts(text)
+    except ValueError as error:
+        raise ContentError(f"annotation {name} has {error}") from None
 
 
 def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> ObjectRings:

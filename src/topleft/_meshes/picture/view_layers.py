@@ -16,6 +16,7 @@ from topleft._core.base.array_types import F64, Array
 from topleft._core.base.arrays import as_real, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.base.remote import Place
+from topleft._core.polygons.rle import to_rle
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import CameraLike, as_camera
 from topleft._meshes.io.layer_files import save_layers
@@ -47,8 +48,9 @@ class ViewLayers(Mapping[str, Array]):
     {'depth': (24, 32), 'world_normal': (24, 32, 3)}
     """
 
-    def __init__(self, arrays: Mapping[str, Array]) -> None:
+    def __init__(self, arrays: Mapping[str, Array], n_instances: int | None = None) -> None:
         self._arrays = dict(arrays)
+        self._n_instances = n_instances
 
     def __getitem__(self, name: str) -> Array:
         return self._arrays[name]
@@ -75,6 +77,41 @@ class ViewLayers(Mapping[str, Array]):
         if layer is not None and not (isinstance(layer, str) and layer in self):
             raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
         return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
+
+    def rle(
+        self, layer: LayerOption = "instance", *, labels: npt.ArrayLike | None = None, compressed: bool = True
+    ) -> Any:
+        """Run lengths of a layer as `to_rle` returns them, in the format of COCO.
+
+        Parameters
+        ----------
+        layer : {"instance", "silhouette", "triangle"}
+            "instance": a list with one for each instance of the scene, those that do not show too. "silhouette": one,
+            unless it holds shares. "triangle": needs `labels`.
+        labels : array_like (N,) of int, optional
+            Only these numbers.
+        compressed : bool
+            As for `to_rle`.
+
+        Raises
+        ------
+        ValueError
+            If there is no such layer, and as `to_rle` does.
+        TypeError
+            If the layer is neither a mask nor ids, or has ids and there are no labels.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> view = tl.render_layers(tl.Mesh(*tl.scenes.shape("cube")), size=(8, 6), layers="instance")
+        >>> view.rle("instance", compressed=False)[0]["counts"][:4]
+        [13, 4, 2, 4]
+        """
+        if not (isinstance(layer, str) and layer in self):
+            raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
+        if layer == "instance" and labels is None and self._n_instances is not None:
+            labels = np.arange(self._n_instances)
+        return to_rle(self[layer], labels=labels, compressed=compressed)
 
 
 class LayerLookOptions(LookOptions, total=False):
@@ -205,7 +242,7 @@ def render_layers(
         if name in LAYERS:
             raise ValueError(f"attributes must not have the name of a layer, got {name!r}")
         found[name] = gbuffer.frags.interpolate(values, background=np.nan)
-    return ViewLayers(found)
+    return ViewLayers(found, 1 if isinstance(gbuffer, CloudBuffer) else len(meshes_of(gbuffer.subject)))
 
 
 def gbuffer_of(

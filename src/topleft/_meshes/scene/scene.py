@@ -7,7 +7,7 @@ Input: meshes and matrices; or whatever a caller gives to be drawn, a path, say.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from html import escape
@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
+from topleft._core.base.arrays import INT32_MAX, set_read_only, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.raster.clusters import Backoff
 from topleft._meshes.io.load import load
@@ -26,6 +26,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
+from topleft._meshes.model.pose import as_pose
 from topleft._meshes.scene.adapt import MeshLike, as_mesh, is_mesh_like
 
 
@@ -36,9 +37,10 @@ class Instance:
     Parameters
     ----------
     mesh : Mesh
-    transform : (4, 4) array_like
-        World from object, with last row [0, 0, 0, 1] and not singular. One that mirrors turns the winding over, and
-        what `cull` leaves out with it, so that the outside stays outside.
+    transform : (4, 4) or (3, 4) array_like, pair (R, t) or (rvec, tvec), or mapping
+        World from object, with last row [0, 0, 0, 1] and not singular; a rotation (3, 3), or OpenCV's vector (3,) for
+        it, and a translation (3,); or what BOP writes, with `cam_R_m2c` and `cam_t_m2c`: the camera is the world then.
+        One that mirrors turns the winding over, and what `cull` leaves out with it, so that the outside stays outside.
     name : str, optional
     material : Material, optional
         For all triangles, instead of those of the mesh; `render(material=)` goes before it.
@@ -76,7 +78,7 @@ class Instance:
         def __init__(
             self,
             mesh: Mesh,
-            transform: npt.ArrayLike = ...,
+            transform: npt.ArrayLike | Mapping[str, npt.ArrayLike] = ...,
             name: str | None = None,
             material: Material | None = None,
             color: ColorLike | None = None,
@@ -95,10 +97,7 @@ class Instance:
             if self.material is not None:
                 raise ValueError("an instance takes a colour or a material, got both: Material(color, ...) has one")
             object.__setattr__(self, "material", Material(color))
-        matrix = as_square("transform", self.transform, 4)
-        if not np.array_equal(matrix[3], [0, 0, 0, 1]):
-            raise ValueError(f"the last row of transform must be [0, 0, 0, 1], got {matrix[3].tolist()}")
-        check_regular("transform", matrix)
+        matrix = as_pose("transform", self.transform)
         matrix.flags.writeable = False
         object.__setattr__(self, "transform", matrix)
 
