@@ -182,7 +182,7 @@ def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
         import dask
         from distributed import Client, LocalCluster
     except ImportError:
-        raise MissingPackageError("--dask needs the package distributed: pip install 'topleft[dask]'") from None
+        raise MissingPackageError("--dask needs the package distributed: pip install distributed") from None
     if address == "local":
         stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": "30s"}))
         cluster = LocalCluster(

@@ -45,9 +45,11 @@ NO_TRIANGLES = {
 }
 """What trimesh may read that is no mesh."""
 
-FORMATS_OF_EXTRA = (".3mf", ".dae", ".xaml")
-PACKAGES = {".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm"}
-"""Formats that trimesh reads by a package of their own."""
+PACKAGES = {
+    ".3mf": "lxml networkx", ".dae": "pycollada lxml networkx", ".xaml": "lxml networkx",
+    ".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm",
+}  # fmt: skip
+"""Formats that trimesh reads by packages of their own."""
 
 BY_MESHIO = (
     ".bdf", ".cgns", ".e", ".exo", ".f3grid", ".h5m", ".inp", ".mdpa", ".med", ".mesh", ".meshb", ".msh", ".nas",
@@ -91,7 +93,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
     try:
         import trimesh
     except ImportError:
-        raise MissingPackageError(_needs(source, "'topleft[render]'")) from None
+        raise MissingPackageError(_needs(source, "trimesh")) from None
     _check_what_it_is(source, suffix)
     try:
         with quiet():
@@ -111,8 +113,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
         # trimesh asks for these to guess the encoding of what is not UTF-8: here, of a file that is no text.
         if getattr(error, "name", None) in ("charset_normalizer", "chardet"):
             raise MeshError("it is not text") from error
-        package = "'topleft[formats]'" if suffix in FORMATS_OF_EXTRA else PACKAGES.get(suffix, error.name or str(error))
-        raise MissingPackageError(_needs(source, package)) from error
+        raise MissingPackageError(_needs(source, PACKAGES.get(suffix, error.name or str(error)))) from error
     return parts
 
 

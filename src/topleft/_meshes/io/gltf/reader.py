@@ -425,7 +425,7 @@ class _Reader:
             import DracoPy
         except ImportError:
             raise MissingPackageError(
-                f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install 'topleft[formats]'"
+                f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install DracoPy"
             ) from None
         mesh = DracoPy.decode(self._accessors.view(draco["bufferView"]).tobytes())
         self._source.budget.check("max_vertices", len(mesh.points))
