@@ -171,7 +171,7 @@ def test_white_mesh_keeps_its_outline_on_the_default_background(run, folder, col
     assert run("render", "a.obj", "-o", "white.png", "--background", "white", *SMALL) == (0, [])
     with Image.open("a.png") as image:
         picture = np.asarray(image).astype(int)
-    assert picture[0, 0].tolist() == [214, 220, 228, 255]
+    assert picture[0, 0].tolist() == [196, 212, 232, 255]
     inside = picture[20:28, 30:40, :3]
     assert (np.abs(inside - picture[0, 0, :3]).max(axis=-1) > 10).all()
     with Image.open("white.png") as image:

@@ -158,7 +158,7 @@ class Orbit:
         )
 
 
-WHITE, BACKDROP = (255, 255, 255, 255), (214, 220, 228, 255)
+WHITE, BACKDROP = (255, 255, 255, 255), (196, 212, 232, 255)
 """What is behind a mesh, and behind one that is white: it is not grey, as white faces are under white light."""
 
 NEARLY_WHITE = 240
