@@ -1,6 +1,8 @@
-"""One fixed hypothesis profile, the command line as a fixture, the count of pixels compared with the reference."""
+"""One fixed hypothesis profile, the command line as a fixture, what is counted: pixels compared, tests skipped."""
 
+import os
 import signal
+from collections import Counter
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
@@ -80,19 +82,54 @@ def pytest_runtest_call(item):
 compared_elsewhere: list[int] = []
 
 
+#: Why tests were skipped, and how often; modules that were skipped whole, by name, with their reasons.
+skipped: Counter[str] = Counter()
+modules_skipped: dict[str, str] = {}
+
+
+def reason_of(report):
+    return str(report.longrepr[2]).removeprefix("Skipped: ") if isinstance(report.longrepr, tuple) else ""
+
+
+def pytest_collectreport(report):
+    if report.skipped:
+        modules_skipped[report.nodeid] = reason_of(report)
+
+
+def pytest_runtest_logreport(report):
+    if report.skipped and not hasattr(report, "wasxfail"):
+        skipped[reason_of(report)] += 1
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node):
-    compared_elsewhere.append(getattr(node, "workeroutput", {}).get("n_pixels_compared", 0))
+    output = getattr(node, "workeroutput", {})
+    compared_elsewhere.append(output.get("n_pixels_compared", 0))
+    modules_skipped.update(output.get("modules_skipped", {}))
+
+
+def beyond_list():
+    """What was skipped more often than the file says that TOPLEFT_MAY_SKIP names: the gate has no test that is dead."""
+    rows = [line.split(None, 1) for line in Path(os.environ["TOPLEFT_MAY_SKIP"]).read_text().splitlines()]
+    allowed = {reason: n for n, reason in (row for row in rows if len(row) == 2 and row[0] != "#")}
+    found = skipped + Counter(modules_skipped.values())
+    return [f"{n} {why}" for why, n in found.items() if allowed.get(why) != "*" and n > int(allowed.get(why, 0))]
 
 
 def pytest_sessionfinish(session):
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput["n_pixels_compared"] = comparing.n_pixels_compared
+        session.config.workeroutput["modules_skipped"] = modules_skipped
+    elif "TOPLEFT_MAY_SKIP" in os.environ and beyond_list() and not session.exitstatus:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter):
     n_pixels = comparing.n_pixels_compared + sum(compared_elsewhere)
     terminalreporter.write_line(f"{n_pixels:,} pixels compared with the exact reference")
+    if "TOPLEFT_MAY_SKIP" in os.environ:
+        for line in beyond_list():
+            terminalreporter.write_line(f"skipped more often than {os.environ['TOPLEFT_MAY_SKIP']} allows: {line}")
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import topleft as tl
 
 
 def run_in_fork(work):
-    """Exit status of a forked child that calls `work`, within half a minute."""
+    """Exit status of a forked child that calls `work`, within two minutes, in which other work may have the cores."""
     pid = os.fork()
     if pid == 0:
         try:
@@ -21,7 +21,7 @@ def run_in_fork(work):
         except BaseException:
             os._exit(1)
         os._exit(0)
-    until = time.monotonic() + 30
+    until = time.monotonic() + 120
     while time.monotonic() < until:
         done, status = os.waitpid(pid, os.WNOHANG)
         if done:

@@ -17,6 +17,7 @@ from comparing import files_of
 from PIL import Image
 
 import topleft as tl
+from topleft._apps.batch.cluster import MESH_KEY, came_of
 from topleft._apps.cli import main
 
 distributed = pytest.importorskip("distributed", reason="the dask extra is not installed")
@@ -63,10 +64,10 @@ def in_time():
     """A cluster whose workers do not come back fails a test and does not hold the rest up."""
 
     def end(signum, frame):
-        raise TimeoutError("the cluster took longer than 60 s")
+        raise TimeoutError("the cluster took longer than 180 s")
 
     before = signal.signal(signal.SIGALRM, end)
-    signal.alarm(60)
+    signal.alarm(180)
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)
@@ -74,6 +75,42 @@ def in_time():
 
 def pids(client):
     return client.run(os.getpid)
+
+
+class Task:
+    """A future of a cluster, which fails with an error if it has one."""
+
+    def __init__(self, status, error=None):
+        self.status, self.error = status, error
+
+    def result(self):
+        return ["drawn"]
+
+    def exception(self):
+        return self.error
+
+
+def killed_worker(task):
+    """As distributed tells of one."""
+    return distributed.KilledWorker(task, None, 3)
+
+
+@pytest.mark.parametrize(
+    ("task", "outcomes", "error"),
+    [
+        (Task("finished"), ["drawn"], None),
+        (Task("cancelled"), None, None),
+        (Task("lost"), None, None),
+        (Task("error", killed_worker(f"{MESH_KEY}-1")), None, None),
+        (Task("error", killed_worker("draw-1")), None, distributed.KilledWorker),
+        (Task("error", ValueError("no")), None, ValueError),
+        (Task("error", ModuleNotFoundError("no", name="topleft")), None, tl.MissingPackageError),
+    ],
+)
+def test_a_task_that_was_lost_or_died_over_its_mesh_is_no_error(task, outcomes, error):
+    got, told = came_of(task)
+    assert got == outcomes
+    assert told is None if error is None else isinstance(told, error)
 
 
 def test_pictures_are_those_of_one_thread(client):

@@ -144,6 +144,7 @@ def test_straightened_leaves_the_lens_out():
             "distortion must be k1, k2, p1, .*: 4, 5, 8, 12 or 14 numbers, got 13",
         ),
         (lambda: OpenCVLens(tau_x=1.6), "tau_x and tau_y must be below 90 degrees, got 1.6 and 0.0 radians"),
+        (lambda: OpenCVLens(tau_y=-2.0), "tau_x and tau_y must be below 90 degrees, got 0.0 and -2.0 radians"),
         (lambda: camera_of(fisheye=[0] * 5), "fisheye must be k1, k2, k3, k4: 4 numbers, got 5"),
         (lambda: OpenCVLens(k2=np.nan), "terms of a lens must be finite"),
         (lambda: FisheyeLens(k4=np.inf), "terms of a lens must be finite"),

@@ -41,6 +41,13 @@ def test_viewpoints_share_the_sphere_evenly(n):
     assert share.max() < 1.25
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 100])
+def test_viewpoints_stand_as_high_above_as_below(n):
+    heights = eyes(viewpoints([(-1.0, -1, -1), (1, 1, 1)], n))[:, 1]
+    assert np.sort(heights) == pytest.approx(-np.sort(heights)[::-1], abs=1e-9)
+    assert len(set(np.diff(np.sort(heights)).round(9))) <= 1
+
+
 def test_viewpoints_all_see_the_whole_subject():
     for camera in viewpoints(KNOT, 20, aspect=4 / 3):
         x, y, depth = camera.project(KNOT.vertices, (400, 300)).T

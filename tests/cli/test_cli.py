@@ -111,6 +111,13 @@ def test_render_fills_the_frame_but_for_the_margin(run):
     assert (rows[0], rows[-1]) == (5, 94)
 
 
+def test_render_limits_of_a_file_are_options(run, folder):
+    (folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 10)
+    status, err = run("render", "a.obj", "-o", "a.png", "--max-triangles", 9, *SMALL)
+    assert (status, "has 10 triangles, more than the 9 of max_triangles" in err[-1]) == (2, True)
+    assert run("render", "a.obj", "-o", "a.png", "--max-triangles", 10, *SMALL) == (0, [])
+
+
 def test_render_crease_makes_edges_sharp_or_not(run, folder):
     pytest.importorskip("trimesh")
     (folder / "a.obj").write_text(PYRAMID)

@@ -312,6 +312,17 @@ def test_sheet_reduces_large_pictures(tmp_path):
     assert sheet[8 + 64, 8 + 128].tolist() == [200, 0, 0]
 
 
+def test_sheet_of_pictures_of_many_sizes_keeps_them_apart(tmp_path):
+    sizes = {"a": (60, 12), "b": (20, 40)}
+    for name, size in sizes.items():
+        Image.new("RGBA", size, (200, 0, 0, 255)).save(tmp_path / f"{name}.png")
+    sheet = make_sheet([[tmp_path / f"{name}.png"] for name in sizes], ["", ""])
+    assert sheet.shape == (8 + 40 + 24, 8 + 2 * (60 + 8), 3)
+    expected = np.full(sheet.shape, 255, np.uint8)
+    expected[8 + 14 : 8 + 26, 8:68] = expected[8:48, 76 + 20 : 76 + 40] = [200, 0, 0]
+    assert np.array_equal(sheet, expected)
+
+
 def test_sheet_leaves_room_for_what_failed(run, folder):
     status, _ = run("render", "cube", "nope.obj", "--sheet", "sheet.png", *SMALL)
     assert status == 1

@@ -6,6 +6,8 @@ import pytest
 import topleft as tl
 from topleft._apps.explore.content import SCENES, content_of_name, scene
 from topleft._apps.explore.handlers import answer
+from topleft._apps.explore.pixels import MethodPicture, difference
+from topleft._apps.explore.probe import MAX_DRAWN, drawn_by
 from topleft._apps.explore.session import Content, Session
 from topleft._apps.explore.state import parse_state
 from topleft.errors import MeshError
@@ -268,6 +270,7 @@ WRONG = {
     "size must be from 1 to 256, got 11, 257": SQUARE | {"size": [11, 257]},
     "size must be two whole numbers": SQUARE | {"size": [1.5, 2]},
     "origin must be from": SQUARE | {"origin": [2**60, 0]},
+    "vertices must be rows of two or three numbers each": SQUARE | {"vertices": [[1, "2"], [3, 4], [5, 6], [7, 8]]},
     "vertices must be rows of two or three numbers": SQUARE | {"vertices": [[1, 2], [3]]},
     "vertices must be a list of rows": SQUARE | {"vertices": "many"},
     "vertices must lie within": SQUARE | {"vertices": [[1e300, 0], [1, 1], [2, 2], [3, 3]]},
@@ -341,3 +344,24 @@ def test_npz_without_triangles_is_refused(folder):
     np.savez("half.npz", vertices=np.eye(3))
     with pytest.raises(MeshError, match=r"half.npz: must hold arrays vertices and triangles, triangles not among them"):
         content_of_name("half.npz")
+
+
+def test_difference_tells_each_kind():
+    """Nothing, the same, more, less, another owner, drawn more often: a pixel each."""
+
+    def drawing(owners, counts):
+        owners = np.array(owners, np.int32).reshape(1, -1, 1)
+        return MethodPicture(
+            owners, np.array(counts).reshape(1, -1, 1), (owners[..., 0] >= 0).astype(np.float32), 0.0, []
+        )
+
+    one = drawing([-1, 0, 0, -1, 0, 0], [0, 1, 1, 0, 1, 2])
+    two = drawing([-1, 0, -1, 0, 1, 0], [0, 1, 0, 1, 1, 1])
+    assert difference(one, two).tolist() == [[0, 1, 2, 3, 4, 5]]
+
+
+@pytest.mark.parametrize(("n", "is_told"), [(MAX_DRAWN, True), (MAX_DRAWN + 1, False)])
+def test_triangles_that_a_classic_draws_are_told_up_to_a_number(n, is_told):
+    state = parse_state(SQUARE | {"triangles": [[0, 1, 2]] * n})
+    found = drawn_by(state, (3, 3), next(iter(CLASSICS)))
+    assert found == (dict.fromkeys(range(n), 1) if is_told else None)

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import topleft as tl
+from topleft._meshes.io.limits.budget import LIMITS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -81,3 +82,13 @@ def is_member(name, member):
     """Tell whether a class has it, or its docstring names it as an attribute."""
     owner = getattr(tl, name)
     return hasattr(owner, member) or re.search(rf"^ *[\w, ]*\b{member}\b[\w, ]* :", owner.__doc__, re.M)
+
+
+def test_limits_of_files_are_those_of_the_page():
+    rows = re.findall(
+        r"(?m)^\| `(max_\w+)` \| .* \| ([\d,]+|8 GiB) \| ([\d.]*) ?\|$", (DOCS / "guide/files.md").read_text()
+    )
+    said = {
+        name: (8 << 30 if "G" in least else int(least.replace(",", "")), float(more or 0)) for name, least, more in rows
+    }
+    assert said == {name: (limit.least, limit.per_byte) for name, limit in LIMITS.items()}

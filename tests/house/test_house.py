@@ -5,6 +5,7 @@
 
 import ast
 import inspect
+import os
 import pickle
 import pkgutil
 import re
@@ -269,3 +270,15 @@ def resolves(name):
     except (ImportError, AttributeError):
         return False
     return True
+
+
+@pytest.mark.parametrize(("allowed", "status"), [("", 1), ("* this Python has a GIL\n* there is no GIL\n", 0)])
+@pytest.mark.parametrize("options", [[], ["-n", "1"]])
+def test_gate_fails_when_more_tests_skip_than_its_list_allows(tmp_path, allowed, status, options):
+    (tmp_path / "may_skip.txt").write_text("# none of these\n" + allowed)
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *options, "tests/engine/test_gil.py"]
+    command += ["tests/base/test_interpreters.py"]
+    environment = {**os.environ, "TOPLEFT_MAY_SKIP": str(tmp_path / "may_skip.txt")}
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment)
+    assert ended.returncode == status, ended.stdout
+    assert ("may_skip.txt allows: 1 th" in ended.stdout) == bool(status)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from topleft.errors import MeshError, MeshWarning, MissingPackageError
 
 trimesh = pytest.importorskip("trimesh")
 
-SHARED_MESHES = Path(__file__).resolve().parents[3] / "shared" / "meshes"
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 GLTF_WITHOUT_ITS_BUFFER = """{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
 "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
@@ -261,24 +259,6 @@ def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(MissingPackageError, match="pip install trimesh"):
         files.load(write("a.3mf", "PK"))
-
-
-@pytest.mark.parametrize(
-    ("name", "n_vertices", "n_triangles"),
-    [
-        ("suzanne.obj", 507, 968),
-        ("african_head.obj", 1339, 2492),
-        ("spot.obj", 3225, 5856),
-        ("teapot.obj", 3241, 6320),
-        ("stanford-bunny.obj", 35947, 69451),
-        ("nefertiti.obj", 49971, 99938),
-    ],
-)
-def test_load_real_mesh_has_all_of_it(name, n_vertices, n_triangles):
-    if not (SHARED_MESHES / name).exists():
-        pytest.skip("the mesh is not on this machine")
-    mesh = files.load(SHARED_MESHES / name)
-    assert (len(mesh.vertices), len(mesh.triangles)) == (n_vertices, n_triangles)
 
 
 # By trimesh

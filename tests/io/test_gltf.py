@@ -10,6 +10,7 @@ import pytest
 from gltf_files import QUAD, TRIANGLE, GltfFile, glb_of
 
 import topleft as tl
+from topleft._meshes.io.gltf.draco import declared_by_draco
 from topleft.errors import MeshError, MeshWarning
 
 QUAD_STRIP = [0, 1, 3, 2]
@@ -548,3 +549,74 @@ def test_load_cameras_of_other_formats_are_none(tmp_path):
     assert tl.load_cameras(tmp_path / "a.obj") == []
     with pytest.raises(FileNotFoundError, match="there is no file"):
         tl.load_cameras(tmp_path / "b.glb")
+
+
+# ---- Draco ----------------------------------------------------------------------------------------------------------
+
+DRACO = "KHR_draco_mesh_compression"
+
+
+def draco_file(content, n_vertices, n_corners):
+    file = GltfFile(extensionsRequired=[DRACO])
+    position = file.add("accessors", {"componentType": 5126, "count": n_vertices, "type": "VEC3"})
+    indices = file.add("accessors", {"componentType": 5125, "count": n_corners, "type": "SCALAR"})
+    packed = {DRACO: {"bufferView": file.view(content), "attributes": {"POSITION": 0}}}
+    file.node(mesh=file.mesh({"attributes": {"POSITION": position}, "indices": indices, "extensions": packed}))
+    return file
+
+
+def grid_of_draco(n, **options):
+    """n * n squares, flat."""
+    draco = pytest.importorskip("DracoPy", reason="needs DracoPy, of the extra formats")
+    y, x = np.mgrid[0 : n + 1, 0 : n + 1].reshape(2, -1)
+    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    triangles = np.concatenate([first[:, None] + [0, 1, n + 2], first[:, None] + [0, n + 2, n + 1]])
+    positions = np.stack([x, y, 0 * x], axis=1).astype(np.float32)
+    return draco.encode(positions, triangles.astype(np.uint32), **options), len(positions), triangles.size
+
+
+@pytest.mark.parametrize("level", [0, 1, 7, 10])
+@pytest.mark.parametrize("n", [1, 200])
+def test_gltf_of_draco_is_read(load, level, n):
+    mesh = load(draco_file(*grid_of_draco(n, compression_level=level, quantization_bits=14)))
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    assert len(mesh.triangles) == 2 * n * n
+    assert np.cross(b - a, c - a)[:, 2].sum() / 2 == pytest.approx(n * n, rel=1e-3)
+
+
+@pytest.mark.parametrize("level", [0, 7])
+def test_gltf_of_draco_that_declares_too_much_is_refused_before_it_is_unpacked(tmp_path, monkeypatch, level):
+    content, *n = grid_of_draco(200, compression_level=level)
+    monkeypatch.setattr("DracoPy.decode", lambda content: pytest.fail("it was unpacked"))
+    tmp_path.joinpath("a.glb").write_bytes(draco_file(content, *n).glb())
+    with pytest.raises(MeshError, match="has 80000 triangles, more than the 79999 of max_triangles"):
+        tl.load(tmp_path / "a.glb", max_triangles=79_999)
+    with pytest.raises(MeshError, match="has 40401 vertices, more than the 40400 of max_vertices"):
+        tl.load(tmp_path / "a.glb", max_vertices=40_400)
+
+
+def test_draco_metadata_is_skipped():
+    content, _, _ = grid_of_draco(3)
+    entry = b"\x01a\x02xy"
+    own = b"\x01" + entry + b"\x00"  # one entry, nothing below
+    nested = b"\x00\x01\x01b" + own
+    packed = content[:9] + b"\x00\x80" + b"\x02\x00" + own + b"\x01" + nested + own + content[11:]
+    assert declared_by_draco(packed) == declared_by_draco(content) == (18, 16)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "no mesh of Draco 2.2"),
+        (b"DRACO\2\1\1\1\0\0", "no mesh of Draco 2.2"),
+        (b"DRACO\2\2\0\1\0\0", "no mesh of Draco 2.2"),
+        (b"DRACO\2\2\1\1\0\0\0\x80", "is cut off"),
+        (b"DRACO\2\2\1\1\0\0\0" + b"\x80" * 1000, "has no end"),
+        (b"DRACO\2\2\1\1\0\x80\0" + b"\0\1\0" * 100, "nested too deep"),
+        (b"DRACO\2\2\1\1\0\0\0\4\2", "cannot read"),
+    ],
+)
+def test_gltf_of_draco_that_is_broken_is_told(load, content, message):
+    pytest.importorskip("DracoPy", reason="needs DracoPy, of the extra formats")
+    with pytest.raises(MeshError, match=message):
+        load(draco_file(content, 4, 6))

@@ -345,3 +345,55 @@ def test_load_stops_at_each_limit_of_its_options(folder, option):
     for wrong, error in ((-1, ValueError), (1.5, TypeError), ("9", TypeError), (True, TypeError)):
         with pytest.raises(error, match=option):
             tl.load(folder / name, **{option: wrong})
+
+
+# ---- formats that trimesh and meshio read ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".xdmf", ".xmf", ".h5m", ".cgns", ".exo"])
+def test_load_of_formats_that_no_budget_holds_for_is_refused(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_bytes(b"<Xdmf/>")
+    with pytest.raises(MeshError, match=f"cannot read .*a{suffix}': .*; if you trust it, read it by meshio"):
+        tl.load(tmp_path / f"a{suffix}")
+
+
+@pytest.mark.parametrize("compression", ["zlib", "lzma", None])
+def test_load_vtu_unpacks_on_its_budget(tmp_path, compression):
+    meshio = pytest.importorskip("meshio")
+    points = np.zeros((200_000, 3))
+    points[1, 0] = points[2, 1] = 1
+    made = meshio.Mesh(points, [("triangle", np.array([[0, 1, 2]]))])
+    meshio.vtu.write(tmp_path / "a.vtu", made, compression=compression)
+    assert tl.load(tmp_path / "a.vtu").triangles.tolist() == [[0, 1, 2]]
+    if compression is not None:
+        with pytest.raises(MeshError, match="more than the 1000000 of max_unpacked_bytes"):
+            tl.load(tmp_path / "a.vtu", max_unpacked_bytes=1_000_000)
+    assert len(meshio.read(tmp_path / "a.vtu").points) == 200_000  # who calls it otherwise has no budget
+
+
+def write_3dxml(path, part, n_parts, textures=0, side=1):
+    """As much of the format as names parts and pictures."""
+    rows = "".join(f'<ReferenceRep id="{i}" associatedFile="urn:3DXML:p.3DRep" format="T"/>' for i in range(n_parts))
+    stream = io.BytesIO()
+    Image.new("L", (side, side)).save(stream, format="PNG")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("Manifest.xml", "<Manifest><Root>a.xml</Root></Manifest>")
+        archive.writestr("a.xml", f'<M><ProductStructure root="0">{rows}</ProductStructure></M>')
+        archive.writestr("p.3DRep", part)
+        archive.writestr("m.xml", "<M>" + '<Attr Name="TextureImage"/>' * textures + "</M>")
+        archive.writestr("t.png", stream.getvalue())
+
+
+@pytest.mark.parametrize(
+    ("how", "option"),
+    [
+        ({"part": "<Rep>" + " " * 100_000 + "</Rep>", "n_parts": 1000}, "max_unpacked_bytes"),
+        ({"part": "<Rep>" + "<a/>" * 600_000 + "</Rep>", "n_parts": 1}, "max_lines"),
+        ({"part": "<Rep/>", "n_parts": 1, "textures": 100, "side": 1000}, "max_texture_pixels"),
+    ],
+)
+def test_load_3dxml_that_multiplies_its_parts_is_refused(tmp_path, how, option):
+    pytest.importorskip("lxml", reason="needs lxml, of the extra formats")
+    write_3dxml(tmp_path / "a.3dxml", **how)
+    with pytest.raises(MeshError, match=f"of {option}$"):
+        tl.load(tmp_path / "a.3dxml")

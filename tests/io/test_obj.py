@@ -86,9 +86,9 @@ def test_obj_400_materials_take_no_longer_than_one(load):
     took = []
     for n in (1, 400):
         parts = [f"usemtl m{i * n // 4000}\n" + face for i, face in enumerate(faces)]
-        start = time.perf_counter()
+        start = time.process_time()
         mesh = load(vertices + "".join(parts), mtl)
-        took.append(time.perf_counter() - start)
+        took.append(time.process_time() - start)
         assert len(mesh.materials) == n
     assert took[1] < 4 * took[0] + 0.1  # once it was a hundred times
 

@@ -67,6 +67,12 @@ def test_off_colors_of_faces_end_at_their_edges(load):
     assert mesh.colors[mesh.triangles][:, :, :3].tolist() == [[[255, 0, 0]] * 3, [[0, 0, 255]] * 3]
 
 
+def test_off_colors_that_one_face_lacks_are_left_out(load):
+    mesh = load(f"OFF\n4 2 0\n{SQUARE}3 0 1 2 255 0 0\n3 0 2 3\n")
+    assert mesh.colors is None
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
 def test_off_normals_and_texture_coordinates_are_read(load):
     mesh = load("STNOFF\n3 1 0\n0 0 0 0 0 1 0.5 1\n1 0 0 0 0 1 0.25 1\n0 1 0 0 0 1 0 0\n3 0 1 2\n")
     assert mesh.normals.tolist() == [[0, 0, 1]] * 3

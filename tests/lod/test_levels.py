@@ -270,6 +270,20 @@ def test_simplify_needles_do_not_end_the_levels(with_uv):
     assert level.bound < 0.1
 
 
+def test_gather_joins_points_of_one_cell_alone():
+    points, triangles = tl.scenes.blob(20_000)
+    found = gather(points, triangles, 2_000)
+    a, b, c = points[triangles.T]
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    side = np.sqrt(4 / np.sqrt(3) * area / 2_000) / 3
+    low, high = (np.full_like(found.points, sign * np.inf) for sign in (1, -1))
+    is_left = found.into >= 0
+    np.minimum.at(low, found.into[is_left], points[is_left])
+    np.maximum.at(high, found.into[is_left], points[is_left])
+    assert len(found.points) < 0.8 * len(points)
+    assert (high - low).max() <= side * (1 + 1e-9)
+
+
 def test_gather_leaves_borders_alone():
     points, triangles = grid(12)
     found = gather(points, triangles, 8)

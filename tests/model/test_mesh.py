@@ -9,6 +9,7 @@ from engine_cases import ON_EACH_ISA, on
 from topleft import scenes
 from topleft._core import engine
 from topleft._meshes.model import mesh as mesh_module
+from topleft._meshes.model.joined import joined
 from topleft._meshes.model.mesh import Mesh, coincident
 from topleft._meshes.model.normals import angle_weighted_normals, face_normals
 
@@ -163,3 +164,15 @@ def test_group_rows_gives_up_where_too_many_hashes_meet(isa):
 
 def test_coincident_of_nothing_is_empty():
     assert [len(part) for part in coincident(np.empty((0, 3)))] == [0, 0]
+
+
+def test_parts_with_and_without_normals_are_joined_with_those_of_their_crease():
+    """Two squares at a right angle, of which one says its normals."""
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float64)
+    told = Mesh(square, [(0, 1, 2), (0, 2, 3)], normals=np.tile([1.0, 0, 0], (4, 1)))
+    bent = Mesh(np.concatenate([square + 5, square[:, [0, 2, 1]] + 5]), [(0, 1, 2), (0, 2, 3), (4, 6, 5), (4, 7, 6)])
+    mesh = joined([told, bent], 30.0)
+    found = mesh.normals[mesh.triangles]
+    assert found[:2].tolist() == [[[1, 0, 0]] * 3] * 2
+    assert found[2:4].tolist() == [[[0, 0, 1]] * 3] * 2
+    assert np.abs(found[4:]).tolist() == [[[0, 1, 0]] * 3] * 2

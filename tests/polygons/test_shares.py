@@ -451,3 +451,33 @@ def test_memory_for_rings_that_meet_is_as_large_as_they_are():
     assert (table.areas == small.areas).all()
     rows, columns = np.divmod(small.pixels.astype(np.int64), 12)
     assert (table.pixels == rows * side + columns).all()
+
+
+@pytest.mark.parametrize(
+    ("starts", "pixels", "areas", "message"),
+    [
+        ([0], [0, 3], [0.5, 1], "starts must ascend from 0 to the 2 entries"),
+        ([0, 1, 9], [0, 3], [0.5, 1], "starts must ascend from 0 to the 2 entries"),
+        ([0, 2, 1, 2], [0, 3], [0.5, 1], "starts must ascend from 0 to the 2 entries"),
+        ([-5, 1, 2], [0, 3], [0.5, 1], "starts must ascend from 0 to the 2 entries"),
+        (np.empty(0, int), [0, 3], [0.5, 1], "starts must ascend from 0 to the 2 entries"),
+        ([[0, 1, 2]], [0, 3], [0.5, 1], "starts must be an array of integers in one row"),
+        ([0, 1, 2], [0, 3], [0.5], "areas must be as many as pixels, 2, got 1"),
+        ([0, 1, 2], [0, 3], [1, 1], "areas must be an array of numbers in one row"),
+        ([0, 1, 2], [0, 4], [0.5, 1], r"pixels must lie in 0\.\.3, got 0\.\.4"),
+        ([0, 1, 2], [0, -1], [0.5, 1], r"pixels must lie in 0\.\.3, got -1\.\.0"),
+        ([0, 1, 2], [0.0, 3.0], [0.5, 1], "pixels must be an array of integers in one row"),
+    ],
+)
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_table_made_by_hand_that_is_none_is_refused(starts, pixels, areas, message, dtype):
+    own = np.array(pixels)
+    own = own.astype(dtype) if own.dtype.kind == "i" else own
+    for use in (lambda table: table.sums(np.ones((2, 2))), lambda table: table.spread(np.ones(2))):
+        with pytest.raises(ValueError, match=message):
+            use(tl.Overlap(np.array(starts), own, np.array(areas), (2, 2)))
+
+
+def test_table_made_by_hand_is_one():
+    found = tl.Overlap(np.array([0, 1, 2]), np.array([0, 3], np.int32), np.array([0.5, 1], np.float32), (2, 2))
+    assert found.sums([[1, 2], [3, 4]]).tolist() == [0.5, 4]

@@ -64,6 +64,27 @@ def test_overdraw_any_clip_space_equals_reference(scene):
     comparing.check_overdraw(scene)
 
 
+@pytest.mark.parametrize("dtype", [np.int64, np.float64, np.float32])
+@pytest.mark.parametrize("bits", [0, 8, 16])
+def test_overdraw_at_the_border_of_narrow_vertices_equals_reference(dtype, bits):
+    """Vertices below 2**30 sub-pixels, at it, and up to twice as far take different ways."""
+    narrow = 2.0 ** (30 - bits)
+    for far in (
+        narrow - 128,
+        narrow - 1,
+        narrow,
+        narrow + 1,
+        narrow + 128,
+        2 * narrow - 128,
+        2 * narrow,
+        2 * narrow + 256,
+    ):
+        xy = np.array(
+            [[-far, 1 - far], [far, 7 + far], [-far, far], [7 - far, -far], [far, 7 - far], [far, -far]], dtype
+        )
+        comparing.check_overdraw(soup(xy, (12, 12), subpixel_bits=bits))
+
+
 @pytest.mark.parametrize("bits", range(17))
 def test_overdraw_each_number_of_bits_equals_reference(bits):
     xy = np.random.default_rng(bits).uniform(-6, 18, (90, 2))

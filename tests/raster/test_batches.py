@@ -118,3 +118,12 @@ def test_batch_has_derivatives_and_textures():
 def test_batch_names_the_row_of_a_bad_index(dtype):
     with pytest.raises(IndexError, match=r"row 1 is \[0, 2, 9\]"):
         tl.rasterize(np.zeros((2, 3, 2)), np.array([[0, 1, 2], [0, 2, 9]], dtype), 4)
+
+
+def test_batch_interpolates_corners_of_each_pose():
+    found = tl.rasterize(MESH.vertices, MESH.triangles, SIZE, transform=POSES)
+    own = np.random.default_rng(0).random((5, len(MESH.triangles), 3, 2)).astype(np.float32)
+    expected = np.stack([found[i].interpolate(own[i]) for i in range(5)])
+    assert np.array_equal(found.interpolate(own), expected)
+    with pytest.raises(ValueError, match="values must be those of all, or 5 of them, got 4"):
+        found.interpolate(own[:4])

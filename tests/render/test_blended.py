@@ -174,7 +174,7 @@ def test_every_sample_sees_all_layers_of_small_triangles():
     placed, view = place(tl.Scene([knot]), camera, size, {"sampling": "msaa4"})
     frags, snapped = draw_nearest(placed, view), [placed.snap(0)]
     for k, at in enumerate(frags.positions):
-        ids, depth = peel_meshes(SCRATCH, snapped, view, 16, is_farthest=False, at_fx=at)
+        ids, depth = peel_meshes(SCRATCH, [snapped], view, 16, is_farthest=False, at_fx=at)
         assert_same(ids[0], frags.drawn_planes[0][k])
         assert_same(depth[0], frags.drawn_planes[1][k])
 

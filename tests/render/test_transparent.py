@@ -1,6 +1,7 @@
 """Transparent meshes and scenes: the layers of all instances, shaded and composited."""
 
 import doctest
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from engine_cases import ON_EACH_ISA, on
 from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
-from topleft._meshes.picture import transparent
+from topleft._meshes.picture import instances, transparent
 
 
 @ON_EACH_ISA
@@ -30,6 +31,32 @@ def test_layers_of_a_scene_are_those_of_the_mesh_of_all(isa, options):
             assert_same(got.instance, instance)
             assert_same(got.triangle, triangle)
             assert_same(got.layer(2).barycentric(), expected.layer(2).barycentric())
+
+
+@pytest.mark.parametrize("n_vertices", [1, 100])
+def test_layers_of_a_scene_of_a_few_instances_at_a_time_are_the_same(monkeypatch, n_vertices):
+    scene = many(3)
+    expected = tl.visible_layers(scene, CAMERA, SIZE, layers=5)
+    monkeypatch.setattr(instances, "VERTICES_AT_ONCE", n_vertices)
+    got = tl.visible_layers(scene, CAMERA, SIZE, layers=5)
+    assert_same(got.id, expected.id)
+    assert_same(got.depth, expected.depth)
+
+
+def test_layers_of_a_scene_take_the_memory_of_a_few_instances(monkeypatch):
+    monkeypatch.setattr(instances, "VERTICES_AT_ONCE", 1)
+    sphere = tl.Mesh(*tl.scenes.icosphere(5))
+
+    def peak(n):
+        scene = tl.Scene([tl.Instance(sphere)] * n)
+        tl.visible_layers(scene, CAMERA, (8, 6), threads=1)
+        tracemalloc.start()
+        tl.visible_layers(scene, CAMERA, (8, 6), threads=1)
+        peaked = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peaked
+
+    assert peak(40) < 2 * peak(4)
 
 
 def test_layers_of_a_scene_are_composited_by_triangle_and_pixel():

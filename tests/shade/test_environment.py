@@ -157,3 +157,7 @@ def test_environment_goes_to_another_process():
 def test_wrong_environments_are_named(make, error, message):
     with pytest.raises(error, match=message):
         make()
+
+
+def test_environment_is_white_unless_told():
+    assert repr(tl.Environment()) == repr(tl.Environment((255, 255, 255), intensity=1.0, up=(0.0, 1.0, 0.0), turn=0.0))

@@ -11,13 +11,16 @@ import pytest
 from changing_arrays import Changing, between_closed_pages
 from fuzzing import Draw, FromRandom
 
+import topleft as tl
+
 FUZZER = Path(__file__).parents[1] / "support/hostile/changing.py"
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="fork and mprotect are POSIX")
 
 
 def test_calls_whose_arrays_change_do_not_crash():
-    ended = subprocess.run([sys.executable, FUZZER, "--cases", "120"], capture_output=True, text=True)
+    command = [sys.executable, FUZZER, "--cases", "120", "--seconds", "3600"]
+    ended = subprocess.run(command, capture_output=True, text=True)
     assert ended.returncode == 0, f"{ended.stdout[-1500:]}\n{ended.stderr[:3000]}"
     assert "120 cases, none that must not be" in ended.stdout
 
@@ -57,3 +60,13 @@ def test_what_is_written_beside_a_shared_array_is_found():
     assert not beside.any()
     with pytest.raises(AssertionError, match="beside"), changing.changed():
         changing._beside[0][0] = 1
+
+
+@pytest.mark.parametrize("index", [3, -1, 2**31 - 1])
+def test_fragments_of_a_triangle_whose_index_left_the_vertices_have_no_weights(index):
+    vertices = np.array([[0, 0, 1], [8, 0, 1], [0, 8, 1], [5, 5, 1], [6, 6, 1]], np.float32)
+    triangles = np.array([[0, 1, 2]], np.int32)
+    frags = tl.rasterize(vertices[:3], triangles, (8, 8))
+    assert frags.barycentric().any()
+    triangles[0, 2] = index
+    assert not frags.barycentric().any()

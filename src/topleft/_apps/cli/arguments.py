@@ -13,6 +13,7 @@ from topleft._core.base.options import Cull, Sampling
 from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
 from topleft._meshes.io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._meshes.io.limits.budget import LIMITS
 from topleft._meshes.io.load import as_seconds
 from topleft._meshes.model.mesh import DEFAULT_CREASE, as_crease
 from topleft._meshes.model.points import DEFAULT_POINT_SIZE
@@ -233,6 +234,8 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PX",
         help="of clouds of points: the diameter of a point, pixels (default %(default)g)",
     )
+    for option, limit in LIMITS.items():
+        add(f"--{option.replace('_', '-')}", type=positive, metavar="N", help=f"refuse files of more {limit.what}")
 
 
 def size(text: str) -> tuple[int, int]:

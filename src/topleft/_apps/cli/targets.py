@@ -26,7 +26,7 @@ from topleft._core.base.whole_file import remove_stale_parts
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.file_cameras import load_cameras
 from topleft._meshes.io.images import SUFFIXES
-from topleft._meshes.io.limits.budget import Budget
+from topleft._meshes.io.limits.budget import LIMITS, Budget
 from topleft._meshes.io.load import load
 from topleft._meshes.io.references import opened, rgba_of
 from topleft._meshes.model.environment import Environment
@@ -55,6 +55,7 @@ class MeshSource:
     point_size: float = DEFAULT_POINT_SIZE
     time: float | None = None
     clip: int | str | None = None
+    limits: tuple[tuple[str, int | None], ...] = ()
 
     def __call__(self) -> Mesh | Points:
         """Read it."""
@@ -74,7 +75,7 @@ class MeshSource:
             return Mesh(*shape(self.name), crease=self.crease)
         if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
             raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
-        return load(self.name, crease=self.crease, time=self.time, clip=self.clip)
+        return load(self.name, crease=self.crease, time=self.time, clip=self.clip, **dict(self.limits))
 
 
 def read_texture(path: str) -> Texture:
@@ -234,13 +235,14 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
         raise UsageError("--clip needs --time: which second of it")
     pattern = _pattern(options.out, options)
     drawing = _render_options(options)
+    limits = tuple((name, getattr(options, name)) for name in LIMITS)
     groups = []
     names = names_of(options.meshes, with_numbers="{index}" not in pattern, with_folders="{folder}" in pattern)
     folders = folders_of(options.meshes)
     for i_mesh, source in enumerate(options.meshes, start):
         name = names[i_mesh - start]
         moment = options.time, options.clip
-        mesh = MeshSource(source, options.texture, options.crease, options.point_size, *moment)
+        mesh = MeshSource(source, options.texture, options.crease, options.point_size, *moment, limits)
         jobs = []
         for i_view in range(options.views):
             # Not str.format: a folder may have other braces in its name.

@@ -542,10 +542,11 @@ def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1
 
 
 def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
-         bint is_farthest, int band_bits, int64_t first_band, int64_t end_band) -> int:
+         bint is_farthest, int band_bits, int64_t first_band, int64_t end_band, bint is_first) -> int:
     """Write the nearest layers of all meshes together, as planes (K, H, W), in bands of 2**band_bits rows.
 
-    `bins`: those of each mesh, or None, where a band is to look at all triangles. Returns as `SnappedMesh.draw` does.
+    `bins`: those of each mesh, or None, where a band is to look at all triangles. `is_first`: clear the planes before;
+    otherwise what is there are layers, too. Returns as `SnappedMesh.draw` does.
     """
     cdef tl_peeled peeled
     cdef tl_target target
@@ -556,6 +557,7 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
     cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
     cdef list pairs = list(zip(meshes, bins, strict=True))
     cdef int64_t i, n = len(pairs)
+    memset(&peeled, 0, sizeof(peeled))
     peeled.n_layers, peeled.is_farthest = ids.shape[0], is_farthest
     peeled.plane_px = height * width
     memset(&target, 0, sizeof(target))
@@ -568,7 +570,7 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
             share.ids, share.end = NULL, mesh.snapped.n_triangles
             if own is not None:
                 share.ids, share.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
-            share.is_first, share.is_last = i == 0, i == n - 1
+            share.is_first, share.is_last = is_first and i == 0, i == n - 1
             window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
             with nogil:
                 bad_row = K.draw(&mesh.snapped, &window, &target, &share)

@@ -73,6 +73,18 @@ class Overlap:
         default_factory=list, repr=False, compare=False
     )
 
+    def __post_init__(self) -> None:
+        """Refuse arrays that are no table, whoever made them."""
+        n = len(self.pixels)
+        for name, kinds in (("starts", "iu"), ("pixels", "iu"), ("areas", "f")):
+            array = getattr(self, name)
+            if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind not in kinds:
+                raise ValueError(f"{name} must be an array of {'numbers' if kinds == 'f' else 'integers'} in one row")
+        if len(self.areas) != n:
+            raise ValueError(f"areas must be as many as pixels, {n}, got {len(self.areas)}")
+        if not len(self.starts) or self.starts[0] != 0 or self.starts[-1] != n or (np.diff(self.starts) < 0).any():
+            raise ValueError(f"starts must ascend from 0 to the {n} entries")
+
     def __len__(self) -> int:
         """Return the number of polygons."""
         return len(self.starts) - 1
@@ -199,9 +211,17 @@ class Overlap:
         own = as_real("values", values)
         if own.shape != (len(self),):
             raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {own.shape}")
+        self._check_pixels()
         weights = np.repeat(own, np.diff(self.starts)) * self.areas
         picture: npt.NDArray[np.float64] = np.bincount(self.pixels, weights, minlength=self.shape[1])  # type: ignore[assignment]
         return picture.reshape(self.size[::-1])
+
+    def _check_pixels(self) -> None:
+        """Raise an error for a table made by hand whose pixels are none; a pass over the entries."""
+        n = self.shape[1]
+        unsigned = self.pixels.view(f"u{self.pixels.dtype.itemsize}")  # below 0 is beyond
+        if len(unsigned) and int(unsigned.max()) >= n:
+            raise ValueError(f"pixels must lie in 0..{n - 1}, got {self.pixels.min()}..{self.pixels.max()}")
 
     def _values_of(self, raster: Any, nodata: float | None) -> npt.NDArray[np.float64]:
         """Return the number (E,) of the pixel of each entry, NaN where it has no data."""
@@ -219,6 +239,7 @@ class Overlap:
         array = as_array("raster", raster)
         if array.shape != self.size[::-1]:
             raise ValueError(f"raster must have shape {self.size[::-1]}, got {array.shape}")
+        self._check_pixels()
         given = array.reshape(-1)[self.pixels]
         values = given.astype(np.float64)
         with np.errstate(all="ignore"):

@@ -6,7 +6,7 @@ In: meshes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and 
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NoReturn, Unpack
 
 import numpy as np
@@ -159,7 +159,7 @@ def peel(
     n, is_farthest = check_peel(checked, layers, depth_test)
     # Layers refer to what they were drawn from, so nothing of it can be reused.
     snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
-    ids, depth = peel_meshes(SCRATCH, [snapped.mesh], checked, n, is_farthest=is_farthest, refuse=snapped.refuse)
+    ids, depth = peel_meshes(SCRATCH, [[snapped.mesh]], checked, n, is_farthest=is_farthest, refuse=snapped.refuse)
     return DepthLayers(ids, depth, snapped)
 
 
@@ -184,7 +184,7 @@ def as_layers(layers: object) -> int:
 
 def peel_meshes(
     memory: Memory,
-    meshes: Sequence[engine.SnappedMesh],
+    chunks: Iterable[Sequence[engine.SnappedMesh]],
     view: View,
     n_layers: int,
     *,
@@ -194,30 +194,35 @@ def peel_meshes(
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids.
 
+    `chunks`: some meshes at a time; a band of rows is drawn once with all of them, and none is held afterwards.
     `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre. `refuse` raises
     the error for an index outside the vertices.
     """
-    meshes = [mesh.seen_from(*at_fx) for mesh in meshes] if any(at_fx) else meshes
     reach_fx = max(map(abs, at_fx))
     width, height = view.size
     check_fits((n_layers, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
-    if 0 in view.size:
-        return ids, depth
-    n_threads = min(height, count_threads(view.threads, sum(mesh.n_triangles for mesh in meshes)))
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
     n_pixels = BAND_BYTES // (8 * n_layers) if choices.can_share(view) else min(height * width, 2**31 - 1)
-    band_bits = bits_of_bands((height, width), n_pixels, n_threads)
-    bins = [bins_of(memory, mesh, view, band_bits, reach_fx) for mesh in meshes]
-    n_bands = -(-height >> band_bits)
 
-    def peel_bands(first: int, end: int) -> int:
-        return engine.peel(meshes, bins, ids, depth, is_farthest, band_bits, first, end)
+    def peel_chunk(meshes: Sequence[engine.SnappedMesh], *, is_first: bool) -> None:
+        meshes = [mesh.seen_from(*at_fx) for mesh in meshes] if any(at_fx) else meshes
+        n_threads = min(height, count_threads(view.threads, sum(mesh.n_triangles for mesh in meshes)))
+        bits = bits_of_bands((height, width), n_pixels, n_threads)
+        bins = [bins_of(memory, mesh, view, bits, reach_fx) for mesh in meshes]
 
-    is_bad = any(one is not None and one.bad_row >= 0 for one in bins)
-    if is_bad or max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
-        refuse()
+        def peel_bands(first: int, end: int) -> int:
+            return engine.peel(meshes, bins, ids, depth, is_farthest, bits, first, end, is_first)
+
+        is_bad = any(one is not None and one.bad_row >= 0 for one in bins)
+        if is_bad or max(run_parts(peel_bands, -(-height >> bits), n_threads)) >= 0:
+            refuse()
+
+    is_first = True
+    for meshes in chunks if 0 not in view.size else ():
+        peel_chunk(meshes, is_first=is_first)
+        is_first = False
     return ids, depth
 
 

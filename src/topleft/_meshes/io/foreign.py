@@ -17,6 +17,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import replace
 from typing import Any
 from urllib.parse import unquote
@@ -45,6 +46,12 @@ NO_TRIANGLES = {
 }
 """What trimesh may read that is no mesh."""
 
+UNBOUNDED = {
+    **dict.fromkeys((".xdmf", ".xmf"), "it names files wherever they lie"),
+    **dict.fromkeys((".cgns", ".e", ".ex2", ".exo", ".h5m", ".hmf", ".med"), "HDF5 unpacks to whatever it says"),
+}
+"""What no budget holds for: whoever trusts the file reads it by meshio, and gives its points and triangles."""
+
 PACKAGES = {
     ".3mf": "lxml networkx", ".dae": "pycollada lxml networkx", ".xaml": "lxml networkx",
     ".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm",
@@ -52,8 +59,7 @@ PACKAGES = {
 """Formats that trimesh reads by packages of their own."""
 
 BY_MESHIO = (
-    ".bdf", ".cgns", ".e", ".exo", ".f3grid", ".h5m", ".inp", ".mdpa", ".med", ".mesh", ".meshb", ".msh", ".nas",
-    ".su2", ".ugrid", ".vtk", ".vtu", ".xdmf", ".xmf",
+    ".bdf", ".f3grid", ".inp", ".mdpa", ".mesh", ".meshb", ".msh", ".nas", ".su2", ".ugrid", ".vtk", ".vtu",
 )  # fmt: skip
 CONVERTERS = {
     **dict.fromkeys(
@@ -129,10 +135,48 @@ def _check_what_it_is(source: InputFile, suffix: str) -> None:
         raise MeshError(f"cannot read {str(source.path)!r}: it is a binary DXF: save it as text")
     if suffix in (".svg", ".dxf", ".binvox"):
         raise MeshError(f"cannot draw {str(source.path)!r}: {NO_TRIANGLES[suffix]}")
+    if suffix in UNBOUNDED:
+        raise MeshError(
+            f"cannot read {str(source.path)!r}: {UNBOUNDED[suffix]}; if you trust it, read it by meshio and draw its "
+            "points and triangles"
+        )
     archive = check_zip(source.path, source.budget)
     if archive is not None:
-        with archive:
+        with archive, broken_archives():
             _check_models(archive, source)
+            if suffix == ".3dxml":
+                _check_3dxml(archive, source.budget)
+
+
+@contextmanager
+def broken_archives() -> Iterator[None]:
+    """Raise an error of ours for members that do not unpack."""
+    try:
+        yield
+    except (zipfile.BadZipFile, RuntimeError, zlib.error, EOFError, OSError) as error:
+        raise MeshError(f"its archive is broken ({error})") from error
+
+
+def _check_3dxml(archive: zipfile.ZipFile, budget: Budget) -> None:
+    """Count the parts and pictures of a 3DXML file as often as they are named: trimesh reads them again each time."""
+    from PIL import Image
+
+    sizes = {row.filename: row.file_size for row in archive.infolist()}
+    n_pixels, n_textures = 0, 1
+    for name in sizes:
+        content = archive.read(name)
+        if content.lstrip()[:1] in (b"<", b"\xef"):
+            budget.spend("max_lines", content.count(b"<") - content.count(b"</"))
+            n_textures += content.count(b"TextureImage")
+            for named in re.findall(rb"""associatedFile\s*=\s*["'](?:[^"']*:)?([^"':]+)["']""", content):
+                budget.spend("max_unpacked_bytes", sizes.get(named.decode("utf-8", errors="replace"), 0))
+        else:
+            with (
+                contextlib.suppress(OSError, ValueError, Image.DecompressionBombError),
+                Image.open(io.BytesIO(content)) as image,
+            ):
+                n_pixels = max(n_pixels, image.width * image.height)
+    budget.spend("max_texture_pixels", n_textures * n_pixels)
 
 
 def _check_models(archive: zipfile.ZipFile, source: InputFile) -> None:
@@ -141,10 +185,7 @@ def _check_models(archive: zipfile.ZipFile, source: InputFile) -> None:
     main = next((row for row in models if "3d/3dmodel.model" in row.filename.lower()), None)
     if main is None:
         return
-    try:
-        counts = {row.filename: Model3MF(archive.read(row), source.budget) for row in models}
-    except (zipfile.BadZipFile, RuntimeError, zlib.error, EOFError, OSError) as error:
-        raise MeshError(f"its archive is broken ({error})") from error
+    counts = {row.filename: Model3MF(archive.read(row), source.budget) for row in models}
     first = counts[main.filename]
     if len(models) > 1 and not first.has_objects:
         raise MeshError(f"cannot read {str(source.path)!r}: its objects are in further files of the archive")
@@ -211,7 +252,8 @@ def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | No
     content = source.content()
     if suffix != ".dae":
         del content  # which is counted
-        return trimesh.load_scene(str(source.path), process=False), None
+        with counted_vtu(source.budget) if suffix == ".vtu" else contextlib.nullcontext():
+            return trimesh.load_scene(str(source.path), process=False), None
 
     class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
         def get(self, name: str) -> bytes:
@@ -231,6 +273,52 @@ def _sided(mesh: Mesh, double_sided: bool | None) -> Mesh:
     if double_sided is None:
         return mesh
     return replace(mesh, materials=tuple(replace(one, double_sided=double_sided) for one in mesh.materials))
+
+
+_unpacking: ContextVar[Budget | None] = ContextVar("_unpacking", default=None)
+
+
+class _CountedModule:
+    """A module that unpacks, on the budget of the file that is being read."""
+
+    def __init__(self, module: Any, unpacker: str) -> None:
+        self._module, self._unpacker = module, unpacker
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._module, name)
+
+    def decompress(self, content: bytes) -> bytes:
+        """All that the module unpacks of some bytes.
+
+        Raises
+        ------
+        MeshError
+            If it is more than allowed.
+        """
+        budget = _unpacking.get()
+        if budget is None:
+            return self._module.decompress(content)
+        unpacker = getattr(self._module, self._unpacker)()
+        most = budget.limit("max_unpacked_bytes") + 1
+        unpacked: bytes = unpacker.decompress(content, most)
+        budget.spend("max_unpacked_bytes", len(unpacked))
+        return unpacked
+
+
+@contextmanager
+def counted_vtu(budget: Budget) -> Iterator[None]:
+    """Have meshio unpack the arrays of a VTU file on its budget; elsewhere it reads as ever."""
+    with contextlib.suppress(ImportError):
+        from meshio.vtu import _vtu
+
+        for name, unpacker in (("zlib", "decompressobj"), ("lzma", "LZMADecompressor")):
+            if not isinstance(getattr(_vtu, name), _CountedModule):
+                setattr(_vtu, name, _CountedModule(getattr(_vtu, name), unpacker))
+    token = _unpacking.set(budget)
+    try:
+        yield
+    finally:
+        _unpacking.reset(token)
 
 
 def _note_missing_pictures(content: bytes, source: InputFile) -> None:

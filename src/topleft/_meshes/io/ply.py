@@ -92,8 +92,9 @@ def read_ply(source: InputFile) -> list[Mesh]:
         if positions is not None and len(positions):
             source.clouds.append(Cloud(positions, _colors(vertex), _together(vertex, (("nx", "ny", "nz"),))))
         return []
-    mesh = _mesh(vertex, corners, n_corners, faces, textures, source)
-    return [] if mesh is None else [mesh]
+    mesh = _mesh(vertex, corners, n_corners, faces, source)
+    del content, found, vertex, corners, n_corners, faces  # before a texture needs memory, too
+    return [] if mesh is None else [_textured(mesh, textures, source)]
 
 
 def _found(content: bytes, order: str, elements: list[_Element], start: int, source: InputFile) -> dict[str, Rows]:
@@ -431,9 +432,7 @@ def triangles_of_strips(values: I64, lengths: I64) -> I64:
     return triangles[(a != b) & (b != c) & (a != c)]
 
 
-def _mesh(
-    vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list[str], source: InputFile
-) -> Mesh | None:  # fmt: skip
+def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, source: InputFile) -> Mesh | None:
     positions = _together(vertex, (("x", "y", "z"),))
     if positions is None:
         raise MeshError("its vertices have no x, y and z")
@@ -452,7 +451,7 @@ def _mesh(
     if isinstance(on_corners, _List) and (on_corners.lengths == 2 * n_corners).all():
         uv = on_corners.values.reshape(-1, 2)[triangles.ravel()]
     elif color_of_face is None or colors is not None:
-        return _textured(Mesh(positions, names, normals, colors, uv), textures, source)
+        return Mesh(positions, names, normals, colors, uv)
     else:
         uv = None if uv is None else uv[names.ravel()]
     # vertices of their own for each triangle: what a face says ends at its edges
@@ -463,7 +462,7 @@ def _mesh(
         colors = colors[names.ravel()]
     own_normals = None if normals is None else normals[names.ravel()]
     rows = np.arange(names.size, dtype=np.int32).reshape(-1, 3)
-    return _textured(Mesh(positions[names.ravel()], rows, own_normals, colors, uv), textures, source)
+    return Mesh(positions[names.ravel()], rows, own_normals, colors, uv)
 
 
 def _textured(mesh: Mesh, textures: list[str], source: InputFile) -> Mesh:

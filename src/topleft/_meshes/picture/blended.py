@@ -162,7 +162,7 @@ class Glass:
         """The layers of a sample that nothing opaque hides, planes (K, H, W) of ids and depths."""
         there, nearest = (planes[k] for planes in frags.drawn_planes)
         for n in (LAYERS, MOST_LAYERS):
-            ids, depth = peel_meshes(SCRATCH, self.snapped, self.view, n, is_farthest=False, at_fx=frags.positions[k])
+            ids, depth = peel_meshes(SCRATCH, [self.snapped], self.view, n, is_farthest=False, at_fx=frags.positions[k])
             for own_ids, own_depth in zip(ids, depth, strict=True):
                 if not (own_ids >= 0).any():
                     break

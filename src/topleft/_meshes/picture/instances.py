@@ -526,8 +526,7 @@ def peel_scene(
     scene.check_counted("a scene that is peeled")
     placed, view = place(scene, camera, size, options, material=material)
     n, is_farthest = check_peel(view, layers, depth_test)
-    meshes = [mesh for chunk in placed.chunks() for mesh in chunk]  # a band of rows is drawn once, with all instances
-    return SceneDepthLayers(*peel_meshes(SCRATCH, meshes, view, n, is_farthest=is_farthest), placed)
+    return SceneDepthLayers(*peel_meshes(SCRATCH, placed.chunks(), view, n, is_farthest=is_farthest), placed)
 
 
 def draw_scene_coverage(

@@ -23,6 +23,7 @@ from topleft._core.base.array_types import F64, Array
 from topleft._core.base.color import encode_srgb
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, normalized
 from topleft._meshes.io.gltf.animations import posed
+from topleft._meshes.io.gltf.draco import declared_by_draco
 from topleft._meshes.io.gltf.materials import Materials
 from topleft._meshes.io.references import Cloud, InputFile
 from topleft._meshes.model.joined import placed_arrays
@@ -427,7 +428,11 @@ class _Reader:
             raise MissingPackageError(
                 f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install DracoPy"
             ) from None
-        mesh = DracoPy.decode(self._accessors.view(draco["bufferView"]).tobytes())
+        content = self._accessors.view(draco["bufferView"]).tobytes()
+        n_triangles, n_vertices = declared_by_draco(content)
+        self._source.budget.check("max_triangles", n_triangles)
+        self._source.budget.check("max_vertices", n_vertices)
+        mesh = DracoPy.decode(content)
         self._source.budget.check("max_vertices", len(mesh.points))
         values = {}
         for name, number in draco["attributes"].items():
