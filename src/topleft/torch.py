@@ -35,7 +35,7 @@ try:
     import torch
     from torch import Tensor
 except ImportError:
-    raise MissingPackageError("topleft.torch needs PyTorch: pip install 'topleft[torch]'") from None
+    raise MissingPackageError("topleft.torch needs PyTorch: pip install torch") from None
 
 __all__ = [
     "DepthPeeler",

@@ -365,5 +365,5 @@ def test_batch_progress_bar_shows_rate_and_time(capsys):
 
 def test_batch_progress_bar_without_tqdm_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "tqdm", None)
-    with pytest.raises(MissingPackageError, match=r"progress=True needs tqdm: pip install 'topleft\[render\]'"):
+    with pytest.raises(MissingPackageError, match=r"progress=True needs tqdm: pip install tqdm"):
         tl.render_batch([], progress=True)

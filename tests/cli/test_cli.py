@@ -355,7 +355,7 @@ def test_render_many_goes_on_after_a_failure(run, folder):
 def test_render_without_trimesh_gives_the_hint(run, folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     (folder / "a.3mf").write_text("PK")
-    expected = "topleft: reading 'a.3mf' needs another package: pip install 'topleft[render]'"
+    expected = "topleft: reading 'a.3mf' needs another package: pip install trimesh"
     assert run("render", "a.3mf", "-o", "out/", *SMALL) == (2, [expected])
     status, lines = run("render", "a.3mf", "cube", "-o", "out/", *SMALL)
     assert (status, lines) == (1, [expected, "topleft: 1 of 2 meshes failed: a.3mf"])

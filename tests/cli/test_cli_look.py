@@ -160,3 +160,27 @@ def test_render_impossible_look_is_one_line_and_status_2(run, folder, checks, ar
     assert (status, len(lines)) == (2, 1)
     assert lines[0].startswith(line)
     assert not (folder / "a.png").exists()
+
+
+@pytest.mark.parametrize("color", ["1 1 1", "0.97 0.96 0.98"])
+def test_white_mesh_keeps_its_outline_on_the_default_background(run, folder, color):
+    """A flat white face that looks at the light was 255 on 255; the backdrop has a hue, which no such face has."""
+    (folder / "a.mtl").write_text(f"newmtl m\nKd {color}\nillum 0\n")
+    (folder / "a.obj").write_text("mtllib a.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nusemtl m\nf 1 2 3\n")
+    assert run("render", "a.obj", "-o", "a.png", *SMALL) == (0, [])
+    assert run("render", "a.obj", "-o", "white.png", "--background", "white", *SMALL) == (0, [])
+    with Image.open("a.png") as image:
+        picture = np.asarray(image).astype(int)
+    assert picture[0, 0].tolist() == [196, 212, 232, 255]
+    inside = picture[20:28, 30:40, :3]
+    assert (np.abs(inside - picture[0, 0, :3]).max(axis=-1) > 10).all()
+    with Image.open("white.png") as image:
+        assert np.asarray(image)[0, 0].tolist() == [255] * 4
+
+
+def test_dark_mesh_stands_on_white(run, folder):
+    (folder / "a.mtl").write_text("newmtl m\nKd 0.5 1 1\n")
+    (folder / "a.obj").write_text("mtllib a.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nusemtl m\nf 1 2 3\n")
+    assert run("render", "a.obj", "-o", "a.jpg", *SMALL) == (0, [])
+    with Image.open("a.jpg") as image:
+        assert np.asarray(image)[0, 0].tolist() == [255] * 3

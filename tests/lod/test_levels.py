@@ -162,7 +162,7 @@ def test_simplify_of_what_is_no_mesh_is_refused(other):
 
 def test_simplify_without_the_package_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "fast_simplification", None)
-    with pytest.raises(ImportError, match=r"pip install 'topleft\[simplify\]'"):
+    with pytest.raises(ImportError, match=r"pip install fast-simplification"):
         tl.simplify(torus())
 
 

@@ -474,5 +474,5 @@ def _bar(n_jobs: int | None) -> _Bar:
     try:
         from tqdm import tqdm
     except ImportError:
-        raise MissingPackageError("progress=True needs tqdm: pip install 'topleft[render]'") from None
+        raise MissingPackageError("progress=True needs tqdm: pip install tqdm") from None
     return _Bar(tqdm(total=n_jobs, unit="picture"))

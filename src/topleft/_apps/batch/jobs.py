@@ -50,8 +50,8 @@ class Job:
         As for `render`.
     size : (width, height), pixels
     options : mapping
-        Other options of `render`, by name; with "opacity" those of `render_transparent`; for "flow" among the layers
-        also "camera_to" and "transforms_to" of `render_layers`.
+        Other options of `render`, by name; "background" may be a function of the mesh (or scene); with "opacity" those
+        of `render_transparent`; for "flow" among the layers also "camera_to" and "transforms_to" of `render_layers`.
     destination : path or URL, optional
         The file to be written; its folder is made. A URL is whatever fsspec can write to where the job is drawn.
         `{layer}` in the name stands for the name of a layer. None: the picture is returned.
@@ -250,6 +250,8 @@ class JobRunner:
         size = as_size(job.size)
         camera = job.camera(scene, size) if callable(job.camera) else job.camera
         options = {"threads": 1, **job.options}
+        if callable(options.get("background")):
+            options["background"] = options["background"](scene)
         rasterizer = self._rasterizer(size)
         if not layers:
             if "opacity" in options:
@@ -258,14 +260,14 @@ class JobRunner:
                 picture = render(scene, camera, size, rasterizer=rasterizer, **options)
             if path is None:
                 return picture
-            save_image(files[0], picture, background=_opaque(job))
+            save_image(files[0], picture, background=_opaque(options))
             return None
         gbuffer = gbuffer_of(scene, camera, size, rasterizer=rasterizer, **options)
         arrays = draw_layers(layers, gbuffer)
         if path is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
         matrix = None if gbuffer.camera.lens is not None else gbuffer.camera.clip_from_world(size)
-        save_layers(path, arrays, matrix=matrix, background=_opaque(job))
+        save_layers(path, arrays, matrix=matrix, background=_opaque(options))
         return None
 
     def _scene(self, scene: Any, scale: float) -> Any:
@@ -291,7 +293,7 @@ def _clear_frames(error: BaseException | None) -> None:
         error = error.__cause__ or error.__context__
 
 
-def _opaque(job: Job) -> tuple[int, int, int]:
+def _opaque(options: Mapping[str, Any]) -> tuple[int, int, int]:
     """What JPEG shows for the background: white if it is transparent."""
-    color = tuple(job.options.get("background", (255, 255, 255)))
+    color = tuple(options.get("background", (255, 255, 255)))
     return color[:3] if len(color) < 4 or color[3] else (255, 255, 255)

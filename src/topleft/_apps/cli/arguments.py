@@ -185,9 +185,9 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--background",
         type=_rgba,
-        default=(255, 255, 255, 255),
+        default=None,
         metavar="COLOR",
-        help="a name, #rrggbb[aa] or transparent (default white)",
+        help="a name, #rrggbb[aa] or transparent (default white; behind white meshes a light blue-grey)",
     )
     add(
         "--crease",

@@ -63,7 +63,8 @@ def extras() -> Iterator[str]:
     for extra, names in sorted(packages.items()):
         there = {name: installed(name) for name in names}
         told = ", ".join(f"{name} {there[name] or 'is not installed'}" for name in names)
-        hint = "" if all(there.values()) else f" (pip install 'topleft[{extra}]')"
+        missing = " ".join(name for name in names if there[name] is None)
+        hint = f" (pip install {missing})" if missing else ""
         yield f"extra {extra}: {told}{hint}"
 
 

@@ -71,8 +71,8 @@ def run_render(options: argparse.Namespace) -> int:
         for path, group in animations:
             if all(file.is_file() for file in _color_files(group)):
                 path.parent.mkdir(parents=True, exist_ok=True)
-                background = group.jobs[0].options["background"]
-                opaque = background[:3] if background[3] else (255, 255, 255)
+                asked = options.background  # frames that are opaque show none of it
+                opaque = asked[:3] if asked is not None and asked[3] else (255, 255, 255)
                 save_animation(path, _color_files(group), fps=options.fps, background=opaque)
         if options.sheet:
             Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
@@ -182,7 +182,7 @@ def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
         import dask
         from distributed import Client, LocalCluster
     except ImportError:
-        raise MissingPackageError("--dask needs the package distributed: pip install 'topleft[dask]'") from None
+        raise MissingPackageError("--dask needs the package distributed: pip install distributed") from None
     if address == "local":
         stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": "30s"}))
         cluster = LocalCluster(

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from topleft._apps.batch.jobs import Job
 from topleft._apps.cli.arguments import UsageError, meant
+from topleft._core.base.color import DEFAULT_COLOR
 from topleft._core.base.options import Sampling
 from topleft._core.base.remote import Place, RemotePath, place_of
 from topleft._core.base.whole_file import remove_stale_parts
@@ -161,6 +162,42 @@ class Orbit:
         )
 
 
+WHITE, BACKDROP = (255, 255, 255, 255), (196, 212, 232, 255)
+"""What is behind a mesh, and behind one that is white: it is not grey, as white faces are under white light."""
+
+NEARLY_WHITE = 240
+
+
+@dataclass(frozen=True)
+class Backdrop:
+    """The background of a mesh for which none is asked: white, unless the mesh is white and would fade into it."""
+
+    def __call__(self, mesh: Mesh | Points) -> tuple[int, int, int, int]:
+        """Return it."""
+        return BACKDROP if min(mean_color(mesh)) >= NEARLY_WHITE else WHITE
+
+
+def mean_color(mesh: Mesh | Points) -> tuple[float, float, float]:
+    """The mean sRGB of what a mesh is made of: materials by their triangles, textures, colours of vertices."""
+    given = DEFAULT_COLOR if mesh.colors is None else mesh.colors[:, :3].mean(axis=0)
+    if isinstance(mesh, Points) or not mesh.materials:
+        red, green, blue = np.asarray(given, np.float64).tolist()
+        return red, green, blue
+    rows = mesh.material_of_triangle
+    n = len(mesh.materials)
+    shares = np.eye(n)[0] if rows is None else np.bincount(rows, minlength=n) / max(1, len(rows))
+    total = np.zeros(3)
+    for share, one in zip(shares.tolist(), mesh.materials, strict=True):
+        own = np.full(3, 255.0) if one.color is None else np.array(one.color[:3], np.float64)
+        if share and one.texture is not None and mesh.uv is not None:
+            own *= one.texture.image[..., :3].mean(axis=(0, 1)) / 255
+        elif one.color is None and mesh.colors is None:
+            own = np.array(DEFAULT_COLOR, np.float64)
+        total += share * own * (1.0 if mesh.colors is None else np.asarray(given) / 255)
+    red, green, blue = total.tolist()
+    return red, green, blue
+
+
 @dataclass(frozen=True)
 class FileCamera:
     """A camera of the file of the mesh."""
@@ -279,7 +316,7 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     drawing = {
         "shading": options.shading,
         "color": options.color,
-        "background": options.background,
+        "background": Backdrop() if options.background is None else options.background,
         "cull": options.cull,
         "subpixel_bits": options.subpixel_bits,
         "tolerance": options.tolerance,

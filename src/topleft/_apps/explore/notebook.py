@@ -26,9 +26,7 @@ def widget_of(content: Content) -> Any:
         import anywidget
         import traitlets
     except ImportError as error:
-        raise MissingPackageError(
-            f"the explorer in a notebook needs {error.name}: pip install 'topleft[explore]'"
-        ) from error
+        raise MissingPackageError(f"the explorer in a notebook needs {error.name}: pip install anywidget") from error
 
     page = files("topleft._apps.explore").joinpath("page")
 

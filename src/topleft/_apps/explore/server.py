@@ -35,7 +35,7 @@ try:
     from websockets.exceptions import InvalidState
 except ImportError as error:
     raise MissingPackageError(
-        f"the explorer needs {error.name or 'starlette'}: pip install 'topleft[explore]'"
+        f"the explorer needs {error.name or 'starlette'}: pip install starlette uvicorn websockets"
     ) from error
 
 LOOPBACK = "127.0.0.1"

@@ -88,7 +88,7 @@ def dask_array_of(raster: Tiles) -> Any:
     try:
         import dask.array as da
     except ImportError:
-        raise MissingPackageError("to_dask needs the package dask: pip install 'topleft[dask]'") from None
+        raise MissingPackageError("to_dask needs the package dask: pip install 'dask[array]'") from None
     t, (w, h) = raster.tiling, raster.window_size
     name = f"topleft-{raster.kind}-{raster.fingerprint}"
     tail = (0,) * len(raster.painter.channels)

@@ -276,5 +276,5 @@ def _bar(n_blocks: int) -> _LevelBar:
     try:
         from tqdm import tqdm
     except ImportError:
-        raise MissingPackageError("progress=True needs the package tqdm: pip install 'topleft[render]'") from None
+        raise MissingPackageError("progress=True needs the package tqdm: pip install tqdm") from None
     return _LevelBar(tqdm(total=n_blocks, unit=" windows"))

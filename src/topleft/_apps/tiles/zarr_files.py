@@ -108,7 +108,7 @@ def codec_of(compression: str) -> tuple[Callable[[bytes], bytes], Callable[[byte
     try:
         from numcodecs.zstd import Zstd
     except ImportError:
-        raise MissingPackageError("compression 'zstd' needs the package zarr: pip install 'topleft[tiles]'") from None
+        raise MissingPackageError("compression 'zstd' needs the package zarr: pip install zarr") from None
     codec = Zstd(level=1)
     return codec.encode, codec.decode, [{"name": "zstd", "configuration": {"level": 1, "checksum": False}}]
 

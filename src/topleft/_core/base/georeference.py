@@ -84,7 +84,7 @@ def _pyproj(what: str) -> Any:
     try:
         import pyproj
     except ImportError:
-        raise MissingPackageError(f"{what} needs the package pyproj: pip install 'topleft[tiles]'") from None
+        raise MissingPackageError(f"{what} needs the package pyproj: pip install pyproj") from None
     return pyproj
 
 

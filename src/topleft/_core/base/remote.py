@@ -68,9 +68,7 @@ class RemotePath:
         try:
             from fsspec.core import url_to_fs
         except ImportError:
-            raise MissingPackageError(
-                f"writing to {self.url} needs the package fsspec: pip install 'topleft[tiles]'"
-            ) from None
+            raise MissingPackageError(f"writing to {self.url} needs the package fsspec: pip install fsspec") from None
         try:
             found: tuple[Any, str] = url_to_fs(self.url, **dict(self.storage))
         except ImportError as error:  # of the package for that kind of URL

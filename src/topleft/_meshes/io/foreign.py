@@ -52,9 +52,11 @@ UNBOUNDED = {
 }
 """What no budget holds for: whoever trusts the file reads it by meshio, and gives its points and triangles."""
 
-FORMATS_OF_EXTRA = (".3mf", ".dae", ".xaml")
-PACKAGES = {".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm"}
-"""Formats that trimesh reads by a package of their own."""
+PACKAGES = {
+    ".3mf": "lxml networkx", ".dae": "pycollada lxml networkx", ".xaml": "lxml networkx",
+    ".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm",
+}  # fmt: skip
+"""Formats that trimesh reads by packages of their own."""
 
 BY_MESHIO = (
     ".bdf", ".f3grid", ".inp", ".mdpa", ".mesh", ".meshb", ".msh", ".nas", ".su2", ".ugrid", ".vtk", ".vtu",
@@ -97,7 +99,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
     try:
         import trimesh
     except ImportError:
-        raise MissingPackageError(_needs(source, "'topleft[render]'")) from None
+        raise MissingPackageError(_needs(source, "trimesh")) from None
     _check_what_it_is(source, suffix)
     try:
         with quiet():
@@ -117,8 +119,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
         # trimesh asks for these to guess the encoding of what is not UTF-8: here, of a file that is no text.
         if getattr(error, "name", None) in ("charset_normalizer", "chardet"):
             raise MeshError("it is not text") from error
-        package = "'topleft[formats]'" if suffix in FORMATS_OF_EXTRA else PACKAGES.get(suffix, error.name or str(error))
-        raise MissingPackageError(_needs(source, package)) from error
+        raise MissingPackageError(_needs(source, PACKAGES.get(suffix, error.name or str(error)))) from error
     return parts
 
 

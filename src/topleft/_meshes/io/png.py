@@ -164,5 +164,5 @@ def _new_deflate(compressor: str) -> Deflate:
     if isal:
         return isal()
     if compressor == "isal":
-        raise ValueError("compressor 'isal' needs the package isal: pip install 'topleft[render]'")
+        raise ValueError("compressor 'isal' needs the package isal: pip install isal")
     return zlib.compressobj(1)

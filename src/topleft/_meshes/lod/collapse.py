@@ -71,7 +71,7 @@ def collapser() -> Any:
         import fast_simplification  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError:
         raise MissingPackageError(
-            "levels of detail need fast-simplification: pip install 'topleft[simplify]'"
+            "levels of detail need fast-simplification: pip install fast-simplification"
         ) from None
     return fast_simplification
 

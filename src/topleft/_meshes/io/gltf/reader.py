@@ -426,7 +426,7 @@ class _Reader:
             import DracoPy
         except ImportError:
             raise MissingPackageError(
-                f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install 'topleft[formats]'"
+                f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install DracoPy"
             ) from None
         content = self._accessors.view(draco["bufferView"]).tobytes()
         n_triangles, n_vertices = declared_by_draco(content)
