@@ -47,6 +47,9 @@
 #include "shade/alpha_test.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
+#include "grid/atlas.c"
+#include "grid/viewshed.c"
+#include "grid/voxels.c"
 #include "tiles/corners.c"
 #include "tiles/merge.c"
 #include "tiles/spans.c"
@@ -146,4 +149,16 @@ const tl_kernels TL_KERNELS = {
     .take_corners = take_corners,
     .merge_fragments = merge_fragments,
     .name_triangles = name_triangles,
+    .touch_texels = touch_texels,
+    .average_texels = average_texels,
+    .find_in_rows = find_in_rows,
+    .find_gutter = find_gutter,
+    .copy_texels = copy_texels,
+    .add_taken = add_taken,
+    .view_heights = view_heights,
+    .fill_columns = fill_columns,
+    .expand_columns = expand_columns,
+    .count_columns = count_columns,
+    .scatter_columns = scatter_columns,
+    .touch_voxels = touch_voxels,
 };

@@ -378,6 +378,41 @@ typedef struct tl_kernels {
 
     /* Ids [first, end) become names[1 + id]. */
     void (*name_triangles)(int32_t *ids, int64_t first, int64_t end, const int32_t *names);
+
+    /* Rows [first, end) of an atlas, (rows of) width texels.  Where an id is -1, that of the nearest triangle that
+     * meets the texel, and its values there; `squared` has a number a texel of these rows, INFINITY.  Or means over
+     * what triangles cover: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */
+    void (*touch_texels)(const tl_atlas *atlas, int64_t first, int64_t end, int32_t *ids, float *squared, float *out);
+    void (*average_texels)(const tl_atlas *atlas, int64_t first, int64_t end, double *sums, float *most, int32_t *ids,
+                           float *out);
+
+    /* The nearest texel with an id, within `reach` < TL_NO_TEXEL: along rows; then by Euclid, its index or -1, with
+     * room for 2 * width numbers; and texels [first, end) of n_bytes copied from there. */
+    void (*find_in_rows)(const int32_t *ids, int64_t width, int64_t first, int64_t end, int reach, int16_t *along);
+    void (*find_gutter)(const int16_t *along, int64_t width, int64_t height, int64_t first, int64_t end, int reach,
+                        int32_t *room, int32_t *from);
+    void (*copy_texels)(const int32_t *from, int64_t first, int64_t end, int64_t n_bytes, uint8_t *texels);
+
+    /* Adds what a picture shows of texels [first, end), at positions, with normals and ids (-1: none), to sums and
+     * weights. */
+    void (*add_taken)(const tl_taken *taken, const float *positions, const float *normals, const int32_t *ids,
+                      int64_t first, int64_t end, float *sums, float *weights);
+
+    /* Rows [first, end) of how high above the ground something is seen; NaN where there is no ground, or too far. */
+    void (*view_heights)(const tl_terrain *terrain, int64_t first, int64_t end, double *out);
+
+    /* Columns of tl_crossings: filled by the even-odd rule in place, where the number of odd ones is returned; a byte
+     * or a share of each voxel, n_steps a column; each bit at strides of a row, a column and a step. */
+    int64_t (*fill_columns)(uint64_t *bits, int64_t n_columns, int64_t n_words);
+    void (*expand_columns)(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out);
+    void (*count_columns)(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, int sample_bits,
+                          float *out);
+    void (*scatter_columns)(const uint64_t *bits, int64_t n_rows, int64_t n_columns, int64_t n_words,
+                            const int64_t *strides, uint8_t *out);
+
+    /* Writes 1 for the voxels of a grid of a shape that triangles [first, end) meet, whose points are in voxels. */
+    void (*touch_voxels)(const double *points, int64_t n_points, const int32_t *triangles, int64_t first, int64_t end,
+                         const int64_t *shape, uint8_t *out);
 } tl_kernels;
 
 #endif

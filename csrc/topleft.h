@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "atlas.h"
 #include "faces.h"
 #include "lens.h"
 #include "nearest.h"
@@ -171,6 +172,15 @@ typedef struct {
     double covered[TL_N_CLASSES]; /* about how many of them are covered: the lesser of area and box, added up */
 } tl_census;
 
+/* The crossings of columns: a bit a step of each sample, in rows of the target.  A depth z flips bit ceil(z - 0.5), the
+ * first step with its middle behind the surface, n_steps where there is none; or sets bit floor(z), if it is a step. */
+typedef struct {
+    uint64_t *bits; /* n_words of 64 a sample, more bits than n_steps */
+    int64_t n_words;
+    int n_steps;
+    int is_set;
+} tl_crossings;
+
 /* The layers of pixels: of every covered sample of a pixel the n_layers that come first by depth, then id.  Planes, the
  * first one first; id -1 and the depth that every other comes before where there are fewer. */
 #define TL_MAX_LAYERS 16
@@ -179,7 +189,8 @@ typedef struct {
     int is_farthest; /* the larger depth comes first */
     int32_t *ids;    /* the window's first pixel in the first plane, with the rows of the target */
     float *depth;
-    int64_t plane_px; /* from plane to plane */
+    int64_t plane_px;              /* from plane to plane */
+    const tl_crossings *crossings; /* instead of the others, which then mean nothing; or NULL */
 } tl_peeled;
 
 typedef struct {

@@ -294,6 +294,52 @@ OTHER_FIELDS = {
 }
 
 
+def grids_beside_others() -> Scenes:
+    """Voxels beside trimesh's, a gutter beside SciPy's nearest, and a viewshed of a million cells."""
+    import topleft as tl
+
+    vertices, triangles = tl.scenes.blob(70_000)
+    pitch = float(np.ptp(vertices, axis=0).max())
+    for n in (128, 256):
+        calls: dict[str, Callable[[], object]] = {
+            "topleft voxelize": partial(tl.voxelize, (vertices, triangles), n, threads=1)
+        }
+        try:
+            import trimesh
+        except ImportError as error:
+            print(f"trimesh: {error}", file=sys.stderr)
+        else:
+            if n == 128:
+                mesh = trimesh.Trimesh(vertices, triangles, process=False)
+                calls["trimesh voxelized().fill()"] = lambda mesh=mesh: mesh.voxelized(pitch / 128).fill()
+        yield f"solid voxels, {n}^3 of 70,000 triangles", calls
+    ball, uv = latitudes(316)
+    atlas = tl.Mesh(*ball, uv=uv)
+    bare = {"topleft bake, without a gutter": partial(tl.bake, atlas, "position", 1024, gutter=0, threads=1)}
+    bare |= {f"gutter of {n}": partial(tl.bake, atlas, "position", 1024, gutter=n, threads=1) for n in (8, 32)}
+    try:
+        from scipy.ndimage import distance_transform_edt
+    except ImportError as error:
+        print(f"scipy: {error}", file=sys.stderr)
+    else:
+        mask = tl.bake(atlas, "triangle", 1024, gutter=0).mask
+        bare["scipy's nearest alone"] = lambda: distance_transform_edt(~mask, return_indices=True)
+    yield "atlas of 200,000 triangles, 1024x1024", bare
+    x, y = np.meshgrid(np.arange(1000), np.arange(1000))
+    hills = 40 * np.sin(x / 97) * np.cos(y / 83) + 9 * np.sin(x / 23 + y / 31)
+    yield "viewshed of 1000x1000", {"topleft": partial(tl.viewshed, hills, (500.5, 400.5), eye_height=9.0, threads=1)}
+
+
+def latitudes(n: int) -> tuple[tuple[NDArray[Any], NDArray[Any]], NDArray[Any]]:
+    """A ball of 2 n^2 triangles whose chart is a rectangle."""
+    polar, azimuth = np.meshgrid(np.linspace(0, np.pi, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij")
+    points = [np.sin(polar) * np.cos(azimuth), np.cos(polar), np.sin(polar) * np.sin(azimuth)]
+    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1, 1)
+    triangles = (corner + [0, 1, n + 2, n + 1])[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32)
+    uv = np.stack([azimuth / (2 * np.pi) * 0.93 + 0.03, polar / np.pi * 0.91 + 0.04], axis=-1)
+    return (np.stack(points, axis=-1).reshape(-1, 3).astype(np.float32), triangles), uv.reshape(-1, 2)
+
+
 @dataclass(frozen=True)
 class Pairs:
     """A row of the table: what is timed, how often, and how long a turn is, seconds; 0: one call."""
@@ -312,6 +358,7 @@ PAIRS = {
     "tolerance": Pairs(levels_beside_whole, "time views with `tolerance=` beside the same without", 31),
     "no-snap": Pairs(unsnapped_beside_snapped, "time vertices that are not snapped beside snapped ones", 10),
     "field": Pairs(field_beside_others, "time a field beside matplotlib, datashader and SciPy", 7),
+    "grids": Pairs(grids_beside_others, "time voxels, atlases and a viewshed beside other programs", 5),
 }
 
 

@@ -1,5 +1,6 @@
-/* Peel: the nearest layers of every pixel, in one pass.
- * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id.
+/* Peel: the nearest layers of every pixel, in one pass; or bits of columns that cross the surface.
+ * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id, or
+ * bits.
  *
  * Depth peeling draws the mesh once a layer, each time what lies behind the layer before.  Here a sample goes through
  * the planes from the first to the last: where it comes before what is there it takes the place, and what was there
@@ -31,10 +32,40 @@ static void clear_layers(const tl_window *window, const tl_target *target)
         }
 }
 
+/* Notes where a column crosses a surface. */
+TL_INLINE void note_crossing(const tl_crossings *c, int64_t at, float depth)
+{
+    const float end = (float)c->n_steps, z = c->is_set ? floorf(depth) : ceilf(depth - 0.5f);
+    const int is_step = z >= 0.0f && z < end;
+    const int64_t step = is_step ? (int64_t)z : z < 0.0f ? 0 : c->n_steps;
+    uint64_t *const word = c->bits + at * c->n_words + (step >> 6);
+    if (!c->is_set)
+        *word ^= 1ull << (step & 63);
+    else if (is_step)
+        *word |= 1ull << (step & 63);
+    else if (depth == end) /* the far side of the grid belongs to its last step */
+        c->bits[at * c->n_words + ((c->n_steps - 1) >> 6)] |= 1ull << ((c->n_steps - 1) & 63);
+}
+
 /* The lanes in m of a triangle. */
+static void cross_lanes(const tl_crossings *c, int64_t at, vm m, vf depth)
+{
+    float depths[TL_MAX_LANES];
+    vf_store(depths, depth);
+    for (unsigned rest = vm_bits(m); rest; rest &= rest - 1) {
+        const int lane = __builtin_ctz(rest);
+        note_crossing(c, at + lane, depths[lane]);
+    }
+}
+
+/* The same, as layers. */
 static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int32_t id)
 {
     const tl_peeled *p = target->peeled;
+    if (p->crossings) {
+        cross_lanes(p->crossings, at, m, depth);
+        return;
+    }
     const int has_room = at + TL_LANES <= target->n_samples;
     const int32_t *end = p->ids + p->n_layers * p->plane_px + at;
     float *depths = p->depth + at;
@@ -67,7 +98,9 @@ static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int3
 static void peel_fragments(const tl_peeled *p, const fragment_list *f, int n)
 {
     const int32_t turn = p->is_farthest ? -1 : 0;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; p->crossings && i < n; i++)
+        note_crossing(p->crossings, (uint32_t)f->sample[i], f->depth[i]);
+    for (int i = 0; !p->crossings && i < n; i++) {
         int64_t at = (uint32_t)f->sample[i], key = sample_key(f->depth[i], f->id[i], turn);
         __builtin_prefetch(p->ids + f->sample[i + TL_PREFETCH], 1);
         __builtin_prefetch(p->depth + f->sample[i + TL_PREFETCH], 1);

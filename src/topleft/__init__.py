@@ -47,20 +47,29 @@ from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageErr
 if TYPE_CHECKING:
     from topleft._apps.batch.batch import render_batch
     from topleft._apps.batch.jobs import Job
+    from topleft._apps.batch.visible import VisibleFaces, visible_faces
     from topleft._apps.diagram.pixel_grid import pixel_grid
     from topleft._apps.explore.open import Explorer, explore
     from topleft._apps.tiles.merge import merge
     from topleft._apps.tiles.tiles import Tiles, Window, tiles
+    from topleft._meshes.grid.bake import Baked, bake
+    from topleft._meshes.grid.viewshed import Viewshed, viewshed
+    from topleft._meshes.grid.voxels import Voxels, voxelize
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
+    "Baked": "topleft._meshes.grid.bake",
     "Explorer": "topleft._apps.explore.open",
     "Job": "topleft._apps.batch.jobs",
     "Tiles": "topleft._apps.tiles.tiles",
     "ViewLayers": "topleft._meshes.picture.view_layers",
+    "Viewshed": "topleft._meshes.grid.viewshed",
+    "VisibleFaces": "topleft._apps.batch.visible",
+    "Voxels": "topleft._meshes.grid.voxels",
     "Window": "topleft._apps.tiles.tiles",
+    "bake": "topleft._meshes.grid.bake",
     "explore": "topleft._apps.explore.open",
     "merge": "topleft._apps.tiles.merge",
     "pixel_grid": "topleft._apps.diagram.pixel_grid",
@@ -68,12 +77,16 @@ _LATE = {
     "render_layers": "topleft._meshes.picture.view_layers",
     "render_transparent": "topleft._meshes.picture.transparent",
     "tiles": "topleft._apps.tiles.tiles",
+    "viewshed": "topleft._meshes.grid.viewshed",
+    "visible_faces": "topleft._apps.batch.visible",
     "visible_layers": "topleft._meshes.picture.transparent",
+    "voxelize": "topleft._meshes.grid.voxels",
 }
 
 __version__: str = build_info()["version"]
 
 __all__ = [
+    "Baked",
     "Camera",
     "DepthLayers",
     "Detail",
@@ -108,9 +121,13 @@ __all__ = [
     "Tiles",
     "TopleftError",
     "ViewLayers",
+    "Viewshed",
+    "VisibleFaces",
+    "Voxels",
     "Window",
     "__version__",
     "as_mesh",
+    "bake",
     "bresenham_line",
     "build_info",
     "choose_detail",
@@ -145,7 +162,10 @@ __all__ = [
     "tiles",
     "turntable",
     "viewpoints",
+    "viewshed",
+    "visible_faces",
     "visible_layers",
+    "voxelize",
     "wireframe",
 ]
 

@@ -1,4 +1,4 @@
-"""The command line: `topleft render`, `mask`, `raster`, `explore`, `explain`, `calibrate`, `doctor` and `info`."""
+"""The command line: `topleft render`, `mask`, `bake`, `raster`, `explore`, `explain`, `calibrate`, `doctor`, `info`."""
 
 from topleft._apps.cli import main
 

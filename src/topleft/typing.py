@@ -10,6 +10,8 @@ from typing import Literal, TypeAlias
 __all__ = [
     "AlphaModeOption",
     "AlphaOption",
+    "BakeOption",
+    "BakeRuleOption",
     "BlendOption",
     "BoundaryOption",
     "ClipDepthOption",
@@ -36,8 +38,10 @@ __all__ = [
     "ShadingOption",
     "SpaceOption",
     "SurfaceOption",
+    "TakenOption",
     "TiffCompressionOption",
     "UpOption",
+    "VoxelRuleOption",
     "WindingOption",
     "WrapOption",
     "YOption",
@@ -82,6 +86,10 @@ ResolveOption: TypeAlias = Literal["values", "linear"]
 RuleOption: TypeAlias = Literal["evenodd", "nonzero"]
 SamplesOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16"]
 SamplingOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner"]
+BakeOption: TypeAlias = Literal["position", "normal", "tangent_normal", "color", "triangle"]
+BakeRuleOption: TypeAlias = Literal["center", "touched", "area"]
+TakenOption: TypeAlias = Literal["best", "mean"]
+VoxelRuleOption: TypeAlias = Literal["center", "touched"]
 WindingOption: TypeAlias = Literal["either", "clockwise", "counter-clockwise"]
 
 # Grids and cameras

@@ -17,7 +17,7 @@ FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 LADDER = (
     ("base",), ("lanes",), ("vertex",), ("clusters", "exact", "mesh"), ("sink",), ("raster",), ("few",),
     ("area", "points", "meshlets"),
-    ("pixels",), ("blend", "lines", "polygons", "shade", "tiles"),
+    ("pixels",), ("blend", "lines", "polygons", "shade", "tiles"), ("grid",),
 )  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}
 

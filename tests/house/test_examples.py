@@ -39,8 +39,8 @@ def test_example_makes_the_picture_of_the_page(name, tmp_path):
     assert (difference.max(axis=-1) > 3).mean() < 0.01
 
 
-def test_examples_are_eleven_and_all_on_the_page():
-    assert len(EXAMPLES) == 11
+def test_examples_are_twelve_and_all_on_the_page():
+    assert len(EXAMPLES) == 12
     assert sorted(re.findall(r"images/example-(\w+)\.png", PAGE)) == EXAMPLES
     assert sorted(re.findall(r"\(../../examples/(\w+)\.py\)", PAGE)) == EXAMPLES
 

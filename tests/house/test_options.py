@@ -5,6 +5,7 @@ import re
 import typing
 from typing import get_args
 
+import numpy as np
 import pytest
 
 import topleft as tl
@@ -57,13 +58,22 @@ TAKEN = {
 }  # fmt: skip
 
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))
+SQUARE = tl.Mesh(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]], colors=np.ones((3, 3), np.uint8), uv=[[0, 0], [1, 0], [1, 1]]
+)
 FLAT = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]], [[0, 1, 2]]
 
 #: Options whose check reads the type: a call of each.
 READ = {
+    "BakeOption": lambda word: tl.bake(SQUARE, word, 2, source=SQUARE),
+    "BakeRuleOption": lambda word: tl.bake(SQUARE, "position", 2, rule=word),
     "FitOption": lambda word: tl.Camera.framing(CUBE, fit=word),
     "SurfaceOption": lambda word: tl.height_map(([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]]), 1.0, surface=word),
+    "TakenOption": lambda word: tl.bake(
+        SQUARE, [np.zeros((2, 2, 3), np.uint8)], 2, cameras=[tl.Camera.look_at((0, 0, 5))], blend=word
+    ),
     "UpOption": lambda word: tl.Camera.framing(CUBE, up=word),
+    "VoxelRuleOption": lambda word: tl.voxelize(CUBE, 2, rule=word),
     "YOption": lambda word: tl.Grid((2, 2), (0, 1, 0, 1), y=word),
 }
 

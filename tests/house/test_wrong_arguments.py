@@ -27,6 +27,7 @@ CLOUD = tl.points(POINTS, SIZE)
 TABLE = tl.overlap([FLAT], SIZE)
 PLAN = tl.plan(POINTS, ONE, SIZE)
 VIEWS = tl.render_layers(CUBE, CAMERA, SIZE, layers=["depth"])
+CHART = tl.Mesh(POINTS, ONE, uv=[[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]])
 LEVELS = tl.Levels(CUBE, [tl.Level(tl.Mesh(*tl.scenes.tetrahedron()), 0.5)])
 RASTER = tl.tiles((FLAT, ONE), SIZE, kind="coverage", extent=(0, 8, 0, 6))
 DRAW = tl.Rasterizer(SIZE)
@@ -61,7 +62,7 @@ CALLS = {
     "Grid": (tl.Grid, {"size": SIZE, "extent": (0, 1, 0, 1), "y": "up"}),
     "Grid.around": (tl.Grid.around, {"subject": (FLAT, ONE), "size": SIZE, "pixel_size": None, "extent": None,
                                      "y": "up"}),
-    "Instance": (tl.Instance, {"mesh": CUBE, "transform": np.eye(4), "name": None}),
+    "Instance": (tl.Instance, {"mesh": CUBE, "transform": np.eye(4), "name": None, "color": None, "material": None}),
     "Light": (tl.Light, {"at": (0, 0, 1), "kind": "point", "color": (1, 2, 3), "intensity": 1, "falloff": 0,
                          "space": "eye"}),
     "Material": (tl.Material, {"color": None, "texture": None, "specular": 0, "shininess": 1, "back_color": None,
@@ -73,6 +74,8 @@ CALLS = {
     "Scene": (tl.Scene, {"instances": [CUBE]}),
     "Texture": (tl.Texture, {"image": np.zeros((2, 2), np.uint8), "filter": "nearest", "wrap": "clamp"}),
     "as_mesh": (tl.as_mesh, {"subject": CUBE}),
+    "bake": (tl.bake, {"mesh": CHART, "what": "position", "size": SIZE, "rule": "center", "gutter": 2, "source": None,
+                       "max_distance": None, "cameras": None, "blend": "best", "threads": None}),
     "bresenham_line": (tl.bresenham_line, {"x0": 0, "y0": 0, "x1": 3, "y1": 2}),
     "choose_detail": (tl.choose_detail, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "tolerance": 0.0,
                                          "viewport": None, "cull": "none"}),
@@ -117,6 +120,13 @@ CALLS = {
                                    "tolerance": 0.0, "threads": None, "out": None}),
     "turntable": (tl.turntable, {"subject": CUBE, "n": 2}),
     "viewpoints": (tl.viewpoints, {"subject": CUBE, "n": 2}),
+    "viewshed": (tl.viewshed, {"terrain": np.zeros((3, 4)), "eye": (1, 1), "grid": None, "pixel_size": None,
+                               "eye_height": None, "target_height": 0.0, "max_distance": None, "curvature": 0.0,
+                               "threads": None}),
+    "visible_faces": (tl.visible_faces, {"mesh": CUBE, "cameras": [CAMERA], "size": SIZE, "min_pixels": 1, "cull": None,
+                                         "executor": None}),
+    "voxelize": (tl.voxelize, {"mesh": CUBE, "shape": 4, "pitch": None, "bounds": None, "solid": True, "rule": "center",
+                               "samples": 1, "threads": None}),
     "visible_layers": (tl.visible_layers, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "layers": 2}),
     "wireframe": (tl.wireframe, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "depth": None,
                                  "depth_test": "less", "depth_bias": 0.1, "out": None}),
@@ -327,7 +337,8 @@ def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
     made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
             "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
-            "MeshWarning", "Explorer", "Overlap", "Tiles", "Window"}  # fmt: skip
+            "MeshWarning", "Explorer", "Overlap", "Tiles", "Window", "Baked", "Viewshed", "VisibleFaces",
+            "Voxels"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made
 

@@ -1,4 +1,4 @@
-"""The command line: `topleft render`, `mask`, `raster`, `explore`, `explain`, `calibrate`, `doctor` and `info`.
+"""The command line: `topleft render`, `mask`, `bake`, `raster`, `explore`, `explain`, `calibrate`, `doctor` and `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
 --strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from typing import NoReturn
 
 from topleft._apps.cli.arguments import REFUSED, Parser, add_render_arguments
+from topleft._apps.cli.bake import add_bake_command
 from topleft._apps.cli.doctor import add_doctor_command
 from topleft._apps.cli.explain import add_plan_commands
 from topleft._apps.cli.explore import add_explore_command
@@ -99,6 +100,7 @@ def _parser() -> Parser:
     render.set_defaults(run=run_render)
     add_plan_commands(commands)
     add_mask_command(commands)
+    add_bake_command(commands)
     add_raster_command(commands)
     add_explore_command(commands)
     add_doctor_command(commands)

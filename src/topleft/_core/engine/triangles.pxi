@@ -557,6 +557,7 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
     cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
     cdef list pairs = list(zip(meshes, bins, strict=True))
     cdef int64_t i, n = len(pairs)
+    memset(&peeled, 0, sizeof(peeled))
     peeled.n_layers, peeled.is_farthest = ids.shape[0], is_farthest
     peeled.plane_px = height * width
     memset(&target, 0, sizeof(target))

@@ -1,0 +1,42 @@
+/* The contract of csrc/grid: a mesh on the texels of its texture coordinates, and what is seen of a height grid. */
+#ifndef TL_ATLAS_H
+#define TL_ATLAS_H
+
+#include <stdint.h>
+
+typedef struct {
+    const double *points;     /* (V, 2): in texels, y down */
+    const int32_t *triangles; /* (T, 3), checked */
+    int64_t n_points, n_triangles;
+    int64_t width;
+    const float *values; /* (V, n_values), or per corner (T, 3, n_values) */
+    int n_values, per_corner;
+} tl_atlas;
+
+#define TL_NO_TEXEL 16384 /* farther than any gutter reaches */
+#define TL_MOST_CHANNELS 4
+
+/* A picture that a camera has taken of a mesh, and what it shows. */
+typedef struct {
+    int64_t width, height;
+    const int32_t *ids; /* triangles, -1 for none */
+    const float *depth; /* window depth, 0 near to 1 far */
+    const float *light; /* (height, width, n_channels), linear */
+    int n_channels;     /* at most TL_MOST_CHANNELS */
+    int keeps_best;     /* the light that is seen best, instead of the mean */
+    double clip_from_object[16];
+    double eye[4]; /* homogeneous: a place, or with 0 the direction to it */
+} tl_taken;
+
+/* A height grid and who looks over it. */
+typedef struct {
+    const double *heights; /* (height, width), NaN where there is none */
+    int64_t width;
+    double eye[3];         /* column, row and height; at the middles of cells columns and rows are whole; in the grid */
+    const double *ways[2]; /* 1 / (k - eye) of each column, and of each row; of none where that is 0 */
+    double cell[2];        /* width and height of a cell */
+    double curvature;      /* how far the ground falls, a unit of squared distance */
+    double most_squared;   /* distance of the farthest cells */
+} tl_terrain;
+
+#endif

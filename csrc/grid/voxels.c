@@ -1,0 +1,199 @@
+/* Voxels: columns of crossings to what lies inside, and the voxels that triangles meet.
+ * In: bits that TL_SINK_PEEL has noted of a mesh seen along its columns, or points in voxels.  Out: a byte or a share
+ * of each voxel, the steps of a column side by side.
+ *
+ * Based on: M. Schwarz, H.-P. Seidel, Fast Parallel Surface and Solid Voxelization on GPUs, 2010 (parity by flipped
+ * bits; a triangle meets a cube if their projections meet and the cube meets the plane). */
+#ifndef TL_VOXELS_C
+#define TL_VOXELS_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "polygons/row_bits.c"
+#include "vertex/corners.h"
+
+/* Fills columns between their crossings by the even-odd rule, in place; returns how many have an odd number.  The last
+ * crossing of such a column is left out. */
+static int64_t fill_columns(uint64_t *bits, int64_t n_columns, int64_t n_words)
+{
+    int64_t n_odd = 0;
+    for (int64_t i = 0; i < n_columns; i++, bits += n_words) {
+        uint64_t parity = 0, any = 0;
+        for (int64_t k = 0; k < n_words; k++)
+            parity ^= bits[k], any |= bits[k];
+        if (!any)
+            continue;
+        if (__builtin_parityll(parity)) {
+            int64_t last = n_words - 1;
+            while (!bits[last])
+                last--;
+            bits[last] &= ~(1ull << (63 - __builtin_clzll(bits[last])));
+            n_odd++;
+        }
+        fill_parity(bits, n_words);
+    }
+    return n_odd;
+}
+
+/* A byte of 0 or 1 for each of the n_steps of columns. */
+static void expand_columns(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out)
+{
+    for (int64_t i = 0; i < n_columns; i++, bits += n_words, out += n_steps) {
+        int64_t k = 0;
+        for (; k + 64 <= n_steps; k += 64)
+            bytes_from_bits(out + k, bits[k >> 6]);
+        if (k < n_steps) {
+            uint8_t tail[64];
+            bytes_from_bits(tail, bits[k >> 6]);
+            memcpy(out + k, tail, (size_t)(n_steps - k));
+        }
+    }
+}
+
+/* The share of the samples of voxels that are filled: 2^sample_bits along each axis, n_columns a row of voxels. */
+static void count_columns(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, int sample_bits,
+                          float *out)
+{
+    const int n = 1 << sample_bits;
+    const uint64_t ones = (1ull << n) - 1;
+    const float share = 1.0f / (float)(n * n * n);
+    const int64_t row_words = n_columns * n * n_words;
+    for (int64_t column = 0; column < n_columns; column++, out += n_steps) {
+        const uint64_t *const own = bits + column * n * n_words;
+        for (int64_t k = 0; k < n_steps; k++) {
+            const int64_t bit = k << sample_bits;
+            int n_filled = 0;
+            for (int y = 0; y < n; y++)
+                for (int x = 0; x < n; x++)
+                    n_filled +=
+                        __builtin_popcountll(own[y * row_words + x * n_words + (bit >> 6)] >> (bit & 63) & ones);
+            out[k] = (float)n_filled * share;
+        }
+    }
+}
+
+/* Writes 1 for each bit of columns (n_rows, n_columns), at strides of a row, a column and a step. */
+static void scatter_columns(const uint64_t *bits, int64_t n_rows, int64_t n_columns, int64_t n_words,
+                            const int64_t *strides, uint8_t *out)
+{
+    for (int64_t row = 0; row < n_rows; row++)
+        for (int64_t column = 0; column < n_columns; column++, bits += n_words) {
+            uint8_t *const own = out + row * strides[0] + column * strides[1];
+            for (int64_t k = 0; k < n_words; k++)
+                for (uint64_t rest = bits[k]; rest; rest &= rest - 1)
+                    own[((k << 6) + __builtin_ctzll(rest)) * strides[2]] = 1;
+        }
+}
+
+/* Where a square of side 1 from (p, q) on meets the side of an edge that its triangle lies on: p a + q b + c >= 0. */
+typedef struct {
+    double a, b, c;
+} square_test;
+
+typedef struct {
+    int axes[3];             /* the last one is where the normal is largest */
+    int64_t low[3], high[3]; /* voxels of the box, by axis of the grid */
+    double normal[3], near, far;
+    square_test sides[3][3]; /* of the projection along each axis: that of axes[(k + 1) % 3] and axes[(k + 2) % 3] */
+} voxel_test;
+
+static void set_sides(voxel_test *t, const double (*v)[3], double size)
+{
+    for (int k = 0; k < 3; k++) {
+        const int p = t->axes[(k + 1) % 3], q = t->axes[(k + 2) % 3], r = t->axes[k];
+        /* the turn of (p, q, r) is that of (0, 1, 2) or the opposite */
+        const double turn = (t->normal[r] < 0.0) == ((p + 1) % 3 == q) ? -1.0 : 1.0;
+        for (int i = 0; i < 3; i++) {
+            const double *from = v[i], *to = v[(i + 1) % 3];
+            square_test *s = &t->sides[k][i];
+            s->a = -turn * (to[q] - from[q]);
+            s->b = turn * (to[p] - from[p]);
+            const double slack = 0x1p-46 * (fabs(s->a) + fabs(s->b)) * size;
+            s->c = fmax(s->a, 0.0) + fmax(s->b, 0.0) - (s->a * from[p] + s->b * from[q]) + slack;
+        }
+    }
+}
+
+/* Prepares the test of a triangle; returns whether its box meets the grid. */
+static int set_voxel_test(voxel_test *t, const double (*v)[3], const int64_t *shape)
+{
+    double edges[2][3], size = 1.0;
+    for (int k = 0; k < 3; k++) {
+        const double low = fmin(fmin(v[0][k], v[1][k]), v[2][k]), high = fmax(fmax(v[0][k], v[1][k]), v[2][k]);
+        const double n = (double)shape[k];
+        if (!(low <= n && high >= 0.0))
+            return 0;
+        t->low[k] = low >= n ? shape[k] - 1 : low > 0.0 ? (int64_t)low : 0; /* the far side belongs to the last voxel */
+        t->high[k] = high >= n ? shape[k] - 1 : (int64_t)high;
+        edges[0][k] = v[1][k] - v[0][k], edges[1][k] = v[2][k] - v[0][k];
+        size = fmax(size, fmax(fabs(low), fmax(fabs(high), n)));
+    }
+    for (int k = 0; k < 3; k++) {
+        const int p = (k + 1) % 3, q = (k + 2) % 3;
+        t->normal[k] = edges[0][p] * edges[1][q] - edges[0][q] * edges[1][p];
+    }
+    const double *const n = t->normal;
+    int w = fabs(n[0]) > fabs(n[1]) ? 0 : 1;
+    w = fabs(n[w]) > fabs(n[2]) ? w : 2;
+    t->axes[0] = (w + 1) % 3, t->axes[1] = (w + 2) % 3, t->axes[2] = w;
+    double least = 0.0, most = 0.0, at = 0.0, sum = 0.0;
+    for (int k = 0; k < 3; k++) {
+        least += fmin(n[k], 0.0), most += fmax(n[k], 0.0);
+        at += n[k] * v[0][k], sum += fabs(n[k]);
+    }
+    const double slack = 0x1p-44 * sum * size + 0x1p-48 * size * size * size;
+    t->near = most - at + slack, t->far = least - at - slack;
+    set_sides(t, v, size);
+    return 1;
+}
+
+TL_INLINE int meets(const square_test *sides, double p, double q)
+{
+    return p * sides[0].a + q * sides[0].b + sides[0].c >= 0.0 && p * sides[1].a + q * sides[1].b + sides[1].c >= 0.0 &&
+           p * sides[2].a + q * sides[2].b + sides[2].c >= 0.0;
+}
+
+/* Writes 1 for the voxels that one triangle meets; strides of the grid's axes. */
+static void touch_triangle(const voxel_test *t, const int64_t *strides, uint8_t *out)
+{
+    const int u = t->axes[0], v = t->axes[1], w = t->axes[2];
+    const double nw = t->normal[w];
+    for (int64_t i = t->low[u]; i <= t->high[u]; i++)
+        for (int64_t j = t->low[v]; j <= t->high[v]; j++) {
+            if (!meets(t->sides[2], (double)i, (double)j))
+                continue;
+            const double base = t->normal[u] * (double)i + t->normal[v] * (double)j;
+            double first = (double)t->low[w], last = (double)t->high[w];
+            if (nw != 0.0) { /* base + nw k + near >= 0 and base + nw k + far <= 0 */
+                const double one = -(base + t->near) / nw, other = -(base + t->far) / nw;
+                first = fmax(first, floor(fmin(one, other)) - 1.0), last = fmin(last, ceil(fmax(one, other)) + 1.0);
+            }
+            for (double k = first; k <= last; k += 1.0) {
+                const double at = base + nw * k;
+                if (at + t->near >= 0.0 && at + t->far <= 0.0 && meets(t->sides[0], (double)j, k) &&
+                    meets(t->sides[1], k, (double)i))
+                    out[i * strides[u] + j * strides[v] + (int64_t)k * strides[w]] = 1;
+            }
+        }
+}
+
+/* Writes 1 for the voxels of a grid, of sides of 1 from the origin on, that triangles [first, end) meet. */
+static void touch_voxels(const double *points, int64_t n_points, const int32_t *triangles, int64_t first, int64_t end,
+                         const int64_t *shape, uint8_t *out)
+{
+    const int64_t strides[3] = {shape[1] * shape[2], shape[2], 1};
+    for (int64_t i = first; i < end; i++) {
+        double v[3][3];
+        voxel_test t;
+        for (int k = 0; k < 3; k++)
+            memcpy(v[k], points + 3 * (int64_t)corner_within(triangles[3 * i + k], n_points), sizeof v[k]);
+        if (set_voxel_test(&t, (const double (*)[3])v, shape))
+            touch_triangle(&t, strides, out);
+    }
+}
+
+#endif

@@ -1,0 +1,151 @@
+"""Visible faces: which triangles of a mesh each of many cameras sees, and in how many pixels.
+
+Input: a mesh or scene, cameras. Output: `VisibleFaces`, a sparse table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._apps.batch.batch import render_batch
+from topleft._apps.batch.jobs import Job
+from topleft._core.base.array_types import I32
+from topleft._core.base.arrays import as_count, shown
+from topleft._meshes.camera.camera import CameraLike, as_camera
+from topleft._meshes.picture.render import DEFAULT_SIZE
+from topleft._meshes.scene.adapt import MeshLike
+from topleft._meshes.scene.scene import Scene, as_meshes, meshes_of, scene_of
+from topleft.typing import CullOption
+
+
+@dataclass(frozen=True, eq=False)
+class VisibleFaces:
+    """What `visible_faces` returns: a row for each camera and triangle that it sees, cameras in their order.
+
+    Attributes
+    ----------
+    camera, face, pixels : (N,) int32
+        Which camera, which triangle, and in how many pixels it shows. Triangles of all instances of a scene are counted
+        in their order.
+    shape : (number of cameras, number of triangles)
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> cameras = [tl.Camera.look_at((0, 0, 5)), tl.Camera.look_at((5, 0, 0))]
+    >>> table = tl.visible_faces(cube, cameras, (64, 64))
+    >>> table.shape, len(table.face), table.seen_by.tolist().count(1)
+    ((2, 12), 4, 4)
+    """
+
+    camera: I32
+    face: I32
+    pixels: I32
+    shape: tuple[int, int]
+    triangles: I32
+    """(T, 3): the vertices of all triangles, those of all instances counted in their order."""
+
+    def __repr__(self) -> str:
+        n_cameras, n_faces = self.shape
+        return f"VisibleFaces({n_cameras} cameras, {n_faces} triangles, {len(self.face)} seen)"
+
+    @property
+    def seen_by(self) -> npt.NDArray[np.int64]:
+        """How many cameras see each triangle, (T,)."""
+        return np.bincount(self.face, minlength=self.shape[1])
+
+    def vertices(self) -> VisibleFaces:
+        """The same table of vertices: each has the pixels of all triangles round it."""
+        n = int(self.triangles.max(initial=-1)) + 1
+        key = (self.camera[:, None].astype(np.int64) * n + self.triangles[self.face]).ravel()
+        found, where = np.unique(key, return_inverse=True)
+        n_pixels = np.bincount(where.ravel(), weights=np.repeat(self.pixels, 3), minlength=len(found))
+        columns: list[I32] = [column.astype(np.int32) for column in (*np.divmod(found, max(n, 1)), n_pixels)]
+        return VisibleFaces(columns[0], columns[1], columns[2], (self.shape[0], n), np.empty((0, 3), np.int32))
+
+    def to_scipy(self) -> Any:
+        """The table as `scipy.sparse.csr_array`, cameras by triangles.
+
+        Raises
+        ------
+        ImportError
+            If SciPy is not installed.
+        """
+        from scipy.sparse import csr_array
+
+        return csr_array((self.pixels, (self.camera, self.face)), shape=self.shape)
+
+
+def visible_faces(
+    mesh: MeshLike | Scene,
+    cameras: Iterable[CameraLike],
+    size: int | tuple[int, int] = DEFAULT_SIZE,
+    *,
+    min_pixels: int = 1,
+    cull: CullOption | None = None,
+    executor: Executor | int | Any = None,
+) -> VisibleFaces:
+    """Which triangles each of many cameras sees, and in how many pixels.
+
+    Parameters
+    ----------
+    mesh : Mesh, Scene, or whatever `as_mesh` takes
+    cameras : iterable of Camera
+        May be a generator.
+    size : int or (width, height), pixels
+        Of the pictures that are counted: a triangle that owns the middle of none of their pixels is not seen.
+    min_pixels : int
+        In how many pixels a triangle must show.
+    cull : {"none", "back", "front"}, optional
+        As for `render`.
+    executor : None, int, concurrent.futures.Executor or dask.distributed.Client
+        Who draws, as for `render_batch`. Never changes a number.
+
+    Returns
+    -------
+    VisibleFaces
+
+    Raises
+    ------
+    ValueError, TypeError
+        As in `render_layers`; if `min_pixels` is no number of at least 1.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> table = tl.visible_faces(ball, tl.viewpoints(ball, 6), (128, 128), min_pixels=3)
+    >>> bool((table.seen_by > 0).all()), int(table.pixels.min())
+    (True, 3)
+    """
+    least = as_count("min_pixels", min_pixels)
+    if not isinstance(cameras, Iterable) or isinstance(cameras, str | bytes | np.ndarray):
+        raise TypeError(f"cameras must be an iterable of Camera, got {shown(cameras)}")
+    subject = as_meshes(mesh)
+    scene = scene_of(subject)
+    scene.check_counted("a scene whose visible triangles are counted")
+    n_faces = scene.n_triangles
+    layers = ("triangle",) if len(scene) == 1 else ("triangle", "instance")
+    jobs = (Job(subject, as_camera(one), size, {"cull": cull}, None, layers) for one in cameras)
+    rows: list[tuple[I32, I32]] = []
+    for result in render_batch(jobs, executor=executor):
+        ids = result.layers["triangle"]
+        if "instance" in layers:
+            ids = np.where(ids >= 0, ids + scene.first_ids[result.layers["instance"]], -1)
+        counts = np.bincount((ids + 1).ravel(), minlength=n_faces + 1)[1:]
+        faces = np.flatnonzero(counts >= least)
+        rows.append((faces.astype(np.int32), counts[faces].astype(np.int32)))
+    n_seen = [len(faces) for faces, _ in rows]
+    camera = np.repeat(np.arange(len(rows), dtype=np.int32), n_seen)
+    none = [np.empty(0, np.int32)]
+    face, pixels = (np.concatenate(none + [row[k] for row in rows]) for k in range(2))
+    firsts = np.cumsum([0, *(len(one.vertices) for one in meshes_of(subject))])
+    corners = [one.triangles + np.int32(first) for one, first in zip(meshes_of(subject), firsts.tolist(), strict=False)]
+    return VisibleFaces(camera, face, pixels, (len(rows), n_faces), np.concatenate(corners))

@@ -1,0 +1,94 @@
+"""`topleft bake`: the atlas of a mesh, from itself or from a finer mesh."""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._apps.cli.arguments import UsageError, positive, size
+from topleft._apps.cli.render import complain
+from topleft._meshes.grid.bake import Baked, bake
+from topleft._meshes.io.images import SUFFIXES, save_image
+from topleft._meshes.io.load import load
+from topleft._meshes.model.mesh import Mesh
+from topleft.errors import MeshError
+from topleft.typing import BakeOption, BakeRuleOption
+
+BAKE_HELP = """\
+MESH and --source are mesh files; MESH has texture coordinates. OUT holds what a texel of them has: .npy as it is; PNG
+normals as normal maps do, colours, and triangles up to 65535, 65535 where there is none; TIFF positions, too.
+
+examples:
+  topleft bake robot.glb -o normals.png --what normal --size 2048
+  topleft bake low.obj -o tangent.png --what tangent_normal --source high.ply --max-distance 0.02
+"""
+
+
+def run_bake(options: argparse.Namespace) -> int:
+    """Write the atlas of a mesh."""
+    if Path(options.out).suffix.lower() not in SUFFIXES:
+        raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
+    mesh = mesh_of(options.mesh)
+    source = None if options.source is None else mesh_of(options.source)
+    how: dict[str, Any] = {"rule": options.rule, "gutter": options.gutter, "threads": options.threads}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        baked = bake(mesh, options.what, options.size, source=source, max_distance=options.max_distance, **how)
+    for one in caught:
+        complain(f"{options.mesh}: {one.message}")
+    Path(options.out).parent.mkdir(parents=True, exist_ok=True)
+    save_image(options.out, drawn(baked, options))
+    return 0
+
+
+def mesh_of(path: str) -> Mesh:
+    """The mesh of a file."""
+    found = load(path)
+    if not isinstance(found, Mesh):
+        raise MeshError(f"{path} holds points, and a mesh is baked")
+    return found
+
+
+def drawn(baked: Baked, options: argparse.Namespace) -> npt.NDArray[Any]:
+    """What the file holds."""
+    suffix = Path(options.out).suffix.lower()
+    if suffix == ".npy" or (suffix in (".tif", ".tiff") and options.what in ("position", "triangle")):
+        return baked.values
+    if options.what == "triangle":
+        if baked.values.max(initial=0) >= 65535:
+            raise UsageError(f"-o {options.out}: this format holds triangles below 65535; write .npy or .tif")
+        return np.where(baked.values < 0, 65535, baked.values).astype(np.uint16)
+    if options.what == "position":
+        raise UsageError(f"-o {options.out}: positions go to .npy or .tif")
+    values = baked.values if options.what == "color" else baked.values * np.float32(127.5) + np.float32(127.5)
+    return np.rint(values).clip(0, 255).astype(np.uint8)
+
+
+def add_bake_command(commands: Any) -> None:
+    """Add the command to the parsers of the command line."""
+    parser = commands.add_parser(
+        "bake",
+        help="write what a mesh has at the texels of its texture coordinates",
+        description=run_bake.__doc__,
+        epilog=BAKE_HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("mesh", metavar="MESH", help="mesh file with texture coordinates")
+    parser.add_argument("-o", "--out", metavar="OUT", required=True, help="file to be written")
+    parser.add_argument(
+        "--what", choices=get_args(BakeOption), default="normal", help="what is baked (default: normal)"
+    )
+    parser.add_argument("--size", type=size, default=(1024, 1024), metavar="WxH", help="texels (default: 1024x1024)")
+    parser.add_argument(
+        "--rule", choices=get_args(BakeRuleOption), default="center", help="which triangles a texel has"
+    )
+    parser.add_argument("--gutter", type=int, default=8, metavar="N", help="texels round charts (default: 8)")
+    parser.add_argument("--source", metavar="FILE", help="another mesh, whose nearest points give the values")
+    parser.add_argument("--max-distance", type=float, metavar="D", help="of those points, units of the mesh")
+    parser.add_argument("--threads", type=positive, metavar="N", help="threads that draw")
+    parser.set_defaults(run=run_bake)

@@ -1,0 +1,173 @@
+# Meshes onto voxels (columns of crossings, bytes and shares, the voxels that triangles meet) and onto texels.
+
+
+def column_words(int64_t n_steps) -> int:
+    """Return how many uint64 a column of so many steps takes in `draw_crossings`."""
+    return n_steps // 64 + 1
+
+
+def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, bint is_set, int64_t first,
+                   int64_t end) -> int:
+    """Note the crossings of rows [first, end) of columns (H, W, column_words): `tl_crossings`.
+
+    Returns as `SnappedMesh.draw` does.
+    """
+    cdef tl_crossings crossings
+    cdef tl_peeled peeled
+    cdef tl_target target
+    cdef tl_window window = mesh.window(first, end - first, bits.shape[1])
+    cdef tl_share share = no_share()
+    cdef int64_t bad_row
+    if end <= first or not bits.shape[1]:
+        return -1
+    memset(&target, 0, sizeof(target))
+    memset(&peeled, 0, sizeof(peeled))
+    crossings.bits, crossings.n_words = &bits[first, 0, 0], bits.shape[2]
+    crossings.n_steps, crossings.is_set = n_steps, is_set
+    peeled.crossings = &crossings
+    target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, bits.shape[1], &peeled
+    share.end = mesh.snapped.n_triangles
+    with nogil:
+        bad_row = K.draw(&mesh.snapped, &window, &target, &share)
+    raise_if_given_up()
+    return bad_row
+
+
+def fill_columns(uint64_t[:, :, ::1] bits, int64_t first, int64_t end) -> int:
+    """Fill rows [first, end) of columns between their crossings, in place; returns how many have an odd number of them."""
+    cdef int64_t n_odd = 0
+    if end > first and bits.shape[1]:
+        with nogil:
+            n_odd = K.fill_columns(&bits[first, 0, 0], (end - first) * bits.shape[1], bits.shape[2])
+    return n_odd
+
+
+def expand_columns(const uint64_t[:, :, ::1] bits, uint8_t[:, :, ::1] out, int64_t first, int64_t end):
+    """Write a byte for each step of rows [first, end) of columns."""
+    if end > first and bits.shape[1]:
+        with nogil:
+            K.expand_columns(&bits[first, 0, 0], (end - first) * bits.shape[1], bits.shape[2], out.shape[2],
+                             &out[first, 0, 0])
+
+
+def count_columns(const uint64_t[:, :, ::1] bits, int sample_bits, float[:, :, ::1] out, int64_t first, int64_t end):
+    """Write the filled share of each voxel of rows [first, end), of which each axis has 2**sample_bits samples."""
+    cdef int64_t row
+    if out.shape[1] and out.shape[2]:
+        with nogil:
+            for row in range(first, end):
+                K.count_columns(&bits[row << sample_bits, 0, 0], out.shape[1], bits.shape[2], out.shape[2], sample_bits,
+                                &out[row, 0, 0])
+
+
+def scatter_columns(const uint64_t[:, :, ::1] bits, uint8_t[::1] out, strides: tuple[int, int, int]):
+    """Write 1 for each bit, at strides of a row, a column and a step."""
+    cdef int64_t own[3]
+    own[0], own[1], own[2] = strides
+    if bits.shape[0] and bits.shape[1]:
+        with nogil:
+            K.scatter_columns(&bits[0, 0, 0], bits.shape[0], bits.shape[1], bits.shape[2], own, &out[0])
+
+
+def touch_voxels(const double[:, ::1] points, const int32_t[:, ::1] triangles, int64_t first, int64_t end,
+                 uint8_t[:, :, ::1] out):
+    """Write 1 for the voxels that triangles [first, end) meet; points in voxels."""
+    cdef int64_t shape[3]
+    shape[0], shape[1], shape[2] = out.shape[0], out.shape[1], out.shape[2]
+    if end > first:
+        with nogil:
+            K.touch_voxels(&points[0, 0], points.shape[0], &triangles[0, 0], first, end, shape, &out[0, 0, 0])
+
+
+cdef class Atlas:
+    """Triangles in texels, and values of their corners: `tl_atlas`. The arrays have been checked."""
+
+    cdef tl_atlas atlas
+    cdef object arrays
+    cdef int64_t height
+
+    def __init__(self, const double[:, ::1] points, const int32_t[:, ::1] triangles, size: tuple[int, int],
+                 const float[:, ::1] values, bint per_corner):
+        """`points` (V, 2), at least one triangle; `values` (V, K), or (3 T, K) per corner."""
+        self.arrays = (points, triangles, values)
+        self.atlas.points, self.atlas.triangles, self.atlas.n_triangles = &points[0, 0], &triangles[0, 0], triangles.shape[0]
+        self.atlas.width, self.height = size
+        self.atlas.n_points = points.shape[0]
+        self.atlas.values, self.atlas.n_values, self.atlas.per_corner = &values[0, 0], values.shape[1], per_corner
+
+    def touch(self, int64_t first, int64_t end, int32_t[:, ::1] ids, float[:, ::1] squared, float[:, :, ::1] out):
+        """Give texels of rows [first, end) without an id those of triangles that meet them; `squared` is INFINITY."""
+        if end > first:
+            with nogil:
+                K.touch_texels(&self.atlas, first, end, &ids[0, 0], &squared[first, 0], &out[0, 0, 0])
+
+    def average(self, int64_t first, int64_t end, double[:, :, ::1] sums, float[:, ::1] most, int32_t[:, ::1] ids,
+                float[:, :, ::1] out):
+        """Write means over rows [first, end); `sums` (H, W, 1 + K) and `most` (H, W) are 0."""
+        if end > first:
+            with nogil:
+                K.average_texels(&self.atlas, first, end, &sums[first, 0, 0], &most[first, 0], &ids[0, 0], &out[0, 0, 0])
+
+
+def find_in_rows(const int32_t[:, ::1] ids, int64_t first, int64_t end, int reach, int16_t[:, ::1] along):
+    """Write the distance along rows [first, end) to the nearest texel with an id."""
+    if end > first and ids.shape[1]:
+        with nogil:
+            K.find_in_rows(&ids[0, 0], ids.shape[1], first, end, reach, &along[0, 0])
+
+
+def find_gutter(const int16_t[:, ::1] along, int64_t first, int64_t end, int reach, int32_t[:, ::1] from_texel):
+    """Write the index of the nearest texel with an id for rows [first, end), -1 where none is within reach."""
+    cdef int32_t[::1] room = np.empty(max(1, 2 * along.shape[1]), np.int32)
+    if end > first and along.shape[1]:
+        with nogil:
+            K.find_gutter(&along[0, 0], along.shape[1], along.shape[0], first, end, reach, &room[0], &from_texel[0, 0])
+
+
+def copy_texels(const int32_t[:, ::1] from_texel, int64_t first, int64_t end, texels: Array):
+    """Copy texels of rows [first, end) from where the nearest with an id are."""
+    cdef uint8_t[::1] raw = as_bytes(texels)
+    cdef int64_t n = from_texel.shape[0] * from_texel.shape[1], width = from_texel.shape[1]
+    if end > first and n and raw.shape[0]:
+        with nogil:
+            K.copy_texels(&from_texel[0, 0], first * width, end * width, raw.shape[0] // n, &raw[0])
+
+
+def add_taken(const int32_t[:, ::1] seen, const float[:, ::1] depth, const float[:, :, ::1] light,
+              const double[:, ::1] clip_from_object, const double[::1] eye, bint keeps_best,
+              const float[:, ::1] positions, const float[:, ::1] normals, const int32_t[::1] ids, int64_t first,
+              int64_t end, float[:, ::1] sums, float[::1] weights):
+    """Add what a picture shows of texels [first, end) to their sums and weights: `tl_taken`."""
+    cdef tl_taken taken
+    cdef int k
+    taken.height, taken.width, taken.n_channels = light.shape[0], light.shape[1], light.shape[2]
+    if end <= first or not (taken.height and taken.width):
+        return
+    taken.ids, taken.depth, taken.light, taken.keeps_best = &seen[0, 0], &depth[0, 0], &light[0, 0, 0], keeps_best
+    for k in range(16):
+        taken.clip_from_object[k] = clip_from_object[k // 4, k % 4]
+    for k in range(4):
+        taken.eye[k] = eye[k]
+    with nogil:
+        K.add_taken(&taken, &positions[0, 0], &normals[0, 0], &ids[0], first, end, &sums[0, 0], &weights[0])
+
+
+def view_heights(const double[:, ::1] heights, const double[::1] eye, const double[::1] columns, const double[::1] rows,
+                 const double[::1] cell, double curvature, double most_squared, int64_t first, int64_t end,
+                 double[:, ::1] out):
+    """Write how high above the ground of rows [first, end) something is seen from (column, row, height).
+
+    `columns`, `rows`: 1 / (k - eye) of each column k, and of each row.
+    """
+    cdef tl_terrain terrain
+    cdef int k
+    if end <= first or not heights.shape[1]:
+        return
+    terrain.heights, terrain.width = &heights[0, 0], heights.shape[1]
+    terrain.ways[0], terrain.ways[1] = &columns[0], &rows[0]
+    terrain.curvature, terrain.most_squared = curvature, most_squared
+    for k in range(3):
+        terrain.eye[k] = eye[k]
+    terrain.cell[0], terrain.cell[1] = cell[0], cell[1]
+    with nogil:
+        K.view_heights(&terrain, first, end, &out[0, 0])

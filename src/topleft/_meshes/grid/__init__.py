@@ -1,0 +1,1 @@
+"""Meshes on grids of voxels and of texels."""

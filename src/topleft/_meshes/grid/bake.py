@@ -1,0 +1,403 @@
+"""Bakes: what a mesh has at the texels of its texture coordinates, from itself, from another mesh, or from pictures.
+
+Input: a `Mesh` with `uv`. Output: `Baked`, an atlas (H, W, C). The kernels are csrc/grid/atlas.c.
+
+Based on: Sander, P. V. et al., "Texture Mapping Progressive Meshes", SIGGRAPH 2001 (from a fine mesh to the atlas of a
+coarse one); Debevec, P. E., C. J. Taylor and J. Malik, "Modeling and Rendering Architecture from Photographs", SIGGRAPH
+1996 (pictures that are projected on a model, weighed by the angle at which they see it).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, cast, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.array_types import F32, F64, I32, U8
+from topleft._core.base.arrays import as_array, as_number, as_size, as_values, shown
+from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
+from topleft._core.base.memory import FRESH, check_fits
+from topleft._core.base.options import check_choice
+from topleft._core.base.threads import run_parts, threads_for
+from topleft._core.raster.verbs import overdraw, rasterize
+from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
+from topleft._meshes.lod.distance import TriangleTree
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.picture.render import rasterize_mesh
+from topleft._meshes.scene.adapt import MeshLike, as_mesh
+from topleft.errors import MeshError, MeshWarning
+from topleft.typing import BakeOption, BakeRuleOption, TakenOption
+
+MOST_GUTTER = 1024
+OUTSIDE = 2.0**-20
+"""How far texture coordinates may leave [0, 1] before that is told: rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """What `bake` returns; row 0 is the top, where v = 1, as in a `Texture`.
+
+    Attributes
+    ----------
+    values : (H, W, C) float32; of pictures uint8; of "triangle" (H, W) int32
+        What the mesh has there, and in the gutter what the nearest texel has; 0, or -1 for triangles, elsewhere.
+    triangle : (H, W) int32
+        The triangle of each texel, -1 in the gutter and elsewhere.
+    mask : (H, W) bool
+        Which texels have a value of their own: not those of the gutter.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> square = tl.Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 1, 2]], uv=[[0, 0], [1, 0], [1, 1]])
+    >>> baked = tl.bake(square, "position", 4, gutter=0)
+    >>> baked.mask.sum(), baked.values[3, 2].tolist()
+    (np.int64(10), [0.625, 0.125, 0.0])
+    """
+
+    values: npt.NDArray[Any]
+    triangle: I32
+    mask: npt.NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        height, width = self.mask.shape
+        return f"Baked({width}x{height}, {self.values.dtype}, {np.count_nonzero(self.mask)} texels)"
+
+
+def bake(
+    mesh: MeshLike,
+    what: BakeOption | npt.ArrayLike | Sequence[npt.ArrayLike] = "position",
+    size: int | tuple[int, int] = 1024,
+    *,
+    rule: BakeRuleOption = "center",
+    gutter: int = 8,
+    source: MeshLike | None = None,
+    max_distance: float | None = None,
+    cameras: Sequence[CameraLike] | None = None,
+    blend: TakenOption = "best",
+    threads: int | None = None,
+) -> Baked:
+    """What a mesh has at the texels of its atlas: the square of its texture coordinates.
+
+    Parameters
+    ----------
+    mesh : Mesh, or whatever `as_mesh` takes, with `uv`
+    what : str, array_like, or sequence of pictures
+        "position": as in the mesh. "normal": unit normals, as in the mesh; "tangent_normal": those of `source` in the
+        frame of the mesh along u, along v and outwards, as normal maps hold them. "color": sRGB of the vertices, 0 to
+        255. "triangle": indices. Or values of vertices (V,) or (V, K), or of corners (T, 3, K). With `cameras` pictures
+        (h, w, 3 or 4) uint8, sRGB.
+    size : int or (width, height)
+        Texels.
+    rule : {"center", "touched", "area"}
+        Which triangles a texel has. "center": the one that owns its middle, by the top-left rule on vertices as they
+        are. "touched": where none does, the nearest to the middle of those that meet it, at its point nearest to the
+        middle. "area": the mean over all that triangles cover of it.
+    gutter : int, 0 to 1024
+        Texels round charts that get what the nearest texel has (by Euclid, the upper left of several), so that a filter
+        that reaches beyond a chart finds no background.
+    source : Mesh, optional
+        Another mesh in the same place, a finer one, say: values, normals and colours are those of its point that is
+        nearest to the mesh. Triangles are its own, too.
+    max_distance : float, optional
+        Of that point; farther ones give no value.
+    cameras : sequence of Camera, optional
+        Of the pictures: each shows the mesh alone, without a lens. A texel gets what a picture shows there if the mesh
+        does not hide it, weighed by the squared cosine of the angle at which it is seen.
+    blend : {"best", "mean"}
+        Of several pictures the one that sees a texel best, or their weighed mean, in linear light.
+    threads : int, optional
+        Never changes a bit.
+
+    Returns
+    -------
+    Baked
+
+    Warns
+    -----
+    MeshWarning
+        If charts overlap, or triangles leave the square: what lies outside is not baked.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no `uv` or no triangles, an option is unknown or out of range, or values do not fit it.
+    MeshError
+        If the mesh or `source` lacks what is to be baked.
+
+    Examples
+    --------
+    >>> import numpy as np, topleft as tl
+    >>> vertices, triangles = tl.scenes.icosphere(3)
+    >>> uv = np.c_[np.arctan2(vertices[:, 1], vertices[:, 0]) / 7 + 0.5, vertices[:, 2] / 2.1 + 0.5]
+    >>> front = vertices[triangles][:, :, 0].max(axis=1) > 0  # without the seam at the back
+    >>> ball = tl.Mesh(vertices, triangles[front], uv=uv)
+    >>> baked = tl.bake(ball, "normal", 64, rule="touched")
+    >>> bool(np.allclose(np.linalg.norm(baked.values[baked.mask], axis=1), 1, atol=1e-5))
+    True
+    """
+    mesh = as_mesh(mesh)
+    other = None if source is None else as_mesh(source)
+    width, height = as_size(size, smallest=1)
+    check_choice("rule", rule, get_args(BakeRuleOption))
+    check_choice("blend", blend, get_args(TakenOption))
+    if not (isinstance(gutter, int | np.integer) and 0 <= gutter <= MOST_GUTTER):
+        raise ValueError(f"gutter must be a number of texels in [0, {MOST_GUTTER}], got {gutter!r}")
+    if max_distance is not None and not as_number("max_distance", max_distance) >= 0:
+        raise ValueError(f"max_distance must be at least 0, got {max_distance!r}")
+    if cameras is not None and other is not None:
+        raise ValueError("values come from a source or from pictures with cameras, got both")
+    chart = chart_of(mesh, (width, height), rule, threads_for(threads, len(mesh.triangles)))
+    if cameras is not None:
+        return with_gutter(from_pictures(chart, pictures_of(what, cameras), blend), gutter, chart.n_threads)
+    if isinstance(what, str):
+        check_choice("what", what, get_args(BakeOption))
+    if isinstance(what, str) and what == "triangle" and other is None:
+        _, ids = chart.values_of(np.zeros((len(mesh.vertices), 1), np.float32))
+        return with_gutter(Baked(ids.copy(), ids, ids >= 0), gutter, chart.n_threads)
+    if other is not None:
+        baked = from_source(chart, other, what, max_distance)
+    else:
+        values, ids = chart.values_of(values_to_bake(mesh, what))
+        if isinstance(what, str) and what.endswith("normal"):
+            values = unit(values)
+        baked = Baked(values, ids, ids >= 0)
+    return with_gutter(baked, gutter, chart.n_threads)
+
+
+class Chart(NamedTuple):
+    """A mesh in the texels of its atlas."""
+
+    mesh: Mesh
+    points: F64
+    """(V, 2): texels, y down."""
+    size: tuple[int, int]
+    rule: str
+    n_threads: int
+
+    def values_of(self, values: F32) -> tuple[F32, I32]:
+        """The values (H, W, K) of vertices (V, K) or corners (T, 3, K), and the triangles (H, W)."""
+        width, height = self.size
+        n_values, triangles = values.shape[-1], self.mesh.triangles
+        check_fits((height, width, n_values), np.float32)
+        if self.rule == "area":
+            ids, out = np.full((height, width), -1, np.int32), np.zeros((height, width, n_values), np.float32)
+        else:
+            frags = rasterize(self.points, triangles, self.size, subpixel_bits="exact", threads=self.n_threads)
+            ids, out = frags.triangle, frags.interpolate(values)
+        if self.rule == "center":
+            return out, ids
+        rows = values.reshape(-1, n_values) if values.ndim == 3 else values
+        atlas = engine.Atlas(self.points, triangles, self.size, rows, values.ndim == 3)
+        if self.rule == "touched":
+            squared = np.full((height, width), np.inf, np.float32)
+            run_parts(lambda first, end: atlas.touch(first, end, ids, squared, out), height, self.n_threads)
+        else:
+            check_fits((height, width, 1 + n_values), np.float64)
+            sums, most = np.zeros((height, width, 1 + n_values)), np.zeros((height, width), np.float32)
+            run_parts(lambda first, end: atlas.average(first, end, sums, most, ids, out), height, self.n_threads)
+        return out, ids
+
+
+def chart_of(mesh: Mesh, size: tuple[int, int], rule: str, n_threads: int) -> Chart:
+    """The atlas of a mesh, with warnings of what it does not hold."""
+    if mesh.uv is None:
+        raise ValueError("a mesh is baked by its texture coordinates, got one without uv")
+    if not len(mesh.triangles):
+        raise ValueError("mesh must have triangles, got none")
+    uv = mesh.uv.astype(np.float64)
+    is_inside = np.logical_and.reduce((uv >= -OUTSIDE) & (uv <= 1 + OUTSIDE), axis=1)
+    if not is_inside.all():
+        if not np.isfinite(uv[mesh.triangles]).all():
+            raise ValueError("uv must be finite where triangles use them, got NaN or infinite ones")
+        n_outside = np.count_nonzero(~is_inside[mesh.triangles].all(axis=1))
+        line = f"{n_outside} triangles leave the square of uv from 0 to 1: what lies outside is not baked"
+        warnings.warn(line, MeshWarning, stacklevel=3)
+    points = np.ascontiguousarray(np.stack([uv[:, 0] * size[0], (1 - uv[:, 1]) * size[1]], axis=1))
+    n_shared = int(
+        np.count_nonzero(overdraw(points, mesh.triangles, size, subpixel_bits="exact", threads=n_threads) > 1)
+    )
+    if n_shared:
+        line = f"charts overlap in {n_shared} texels, which several triangles own"
+        warnings.warn(line, MeshWarning, stacklevel=3)
+    return Chart(mesh, points, size, rule, n_threads)
+
+
+def values_to_bake(mesh: Mesh, what: object) -> F32:
+    """The values of vertices (V, K) or corners (T, 3, K) that a word or an array asks for."""
+    if not isinstance(what, str):
+        return as_values(cast(Any, what), len(mesh.vertices), len(mesh.triangles))
+    if what == "color":
+        if mesh.colors is None:
+            raise MeshError("what='color' needs a mesh whose vertices have colours, got one without")
+        return mesh.colors.astype(np.float32)
+    if what == "position":
+        return np.ascontiguousarray(mesh.vertices, np.float32)
+    if what == "normal":
+        return normals_to_bake(mesh)
+    raise ValueError(f"what={what!r} needs a source")
+
+
+def normals_to_bake(mesh: Mesh) -> F32:
+    """The unit normals of vertices (V, 3) or corners (T, 3, 3)."""
+    if mesh.is_faceted:
+        return np.repeat(face_normals(mesh)[:, None], 3, axis=1)
+    corners = mesh.corner_normals()
+    found = mesh.vertex_normals() if corners is None else corners.rows[corners.of_corner]
+    return np.ascontiguousarray(found, np.float32)
+
+
+def face_normals(mesh: Mesh) -> F32:
+    """The unit normals of triangles, (T, 3); 0 where one has no area."""
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    return unit(np.cross(b - a, c - a)).astype(np.float32)
+
+
+def unit(vectors: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Vectors (..., 3) of length 1; 0 stays."""
+    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    return np.divide(vectors, length[..., None], out=np.zeros_like(vectors), where=length[..., None] > 0)
+
+
+def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | None) -> Baked:
+    """The values of another mesh at its points that are nearest to those of the atlas."""
+    if not len(source.triangles):
+        raise MeshError("source must have triangles, got none")
+    word = what if isinstance(what, str) else ""
+    values = normals_to_bake(source) if word.endswith("normal") else None
+    if values is None and word != "triangle":
+        values = values_to_bake(source, what)
+    positions, ids = chart.values_of(np.ascontiguousarray(chart.mesh.vertices, np.float32))
+    at = np.flatnonzero(ids.reshape(-1) >= 0)
+    points = positions.reshape(-1, 3)[at].astype(np.float64)
+    center = source.vertices[source.triangles[0, 0]].astype(np.float64)
+    tree = TriangleTree(source.vertices.astype(np.float64) - center, source.triangles)
+    nearest, feet = np.empty(len(at), np.int32), np.empty((len(at), 3))
+    points -= center
+    found = tree.tree  # made before threads ask for it
+    run_parts(lambda first, end: found.find_nearest(points, first, end, nearest, feet), len(at), chart.n_threads)
+    is_near = np.ones(len(at), np.bool_)
+    if max_distance is not None:
+        is_near = np.einsum("ij,ij->i", feet - points, feet - points) <= max_distance * max_distance
+    at, own = at[is_near], tree.order[nearest[is_near]]
+    triangle: I32 = np.full(ids.shape, -1, np.int32)
+    triangle.reshape(-1)[at] = own
+    if values is None:
+        return Baked(triangle.copy(), triangle, triangle >= 0)
+    corners = source.triangles[own]
+    weights = weights_at(tree.points[corners], feet[is_near]).astype(np.float32)
+    each = values[own] if values.ndim == 3 else values[corners]
+    taken = np.einsum("nk,nkc->nc", weights, each)
+    if word.endswith("normal"):
+        taken = unit(taken)
+    if word == "tangent_normal":
+        taken = in_tangent_frame(chart, ids.reshape(-1)[at], at, taken)
+    out = np.zeros((ids.size, taken.shape[1]), np.float32)
+    out[at] = taken
+    return Baked(out.reshape(*ids.shape, -1), triangle, triangle >= 0)
+
+
+def weights_at(corners: F64, points: F64) -> F64:
+    """Barycentric weights (N, 3) of points on triangles (N, 3, 3); those of the first corner where there is no area."""
+    u, v, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
+    uu, uv, vv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v)))
+    pu, pv = np.einsum("ij,ij->i", p, u), np.einsum("ij,ij->i", p, v)
+    d = uu * vv - uv * uv
+    safe = np.where(d > 0, d, 1)
+    second, third = (np.where(d > 0, x / safe, 0).clip(0, 1) for x in (vv * pu - uv * pv, uu * pv - uv * pu))
+    return np.stack([1 - second - third, second, third], axis=1)
+
+
+def in_tangent_frame(chart: Chart, own: I32, at: npt.NDArray[np.intp], normals: F32) -> F32:
+    """Normals (N, 3) along u, along v and outwards, at texels `at` of triangles `own` of the mesh."""
+    mesh = chart.mesh
+    smooth, _ = chart.values_of(normals_to_bake(mesh))
+    outwards = unit(smooth.reshape(-1, 3)[at].astype(np.float64))
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    ta, tb, tc = (mesh.uv[mesh.triangles[:, k]].astype(np.float64) for k in range(3))  # type: ignore[index]
+    (u1, v1), (u2, v2) = (tb - ta).T, (tc - ta).T
+    sign = np.where(u1 * v2 - u2 * v1 < 0, -1.0, 1.0)[:, None]
+    along_u = (((b - a) * v2[:, None] - (c - a) * v1[:, None]) * sign)[own]
+    along_v = (((c - a) * u1[:, None] - (b - a) * u2[:, None]) * sign)[own]
+    tangent = unit(along_u - outwards * np.einsum("ij,ij->i", along_u, outwards)[:, None])
+    other = np.cross(outwards, tangent)
+    other *= np.where(np.einsum("ij,ij->i", other, along_v) < 0, -1.0, 1.0)[:, None]
+    axes = (tangent, other, outwards)
+    return np.stack([np.einsum("ij,ij->i", normals, axis) for axis in axes], axis=1).astype(np.float32)
+
+
+def pictures_of(given: object, cameras: Sequence[CameraLike]) -> list[tuple[U8, Camera]]:
+    """Pictures and their cameras, checked."""
+    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
+        raise TypeError(f"what must be a sequence of pictures with cameras=, got {shown(given)}")
+    if len(given) != len(cameras) or not len(cameras):
+        raise ValueError(
+            f"there must be a camera for each picture, got {len(given)} pictures and {len(cameras)} cameras"
+        )
+    found = []
+    for i, (one, own) in enumerate(zip(given, cameras, strict=True)):
+        picture, camera = as_array(f"what[{i}]", one), as_camera(own)
+        if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4):
+            raise ValueError(
+                f"what[{i}] must be (h, w, 3) or (h, w, 4) uint8, got {picture.dtype} of shape {picture.shape}"
+            )
+        if camera.lens is not None:
+            raise ValueError(f"cameras[{i}] must have no lens: straighten the picture first")
+        found.append((picture, camera))
+    return found
+
+
+def from_pictures(chart: Chart, pictures: Sequence[tuple[U8, Camera]], blend: str) -> Baked:
+    """The colours (H, W, 3) uint8 that pictures show of the mesh."""
+    mesh = chart.mesh
+    positions, ids = chart.values_of(np.ascontiguousarray(mesh.vertices, np.float32))
+    points, flat = positions.reshape(-1, 3), ids.reshape(-1)
+    normals = np.append(face_normals(mesh), np.zeros((1, 3), np.float32), axis=0)[flat]
+    sums, weights = np.zeros((flat.size, 3), np.float32), np.zeros(flat.size, np.float32)
+
+    def add(picture: U8, camera: Camera) -> None:
+        size = picture.shape[1], picture.shape[0]
+        frags = rasterize_mesh(mesh, camera, size, cull="none", threads=chart.n_threads)
+        light, clip, eye = LIGHT_OF_SRGB[picture[..., :3]], camera.clip_from_world(size), eye_of(camera)
+        what = frags.triangle, frags.depth, light, clip, eye, blend == "best", points, normals, flat
+
+        def add_texels(first: int, end: int) -> None:
+            engine.add_taken(*what, first, end, sums, weights)
+
+        run_parts(add_texels, flat.size, chart.n_threads)
+
+    for picture, camera in pictures:
+        if picture.size:
+            add(picture, camera)
+    is_seen = weights > 0
+    light_of = np.divide(sums, weights[:, None], out=np.zeros_like(sums), where=is_seen[:, None])
+    steps = np.rint(np.minimum(light_of, 1) * LINEAR_ONE).astype(np.int64)
+    values = srgb_tables()[1][steps].reshape(*ids.shape, 3)
+    triangle = np.where(is_seen.reshape(ids.shape), ids, np.int32(-1))
+    return Baked(values, triangle, triangle >= 0)
+
+
+def eye_of(camera: Camera) -> F64:
+    """Where a camera stands (x, y, z, 1), or, without perspective, the direction to it (x, y, z, 0)."""
+    if not camera.projection[3, :3].any():
+        return np.append(camera.view[2, :3], 0.0)
+    return np.append(engine.product(engine.inverse(camera.view[:3, :3]), -camera.view[:3, 3]), 1.0)
+
+
+def with_gutter(baked: Baked, gutter: int, n_threads: int) -> Baked:
+    """The same with texels round the charts that have what the nearest texel has."""
+    if not gutter:
+        return baked
+    height = len(baked.triangle)
+    along = FRESH.empty("along rows", baked.triangle.shape, np.int16)
+    nearest = FRESH.empty("nearest texels", baked.triangle.shape, np.int32)
+    triangle, values = np.ascontiguousarray(baked.triangle), np.ascontiguousarray(baked.values)
+    run_parts(lambda first, end: engine.find_in_rows(triangle, first, end, gutter, along), height, n_threads)
+    run_parts(lambda first, end: engine.find_gutter(along, first, end, gutter, nearest), height, n_threads)
+    run_parts(lambda first, end: engine.copy_texels(nearest, first, end, values), height, n_threads)
+    return Baked(values, triangle, baked.mask)
