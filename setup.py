@@ -18,9 +18,11 @@ CC                  on Windows, which clang to take
 import hashlib
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -151,9 +153,15 @@ def make_once(target: Path, key: str, make) -> None:
 
 
 class BuildAnew(build):
-    """Begin with an empty folder: a module that is gone would stay in it, and come into the wheel."""
+    """Begin with an empty folder: a module that is gone would stay in it, and come into the wheel.
+
+    A compiler that is missing is told before anything is copied, so that the sentence stands alone.
+    """
 
     def run(self) -> None:
+        command = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "")
+        if os.name != "nt" and command and shutil.which(command[0]) is None:
+            raise CompileError(f"topleft needs gcc or clang, and finds no {command[0]!r}: install one, or set CC")
         shutil.rmtree(self.build_lib, ignore_errors=True)
         super().run()
 

@@ -9,7 +9,13 @@
 
 #define TL_MAX_LEVELS 16
 
-typedef enum { TL_FILTER_NEAREST = 0, TL_FILTER_BILINEAR = 1, TL_FILTER_TRILINEAR = 2 } tl_filter;
+/* TL_FILTER_PIXELATED: TL_FILTER_NEAREST where texels are larger than a pixel, else TL_FILTER_TRILINEAR. */
+typedef enum {
+    TL_FILTER_NEAREST = 0,
+    TL_FILTER_BILINEAR = 1,
+    TL_FILTER_TRILINEAR = 2,
+    TL_FILTER_PIXELATED = 3
+} tl_filter;
 typedef enum { TL_WRAP_REPEAT = 0, TL_WRAP_CLAMP = 1, TL_WRAP_MIRROR = 2 } tl_wrap;
 
 /* A picture and its halves.  A texel is four uint16, red, green, blue and alpha, in 65535ths; row 0 is v = 0.  Behind
@@ -32,7 +38,7 @@ typedef struct {
 typedef struct {
     const float *texels;
     const int64_t *rows; /* of each level where it begins, in texels, and its width and height */
-    int n_levels;        /* 1 unless `filter` is TL_FILTER_TRILINEAR */
+    int n_levels;        /* 1 unless `filter` is TL_FILTER_TRILINEAR or TL_FILTER_PIXELATED */
     int n_channels;
     tl_filter filter;
     tl_wrap wrap_u, wrap_v;
@@ -122,7 +128,7 @@ typedef struct {
     /* The depth cue: a share (distance - near) * fog_scale of the light, 0 to 1, gives way to fog_color; fog_scale 0:
      * none.  The distance is w times distance_scale, or distance_start + depth * distance_scale without perspective. */
     float fog_color[3], fog_near, fog_scale, distance_start, distance_scale;
-    const float *decode; /* (256,): the light of an sRGB value */
+    const float *decode; /* (256,): the light of an sRGB value; NULL: colours of vertices are light */
     float background[4]; /* linear light and opacity */
     uint8_t background_bytes[4];
 } tl_shading;

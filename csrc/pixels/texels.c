@@ -126,14 +126,14 @@ TL_INLINE double level_of(const tl_levels *t, const float *slopes)
 TL_INLINE void look_up_one(const tl_levels *t, double u, double v, const float *slopes, float *out)
 {
     u = folded_to_array(u, t->wrap_u), v = folded_to_array(v, t->wrap_v);
-    if (t->filter == TL_FILTER_NEAREST) {
+    const double level = t->n_levels > 1 ? level_of(t, slopes) : 0.0;
+    if (t->filter == TL_FILTER_NEAREST || (t->filter == TL_FILTER_PIXELATED && level == 0.0)) {
         const int64_t width = t->rows[1], height = t->rows[2], n = t->n_channels;
         const int64_t x = wrapped(floor_of(u * (double)width), width, t->wrap_u);
         const int64_t y = wrapped(floor_of(v * (double)height), height, t->wrap_v);
         memcpy(out, t->texels + n * (y * width + x), (size_t)(4 * n));
         return;
     }
-    const double level = t->n_levels > 1 ? level_of(t, slopes) : 0.0;
     const int fine = (int)level;
     const double share = level - (double)fine;
     for (int first = 0; first < t->n_channels; first += TL_MAX_SUMS) {

@@ -132,11 +132,16 @@ TL_INLINE void start_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t 
         set_uv_lanes(p);
 }
 
-/* The colours of the vertices: interpolated as sRGB values, rounded to whole ones, then turned to light. */
+/* The colours of the vertices: interpolated as sRGB values, rounded to whole ones, then turned to light; or as light
+ * alone. */
 TL_INLINE void set_colors(shaded_lanes *p)
 {
     for (int c = 0; c < 3; c++) {
         const vf value = vf_mul(weighed(p, RUN_COLOR + c, RUN_COLOR + 3 + c, RUN_COLOR + 6 + c), p->inv_q);
+        if (!p->s->shading->decode) {
+            p->color[c] = vf_max(value, vf_set1(0.0f));
+            continue;
+        }
         const vi level = vi_max(vi_min(vi_rint(value), vi_set1(255)), vi_set1(0));
         p->color[c] = vf_of_bits(vi_gather(vm_all(), (const int32_t *)p->s->shading->decode, level));
     }

@@ -92,10 +92,15 @@ typedef struct {
     vf weight[4];
 } texel_quad;
 
-TL_INLINE void find_quad(const tl_texture *t, vi level, vf u, vf v, texel_quad *quad)
+/* In `sharp` lanes the nearest of them has all the weight. */
+TL_INLINE void find_quad(const tl_texture *t, vi level, vf u, vf v, vm sharp, texel_quad *quad)
 {
     const vi width = vi_lookup(t->width, level), height = vi_lookup(t->height, level), one = vi_set1(1);
-    const texel_pair x = find_pair(u, width, t->wrap_u), y = find_pair(v, height, t->wrap_v);
+    texel_pair x = find_pair(u, width, t->wrap_u), y = find_pair(v, height, t->wrap_v);
+    if (t->filter == TL_FILTER_PIXELATED) {
+        x.share = vf_select(sharp, vf_from_vi(vi_floor(vf_add(x.share, vf_set1(0.5f)))), x.share);
+        y.share = vf_select(sharp, vf_from_vi(vi_floor(vf_add(y.share, vf_set1(0.5f)))), y.share);
+    }
     const vi next = vi_add(y.first, one), stride = vi_add(width, one);
     const vi second = vi_select(vi_gt(height, next), next, t->wrap_v == TL_WRAP_REPEAT ? vi_set1(0) : y.first);
     const vi base = vi_add(vi_lookup(t->offset, level), x.first);
@@ -157,17 +162,18 @@ TL_INLINE void find_texels(const tl_texture *t, vf u, vf v, const vf *du, const 
     u = folded(u, t->wrap_u), v = folded(v, t->wrap_v);
     laid->as = t, laid->has_coarse = 0;
     if (t->filter == TL_FILTER_BILINEAR) {
-        find_quad(t, vi_set1(0), u, v, &laid->fine);
+        find_quad(t, vi_set1(0), u, v, vm_first(0), &laid->fine);
         return;
     }
     const vf zero = vf_set1(0.0f), last = vf_set1((float)(t->n_levels - 1));
-    const vf lod = vf_min(vf_max(level_of_detail(t, du, dv), zero), last);
+    const vf detail = level_of_detail(t, du, dv), lod = vf_min(vf_max(detail, zero), last);
     const vi level = vi_floor(lod);
+    const vm sharp = t->filter == TL_FILTER_PIXELATED ? vf_ge(zero, detail) : vm_first(0);
     laid->share = vf_sub(lod, vf_from_vi(level));
     laid->has_coarse = vm_any(vf_lt(zero, laid->share));
-    find_quad(t, level, u, v, &laid->fine);
+    find_quad(t, level, u, v, sharp, &laid->fine);
     if (laid->has_coarse)
-        find_quad(t, vi_min(vi_add(level, vi_set1(1)), vi_set1(t->n_levels - 1)), u, v, &laid->coarse);
+        find_quad(t, vi_min(vi_add(level, vi_set1(1)), vi_set1(t->n_levels - 1)), u, v, sharp, &laid->coarse);
 }
 
 TL_INLINE void filter_texels(const tl_texture *t, const laid_texture *laid, vf *rgba, int n_channels)

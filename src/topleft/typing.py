@@ -103,7 +103,7 @@ YOption: TypeAlias = Literal["up", "down"]
 
 AlphaModeOption: TypeAlias = Literal["opaque", "mask", "blend"]
 EncodingOption: TypeAlias = Literal["srgb", "linear"]
-FilterOption: TypeAlias = Literal["trilinear", "bilinear", "nearest"]
+FilterOption: TypeAlias = Literal["trilinear", "bilinear", "nearest", "pixelated"]
 LightKindOption: TypeAlias = Literal["directional", "point"]
 PointUnitOption: TypeAlias = Literal["px", "world"]
 ShadingOption: TypeAlias = Literal["smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"]

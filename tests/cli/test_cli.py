@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -149,7 +150,9 @@ def test_render_cloud_of_points_is_the_picture_of_points(run, folder):
 
 def test_render_word_in_braces_that_stands_for_nothing_is_refused(run, folder):
     status, lines = run("render", "cube", "-o", "{nam}.png")
-    message = "topleft: OUT may have {name}, {view}, {index}, {layer}, got {nam} in '{nam}.png'; did you mean name?"
+    message = (
+        "topleft: OUT may have {name}, {folder}, {view}, {index}, {layer}, got {nam} in '{nam}.png'; did you mean name?"
+    )
     assert (status, lines) == (2, [message])
     (folder / "{nam}").mkdir()
     assert run("render", "cube", "-o", "{nam}/{name}.png", *SMALL) == (0, [])
@@ -222,23 +225,44 @@ def test_render_views_go_round_the_mesh(run):
         assert np.array_equal(np.load(f"a-00{i_view}.npy") >= 0, expected)
 
 
-def test_render_files_of_one_name_would_collide(run, folder):
-    for place in ("a", "b"):
-        (folder / place).mkdir()
-        (folder / place / "cube.obj").write_text(QUADS)
-    status, lines = run("render", "a/cube.obj", "b/cube.obj", "-o", "out/")
-    assert (status, len(lines)) == (2, 1)
-    assert lines[0].startswith(
-        "topleft: 'a/cube.obj' and 'b/cube.obj' would both be written to 'out/cube.png'; put {index}"
-    )
-    assert names(folder) == ["a/cube.obj", "b/cube.obj"]
+@pytest.mark.parametrize(
+    ("out", "pictures"),
+    [
+        ("out/", ["out/Cube-3.png", "out/cube-2.png", "out/cube.png"]),
+        ("out/{folder}/{name}.png", ["out/a/cube-2.png", "out/a/cube.png", "out/b/Cube.png"]),
+        ("out/{index}-{name}.png", ["out/000-cube.png", "out/001-cube-2.png", "out/002-Cube.png"]),
+    ],
+)
+def test_render_files_of_one_name_have_numbers_or_folders(run, folder, out, pictures):
+    """Names that differ by case alone are one name on some disks; a mesh that has the number in its name keeps it."""
+    meshes = ["a/cube.obj", "a/cube-2.obj", "b/Cube.obj"]
+    for mesh in meshes:
+        (folder / mesh).parent.mkdir(exist_ok=True)
+        (folder / mesh).write_text(QUADS)
+    assert run("render", *meshes, "-o", out, *SMALL)[0] == 0
+    assert names(folder) == sorted([*meshes, *pictures])
 
 
-def test_render_names_that_differ_by_case_would_collide(run, folder):
-    for place, name in (("a", "cube.obj"), ("b", "Cube.obj")):
-        (folder / place).mkdir()
-        (folder / place / name).write_text(QUADS)
-    assert run("render", "a/cube.obj", "b/Cube.obj", "-o", "out/")[0] == 2
+@pytest.mark.parametrize(
+    ("suffix", "told"),
+    [
+        (".step", "reading 'x.step' needs another package: pip install cascadio"),
+        (".fbx", "cannot read 'x.fbx': there is no reader of .fbx; Blender and assimp convert it: assimp export x.fbx"),
+        (".usdz", "cannot read 'x.usdz': there is no reader of .usdz; Blender converts it"),
+        (".3ds", "cannot read 'x.3ds': there is no reader of .3ds; Blender and assimp convert it"),
+    ],
+)
+def test_render_goes_on_after_a_format_that_nothing_reads_and_names_what_does(run, folder, suffix, told):
+    pytest.importorskip("trimesh")
+    if suffix == ".step" and importlib.util.find_spec("cascadio"):
+        pytest.skip("cascadio is installed")
+    (folder / f"x{suffix}").write_text("what nobody reads")
+    assert run("render", f"x{suffix}", "-o", "x.png")[0] == 2
+    assert names(folder) == [f"x{suffix}"]
+    status, lines = run("render", f"x{suffix}", "cube", "-o", "out/", *SMALL)
+    assert status == 1
+    assert lines[0].startswith(f"topleft: {told}")
+    assert names(folder) == ["out/cube.png", f"x{suffix}"]
 
 
 def test_render_never_replaces_a_mesh(run, folder):
@@ -331,8 +355,10 @@ def test_render_many_goes_on_after_a_failure(run, folder):
 def test_render_without_trimesh_gives_the_hint(run, folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     (folder / "a.3mf").write_text("PK")
-    expected = "topleft: reading a mesh needs trimesh: pip install 'topleft[render]'"
-    assert run("render", "a.3mf", "cube", "-o", "out/", *SMALL) == (2, [expected])
+    expected = "topleft: reading 'a.3mf' needs another package: pip install 'topleft[render]'"
+    assert run("render", "a.3mf", "-o", "out/", *SMALL) == (2, [expected])
+    status, lines = run("render", "a.3mf", "cube", "-o", "out/", *SMALL)
+    assert (status, lines) == (1, [expected, "topleft: 1 of 2 meshes failed: a.3mf"])
 
 
 def test_render_shape_needs_no_optional_package(run, monkeypatch):

@@ -20,7 +20,7 @@ from PIL import Image
 
 from topleft import scenes
 from topleft._apps.cli import animation
-from topleft._apps.cli.sheet import make_sheet
+from topleft._apps.cli.sheet import make_sheet, wrapped
 from topleft._apps.cli.targets import Orbit
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
@@ -329,7 +329,61 @@ def test_sheet_leaves_room_for_what_failed(run, folder):
     sheet = pixels("sheet.png")
     assert sheet.shape == (8 + 48 + 24, 8 + 2 * (64 + 8), 3)
     assert (sheet[8:56, 8:72] != 255).any()
-    assert (sheet[8:56, 80:144] == 255).all()
+    reason = sheet[8:56, 80:144]
+    assert (reason[..., 0] > reason[..., 1]).any()  # red words
+    assert (reason[:, 62:] == 255).all()
+
+
+def test_sheet_wraps_reasons_and_cuts_long_words():
+    assert wrapped("no such file 'abcdefghijklm'", 10, len) == ["no such", "file", "'abcdefghi", "jklm'"]
+    assert wrapped("", 10, len) == []
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_report_tells_each_picture(run, folder, jobs):
+    (folder / "a.obj").write_text("mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
+    arguments = ["-o", "p/", "--report", "r/report.json", "--jobs", jobs, *SMALL]
+    assert run("render", "cube", "nope.obj", "a.obj", *arguments)[0] == 1
+    report = json.loads((folder / "r/report.json").read_text())
+    assert [report[name] for name in ("written", "skipped", "failed")] == [2, 0, 1]
+    cube, nope, a = report["pictures"]
+    assert (cube["mesh"], cube["status"], cube["files"]) == ("cube", "written", ["p/cube.png"])
+    assert (cube["size"], cube["bytes"]) == ([64, 48], (folder / "p/cube.png").stat().st_size)
+    assert cube["seconds"] > 0
+    assert (nope["status"], nope["error"], nope["files"]) == ("failed", "there is no file 'nope.obj'", [])
+    assert a["warnings"] == ["'a.obj': material libraries not found: 'gone.mtl'"]
+    run("render", "cube", *arguments, "--resume")
+    assert json.loads((folder / "r/report.json").read_text())["skipped"] == 1
+
+
+def test_report_that_is_no_json_file_is_refused(run):
+    status, lines = run("render", "cube", "-o", "a.png", "--report", "r.txt")
+    assert (status, lines) == (2, ["topleft: --report must be a file of this machine that ends in .json, got 'r.txt'"])
+
+
+def test_warnings_all_are_told_line_by_line(run, folder):
+    meshes = [f"{i}.obj" for i in range(10)]
+    for mesh in meshes:
+        (folder / mesh).write_text("mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
+    lines = run("render", *meshes, "-o", "p/", *SMALL)[1]
+    assert len(lines) == 1
+    assert lines[0].endswith("; and 2 more (--warnings all)")
+    lines = run("render", *meshes, "-o", "p/", "--warnings", "all", *SMALL)[1]
+    assert lines == [f"topleft: '{i}.obj': material libraries not found: 'gone.mtl'" for i in range(10)]
+
+
+def test_error_of_the_library_ends_no_batch(run, folder, monkeypatch):
+    """What no file should cause is told with its kind; alone it is raised, for its trace."""
+    (folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+    def broken(*_, **__):
+        raise KeyError("lost")
+
+    monkeypatch.setattr("topleft._apps.cli.targets.load", broken)
+    status, lines = run("render", "a.obj", "cube", "-o", "p/", *SMALL)
+    assert (status, lines) == (1, ["topleft: a.obj: KeyError: 'lost'", "topleft: 1 of 2 meshes failed: a.obj"])
+    with pytest.raises(KeyError, match="lost"):
+        run("render", "a.obj", "-o", "p/", *SMALL)
 
 
 # Animations

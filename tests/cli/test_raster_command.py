@@ -194,3 +194,52 @@ def test_command_leaves_optional_packages_alone(tmp_path, pair):
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=env, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+POLYGONS = {
+    "type": "FeatureCollection",
+    "features": [
+        {"type": "Feature", "properties": {"use": 3, "share": 0.5}, "geometry": {
+            "type": "MultiPolygon", "coordinates": [[[[1, 1], [4, 1], [4, 3], [1, 3]]], [[[5, 5], [7, 5], [7, 7]]]]}},
+        {"type": "Feature", "properties": {"use": 7, "share": 2}, "geometry": {"type": "Polygon", "coordinates": [
+            [[4, 1], [6, 1], [6, 3]]]}},
+    ],
+}  # fmt: skip
+GRID = ["--pixel-size", "0.5", "--extent", "0", "8", "0", "8", "--quiet"]
+
+
+@pytest.mark.parametrize(
+    ("more", "values", "nodata"),
+    [
+        ([], np.array([0, 0, 1], np.int32), -1),
+        (["--values", "use", "--nodata", "0"], np.array([3, 3, 7], np.int32), 0),
+        (["--values", "share", "--nodata", "-9999"], np.array([0.5, 0.5, 2]), -9999),
+    ],
+)
+def test_polygons_of_a_file_become_a_raster(tmp_path, more, values, nodata):
+    rasterio = pytest.importorskip("rasterio")
+    (tmp_path / "a.geojson").write_text(json.dumps(POLYGONS))
+    assert main(["raster", str(tmp_path / "a.geojson"), "-o", str(tmp_path / "a.tif"), *GRID, *more]) == 0
+    grid = tl.Grid((16, 16), (0, 8, 0, 8), crs="EPSG:4326", nodata=nodata)
+    rings = [
+        [POLYGONS["features"][0]["geometry"]["coordinates"][0][0]],
+        [POLYGONS["features"][0]["geometry"]["coordinates"][1][0]],
+        [POLYGONS["features"][1]["geometry"]["coordinates"][0]],
+    ]
+    with rasterio.open(tmp_path / "a.tif") as found:
+        assert tl.Grid.like(found) == grid
+        assert np.array_equal(found.read(1), tl.polygons(rings, grid, values=values))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--values", "name"], "--values name: object 0 of"),
+        (["--kind", "depth"], "polygons have numbers, values and a mask, got depth"),
+        (["--surface", "lower"], "polygons have numbers, values and a mask, got lower"),
+    ],
+)
+def test_what_polygons_have_not_is_told_in_one_line(tmp_path, capsys, more, said):
+    (tmp_path / "a.geojson").write_text(json.dumps(POLYGONS))
+    assert main(["raster", str(tmp_path / "a.geojson"), "-o", str(tmp_path / "a.tif"), *GRID, *more]) == 2
+    assert said in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """The page of the explorer in a browser: what is seen is what the library draws, whatever is dragged or pressed."""
 
 import json
+import re
 import shutil
 from contextlib import contextmanager
 
@@ -162,15 +163,16 @@ def test_keys_take_and_move_a_corner_and_undo(page):
     check_pictures(page)
 
 
-def test_tab_goes_through_the_scenes_and_escape_leaves_the_picture(page):
+def test_page_down_goes_through_the_scenes_and_tab_leaves_the_picture(page):
     page.locator("[data-panel=pixels] .stage").focus()
     for name in ("wide", "tall"):
-        page.keyboard.press("Tab")
+        page.keyboard.press("PageDown")
         page.wait_for_function(f"() => document.querySelector('.status').textContent === '{name}'")
         check_pictures(page)
-    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("PageUp")
     page.wait_for_function("() => document.querySelector('.status').textContent === 'wide'")
-    page.keyboard.press("Escape")
+    assert page.inner_text("[data-panel=pixels] .about") == "a triangle wider than tall"
+    page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.getAttribute('aria-label')") == "Scene"
 
 
@@ -180,12 +182,21 @@ def test_all_controls_are_reached_by_keyboard_alone(page):
     assert page.evaluate("document.activeElement.className") == "stage"
     page.keyboard.press("ArrowRight")
     page.wait_for_function("() => document.querySelector('.why').textContent.includes('(9, 6)')")
-    page.keyboard.press("Escape")
+    page.keyboard.press("Tab")
     reached = set()
     for _ in range(60):
         reached.add(page.evaluate(NAME))
         page.keyboard.press("Tab")
-    assert {"Scene", "draws", "beside it", "sub-pixel bits", "sampling", "corner 1, x", "split", "Copy link"} <= reached
+    assert {
+        "Scene",
+        "method",
+        "compare with",
+        "sub-pixel bits",
+        "sampling",
+        "corner 1, x",
+        "split",
+        "Copy link",
+    } <= reached
 
 
 def edit(page, name):
@@ -208,8 +219,9 @@ def test_triangles_are_added_split_flipped_and_removed(page):
 
 
 def test_methods_and_rules_are_switched(page):
-    for label, value in (("draws", "edge_increment/bottom-right"),
-                         ("beside it", ""), ("draws", "scanline"), ("sampling", "msaa4"), ("sub-pixel bits", "exact"),
+    for label, value in (("method", "edge_increment/bottom-right"),
+                         ("compare with", ""), ("method", "scanline"), ("sampling", "msaa4"),
+                         ("sub-pixel bits", "exact"),
                          ("sampling", "outer"), ("sampling", "area"), ("cull", "back"), ("winding", "clockwise"),
                          ("sampling", "center")):  # fmt: skip
         pixels_of(page).get_by_label(label, exact=True).select_option(value)
@@ -224,7 +236,7 @@ def test_hovered_pixel_says_whose_it_is(page):
     page.mouse.move(box["x"] + 9.5 * cell, box["y"] + 7.5 * cell)
     page.wait_for_function("() => document.querySelector('.why').textContent.includes('draws it')")
     told = page.locator(".why").inner_text()
-    assert "left edge of triangle 1, so the pixel is its own" in told
+    assert "left edge of triangle 1, so the pixel belongs to it" in told
     assert (
         "bresenham_scanline draws it 2 times, for triangle 0 and triangle 1; by the exact rule it is triangle 1's."
         in told
@@ -266,7 +278,7 @@ def test_exported_file_is_saved(page, button, begins):
 
 def test_link_restores_the_state_in_another_page(page, chromium, explorer):
     drag(page, 2, (30, -20))
-    pixels_of(page).get_by_label("draws", exact=True).select_option("zigzag")
+    pixels_of(page).get_by_label("method", exact=True).select_option("zigzag")
     pixels_of(page).get_by_label("sub-pixel bits").select_option("4")
     check_pictures(page)
     page.wait_for_timeout(400)
@@ -366,3 +378,90 @@ def test_page_works_in_the_cell_of_a_notebook(page):
     check_pictures(page)
     assert content.moved.tolist() == state_of(page)["vertices"] != [[1, 1], [12, 3], [2, 9]]
     assert page.evaluate("location.hash") == before
+
+
+def test_window_is_zoomed_and_moved_and_shown_whole_again(page):
+    """Wheel and keys zoom round a place, Shift and the mouse move: each time Python draws the window anew."""
+    whole = state_of(page)
+    box = page.locator('[data-key="a"] svg').bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.wheel(0, -300)
+    page.wait_for_function(QUIET)
+    near = state_of(page)
+    assert near["size"] < whole["size"]
+    assert all(0 < at < n for at, n in zip(near["origin"], whole["size"], strict=True))
+    check_pictures(page)
+    page.keyboard.down("Shift")
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2 + 80, box["y"] + box["height"] / 2, steps=4)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    assert state_of(page)["origin"][0] < near["origin"][0]
+    check_pictures(page)
+    page.locator("[data-panel=pixels] .stage").focus()
+    page.keyboard.press("-")
+    assert state_of(page)["size"] > near["size"]
+    page.keyboard.press("Home")
+    check_pictures(page)
+    assert (state_of(page)["size"], state_of(page)["origin"]) == (whole["size"], whole["origin"])
+
+
+def test_window_is_pinched_by_two_fingers(chromium, explorer):
+    with opened(chromium, explorer, viewport=PHONE, has_touch=True) as page:
+        whole = state_of(page)["size"]
+        box = page.locator('[data-key="a"] svg').bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        touch = page.context.new_cdp_session(page)
+        for kind, reach in (("touchStart", 20), ("touchMove", 40), ("touchMove", 60)):
+            fingers = [{"x": x - reach, "y": y, "id": 0}, {"x": x + reach, "y": y, "id": 1}]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        page.wait_for_function(f"() => {STATE}.size[0] < {whole[0]}")
+        check_pictures(page)
+
+
+BOXES = """() => ["figcaption", ".view", ".why", ".side"]
+  .flatMap((one) => [...document.querySelectorAll(`[data-panel=pixels] ${one}`)])
+  .map((one) => one.getBoundingClientRect()).map(({left, right, top, bottom}) => [left, right, top, bottom])"""
+
+
+@pytest.mark.parametrize("width", [390, 1280, 1440, 1920])
+@pytest.mark.parametrize("scene", ["shared-edge", "tight-fan", "fan-128-gap"])
+def test_nothing_overlaps_and_nothing_is_wider_than_the_page(chromium, scene, width):
+    viewport = {"width": width, "height": 860}
+    with tl.explore(scene, wait=False, browser=False) as found, opened(chromium, found, viewport=viewport) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        boxes = page.evaluate(BOXES)
+        for i, (left, right, top, bottom) in enumerate(boxes):
+            for others in boxes[:i]:
+                is_beside = right <= others[0] + 1 or left >= others[1] - 1
+                assert is_beside or bottom <= others[2] + 1 or top >= others[3] - 1
+
+
+def test_edges_are_switched_off(page):
+    page.locator("[data-panel=pixels] .edged").uncheck()
+    assert page.locator('[data-key="a"] .edges').get_attribute("d") == ""
+    page.locator("[data-panel=pixels] .edged").check()
+    assert page.locator('[data-key="a"] .edges').get_attribute("d") != ""
+
+
+def test_counts_add_up(page):
+    """The kinds of wrong pixels are all that are wrong; those of the difference all that either draws."""
+    told = page.inner_text('[data-key="b"] figcaption')
+    n, kinds = re.search(r"([\d,]+) wrong: (.*)", told).groups()
+    assert int(n) == sum(map(int, re.findall(r"(\d+) ", kinds + " ")))
+    n, whole = re.search(
+        r"(\d+) of (\d+) pixels differ", page.inner_text('[data-key="difference"] figcaption')
+    ).groups()
+    legend = [int(one) for one in re.findall(r"(\d+) ", page.inner_text('[data-key="difference"] .legend'))]
+    assert sum(legend) == int(whole)
+    assert sum(legend[1:]) == int(n)
+
+
+def test_page_without_its_socket_says_so(chromium, explorer):
+    context = chromium.new_context()
+    context.add_init_script("WebSocket = class { constructor() { setTimeout(() => this.onerror(), 0); } }")
+    page = context.new_page()
+    page.goto(explorer.url.split("#")[0])
+    page.wait_for_function("() => document.querySelector('.status').textContent.includes('WebSocket is blocked')")
+    context.close()

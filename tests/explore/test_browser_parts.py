@@ -74,7 +74,7 @@ def mesh_page(chromium, explorer):
 @pytest.fixture
 def steps_page(chromium, explorer):
     with opened(chromium, explorer, "#steps=" + json.dumps({"scene": "two-triangles", "method": "edge"})) as page:
-        page.wait_for_function(f"() => {PART}.steps.state().step > 0")
+        page.wait_for_function(f"() => {PART}.steps.state().step === 0")
         yield page
 
 
@@ -170,6 +170,14 @@ def test_click_tells_the_triangle(mesh_page):
     page.wait_for_function("() => document.querySelector('[data-panel=mesh] dl').children.length > 2")
     told = page.inner_text("[data-panel=mesh] dl").split("\n")
     assert told[told.index("triangle") + 1] == str(frags.triangle[y, x])
+    page.set_input_files(
+        "[data-panel=mesh] input[type=file]",
+        {"name": "a.obj", "mimeType": "text/plain", "buffer": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"},
+    )
+    page.wait_for_function(
+        "() => document.querySelector('[data-panel=mesh] .side').textContent.includes('1 triangles')"
+    )
+    assert page.evaluate("document.querySelector('[data-panel=mesh] dl').children.length") == 0
 
 
 def test_layer_is_chosen_and_restored_by_the_link(chromium, explorer, mesh_page):
@@ -247,6 +255,14 @@ def test_steps_go_on_and_back_by_keys(steps_page):
     assert "E0" in told
     page.keyboard.press("Shift+ArrowRight")
     assert steps_state(page)["step"] > 3
+    page.keyboard.press("Home")
+    assert steps_state(page)["step"] == 0
+    page.keyboard.press("PageDown")
+    page.keyboard.press("PageDown")
+    second = steps_state(page)["step"]
+    assert "triangle 1" in page.inner_text("[data-panel=steps] .legend")
+    page.keyboard.press("PageUp")
+    assert 0 < steps_state(page)["step"] < second
     page.keyboard.press("End")
     page.keyboard.press("Home")
     assert steps_state(page)["step"] == 0

@@ -150,8 +150,8 @@ def test_probe_of_a_shared_edge_names_both_sides_and_the_owner():
     told = ask("pixels.probe", state=SQUARE | {"method": "bresenham_scanline"}, pixel=[5, 5]).header
     assert told["owner"] == 1
     assert told["sentences"][0] == (
-        "The centre of pixel (5, 5) lies on an edge. Edge 1\N{EN DASH}2 is a left edge of triangle 1, so the pixel is "
-        "its own. Edge 1\N{EN DASH}2 is a right edge of triangle 0, so the pixel is not its own."
+        "The centre of pixel (5, 5) lies on an edge. Edge 1\N{EN DASH}2 is a left edge of triangle 1, so the pixel "
+        "belongs to it. Edge 1\N{EN DASH}2 is a right edge of triangle 0, so the pixel does not belong to it."
     )
     assert told["sentences"][1] == (
         "bresenham_scanline draws it 2 times, for triangle 0 and triangle 1; by the exact rule it is triangle 1's."

@@ -98,6 +98,16 @@ def test_readme_heights_and_fields_are_those_of_the_sphere(folder):
     assert np.isnan(found["grid"][0, 0])
 
 
+def test_readme_grid_has_a_crs_and_no_data(folder):
+    rasterio = pytest.importorskip("rasterio")
+    pytest.importorskip("pyproj")
+    found = {}
+    exec(PROGRAMS["CRS and no data"], found)
+    assert np.unique(found["zones"]).tolist() == [-9999, 7]
+    with rasterio.open(folder / "zones.tif") as raster:
+        assert (raster.crs.to_epsg(), raster.nodata) == (25832, -9999)
+
+
 def test_readme_polygons_have_a_hole_of_another_label(folder):
     found = {}
     exec(PROGRAMS["Polygons"], found)

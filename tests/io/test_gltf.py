@@ -236,6 +236,36 @@ def test_gltf_vertex_colors_are_light_beside_a_material(load, dtype):
     assert mesh.materials[0].color == (255, 0, 0)
 
 
+def test_gltf_light_is_linear_between_vertices(load):
+    """Half red and half green light in the middle: sRGB 188, and not the 128 between the numbers."""
+    file = GltfFile(materials=[{"extensions": {"KHR_materials_unlit": {}}}])
+    colors = np.array([[1, 0, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]], np.float32)
+    mesh = load(file.shown(QUAD, [0, 1, 2, 0, 2, 3], COLOR_0=colors, material=0))
+    assert mesh.color_interpolation == "linear"
+    low, high = mesh.bounds
+    camera = tl.Camera.look_at(((low + high) / 2 + [0, 0, 5]).tolist(), ((low + high) / 2).tolist(), ortho_height=1.0)
+    picture = tl.render(mesh, camera, (8, 8)).astype(int)
+    assert np.abs(picture[4, 3:5, :2].mean(axis=0) - 188).max() <= 2
+
+
+@pytest.mark.parametrize(
+    ("filters", "expected"),
+    [
+        ({}, "trilinear"),
+        ({"magFilter": 9728}, "pixelated"),
+        ({"magFilter": 9728, "minFilter": 9987}, "pixelated"),
+        ({"magFilter": 9728, "minFilter": 9728}, "nearest"),
+        ({"magFilter": 9729, "minFilter": 9729}, "bilinear"),
+    ],
+)
+def test_gltf_filters_are_told_apart(load, filters, expected):
+    file = GltfFile()
+    index = file.texture(np.zeros((2, 2, 3), np.uint8), **filters)
+    file.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": index}}}]
+    mesh = load(file.shown(TEXCOORD_0=[[0, 0], [1, 0], [0, 1]], material=0))
+    assert mesh.materials[0].texture.filter == expected
+
+
 def test_gltf_material_says_what_the_file_says(load):
     material = material_of(
         load,
@@ -294,7 +324,7 @@ def test_gltf_textures_have_their_places(load):
     assert mesh.uv.tolist() == [[0, 1], [1, 1], [0, 0.75]]
     assert mesh.uv1.tolist() == mesh.uv.tolist()
     rough = material.metallic_roughness_texture
-    assert (rough.encoding, rough.uv_set, rough.wrap, rough.filter) == ("linear", 1, ("clamp", "mirror"), "nearest")
+    assert (rough.encoding, rough.uv_set, rough.wrap, rough.filter) == ("linear", 1, ("clamp", "mirror"), "pixelated")
     assert material.occlusion_texture is rough
     assert (material.texture.encoding, material.texture.filter) == ("srgb", "trilinear")
     assert material.emission_texture is material.texture

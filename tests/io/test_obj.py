@@ -220,6 +220,7 @@ def test_mtl_metallic_rough_maps_become_one(load, tmp_path):
         ("map_Kd http://a.example/b.png\n", "textures outside of its folder not read"),
         ("map_Kd a.mtl\n", "textures that cannot be read: 'a.mtl'"),
         ("map_Ks a.png\n", "map_Ks of its materials not read"),
+        ("map_Ka a.png\n", "map_Ka of its materials not read"),
         ("d 0\n", "materials that are wholly transparent"),
     ],
 )
@@ -229,6 +230,13 @@ def test_mtl_what_is_missing_is_told(tmp_path, mtl, message):
     with pytest.warns(MeshWarning, match=message) as caught:
         tl.load(tmp_path / "a.obj")
     assert len(caught) == 1
+
+
+@pytest.mark.filterwarnings("error::topleft.MeshWarning")
+@pytest.mark.parametrize("mtl", ["map_Ka a.png\nmap_Kd a.png\n", "map_Kd a.png\nmap_Ka a.png\n"])
+def test_mtl_ambient_map_beside_that_of_colour_is_not_missed(load, tmp_path, mtl):
+    picture(tmp_path, "a.png", np.zeros((1, 1, 3)))
+    assert material_of(load, mtl).texture is not None
 
 
 def test_mtl_paths_of_other_machines_are_found_by_name(load, tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import sys
 
 import numpy as np
 import pytest
@@ -242,7 +243,7 @@ def plane(files, points, **properties):
     files.joinpath("plane.json").write_text(json.dumps(feature))
 
 
-@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e300, 10**400, -1, 1.5, 2**31, True, None, "3"])
+@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e300, 10**400, -1, 1.5, 2**31, True, None, ["3"]])
 def test_labels_that_are_no_whole_numbers_are_refused(files, run, value):
     plane(files, SQUARE, a=value)
     status, lines = run("mask", "plane.json", "-o", "m.png", "--labels", "a")
@@ -287,3 +288,91 @@ def test_extent_without_polygons_is_told(files, run):
     status, lines = run("mask", "map.geojson", "-o", "m.png", "--size", "7x4", "--extent", 1000, 1001, 0, 1)
     assert (status, len(lines)) == (0, 1)
     assert "map: no polygon meets a pixel of the grid" in lines[0]
+
+
+PARCELS = [[9.0, 50.0], [9.1, 50.0], [9.1, 50.1], [9.0, 50.1]]
+
+
+def test_words_of_a_property_are_labels_with_a_legend(files, run):
+    feature = {"type": "Feature", "geometry": {"type": "Polygon"}}
+    uses = {"wood": SQUARE, "field": [[5, 0], [6, 0], [6, 1]], "höfe": [[0, 0], [1, 0], [1, 1], [0, 1]]}
+    features = [
+        {**feature, "properties": {"use": use}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+        for use, ring in uses.items()
+    ]
+    files.joinpath("uses.json").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    arguments = ["-o", "m.png", "--labels", "use", "--size", "7x4", "--extent", 0, 7, 0, 4]
+    assert run("mask", "uses.json", *arguments) == (0, [])
+    legend = json.loads(files.joinpath("m.png.legend.json").read_text())
+    assert legend == {"1": "field", "2": "höfe", "3": "wood"}
+    drawn = picture("m.png")
+    assert (drawn[1, 1], drawn[3, 0], drawn[0, 6]) == (3, 2, 0)
+
+
+@pytest.mark.parametrize(
+    ("more", "epsg", "nodata"), [([], 4326, None), (["--nodata", -7, "--labels", "index"], 4326, -7)]
+)
+def test_tif_of_polygons_says_where_it_lies(files, run, more, epsg, nodata):
+    rasterio = pytest.importorskip("rasterio")
+    plane(files, PARCELS)
+    assert run("mask", "plane.json", "-o", "m.tif", "--size", "20x10", "--extent", 9, 9.2, 50, 50.1, *more) == (0, [])
+    with rasterio.open(files / "m.tif") as found:
+        assert (found.crs.to_epsg(), found.nodata) == (epsg, nodata)
+        assert found.transform.to_gdal() == pytest.approx((9, 0.01, 0, 50.1, 0, -0.01))
+        pixels = found.read(1)
+    assert (pixels[:, :10] == (1 if more else 255)).all()
+    assert (pixels[:, 10:] == (nodata or 0)).all()
+
+
+def test_polygons_go_to_another_crs_on_request_and_are_refused_otherwise(files, run):
+    rasterio = pytest.importorskip("rasterio")
+    pyproj = pytest.importorskip("pyproj")
+    plane(files, PARCELS)
+    assert run("mask", "plane.json", "-o", "utm.tif", "--crs", "EPSG:25832") == (0, [])
+    x, y = pyproj.Transformer.from_crs(4326, 25832, always_xy=True).transform(*np.transpose(PARCELS))
+    with rasterio.open(files / "utm.tif") as found:
+        assert found.crs.to_epsg() == 25832
+        assert (found.bounds.left, found.bounds.top) == pytest.approx((x.min(), y.max()))
+    assert run("mask", "plane.json", "-o", "like.tif", "--like", "utm.tif", "--crs", "EPSG:25832") == (0, [])
+    assert np.array_equal(picture(files / "like.tif"), picture(files / "utm.tif"))
+    said = "topleft: plane.json is of EPSG:4326, utm.tif of EPSG:25832: --crs EPSG:25832 transforms it"
+    assert run("mask", "plane.json", "-o", "m.tif", "--like", "utm.tif") == (2, [said])
+
+
+@pytest.mark.parametrize("suffix", ["gpkg", "shp", "fgb"])
+def test_vector_files_are_read_where_their_packages_are(files, run, suffix):
+    pyogrio = pytest.importorskip("pyogrio")
+    shapely = pytest.importorskip("shapely")
+    square = shapely.Polygon(SQUARE)
+    other = shapely.MultiPolygon([shapely.box(5, 0, 6, 1), shapely.box(0, 0, 1, 1)])
+    pyogrio.raw.write(
+        files / f"a.{suffix}", np.array([square.wkb, other.wkb], object), [np.array(["b", "a"], object)], ["use"],
+        geometry_type="Unknown" if suffix == "gpkg" else "Polygon" if suffix == "shp" else "Unknown",
+        crs="EPSG:25832", driver={"gpkg": "GPKG", "shp": "ESRI Shapefile", "fgb": "FlatGeobuf"}[suffix],
+    )  # fmt: skip
+    arguments = ["-o", "m.tif", "--labels", "use", "--size", "7x4", "--extent", 0, 7, 0, 4]
+    assert run("mask", f"a.{suffix}", *arguments) == (0, [])
+    expected = tl.polygons([square, other], tl.Grid((7, 4), (0, 7, 0, 4)), values=np.array([2, 1], np.uint8))
+    assert np.array_equal(picture("m.tif"), expected)
+
+
+def test_vector_file_without_its_packages_gives_the_hint(files, run, monkeypatch):
+    for name in ("pyogrio", "fiona"):
+        monkeypatch.setitem(sys.modules, name, None)
+    (files / "a.gpkg").write_bytes(b"SQLite")
+    said = "topleft: reading 'a.gpkg' needs another package: pip install pyogrio shapely"
+    assert run("mask", "a.gpkg", "-o", "m.png") == (2, [said])
+    assert run("mask", "gone.gpkg", "-o", "m.png") == (2, ["topleft: No such file or directory: 'gone.gpkg'"])
+
+
+def test_vector_file_that_is_broken_is_told_in_one_line(files, run):
+    pytest.importorskip("pyogrio")
+    pytest.importorskip("shapely")
+    (files / "a.gpkg").write_bytes(b"SQLite")
+    status, lines = run("mask", "a.gpkg", "-o", "m.png")
+    assert (status, len(lines), lines[0].startswith("topleft: cannot read 'a.gpkg'")) == (2, 1, True)
+
+
+def test_no_data_of_a_mask_is_refused(files, run):
+    said = "topleft: --nodata is for --labels: a mask is 0 where nothing is"
+    assert run("mask", "map.geojson", "-o", "m.tif", "--nodata", 9) == (2, [said])

@@ -100,3 +100,17 @@ def test_masks_of_pycocotools_are_coarser():
     ours = tl.polygons([ring.ravel().tolist()], (SIDE, SIDE))
     at = centers()[(ours != theirs).ravel()]
     assert (shapely.distance(shapely.Polygon(ring).boundary, shapely.points(at)) < 1).all()
+
+
+def random_polygons(shapely, n=60):
+    rng = np.random.default_rng(0)
+    found = (shapely.Polygon(rng.uniform(0, 64, (7, 2))).buffer(0) for _ in range(n))
+    return [one for one in found if one.geom_type == "Polygon" and not one.is_empty]
+
+
+@pytest.mark.parametrize(("sampling", "is_touched"), [("center", False), ("outer", True)])
+def test_pixels_are_those_of_gdal_where_the_snap_moves_no_edge_over_a_centre(sampling, is_touched):
+    features, shapely = pytest.importorskip("rasterio.features"), pytest.importorskip("shapely")
+    for polygon in random_polygons(shapely):
+        burnt = features.rasterize([(polygon, 1)], (64, 64), all_touched=is_touched) > 0
+        assert np.array_equal(tl.polygons([polygon], (64, 64), sampling=sampling, subpixel_bits=16), burnt)

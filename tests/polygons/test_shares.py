@@ -2,6 +2,7 @@
 
 import tracemalloc
 import warnings
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -328,6 +329,61 @@ def test_no_data_that_a_raster_names_itself_does_not_count():
 def test_no_data_that_is_no_number_is_refused(nodata):
     with pytest.raises(TypeError, match="nodata must be a number"):
         tl.overlap([[square(0, 0, 2, 1)]], (2, 1)).means([[1, 2]], nodata=nodata)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_statistics_are_those_of_numpy_with_the_areas_as_weights(seed):
+    """One polygon far away, pixels without data, numbers that stand often: each statistic is that of a plain loop."""
+    rng = np.random.default_rng(seed)
+    rings = [[np.cumsum(rng.normal(size=(9, 2)), axis=0) * 3 + rng.uniform(0, 30, 2)] for _ in range(20)]
+    rings.append([square(900, 900, 905, 905)])
+    table = tl.overlap(rings, (32, 30))
+    raster = rng.integers(0, 4, (30, 32)).astype(np.float64)
+    raster[rng.random(raster.shape) < 0.2] = -9999
+    q = [0.0, 0.25, 0.5, 0.9, 1.0]
+    found = {
+        "count": table.counts(raster, nodata=-9999),
+        "min": table.minima(raster, nodata=-9999),
+        "max": table.maxima(raster, nodata=-9999),
+        "stdev": table.stdevs(raster, nodata=-9999),
+        "majority": table.majorities(raster, nodata=-9999),
+    }
+    quantiles, medians = table.quantiles(raster, q, nodata=-9999), table.quantiles(raster, nodata=-9999)
+    for i, (first, end) in enumerate(pairwise(table.starts.tolist())):
+        values, areas = raster.ravel()[table.pixels[first:end]], table.areas[first:end].astype(np.float64)
+        values, areas = values[values != -9999], areas[values != -9999]
+        assert found["count"][i] == pytest.approx(areas.sum())
+        if not len(values):
+            assert all(np.isnan(found[name][i]) for name in ("min", "max", "stdev", "majority"))
+            assert np.isnan([*quantiles[i], medians[i]]).all()
+            continue
+        assert (found["min"][i], found["max"][i]) == (values.min(), values.max())
+        mean = np.average(values, weights=areas)
+        assert found["stdev"][i] == pytest.approx(np.sqrt(np.average((values - mean) ** 2, weights=areas)))
+        assert found["majority"][i] == np.argmax(np.bincount(values.astype(int), areas))
+        order = np.argsort(values, kind="stable")
+        reached = np.cumsum(areas[order])
+        expected = [values[order][np.argmax(reached >= share * reached[-1] - 1e-9)] for share in q]
+        assert quantiles[i].tolist() == expected
+        assert medians[i] == expected[2]
+
+
+def test_counts_without_a_raster_are_areas():
+    table = tl.overlap([[[(0.5, 0), (2, 0), (2, 1), (0.5, 1)]]], (3, 1))
+    assert table.counts().tolist() == table.totals().tolist() == [1.5]
+
+
+def test_majority_of_equal_areas_is_the_least_number():
+    table = tl.overlap([[square(0, 0, 2, 1)], [square(5, 5, 6, 6)]], (2, 1))
+    found = table.majorities([[7, 3]])
+    assert found[0] == 3
+    assert np.isnan(found[1])
+
+
+@pytest.mark.parametrize("q", [-0.1, 1.5, np.nan, [[0.5]]])
+def test_quantiles_beyond_0_and_1_are_refused(q):
+    with pytest.raises(ValueError, match="q must be one number from 0 to 1 or several"):
+        tl.overlap([[square(0, 0, 2, 1)]], (2, 1)).quantiles([[1, 2]], q)
 
 
 def test_polygons_of_another_crs_are_told():

@@ -80,6 +80,7 @@ def test_shade_lights_are_those_of_the_reference(camera, specular, shininess):
 @ON_EACH_CAMERA
 def test_shade_vertex_colors_are_those_of_the_reference(camera):
     check(COLORED, camera, tl.Material())
+    check(replace(COLORED, color_interpolation="linear"), camera, tl.Material())
 
 
 @ON_EACH_CAMERA
@@ -106,6 +107,36 @@ def test_shade_nearest_texel_is_that_of_the_reference(wrap):
     expected = reference.encode(reference.sample(material.texture, w.of(KNOT.uv), None))[:, :3]
     # A coordinate that float32 rounds over the border between two texels: a few in ten thousand.
     assert (np.abs(got[frags.mask, :3] - expected) > 0.51).any(axis=1).mean() < 1e-3
+
+
+KINDS = ("pixelated", "nearest", "trilinear")
+
+
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+@pytest.mark.parametrize("n_repeats", [0.2, 9])
+def test_shade_pixelated_texture_is_nearest_where_texels_are_large_and_trilinear_elsewhere(n_repeats, wrap):
+    """Each pixel is that of one or the other to the bit; the rim of a sphere is always far in its halvings."""
+    mesh = textured("sphere", n_repeats)
+    found, nearest, trilinear = (
+        tl.render(mesh, size=SIZE, material=tl.Material(texture=tl.Texture(NOISE, kind, wrap), unlit=True))
+        for kind in KINDS
+    )
+    is_nearest, is_trilinear = (found == nearest).all(axis=-1), (found == trilinear).all(axis=-1)
+    assert (is_nearest | is_trilinear).all()
+    assert is_trilinear.all() == (n_repeats == 9)
+    if n_repeats < 1:
+        assert (is_nearest & ~is_trilinear).sum() > 1000
+        assert (is_trilinear & ~is_nearest).sum() > 1000
+
+
+@pytest.mark.parametrize("n_repeats", [0.2, 9])
+def test_samples_of_a_pixelated_texture_are_nearest_where_texels_are_large(n_repeats):
+    mesh = tl.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    uv = n_repeats * mesh.vertices[:, :2]
+    frags = tl.rasterize_mesh(mesh, tl.Camera.look_at((0, 0, 3)), SIZE)
+    found, nearest, trilinear = (frags.sample(tl.Texture(NOISE, kind), uv) for kind in KINDS)
+    assert np.array_equal(found, nearest if n_repeats < 1 else trilinear)
+    assert not np.array_equal(nearest, trilinear)
 
 
 def test_shade_seam_shows_no_line():

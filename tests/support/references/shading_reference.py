@@ -249,7 +249,8 @@ def picture(
     has_texture = material.texture is not None and mesh.uv is not None
     base = decode(material.color or (255, 255, 255)) * np.ones((len(n), 3))
     if mesh.colors is not None:
-        base = base * decode(np.rint(w.of(mesh.colors[:, :3])))
+        is_light = mesh.color_interpolation == "linear"
+        base = base * (w.of(decode(mesh.colors[:, :3])) if is_light else decode(np.rint(w.of(mesh.colors[:, :3]))))
     if has_texture:
         base = base * look_up(material.texture, w, mesh)[:, :3]
     if material.back_color is not None:

@@ -65,6 +65,8 @@ class Result:
         Whether its files were there and it was left out (`resume`).
     warnings : tuple of str
         What the mesh lacks of its file, a line each: textures that are not there, say.
+    seconds : float
+        How long the job took where it was drawn; of a mesh that several jobs share, the first has the reading.
     """
 
     index: int
@@ -73,6 +75,7 @@ class Result:
     error: Exception | None = None
     is_skipped: bool = False
     warnings: tuple[str, ...] = ()
+    seconds: float = 0.0
 
     @property
     def picture(self) -> npt.NDArray[np.uint8] | None:
@@ -291,7 +294,11 @@ def _one_by_one(jobs: Iterator[object], resume: bool) -> Iterator[Result]:
             yield Result(index, job, is_skipped=True)
             continue
         (outcome,) = runner.draw([(index, job)])
-        yield Result(index, job, outcome.picture, outcome.error, warnings=outcome.warnings)
+        yield _result(job, outcome)
+
+
+def _result(job: Job, outcome: Outcome) -> Result:
+    return Result(outcome.index, job, outcome.picture, outcome.error, False, outcome.warnings, outcome.seconds)
 
 
 @dataclass(eq=False)
@@ -318,10 +325,7 @@ class _Task:
             return [Result(index, job, error=self.came) for index, job in self.jobs]
         if isinstance(self.came, BaseException):
             raise self.came
-        return [
-            Result(index, job, outcome.picture, outcome.error, warnings=outcome.warnings)
-            for (index, job), outcome in zip(self.jobs, self.came, strict=True)
-        ]
+        return [_result(job, outcome) for (_, job), outcome in zip(self.jobs, self.came, strict=True)]
 
 
 def _chunks(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -138,6 +139,7 @@ class Outcome:
     error: Exception | None = None
     warnings: tuple[str, ...] = ()
     """What its mesh lacks of its file."""
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -220,13 +222,14 @@ class JobRunner:
         """Return what came of each job; an error of one does not stop the next."""
         outcomes = []
         for index, job in jobs:
+            start, picture, failure = time.perf_counter(), None, None
             with listening() as lines:
                 try:
                     picture = self.draw_one(job)
-                    outcomes.append(Outcome(index, picture, warnings=tuple(lines)))
                 except Exception as error:
                     _clear_frames(error)
-                    outcomes.append(Outcome(index, error=error, warnings=tuple(lines)))
+                    failure = error
+            outcomes.append(Outcome(index, picture, failure, tuple(lines), time.perf_counter() - start))
         return outcomes
 
     def draw_one(self, job: Job) -> Array | dict[str, Array] | None:

@@ -15,17 +15,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
-from topleft._apps.cli.arguments import REFUSED, Parser, add_render_arguments
+from topleft._apps.cli.arguments import FAILED, REFUSED, Parser, add_render_arguments
 from topleft._apps.cli.bake import add_bake_command
 from topleft._apps.cli.doctor import add_doctor_command
 from topleft._apps.cli.explain import add_plan_commands
 from topleft._apps.cli.explore import add_explore_command
 from topleft._apps.cli.mask import add_mask_command
 from topleft._apps.cli.raster import add_raster_command
-from topleft._apps.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
+from topleft._apps.cli.render import run_render
+from topleft._apps.cli.report import TOLD, complain, complain_of_lacks, one_line
 from topleft._core.engine.isa import build_info
 from topleft._meshes.io.notes import listening
-from topleft.errors import TopleftError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy, for numbers that overflow: lines of its own
             status: int = options.run(options)
         complain_of_lacks(lacks)
-    except (TopleftError, OSError, ValueError, MemoryError) as error:
+    except TOLD as error:
         complain(one_line(error))
         return REFUSED
     except KeyboardInterrupt:

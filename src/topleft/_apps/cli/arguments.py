@@ -23,8 +23,8 @@ from topleft._meshes.picture.shade import Shading
 from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
 
-REFUSED = 2
-"""Exit status: nothing could be done."""
+FAILED, REFUSED = 1, 2
+"""Exit status: a part of the work failed; nothing could be done."""
 
 UP_HELP = "the axis that points up: z for most CAD, print, scan and map files; never guessed (default y)"
 
@@ -42,7 +42,9 @@ OUT is a file or a folder:
   pictures/          a folder, made if need be: pictures/bunny.png, or pictures/bunny-000.png, ...
   a/{{name}}-{{view}}.jpg   a pattern: {{name}} of the mesh, {{view}} and {{index}} of the mesh in the list, as numbers,
                      {{layer}}; several layers without it: knot-color.png, knot-depth.png, ...
-Meshes of one name and different formats have the format in theirs: bunny-obj.png, bunny-ply.png.
+  a/{{folder}}/{{name}}.png  {{folder}} is that of the mesh, below the one that all meshes lie in
+Meshes of one name and different formats have the format in theirs: bunny-obj.png, bunny-ply.png. Further ones have
+numbers, unless {{folder}} or {{index}} tells them apart: tree.png, tree-2.png.
 Formats: {" ".join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
 
 --layers: {", ".join(LAYERS_OF_ONE_VIEW[:8])},
@@ -66,6 +68,9 @@ mesh lacks of its file (textures that are not there, say) is told in one line at
 
 Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written, or --strict and a
 mesh lacks something; 2, nothing was written.
+
+--report FILE.json: how many were "written", "skipped" and "failed", and of each of "pictures" its "mesh", "status",
+"files", "size", "bytes", "seconds", "warnings" and "error".
 """
 
 MAX_VIEWS = 100_000
@@ -114,6 +119,13 @@ def add_render_arguments(parser: Parser) -> None:
     add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
     add("--resume", action="store_true", help="leave out pictures whose files are there")
     add("--strict", action="store_true", help="exit with 1 if a mesh lacks something of its file: a texture, say")
+    add("--report", metavar="FILE", help="what came of each picture, as JSON; see below")
+    add(
+        "--warnings",
+        choices=["short", "all"],
+        default="short",
+        help="what meshes lack of their files: the first few in one line (default), or all, a line each",
+    )
     add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
     add(
         "--animation",

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._apps.cli.arguments import UsageError, positive, size
-from topleft._apps.cli.render import complain
+from topleft._apps.cli.report import complain
 from topleft._meshes.grid.bake import Baked, bake
 from topleft._meshes.io.images import SUFFIXES, save_image
 from topleft._meshes.io.load import load

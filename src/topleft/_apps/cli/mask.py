@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._apps.cli.arguments import UsageError, positive, size
-from topleft._apps.cli.render import FAILED, complain
+from topleft._apps.cli.arguments import FAILED, UsageError, positive, size
+from topleft._apps.cli.report import complain
+from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import Grid
 from topleft._core.base.options import Sampling
 from topleft._core.polygons.polygons import Rule, polygons
@@ -24,20 +27,25 @@ from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
 DEFAULT_SIDE = 1024
 
 MASK_HELP = """\
-FILE is GeoJSON (Polygon, MultiPolygon, features and collections of them; y is up) or annotations in the format of COCO
-(a picture for each image, of its size): polygons and run lengths, as lists and as text.
+FILE is GeoJSON (Polygon, MultiPolygon, features and collections of them; y is up), a GeoPackage, shapefile or other
+vector file that pyogrio or fiona reads, or annotations in the format of COCO (a picture for each image, of its size):
+polygons and run lengths, as lists and as text.
 
 OUT is a file, or for several images a pattern: masks/{name}.png, or masks/{folder}/{name}.png where images of several
 folders have one name; {index} is the number of the image. A mask is 255 inside and 0 outside, with --sampling
 area and msaa2 to msaa16 the share of the pixel in between. --labels writes numbers: index, of the objects in their
-order from 1 on, or a property of the features or annotations, such as category_id; 0 where nothing is. PNG holds
-numbers up to 65535; .npy and TIFF hold all.
+order from 1 on, or a property of the features or annotations, such as category_id; 0 where nothing is, or --nodata. PNG
+holds numbers up to 65535; .npy and TIFF hold all. Words of a property are numbered from 1 on in the order of the
+alphabet, and OUT.legend.json says which is which.
+
+A .tif of polygons on a plane is a GeoTIFF. Its CRS is that of the file (of GeoJSON degrees of WGS84, EPSG:4326), or
+--crs, to which the polygons are then transformed. --like RASTER takes size, extent, CRS and nodata of a raster.
 """
 
 
 def run_mask(options: argparse.Namespace) -> int:
     """Write masks or labels of the polygons in a file."""
-    pictures = load_polygons(options.file, has_crowds=not options.no_crowds)
+    pictures = load_polygons(options.file, has_crowds=not options.no_crowds, layer=options.layer)
     if options.image is not None:
         pictures = [p for p in pictures if options.image in (p.name, f"{p.folder}/{p.name}")]
         if not pictures:
@@ -46,13 +54,18 @@ def run_mask(options: argparse.Namespace) -> int:
         raise UsageError(f"{options.file} has {len(pictures)} images: -o needs {{name}}, or --image chooses one")
     if Path(options.out).suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
+    if options.nodata is not None and options.labels is None:
+        raise UsageError("--nodata is for --labels: a mask is 0 where nothing is")
     status, paths = 0, paths_of(pictures, options.out)
     for path, picture in zip(paths, pictures, strict=True):
         path.parent.mkdir(parents=True, exist_ok=True)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", UserWarning)
-            drawn = draw(picture, options)
-        save_image(path, drawn)
+            drawn, frame, legend = draw(picture, options)
+        is_placed = isinstance(frame, Grid) and path.suffix.lower() in (".tif", ".tiff")
+        save_image(path, drawn, grid=frame if is_placed and isinstance(frame, Grid) else None)
+        if legend:
+            path.with_name(f"{path.name}.legend.json").write_text(json.dumps(legend, indent=1, ensure_ascii=False))
         for one in caught:
             complain(f"{picture.name}: {one.message}")
         if picture.n_skipped:
@@ -76,46 +89,77 @@ def paths_of(pictures: list[PolygonPicture], out: str) -> list[Path]:
     return list(found)
 
 
-def draw(picture: PolygonPicture, options: argparse.Namespace) -> npt.NDArray[Any]:
-    """Return the mask or the labels of a picture."""
-    frame = frame_of(picture, options)
+Frame = tuple[int, int] | Grid
+
+
+def draw(picture: PolygonPicture, options: argparse.Namespace) -> tuple[npt.NDArray[Any], Frame, dict[int, str]]:
+    """Return the mask or the labels of a picture, where it lies, and what labels stand for."""
+    rings, frame = frame_of(picture, options)
     how: dict[str, Any] = {"rule": options.rule, "sampling": options.sampling, "threads": options.threads}
     how["max_crossings"] = options.max_crossings
     if options.labels is None:
-        mask = polygons(picture.polygons, frame, **how)
-        return np.rint(mask * np.float32(255)).astype(np.uint8)
-    labels = labels_of(picture, options.labels)
-    drawn = polygons(picture.polygons, frame, values=labels[picture.owners], **how)
-    if Path(options.out).suffix.lower() == ".npy":
-        return drawn
-    largest = int(labels.max(initial=0))
-    if largest > 65535 and Path(options.out).suffix.lower() == ".png":
-        raise UsageError(f"--labels {options.labels}: PNG holds numbers up to 65535, got {largest}; write .npy or .tif")
-    return drawn.astype(np.uint8 if largest < 256 else np.uint16 if largest < 65536 else np.int32)
+        mask = polygons(rings, frame, **how)
+        return np.rint(mask * np.float32(255)).astype(np.uint8), frame, {}
+    labels, legend = labels_of(picture, options.labels)
+    said = frame.nodata if options.nodata is None and isinstance(frame, Grid) else options.nodata
+    empty = 0 if said is None else int(said)
+    drawn = polygons(rings, frame, values=labels[picture.owners], background=empty, **how)
+    if Path(options.out).suffix.lower() != ".npy":
+        least, largest = min(empty, 0), max(int(labels.max(initial=0)), empty)
+        if largest > 65535 and Path(options.out).suffix.lower() == ".png":
+            raise UsageError(
+                f"--labels {options.labels}: PNG holds numbers up to 65535, got {largest}; write .npy or .tif"
+            )
+        drawn = drawn.astype(np.int32 if least < 0 or largest > 65535 else np.uint8 if largest < 256 else np.uint16)
+    return drawn, frame, legend
 
 
-def labels_of(picture: PolygonPicture, name: str) -> npt.NDArray[np.int32]:
-    """Return the number of each object."""
+def labels_of(picture: PolygonPicture, name: str) -> tuple[npt.NDArray[np.int32], dict[int, str]]:
+    """Return the number of each object, and what numbers of words stand for."""
     if name == "index":
-        return np.arange(1, len(picture.objects) + 1, dtype=np.int32)
+        return np.arange(1, len(picture.objects) + 1, dtype=np.int32), {}
+    values = [said.get(name) for said in picture.objects]
+    if values and all(isinstance(value, str) for value in values):
+        words, which = np.unique(np.array(values), return_inverse=True)
+        return (which + 1).astype(np.int32), dict(enumerate(words.tolist(), 1))
     numbers = []
-    for i, said in enumerate(picture.objects):
-        value = said.get(name)
+    for i, value in enumerate(values):
         if not isinstance(value, (int, float)) or not 0 <= value < 2**31 or value != int(value):
             raise UsageError(
                 f"--labels {name}: object {i} of {picture.name} has {value!r}, not a whole number from 0 on"
             )
         numbers.append(int(value))
-    return np.array(numbers, np.int32)
+    return np.array(numbers, np.int32), {}
 
 
-def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[int, int] | Grid:
-    """Return the size of an image, or the grid over a plane."""
+def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[Any, Frame]:
+    """Return the rings of a picture, and the size of an image or the grid over a plane that they lie in."""
     if picture.size is not None:
-        if options.extent is not None or options.size is not None:
-            raise UsageError("--size and --extent are for GeoJSON: images have a size")
-        return picture.size
-    points = picture.polygons[0]
+        given = [name for name in ("size", "extent", "crs", "like") if getattr(options, name) is not None]
+        if given:
+            raise UsageError(f"--{given[0]} is for polygons on a plane: images have a size")
+        return picture.polygons, picture.size
+    like = None if options.like is None else Grid.like(options.like)
+    if like is not None and (options.size is not None or options.extent is not None):
+        raise UsageError("--like says size and extent: give neither beside it")
+    (points, rings, polygon_offsets), crs = picture.polygons, options.crs or (picture.crs if like is None else like.crs)
+    if picture.crs is not None and crs is not None and not is_same_crs(picture.crs, crs):
+        if options.crs is None:
+            raise UsageError(f"{options.file} is of {picture.crs}, {options.like} of {crs}: --crs {crs} transforms it")
+        points = transformed(points, picture.crs, crs)
+    if like is not None:
+        if like.crs is not None and crs is not None and not is_same_crs(like.crs, crs):
+            raise UsageError(f"--crs must be that of --like, {like.crs}, got {crs}")
+        grid = like
+    else:
+        grid = grid_over(points, options)
+    nodata = grid.nodata if options.nodata is None else options.nodata
+    is_label = options.labels is not None and nodata is not None and float(nodata).is_integer()
+    return (points, rings, polygon_offsets), replace(grid, crs=crs, nodata=nodata if is_label else None)
+
+
+def grid_over(points: npt.NDArray[np.float64], options: argparse.Namespace) -> Grid:
+    """Return the grid of so many pixels over points, or over the extent that is asked for."""
     if options.extent is None and not len(points):
         raise UsageError(f"{options.file} has no polygons: --extent must say what is shown")
     if options.extent is None:
@@ -143,7 +187,7 @@ def add_mask_command(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     mask.set_defaults(run=run_mask)
-    mask.add_argument("file", metavar="FILE", help="GeoJSON, or annotations in the format of COCO")
+    mask.add_argument("file", metavar="FILE", help="GeoJSON, a vector file, or annotations of COCO")
     mask.add_argument("-o", "--out", required=True, metavar="OUT", help="where the picture goes; see below")
     mask.add_argument("--labels", metavar="NAME", help="write numbers: index, or a property")
     mask.add_argument(
@@ -154,6 +198,10 @@ def add_mask_command(commands: Any) -> None:
     mask.add_argument(
         "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="what is shown (all)"
     )
+    mask.add_argument("--crs", metavar="CRS", help="what the picture is in, EPSG:25832 say: the polygons go there")
+    mask.add_argument("--like", metavar="RASTER", help="take size, extent, CRS and nodata of a raster")
+    mask.add_argument("--nodata", type=int, metavar="N", help="what --labels have where nothing is (0)")
+    mask.add_argument("--layer", metavar="NAME", help="of a vector file (the first one)")
     mask.add_argument("--no-crowds", action="store_true", help="leave out annotations of COCO that are crowds")
     mask.add_argument("--image", metavar="NAME", help="the one of several images, its file name without the end")
     mask.add_argument(

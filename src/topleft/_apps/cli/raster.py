@@ -1,29 +1,37 @@
-"""`topleft raster`: a mesh to a raster of any size, in GeoTIFF, Zarr or Deep Zoom."""
+"""`topleft raster`: a mesh or polygons to a raster of any size, in GeoTIFF, Zarr or Deep Zoom."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from topleft._apps.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, positive, size, subpixel_bits
-from topleft._apps.cli.render import client_of, complain
+from topleft._apps.cli.render import client_of
+from topleft._apps.cli.report import complain
+from topleft._apps.tiles.areas import Areas, extent_of_polygons
 from topleft._apps.tiles.blocks import Triangles, mapped_npy, triangles_of
 from topleft._apps.tiles.drawing import KINDS
 from topleft._apps.tiles.tiles import WINDOW, Tiles, extent_of, tiles
+from topleft._core.base.georeference import is_same_crs, transformed
+from topleft._core.base.grid import grid_around
 from topleft._core.base.remote import Place, RemotePath, place_of
 from topleft._core.base.threads import available_threads
+from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, load_polygons
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.levels import Written
 
 RASTER_HELP = """\
 MESH is a mesh file, or two .npy files with a comma between them: vertices.npy,triangles.npy. Binary STL, binary PLY of
-triangles and .npy are mapped and need not fit memory. x and y are the plane, z is the height.
+triangles and .npy are mapped and need not fit memory. x and y are the plane, z is the height. GeoJSON and vector files
+(.gpkg, .shp, ...) are polygons: their numbers are written unless --values names a property, or --kind coverage asks for
+a mask. --crs transforms them.
 
 OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder, or a URL that fsspec reaches) or .dzi (Deep Zoom). Heights
 of the upper surface are written unless --labels, --values or --kind asks for something else. What is there is left
@@ -34,13 +42,14 @@ examples:
   topleft raster terrain.ply -o heights.tif --pixel-size 1 --crs EPSG:25832
   topleft raster v.npy,t.npy -o labels.zarr --pixel-size 0.5 --labels --levels 5 --resume
   topleft raster mesh.ply -o depth.tif --pixel-size 10 --values water_depth --nodata -9999
+  topleft raster parcels.gpkg -o use.tif --pixel-size 1 --values use_code --nodata 0
 """
 
 SUFFIXES = (".tif", ".tiff", ".zarr", ".dzi")
 
 
 def run_raster(options: argparse.Namespace) -> int:
-    """Write a raster of a mesh, of any size."""
+    """Write a raster of a mesh or of polygons, of any size."""
     path = place_of(options.out)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
@@ -70,7 +79,8 @@ def run_raster(options: argparse.Namespace) -> int:
             f"{written.n_kept} kept, {written.n_blank} blank"
         )
     if not (written.n_drawn or written.n_kept):
-        complain(f"no triangle of {options.mesh} lies within {options.out}: all of it is blank")
+        what = "polygon" if isinstance(raster.triangles, Areas) else "triangle"
+        complain(f"no {what} of {options.mesh} lies within {options.out}: all of it is blank")
     return 0
 
 
@@ -98,8 +108,46 @@ def compression(options: argparse.Namespace, usual: str) -> Any:
     return "none" if options.uncompressed else usual
 
 
+def raster_of_polygons(options: argparse.Namespace) -> Tiles:
+    """Return the raster of a file of polygons."""
+    (picture, *more) = load_polygons(options.mesh)
+    if more or picture.size is not None:
+        raise UsageError(f"{options.mesh} holds annotations of images: topleft mask draws them")
+    if options.surface is not None or options.kind not in (None, "labels", "coverage"):
+        raise UsageError(f"polygons have numbers, values and a mask, got {options.kind or options.surface}")
+    (points, rings, offsets), crs = picture.polygons, options.crs or picture.crs
+    if picture.crs is not None and crs is not None and not is_same_crs(picture.crs, crs):
+        points = transformed(points, picture.crs, crs)
+    subject = points, rings, offsets
+    kind: Any = options.kind or "labels"
+    more_options: dict[str, Any] = {} if options.subpixel_bits == 8 else {"subpixel_bits": options.subpixel_bits}
+    if options.values is not None:
+        kind = "fill"
+        said = [row.get(options.values) for row in picture.objects]
+        if not all(isinstance(value, int | float) for value in said):
+            i = next(i for i, value in enumerate(said) if not isinstance(value, int | float))
+            raise UsageError(f"--values {options.values}: object {i} of {options.mesh} has {said[i]!r}, no number")
+        values = np.array(said)
+        holds = values.dtype.kind in "bi" and (not values.size or np.abs(values).max() < 2**31)
+        more_options["values"] = values.astype(np.int32 if holds else np.float64)[picture.owners]
+    elif kind == "labels":
+        kind, more_options["values"] = "fill", np.arange(len(picture.objects), dtype=np.int32)[picture.owners]
+    nodata = -1 if options.nodata is None and options.values is None else options.nodata
+    step = options.pixel_size
+    extent = extent_of_polygons(subject) if options.extent is None else options.extent
+    grid = grid_around(extent, options.size, step if step is None or len(step) > 1 else step[0], "up")
+    grid = replace(grid, crs=crs, nodata=None if kind == "coverage" else nodata)
+    if kind == "fill" and nodata is not None:
+        more_options["background"] = nodata
+    return tiles(subject, grid, kind=kind, window=options.window, threads=options.threads, **more_options)
+
+
 def raster_of(options: argparse.Namespace) -> Tiles:
     """Return the raster that is asked for."""
+    if (options.pixel_size is None) == (options.size is None):
+        raise UsageError("either --pixel-size or --size must say how large the raster is")
+    if Path(options.mesh).suffix.lower() in (*VECTOR_SUFFIXES, ".geojson", ".json"):
+        return raster_of_polygons(options)
     named = options.mesh.split(",")
     mesh = tuple(named) if len(named) == 2 and all(name.endswith(".npy") for name in named) else options.mesh
     triangles = triangles_of(mesh, options.folder)
@@ -118,8 +166,6 @@ def raster_of(options: argparse.Namespace) -> Tiles:
         more["subpixel_bits"] = options.subpixel_bits
     if kind == "field" and options.nodata is not None:
         more["nodata"] = options.nodata
-    if (options.pixel_size is None) == (options.size is None):
-        raise UsageError("either --pixel-size or --size must say how large the raster is")
     step = options.pixel_size
     return tiles(
         triangles,
@@ -150,13 +196,13 @@ def add_raster_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
     raster = commands.add_parser(
         "raster",
-        help="write a raster of any size: heights, values, labels",
+        help="write a raster of any size: heights, values, labels, polygons",
         description=run_raster.__doc__,
         epilog=RASTER_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     raster.set_defaults(run=run_raster)
-    raster.add_argument("mesh", metavar="MESH", help="a mesh file, or vertices.npy,triangles.npy")
+    raster.add_argument("mesh", metavar="MESH", help="a mesh file, vertices.npy,triangles.npy, or polygons")
     raster.add_argument("-o", "--out", required=True, metavar="OUT", help="a file .tif or .dzi, or a folder .zarr")
     raster.add_argument(
         "--pixel-size", type=float, nargs="+", metavar="N", help="width, and height if it differs, of a pixel in units"

@@ -13,7 +13,7 @@ import tempfile
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -22,16 +22,14 @@ from typing import Any
 from topleft._apps.batch.batch import Result, render_batch
 from topleft._apps.batch.jobs import Job
 from topleft._apps.cli.animation import check_animation, save_animation
-from topleft._apps.cli.arguments import UsageError
+from topleft._apps.cli.arguments import FAILED, REFUSED, UsageError
 from topleft._apps.cli.job_file import read_jobs
+from topleft._apps.cli.report import TOLD, check_report, complain, complain_of_lacks, one_line, write_report
 from topleft._apps.cli.sheet import make_sheet
 from topleft._apps.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
 from topleft._core.base.remote import is_url
 from topleft._meshes.io.images import PICTURE_SUFFIXES, save_image
-from topleft.errors import MeshWarning, MissingPackageError, TopleftError
-
-FAILED = 1
-"""Exit status: a part of the work failed."""
+from topleft.errors import MeshWarning, MissingPackageError
 
 MOST_VIEWS_TOGETHER = 16
 """Views of a mesh that a process draws before it gives word: it reads the mesh once for them."""
@@ -39,9 +37,6 @@ MOST_VIEWS_TOGETHER = 16
 
 CONNECT_S = 20
 """How long a scheduler has to answer."""
-
-MOST_LACKS = 8
-"""What meshes lack that one line tells."""
 
 
 def run_render(options: argparse.Namespace) -> int:
@@ -54,11 +49,25 @@ def run_render(options: argparse.Namespace) -> int:
             check_animation(path)
         if extras:
             _check_pictures(groups, options)
+        if options.report:
+            check_report(options.report)
+            extras.append(Path(options.report))
         check_targets(groups, extras)
-        failed, lacks = _render(groups, options)
-        for _, message in failed:
+        results = _render(groups, options)
+        if options.report:
+            write_report(Path(options.report), (group.source for group in groups for _ in group.jobs), results)
+        reasons = _reasons(groups, results)
+        for message in dict.fromkeys(filter(None, reasons)):
             complain(message)
-        complain_of_lacks(lacks)
+        drawn = [result for result in results if result.error is None]
+        lacks = list(dict.fromkeys(line for result in drawn for line in result.warnings))
+        complain_of_lacks(lacks, is_each_told=options.warnings == "all")
+        failed = [group.source for group, reason in zip(groups, reasons, strict=True) if reason]
+        if failed and len(groups) > 1:
+            complain(f"{len(failed)} of {len(groups)} meshes failed: {' '.join(dict.fromkeys(failed))}")
+        if not drawn:
+            _raise_unknown(results)
+            return REFUSED
         for path, group in animations:
             if all(file.is_file() for file in _color_files(group)):
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -67,13 +76,27 @@ def run_render(options: argparse.Namespace) -> int:
                 save_animation(path, _color_files(group), fps=options.fps, background=opaque)
         if options.sheet:
             Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
-            sheet = make_sheet([_color_files(group) for group in groups], [group.name for group in groups])
+            sheet = make_sheet([_color_files(group) for group in groups], [group.name for group in groups], reasons)
             save_image(options.sheet, sheet)
-    if failed:
-        sources = list(dict.fromkeys(source for source, _ in failed))
-        complain(f"{len(sources)} of {len(groups)} meshes failed: {' '.join(sources)}")
-        return FAILED
-    return FAILED if lacks and options.strict else 0
+    return FAILED if failed or (lacks and options.strict) else 0
+
+
+def _reasons(groups: Sequence[MeshJobs], results: Sequence[Result]) -> list[str]:
+    """Why each mesh failed, as its first job that failed says; empty for those that did not."""
+    left, reasons = iter(results), []
+    for group in groups:
+        errors = [error for error in (next(left).error for _ in group.jobs) if error is not None]
+        reason = one_line(errors[0]) if errors else ""
+        is_named = not reason or len(groups) == 1 or group.source in reason
+        reasons.append(reason if is_named else f"{group.source}: {reason}")
+    return reasons
+
+
+def _raise_unknown(results: Sequence[Result]) -> None:
+    """Raise an error that is a fault of the library's own: its trace helps whoever reports it."""
+    for result in results:
+        if result.error is not None and not isinstance(result.error, TOLD):
+            raise result.error
 
 
 def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
@@ -96,14 +119,11 @@ def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
     return groups
 
 
-def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[list[tuple[str, str]], list[str]]:
-    """Render all; the sources of what failed, each with the reason, once, and what meshes lack of their files."""
+def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[Result]:
+    """Render all, whatever fails; what came of each job, in their order."""
     jobs = [job for group in groups for job in group.jobs]
     if options.dask is not None:
         jobs = [_elsewhere(job) for job in jobs]
-    source_of = [group.source for group in groups for _ in group.jobs]
-    failed: dict[tuple[str, str], None] = {}
-    lacks: dict[str, None] = {}
     with ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", MeshWarning)  # results have them
@@ -114,22 +134,18 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[li
             else client_of(options.dask, options.jobs, stack)
         )
         chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
-        results = stack.enter_context(
+        batch = stack.enter_context(
             render_batch(
                 jobs, executor=executor, progress=bar.step, on_error="collect", order="completed",
                 resume=options.resume, chunk=None if options.dask or isinstance(executor, int) else chunk,
             )
         )  # fmt: skip
-        for result in results:
-            lacks |= dict.fromkeys(result.warnings)
-            if result.error is None:
-                continue
-            known = isinstance(result.error, (TopleftError, OSError, ValueError, MemoryError))
-            if len(groups) == 1 or isinstance(result.error, MissingPackageError) or not known:
+        results = []
+        for result in batch:
+            if isinstance(result.error, BrokenExecutor):  # all that are left would say the same
                 raise result.error
-            failed[source_of[result.index], one_line(result.error)] = None
-    order = {group.source: i for i, group in reversed(list(enumerate(groups)))}
-    return sorted(failed, key=lambda entry: order[entry[0]]), list(lacks)
+            results.append(result)
+    return sorted(results, key=lambda result: result.index)
 
 
 def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor | int | None:
@@ -268,24 +284,3 @@ class _Progress:
     def step(self, _: Result) -> None:
         if self._bar is not None:
             self._bar.update()
-
-
-def complain(message: str) -> None:
-    """Print one line on stderr."""
-    print(f"topleft: {message}", file=sys.stderr)
-
-
-def complain_of_lacks(lines: Sequence[str]) -> None:
-    """Print what meshes lack of their files, in one line."""
-    if lines:
-        more = f"; and {len(lines) - MOST_LACKS} more" if len(lines) > MOST_LACKS else ""
-        complain("; ".join(lines[:MOST_LACKS]) + more)
-
-
-def one_line(error: BaseException) -> str:
-    """What is wrong, in one line."""
-    if isinstance(error, MemoryError):
-        return "not enough memory for a mesh or picture of this size"
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.strerror}: {error.filename!r}" if error.filename else error.strerror
-    return " ".join(str(error).split())

@@ -6,7 +6,7 @@ Input: the files of the pictures. Output: a picture (H, W, 3) uint8.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,17 +15,21 @@ import numpy.typing as npt
 LONGEST_SIDE = 256
 GAP = 8
 CAPTION_HEIGHT = 16
-PAPER, INK = (255, 255, 255), (60, 60, 60)
+LINE_HEIGHT = 13
+PAPER, INK, ALARM = (255, 255, 255), (60, 60, 60), (176, 0, 32)
 
 
-def make_sheet(files: Sequence[Sequence[Path]], captions: Sequence[str]) -> npt.NDArray[np.uint8]:
-    """Return a sheet of the pictures of each mesh; what is not there stays empty.
+def make_sheet(
+    files: Sequence[Sequence[Path]], captions: Sequence[str], reasons: Sequence[str] = ()
+) -> npt.NDArray[np.uint8]:
+    """Return a sheet of the pictures of each mesh; where one is not there, its cell says the reason.
 
     Several pictures of several meshes: a row for each mesh. Otherwise the rows make the sheet about square.
     """
     from PIL import Image, ImageDraw
 
     n_views = max(map(len, files))
+    mesh_of = [i for i, views in enumerate(files) for _ in views]
     if len(files) > 1 and n_views > 1:
         n_columns, cells = n_views, [(row, k, file) for row, views in enumerate(files) for k, file in enumerate(views)]
     else:
@@ -33,9 +37,11 @@ def make_sheet(files: Sequence[Sequence[Path]], captions: Sequence[str]) -> npt.
         n_columns = math.ceil(math.sqrt(len(flat)))
         cells = [(i // n_columns, i % n_columns, file) for i, file in enumerate(flat)]
     n_rows = 1 + max(row for row, _, _ in cells)
-    pictures = {}
-    for row, column, file in cells:
+    pictures, missing = {}, {}
+    for i, (row, column, file) in enumerate(cells):
+        missing[row, column] = reasons[mesh_of[i]] if reasons else ""
         if file.is_file():
+            del missing[row, column]
             with Image.open(file) as image:
                 reduced = image.convert("RGBA")
                 reduced.thumbnail((LONGEST_SIDE, LONGEST_SIDE), Image.Resampling.HAMMING)
@@ -48,9 +54,27 @@ def make_sheet(files: Sequence[Sequence[Path]], captions: Sequence[str]) -> npt.
     for (row, column), picture in pictures.items():
         left, top = GAP + column * step_x, GAP + row * step_y
         sheet.paste(picture, (left + (width - picture.width) // 2, top + (height - picture.height) // 2), picture)
+    for (row, column), reason in missing.items():
+        lines = wrapped(reason, width - 4, pen.textlength)[: max(1, height // LINE_HEIGHT)]
+        pen.text((GAP + column * step_x + 2, GAP + row * step_y), "\n".join(lines), fill=ALARM, spacing=2)
     for i, caption in enumerate(captions):
         row, column = (i, 0) if n_views > 1 else (i // n_columns, i % n_columns)
         if len(captions) == 1:
             row, column = n_rows - 1, 0
         pen.text((GAP + column * step_x + 2, GAP + row * step_y + height + 2), caption, fill=INK)
     return np.asarray(sheet)
+
+
+def wrapped(text: str, width: float, length: Callable[[str], float]) -> list[str]:
+    """Return the lines of a text that are no longer than the width; words that are longer are cut."""
+    lines = [""]
+    for word in text.split():
+        rest = word
+        if lines[-1] and length(f"{lines[-1]} {rest}") <= width:
+            lines[-1] += f" {rest}"
+            continue
+        while rest:
+            n = next((n for n in range(len(rest), 1, -1) if length(rest[:n]) <= width), 1)
+            lines.append(rest[:n])
+            rest = rest[n:]
+    return lines[1:]

@@ -6,6 +6,7 @@ Input: parsed arguments. Output: a list of `MeshJobs`.
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -199,7 +200,8 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
     drawing = _render_options(options)
     limits = tuple((name, getattr(options, name)) for name in LIMITS)
     groups = []
-    names = names_of(options.meshes)
+    names = names_of(options.meshes, with_numbers="{index}" not in pattern, with_folders="{folder}" in pattern)
+    folders = folders_of(options.meshes)
     for i_mesh, source in enumerate(options.meshes, start):
         name = names[i_mesh - start]
         moment = options.time, options.clip
@@ -208,6 +210,7 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
         for i_view in range(options.views):
             # Not str.format: a folder may have other braces in its name.
             filled = pattern.replace("{view}", f"{i_view:03d}").replace("{index}", f"{i_mesh:03d}")
+            filled = filled.replace("{folder}", folders[i_mesh - start])
             azimuth_deg = options.azimuth + 360 * i_view / options.views
             camera: Orbit | FileCamera = Orbit(
                 azimuth_deg, options.elevation, options.fov, options.up, options.ortho, fits=options.views == 1
@@ -221,17 +224,40 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
     return groups
 
 
-def names_of(sources: Sequence[str]) -> list[str]:
-    """What {name} stands for: the file without its suffix, or with it where another file differs in nothing else."""
+def names_of(sources: Sequence[str], *, with_numbers: bool = True, with_folders: bool = False) -> list[str]:
+    """What {name} stands for: the file without its suffix, or with it where another file differs in nothing else.
+
+    Further files of one name get numbers, unless what OUT says besides tells them apart.
+    """
     stems = [source if source in SHAPES else Path(source).stem for source in sources]
     suffixes = [Path(source).suffix.casefold().removeprefix(".") for source in sources]
     suffixes_of: dict[str, set[str]] = {}
     for stem, suffix in zip(stems, suffixes, strict=True):
         suffixes_of.setdefault(stem.casefold(), set()).add(suffix)
-    return [
+    names = [
         f"{stem}-{suffix}" if suffix and len(suffixes_of[stem.casefold()]) > 1 else stem
         for stem, suffix in zip(stems, suffixes, strict=True)
     ]
+    if not with_numbers:
+        return names
+    folders = folders_of(sources) if with_folders else [""] * len(names)
+    keys = [(folder.casefold(), name.casefold()) for folder, name in zip(folders, names, strict=True)]
+    taken, seen = set(keys), set[tuple[str, str]]()
+    for i, (folder, key) in enumerate(keys):
+        if (folder, key) in seen:
+            n = next(n for n in itertools.count(2) if (folder, f"{key}-{n}") not in taken)
+            names[i] = f"{names[i]}-{n}"
+            taken.add((folder, f"{key}-{n}"))
+        seen.add((folder, key))
+    return names
+
+
+def folders_of(sources: Sequence[str]) -> list[str]:
+    """What {folder} stands for: the folder of a mesh below the one that all lie in; "." there, and of shapes."""
+    folders = [None if source in SHAPES else Path(source).absolute().parent for source in sources]
+    there = [folder for folder in folders if folder is not None]
+    home = os.path.commonpath(there) if there else ""
+    return ["." if folder is None else os.path.relpath(folder, home) for folder in folders]
 
 
 def default_sampling(options: argparse.Namespace) -> str:
@@ -276,7 +302,7 @@ def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
 def _pattern(out: str, options: argparse.Namespace) -> str:
     """OUT as a file name with {name}, {view}, {index} and {layer} where several pictures need them."""
     path = place_of(out)
-    check_words("OUT", path, ("name", "view", "index", "layer"))
+    check_words("OUT", path, ("name", "folder", "view", "index", "layer"))
     is_folder = out.endswith(("/", "\\")) or not path.suffix or (isinstance(path, Path) and path.is_dir())
     if not out or (path.suffix.lower() not in SUFFIXES and not is_folder):
         raise UsageError(f"OUT must end in one of {' '.join(SUFFIXES)}, or in / for a folder, got {out!r}")
@@ -326,7 +352,7 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
         if key in owner_of:
             raise UsageError(
                 f"{owner_of[key]!r} and {source!r} would both be written to {str(target)!r}; "
-                "put {index} into OUT or give each a folder"
+                "put {index} or {folder} into OUT"
             )
         owner_of[key] = source
     files = (Path(group.source) for group in groups if group.source not in SHAPES)

@@ -26,6 +26,37 @@ MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000
 SCENES: tuple[str, ...] = ("shared-edge", *scenes.TUTORIAL_SCENES, *failure_scenes.FAILURE_SCENES)
 """Names of what is drawn magnified, in the order of the page."""
 
+BASICS = {
+    "shared-edge": "two triangles that share an edge through pixel centres",
+    "wide": "a triangle wider than tall", "tall": "a triangle taller than wide",
+    "vertical-edge": "a triangle with a vertical edge", "horizontal-edge": "a triangle with a horizontal edge",
+    "right-angled": "a triangle with a right angle", "coincident-vertices": "two vertices in one place: no area",
+    "single-point": "all vertices in one place", "horizontal-sliver": "a sliver that lies",
+    "vertical-sliver": "a sliver that stands", "horizontal-line": "three vertices on a horizontal line",
+    "vertical-line": "three vertices on a vertical line",
+}  # fmt: skip
+FANS = {
+    "tight-fan": "16 thin triangles round one vertex, downwards",
+    "tight-fan-sideways": "the same fan, to the right",
+}
+SPLITS = {"two-triangles": "a square cut along a diagonal", "square-of-four": "the same square cut into four"}
+KINDS = {"gap": "a pixel that nobody draws", "overdraw": "a pixel drawn twice", "wrong": "another triangle shows"}
+FAMILIES = {
+    "any": "random triangles", "far": "vertices {} px away", "large": "triangles of {} px",
+    "dense": "triangles of {} px", "fan": "a fan of {}", "hub": "a hub of {}", "edge": "an edge {} px from a centre",
+}  # fmt: skip
+
+
+def scene_groups() -> list[list[Any]]:
+    """All scenes as the page lists them: [heading, [[name, what it shows], ...]] each."""
+    failures = {
+        name: f"{KINDS[one.kind]}: {FAMILIES[one.family].format(one.value)}"
+        for name, one in failure_scenes.FAILURE_SCENES.items()
+    }
+    groups = {"basics": BASICS, "fans": FANS, "splits": SPLITS, "failures of methods": failures}
+    return [[heading, [[name, told] for name, told in rows.items()]] for heading, rows in groups.items()]
+
+
 SHARED_EDGE = {
     "vertices": [[2.5, 2.5], [13.5, 1.5], [3.5, 11.5], [12.5, 10.5]], "triangles": [[0, 1, 2], [1, 3, 2]],
     "size": [16, 13], "origin": [0, 0], "other": "bresenham_scanline", "exact": True,
@@ -39,6 +70,8 @@ MARGIN_PX = 3
 
 def content_of(vertices: Any, triangles: ArrayLike | None, size: Any) -> Content:
     """Return what `topleft.explore` shows of its arguments."""
+    if vertices is None and triangles is None:
+        return content_of_name(SCENES[0])
     if triangles is not None:
         return Content("pixels", magnified(vertices, triangles, size), name="arrays")
     if isinstance(vertices, (str, os.PathLike)):

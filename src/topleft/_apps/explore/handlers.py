@@ -10,7 +10,7 @@ import traceback
 from typing import Any
 
 from topleft._apps.explore import export, mesh_view, pixels, probe, race, trace
-from topleft._apps.explore.content import SCENES, scene
+from topleft._apps.explore.content import SCENES, scene, scene_groups
 from topleft._apps.explore.session import Handler, Reply, Request, Session
 from topleft.errors import TopleftError
 
@@ -26,6 +26,7 @@ def hello(session: Session, _: Request) -> Reply:
             "fragment": content.fragment,
             "pixels": {**scene(given["scene"]), **given} if "scene" in given else given,
             "scenes": SCENES,
+            "groups": scene_groups(),
             "methods": pixels.methods(),
         }
     )

@@ -66,7 +66,7 @@ class Explorer:
 
 
 def explore(
-    vertices: Any, triangles: ArrayLike | None = None, size: int | tuple[int, int] | None = None, *,
+    vertices: Any = None, triangles: ArrayLike | None = None, size: int | tuple[int, int] | None = None, *,
     wait: bool | None = None, browser: bool = True,
 ) -> Any:  # fmt: skip
     """Return an explorer: a page in the browser, or in the cell of a notebook, where triangles can be moved.
@@ -76,7 +76,8 @@ def explore(
     vertices : array_like, shape (V, 2) or (V, 3); or a mesh, a path, a mesh of another library; or the name of a scene
         Pixels, or pixels and depth, with `triangles`: at most 1,000 of them, which are drawn magnified. A mesh is
         turned and walked around. A name of `topleft.scenes.TUTORIAL_SCENES` or of
-        `topleft.failure_scenes.FAILURE_SCENES` is drawn magnified.
+        `topleft.failure_scenes.FAILURE_SCENES` is drawn magnified; unless anything is given, two triangles that share
+        an edge.
     triangles : array_like of integers, shape (T, 3), optional
         Indices of vertices.
     size : (int, int), or int for a square, optional

@@ -34,17 +34,10 @@ HEAT = np.array(
 """Of 0, 1, 2, 3, and more triangles on a pixel."""
 
 DIFFERENCES = np.array(
-    [
-        [0, 0, 0, 0],
-        [128, 128, 128, 70],
-        [0, 114, 178, 255],
-        [230, 159, 0, 255],
-        [204, 121, 167, 255],
-        [213, 94, 0, 255],
-    ],
+    [[0, 0, 0, 0], [128, 128, 128, 70], [94, 60, 153, 255], [166, 206, 57, 255], [190, 20, 60, 255], [44, 44, 52, 255]],
     np.uint8,
 )
-"""Of nothing, the same, the first alone, the second alone, another owner, another count."""
+"""Of nothing, the same, the first alone, the second alone, another owner, another count; none is one of a triangle."""
 
 INK = (60, 72, 88, 255)
 
@@ -239,15 +232,25 @@ def draw_all(session: Session, request: Request) -> Reply:
         arrays[f"{key}_counts"] = np.ceil(drawings[key].counts).max(axis=2).astype(np.int32)
         if key == EXACT:
             for other in drawings.keys() - {EXACT}:
-                n = int((difference(drawings[other], drawings[EXACT]) > 1).sum())
-                panels[other]["n_wrong"] = n
-                panels[other]["facts"].append([f"{n:,} wrong", "bad"] if n else ["all exact", "good"])
+                told = np.bincount(difference(drawings[other], drawings[EXACT]).reshape(-1), minlength=len(DIFFERENCES))
+                panels[other]["n_wrong"] = n = int(told[2:].sum())
+                panels[other]["facts"].append(wrong_of(told.tolist()) if n else ["all exact", "good", WRONG])
     pair = list(drawings)[:2]
     if len(pair) == 2:
         kinds = difference(drawings[pair[0]], drawings[pair[1]])
         arrays["difference"] = DIFFERENCES[kinds]
         panels["difference"] = panel("difference", "difference") | compared(kinds, [names[key] for key in pair])
     return Reply({"panels": list(panels.values()), "samples": samples_of(state)}, arrays)
+
+
+WRONG = "beside the exact picture of the vertices as they are: each pixel counts once"
+
+
+def wrong_of(told: list[int]) -> list[str]:
+    """How many pixels are wrong, of each kind; the kinds add up."""
+    words = ("", "", "too many", "missing", "of another triangle", "drawn too often")
+    kinds = ", ".join(f"{n:,} {word}" for n, word in zip(told, words, strict=True) if word and n)
+    return [f"{sum(told[2:]):,} wrong: {kinds}", "bad", WRONG]
 
 
 def panel(key: str, title: str) -> dict[str, Any]:
@@ -259,14 +262,18 @@ def described(drawing: MethodPicture, state: PixelState) -> dict[str, Any]:
     """What is written over and below a picture."""
     ms, n = 1e3 * drawing.seconds, int((drawing.shares > 0).sum())
     n_twice = int((np.ceil(drawing.counts).max(axis=2) > 1).sum())
-    facts = [[f"{n:,} px", "n"], [f"{ms:.1f} ms" if ms >= 1 else f"{1e3 * ms:.0f} \N{MICRO SIGN}s", "n"]]
+    facts = [
+        [f"{n:,} px", "n", "pixels that are drawn at least once"],
+        [f"{ms:.1f} ms" if ms >= 1 else f"{1e3 * ms:.0f} \N{MICRO SIGN}s", "n", "of the call that draws it"],
+    ]
     words = ("once", "twice", "3 times", "4 or more")
     legend = list(zip(map(css, HEAT[1:]), words, strict=True)) if state.look == "overdraw" else []
     return {
         "n": n,
         "n_twice": n_twice,
         "notes": ", ".join(drawing.notes),
-        "facts": facts + ([[f"{n_twice:,} twice", "n"]] if n_twice else []),
+        "facts": facts
+        + ([[f"{n_twice:,} of them more than once", "n", "drawn for several triangles"]] if n_twice else []),
         "legend": legend,
     }
 
@@ -277,7 +284,9 @@ def compared(kinds: NDArray[np.uint8], names: list[str]) -> dict[str, Any]:
     words = ("", "same", f"{names[0]} alone", f"{names[1]} alone", "another owner", "drawn more often")
     n = sum(told[2:])
     legend = [[css(DIFFERENCES[k]), f"{told[k]:,} {words[k]}"] for k in range(1, len(told)) if told[k]]
-    facts = [["1 pixel" if n == 1 else f"{n:,} pixels", "bad" if n else "good"]]
+    facts = [
+        [f"{n:,} of {sum(told[1:]):,} pixels differ", "bad" if n else "good", "of those that either of them draws"]
+    ]
     return {"kinds": told, "facts": facts, "legend": legend}
 
 

@@ -180,7 +180,9 @@ def edge_story(one: Verdict) -> str:
     ends = " and ".join(map(named, through))
     kinds = " and a ".join(edge.kind for edge in through)
     story = f"Edge {ends} is a {kinds} edge" if len(through) == 1 else f"Edges {ends} are a {kinds} edge"
-    return f"{story} of triangle {one.triangle}, so the pixel is {'' if one.is_covered else 'not '}its own."
+    return (
+        f"{story} of triangle {one.triangle}, so the pixel {'belongs' if one.is_covered else 'does not belong'} to it."
+    )
 
 
 def classic_story(method: str, times: dict[int, int] | None, owner: Verdict | None) -> str:

@@ -7,7 +7,7 @@ when it is sent to another process.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from topleft._apps.tiles.blocks import Triangles
 from topleft._apps.tiles.drawing import Painter, Payload, without_values
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_aligned
+from topleft._core.base.georeference import xarray_module
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
@@ -107,13 +108,9 @@ def dask_array_of(raster: Tiles) -> Any:
 
 def data_array_of(raster: Tiles) -> Any:
     """`Tiles.to_xarray`."""
-    try:
-        import xarray as xr
-    except ImportError:
-        raise MissingPackageError("to_xarray needs the package xarray: pip install xarray") from None
-    grid = raster.grid
-    coordinates = {} if grid is None else {"y": grid.y_centers, "x": grid.x_centers}
-    names = ["y", "x", "channel"][: len(raster.shape)]
-    nodata = raster.painter.nodata
-    attributes = {} if nodata is None else {"nodata": nodata}
-    return xr.DataArray(dask_array_of(raster), dims=names, coords=coordinates, name=raster.kind, attrs=attributes)
+    xr, nodata = xarray_module(), raster.painter.nodata
+    if raster.grid is None:
+        names = ["y", "x", "channel"][: len(raster.shape)]
+        own = {} if nodata is None else {"nodata": nodata}
+        return xr.DataArray(dask_array_of(raster), dims=names, name=raster.kind, attrs=own)
+    return replace(raster.grid, nodata=nodata).to_xarray(dask_array_of(raster), raster.kind)

@@ -304,6 +304,7 @@ class FieldPainter(Painter):
         self.is_of_faces = is_per_face(array, triangles.n_vertices, triangles.n_faces, per)
         self.faces = triangles.faces
         nodata = self.options.get("nodata")
+        nodata = self.grid.nodata if nodata is None and self.grid is not None else nodata
         self.dtype = np.dtype(dtype_of_field(array.dtype, is_of_faces=self.is_of_faces, has_nodata=nodata is not None))
         self.empty = nodata_of(nodata, self.dtype.type)[0]
         self.has_nodata, self.nodata = nodata is not None, float(self.empty)
@@ -355,7 +356,8 @@ class HeightPainter(Painter):
         check_choice("surface", self.surface, ("upper", "lower"))
         if triangles.n_components != 3:
             raise ValueError(f"a height map needs points of shape (V, 3), got (V, {triangles.n_components})")
-        self.dtype, self.empty, self.nodata = np.dtype(np.float64), np.nan, np.nan
+        empty = np.nan if self.grid is None or self.grid.nodata is None else self.grid.nodata
+        self.dtype, self.empty, self.nodata = np.dtype(np.float64), empty, empty
 
     def check(self, corners: Array, where: Callable[[int], str]) -> None:
         """Look at a block of corners (N, 3, C) while the index is made."""
@@ -381,6 +383,8 @@ class HeightPainter(Painter):
         own = rows(len(payload.triangles))
         ids = visible(np.column_stack([points, depth_of(heights, self.low, self.high)]), own, view, sink)
         fill_planes(ids, points, own, heights, view, canvas)
+        if self.grid.nodata is not None:
+            canvas[ids < 0] = self.empty
         if out is not None and canvas is not out:
             out[...] = canvas
         return canvas if out is None else out

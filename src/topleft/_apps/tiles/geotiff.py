@@ -28,11 +28,10 @@ from topleft._apps.tiles.folders import MANIFEST, DiskFolder, fingerprints_at, o
 from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, halved, write_levels
 from topleft._apps.tiles.store import TileStore, begin, level_size, n_levels_to
 from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_count, as_number, check_progress, shown
-from topleft._core.base.grid import Grid
+from topleft._core.base.arrays import as_count, as_number, check_progress
+from topleft._core.base.georeference import Tags, geo_tags, nodata_tag
 from topleft._core.base.options import check_choice
 from topleft._core.base.remote import as_place
-from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
@@ -131,7 +130,10 @@ def write_geotiff(
         raise ValueError(f"a GeoTIFF has pixels, got a raster of {raster.size[0]} x {raster.size[1]}")
     if not file.absolute().parent.is_dir():
         raise FileNotFoundError(f"cannot write {str(file)!r}: its folder is not there")
-    geo = geo_tags(crs, raster.grid)
+    if raster.grid is None and crs is not None:
+        raise ValueError(f"crs is for a raster on a Grid, got {crs!r} for one in pixels")
+    own_crs = raster.grid.crs if raster.grid is not None and crs is None else crs
+    geo = {} if raster.grid is None else geo_tags(own_crs, raster.grid.transform)
     dtype = np.dtype(np.uint8) if raster.dtype == bool else raster.dtype
     told = raster.painter.nodata if nodata is None else as_number("nodata", nodata)
     n_levels = n_levels_to(raster.size, side) if overviews else 1
@@ -164,51 +166,8 @@ def write_geotiff(
     return written
 
 
-def geo_tags(crs: str | int | None, grid: Grid | None) -> Tags:
-    """The tags that say where the raster lies: size of pixels, corner, kind and EPSG code of the CRS.
-
-    Raises
-    ------
-    ValueError
-        If the CRS is unknown, or there is no grid.
-    """
-    if grid is None:
-        if crs is not None:
-            raise ValueError(f"crs is for a raster on a Grid, got {crs!r} for one in pixels")
-        return {}
-    keys = [(1025, 1)]  # a pixel is an area
-    if crs is not None:
-        code, is_geographic = epsg_of(crs)
-        keys = [(1024, 2 if is_geographic else 1), *keys, (2048 if is_geographic else 3072, code)]
-    words = [1, 1, 1, len(keys), *(number for key, value in keys for number in (key, 0, 1, value))]
-    a, _, x, _, e, y = grid.transform
-    if e < 0:
-        place: Tags = {33550: ("d", [a, -e, 0.0]), 33922: ("d", [0.0, 0.0, 0.0, x, y, 0.0])}
-    else:
-        place = {34264: ("d", [a, 0.0, 0.0, x, 0.0, e, 0.0, y, *([0.0] * 7), 1.0])}
-    return {**place, 34735: ("H", words)}
-
-
-def epsg_of(crs: str | int) -> tuple[int, bool]:
-    """The EPSG code of a CRS, and whether it is geographic."""
-    try:
-        import pyproj
-    except ImportError:
-        raise MissingPackageError("crs needs the package pyproj: pip install 'topleft[tiles]'") from None
-    try:
-        found = pyproj.CRS.from_user_input(crs)
-    except (pyproj.exceptions.CRSError, TypeError, ValueError) as error:
-        raise ValueError(f"crs must be one that pyproj knows, 'EPSG:25832', say, got {shown(crs)} ({error})") from None
-    code = found.to_epsg()
-    if code is None or code > 65535 or not (found.is_projected or found.is_geographic):
-        raise ValueError(f"crs must be projected or geographic and have an EPSG code up to 65535, got {shown(crs)}")
-    return int(code), bool(found.is_geographic)
-
-
 TYPES = {"H": (3, 2), "I": (4, 4), "d": (12, 8), "s": (2, 1), "Q": (16, 8)}
 """The number and the size of a type of TIFF, by the letter of `struct`."""
-
-Tags = dict[int, tuple[str, Any]]
 
 
 @dataclass
@@ -305,9 +264,7 @@ def tags_of(
     if level == 0:
         tags |= more
     if nodata is not None:
-        whole = float(nodata)
-        text = repr(int(whole)) if np.isfinite(whole) and whole == int(whole) else repr(whole)
-        tags[42113] = ("s", text.encode() + b"\0")
+        tags[42113] = nodata_tag(nodata)
     return dict(sorted(tags.items()))
 
 

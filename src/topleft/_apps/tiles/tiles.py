@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._apps.tiles.ahead import in_order, kept_memory
+from topleft._apps.tiles.areas import AreaIndex, AreaPainter, Areas, are_polygons, areas_of, extent_of_polygons
 from topleft._apps.tiles.blocks import BLOCK, Triangles, fingerprint_of, triangles_of
 from topleft._apps.tiles.drawing import KINDS, ON_GRIDS, Painter, painter_of
 from topleft._apps.tiles.spans import SPAN_BYTES, Tiling, WindowIndex
@@ -98,16 +99,19 @@ def tiles(
 
     Parameters
     ----------
-    mesh : mesh, path, pair of paths, or iterator of blocks
+    mesh : mesh, path, pair of paths, iterator of blocks, or polygons
         Whatever `as_mesh` takes, also arrays of `numpy.memmap`. The name of a file: binary STL, and binary PLY with
         triangles, are mapped and never read as a whole. Names of two .npy files, vertices and triangles. An iterator of
         pairs (vertices, triangles), the triangles naming vertices of their block: these go to two files in `folder`.
+        Polygons are shapely's, a GeoSeries, GeoJSON, ``(coordinates, ring_offsets, polygon_offsets)`` or a list of
+        polygons, which are lists of rings; they stay in memory.
     size : (width, height) or Grid, optional
         Of the whole raster, up to 2**31 - 1 a side. With a `Grid`, or with `extent` or `pixel_size`, vertices are in
         data units; otherwise in pixels, unless `kind` is "field" or "height_map".
     kind : {"labels", "depth", "coverage", "overdraw", "fill", "field", "height_map"}
         What pixels hold. "labels": the index of the triangle that shows, int32, -1 for none, as `rasterize` has it;
-        "depth" likewise. The others: what the verb of that name returns.
+        "depth" likewise. The others: what the verb of that name returns. Of polygons "labels", their numbers,
+        "coverage", a mask, and "fill", the `values` of each: what `polygons` returns.
     values : array_like, optional
         For "fill" the colours, of triangles or of vertices; for "field" the values, of vertices or faces.
     window : int or (width, height), pixels
@@ -123,7 +127,8 @@ def tiles(
     **options
         Of the verb: ``subpixel_bits`` and ``cull``; "coverage", "overdraw" and "fill": ``sampling``; "labels" and
         "depth": ``depth_test``, ``background_depth``; "fill": ``per``, ``background``, ``blend``, ``alpha``,
-        ``resolve``, ``dtype``; "field": ``per``, ``nodata``; "height_map": ``surface``.
+        ``resolve``, ``dtype``; "field": ``per``, ``nodata``; "height_map": ``surface``. Of polygons ``rule``, ``crs``,
+        ``sampling``, ``background``, ``subpixel_bits``, ``assume_valid`` and ``max_crossings`` of `polygons`.
 
     Returns
     -------
@@ -160,21 +165,27 @@ def tiles(
     """
     where = None if folder is None else os.fspath(as_path("folder", folder))
     check_choice("kind", kind, tuple(KINDS))
-    triangles = triangles_of(mesh, where)
+    is_of_areas = are_polygons(mesh)
+    triangles: Any = None if is_of_areas else triangles_of(mesh, where)
     grid: Grid | None = None
     if isinstance(size, Grid):
         if extent is not None or pixel_size is not None or y != "up":
             raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")
         grid = size
     elif kind in ON_GRIDS or extent is not None or pixel_size is not None:
-        around = extent_of(triangles) if extent is None else extent
+        around = extent if extent is not None else extent_of_polygons(mesh) if is_of_areas else extent_of(triangles)
         whole = None if size is None else as_size(size)
         grid = grid_around(around, whole, pixel_size, y)
     elif size is None:
         raise TypeError("size must be (width, height) or a Grid, or extent or pixel_size be given")
     whole = as_size(size) if grid is None else grid.size
     tiling_size = as_size(window, "window", smallest=1)
-    painter = painter_of(kind, grid, triangles, values, options)
+    painter: Painter
+    if is_of_areas:
+        triangles = areas_of(mesh, grid, options.pop("crs", None))
+        painter = AreaPainter.of_kind(kind, grid, triangles, values, options)
+    else:
+        painter = painter_of(kind, grid, triangles, values, options)
     return Tiles(
         triangles, painter, kind, whole, tiling_size, parse_threads(threads), as_count("memory", memory), where
     )  # fmt: skip
@@ -203,7 +214,7 @@ class Tiles:
 
     def __init__(
         self,
-        triangles: Triangles,
+        triangles: Triangles | Areas,
         painter: Painter,
         kind: str,
         size: tuple[int, int],
@@ -212,12 +223,13 @@ class Tiles:
         memory: int,
         folder: str | None,
     ) -> None:
-        self.triangles, self.painter, self.kind = triangles, painter, kind
+        self.triangles: Any = triangles
+        self.painter, self.kind = painter, kind
         self.size, self.threads = size, threads
         self.window_size = min(window_size[0], max(size[0], 1)), min(window_size[1], max(size[1], 1))
         self.tiling = Tiling(*size, *self.window_size, 0 if painter.is_exact else painter.view.get("subpixel_bits", 8))
         self._memory, self._folder = memory, folder
-        self._index: WindowIndex | None = None
+        self._index: WindowIndex | AreaIndex | None = None
         self._fingerprint: str | None = None
 
     def __repr__(self) -> str:
@@ -225,7 +237,7 @@ class Tiles:
         t = self.tiling
         return (
             f"Tiles({self.kind}: {width}x{height} {self.dtype}, {t.n_columns}x{t.n_rows} windows of {w}x{h} pixels, "
-            f"{self.triangles.n} triangles)"
+            f"{self.triangles.n} {'polygons' if isinstance(self.triangles, Areas) else 'triangles'})"
         )
 
     @property
@@ -246,6 +258,8 @@ class Tiles:
     @property
     def has_means(self) -> bool:
         """Whether the mean of neighbouring pixels says something: not of labels, masks and counts."""
+        if isinstance(self.triangles, Areas) and not self.painter.channels:  # values of polygons may be names
+            return self.dtype.kind == "f"
         return self.dtype.kind == "f" or (self.kind == "fill" and self.painter.options.get("dtype") is None)
 
     @property
@@ -262,9 +276,11 @@ class Tiles:
         return self.tiling.n_rows * self.tiling.n_columns
 
     @property
-    def index(self) -> WindowIndex:
+    def index(self) -> WindowIndex | AreaIndex:
         """Which triangles each window needs; made when it is first asked for."""
-        if self._index is None:
+        if self._index is None and isinstance(self.triangles, Areas):
+            self._index = AreaIndex(self.triangles, self.tiling)
+        elif self._index is None:
             self._index = WindowIndex(
                 self.triangles,
                 self.tiling,
@@ -284,6 +300,8 @@ class Tiles:
     @property
     def is_mapped(self) -> bool:
         """Whether the mesh lies in files that other processes can map."""
+        if isinstance(self.triangles, Areas):
+            return False
         values = getattr(self.painter, "values", None)
         state = getattr(self.triangles, "__getstate__")()  # noqa: B009
         arrays = [state.get("_rows"), state.get("triangles"), *state.get("columns", ())]

@@ -6,14 +6,15 @@ Input: an extent and a size, or what the grid is to be laid round. Output: `Grid
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_array, as_real, as_size, shown
+from topleft._core.base.arrays import as_array, as_number, as_real, as_size, shown
+from topleft._core.base.georeference import crs_text, data_array, frame_of_raster
 from topleft._core.base.options import check_choice
 from topleft.typing import YOption
 
@@ -36,11 +37,19 @@ class Grid:
     y : {"up", "down"}
         Where y grows in the picture. "up": row 0 is at `y_max`, as on a map (`imshow(origin="upper")`); "down": row 0
         is at `y_min` (`origin="lower"`).
+    crs : str, int or CRS, optional
+        The coordinate reference system of the extent: "EPSG:25832", 25832, WKT, or that of pyproj, rasterio or
+        geopandas; kept as text. Files and xarray get it; polygons that say another one are refused.
+    nodata : number, optional
+        What stands where nothing is: the default of `nodata=` of `field`, `tiles` and `Overlap.means`, of `background=`
+        of `polygons` with values, and what files say.
 
     Raises
     ------
     ValueError
         If the extent is empty or not finite, or `y` is neither "up" nor "down".
+    TypeError
+        If `crs` is no CRS, or `nodata` no number.
 
     Examples
     --------
@@ -54,10 +63,19 @@ class Grid:
     size: tuple[int, int]
     extent: Extent
     y: str = "up"
+    crs: str | None = None
+    nodata: float | None = None
 
     if TYPE_CHECKING:  # what is given may be any four numbers; what is kept is as above
 
-        def __init__(self, size: int | tuple[int, int], extent: ExtentLike, y: YOption = "up") -> None: ...
+        def __init__(
+            self,
+            size: int | tuple[int, int],
+            extent: ExtentLike,
+            y: YOption = "up",
+            crs: object = None,
+            nodata: float | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", as_size(self.size))
@@ -71,6 +89,17 @@ class Grid:
             )
         object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
         check_choice("y", self.y, get_args(YOption))
+        object.__setattr__(self, "crs", crs_text(self.crs))
+        if self.nodata is not None:
+            as_number("nodata", self.nodata)
+            object.__setattr__(self, "nodata", np.asarray(self.nodata).item())  # a whole number stays one
+
+    def __repr__(self) -> str:
+        """The constructor's call, without what is not set."""
+        more = "".join(
+            f", {name}={value!r}" for name in ("crs", "nodata") if (value := getattr(self, name)) is not None
+        )
+        return f"Grid(size={self.size}, extent={self.extent}, y={self.y!r}{more})"
 
     @classmethod
     def around(
@@ -81,6 +110,8 @@ class Grid:
         pixel_size: float | tuple[float, float] | None = None,
         extent: ExtentLike | None = None,
         y: YOption = "up",
+        crs: object = None,
+        nodata: float | None = None,
     ) -> Grid:
         """The grid round a mesh, of so many pixels or of pixels so large.
 
@@ -95,7 +126,7 @@ class Grid:
             and has as many whole pixels as cover it.
         extent : (x_min, x_max, y_min, y_max), optional
             Data units; the box of the mesh unless given.
-        y : {"up", "down"}
+        y, crs, nodata
             As for `Grid`.
 
         Raises
@@ -106,10 +137,33 @@ class Grid:
         """
         from topleft._meshes.field.field import extent_around  # which imports this module
 
-        return grid_around(extent_around(subject, extent), size, pixel_size, y)
+        found = grid_around(extent_around(subject, extent), size, pixel_size, y)
+        return replace(found, crs=crs_text(crs), nodata=nodata)
 
     @classmethod
-    def from_transform(cls, transform: Any, size: int | tuple[int, int]) -> Grid:
+    def like(cls, raster: Any) -> Grid:
+        """The grid of a raster: its size, extent, CRS and number of no data.
+
+        Parameters
+        ----------
+        raster : open dataset of rasterio, DataArray or Dataset of xarray, or path
+            A file is opened by rasterio. Coordinates of xarray are x and y, or lon and lat, evenly spaced; the CRS is
+            that of `spatial_ref`, as rioxarray writes it, or of ``attrs["crs"]``.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If it is none of these, its coordinates are not evenly spaced, or as `from_transform`.
+        MissingPackageError
+            If it is a file and rasterio is not installed.
+        """
+        transform, size, crs, nodata = frame_of_raster(raster)
+        return cls.from_transform(transform, size, crs=crs, nodata=nodata)
+
+    @classmethod
+    def from_transform(
+        cls, transform: Any, size: int | tuple[int, int], *, crs: object = None, nodata: float | None = None
+    ) -> Grid:
         """The grid of a raster of rasterio, GDAL or a world file.
 
         Parameters
@@ -119,6 +173,8 @@ class Grid:
             GDAL's `GetGeoTransform()` has them in another order: (c, a, b, f, d, e).
         size : (width, height), pixels
             rasterio's `src.width, src.height`.
+        crs, nodata
+            As for `Grid`; `Grid.like` takes all of it from a dataset.
 
         Raises
         ------
@@ -143,7 +199,7 @@ class Grid:
         width, height = as_size(size, smallest=1)
         y_first, y_last = f, f + e * height
         extent = (c, c + a * width, min(y_first, y_last), max(y_first, y_last))
-        return cls((width, height), extent, "up" if e < 0 else "down")
+        return cls((width, height), extent, "up" if e < 0 else "down", crs, nodata)
 
     @property
     def transform(self) -> tuple[float, float, float, float, float, float]:
@@ -151,6 +207,24 @@ class Grid:
         x_min, _, y_min, y_max = self.extent
         a, e = self.pixel_size
         return (a, 0.0, x_min, 0.0, -e, y_max) if self.y == "up" else (a, 0.0, x_min, 0.0, e, y_min)
+
+    def to_xarray(self, array: npt.ArrayLike, name: str | None = None) -> Any:
+        """An `xarray.DataArray` of an array (H, W) or (H, W, C) of this grid, with coordinates, CRS and no data.
+
+        rioxarray reads them (``array.rio.crs``) and writes them to files (``array.rio.to_raster``).
+
+        Raises
+        ------
+        ValueError
+            If the array has another shape.
+        MissingPackageError
+            If xarray is not installed.
+        """
+        shape = np.shape(array)
+        if shape[:2] != self.size[::-1] or len(shape) not in (2, 3):
+            raise ValueError(f"array must have shape {self.size[::-1]} or one with channels, got {shape}")
+        own = array if hasattr(array, "shape") else np.asarray(array)
+        return data_array(own, name, self.x_centers, self.y_centers, self.transform, self.crs, self.nodata)
 
     @property
     def pixel_size(self) -> tuple[float, float]:

@@ -24,7 +24,7 @@ from topleft.typing import EncodingOption, FilterOption, WrapOption
 MOST_KEPT_BYTES = 1 << 27
 """What the levels of a texture may take and be kept with it; those of 2048 x 2048 texels of four channels take 2/3."""
 
-FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2}  # tl_filter in csrc/shading.h
+FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2, "pixelated": 3}  # tl_filter in csrc/shading.h
 WRAP_CODES = {"repeat": 0, "clamp": 1, "mirror": 2}  # tl_wrap
 
 
@@ -65,7 +65,7 @@ def as_levels(texture: object, filter: str, wrap: object, encoding: str | None) 
     ----------
     texture : Texture, or (H, W) or (H, W, C) array_like of real numbers
         A `Texture` tells filter, wrap and encoding itself, and keeps its levels.
-    filter : {"trilinear", "bilinear", "nearest"}
+    filter : {"trilinear", "bilinear", "nearest", "pixelated"}
     wrap : {"repeat", "clamp", "mirror"}, or a pair of them
     encoding : {"linear", "srgb"}, optional
         "srgb": the first three channels are decoded to light. Unsigned bytes become 0 to 1 either way.
@@ -116,7 +116,7 @@ def levels_of(values: F32, filter: str, wraps: tuple[str, str]) -> ValueLevels: 
     """Return contiguous values (H, W, C) with their halvings, where the filter looks at those."""
     height, width, n_channels = values.shape
     rows = [(0, width, height)]
-    while filter == "trilinear" and max(width, height) > 1:
+    while filter in ("trilinear", "pixelated") and max(width, height) > 1:
         offset, width, height = rows[-1]
         offset, width, height = offset + height * width, max(1, width // 2), max(1, height // 2)
         rows.append((offset, width, height))

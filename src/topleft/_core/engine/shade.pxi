@@ -71,7 +71,7 @@ cdef class ShadingTable:
                  const int32_t[:, ::1] normal_of_corner or None, const float[:, ::1] corner_normals or None,
                  const float[:, ::1] face_normals or None, positions: Array, const uint8_t[::1] is_turned or None,
                  const float[:, ::1] uv or None, const float[:, ::1] uv1 or None, const float[:, ::1] colors or None,
-                 bint has_alpha, float front_side, const int32_t[::1] material_of or None, const float[::1] decode):
+                 bint has_alpha, float front_side, const int32_t[::1] material_of or None, const float[::1] decode or None):
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef tl_shading *s = &self.shading
         self.arrays = (normals, normal_of_corner, corner_normals, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
@@ -87,7 +87,7 @@ cdef class ShadingTable:
         s.has_alpha, s.front_side, s.surroundings, s.wants_opacity = has_alpha, front_side, NULL, False
         s.colors = &colors[0, 0] if colors is not None and colors.shape[0] else NULL
         s.material_of = &material_of[0] if material_of is not None and material_of.shape[0] else NULL
-        s.decode = &decode[0]
+        s.decode = &decode[0] if decode is not None else NULL
         s.n_materials = s.n_lights = 0
         s.matcap = NULL
 

@@ -6,8 +6,7 @@ Input: rings and a size. Output: `Overlap`.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from threading import Condition, Lock
 from typing import Any
@@ -16,15 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real
+from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, shown
+from topleft._core.base.georeference import numbers_without_data
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
 from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.draw import cells_for
-from topleft._core.polygons.polygons import Rule, frame_of, warn_if_apart
+from topleft._core.polygons.polygons import Rule, frame_of, in_crs_of, warn_if_apart
 from topleft._core.polygons.prepared import MAX_CROSSINGS, Prepared, prepare
-from topleft._core.polygons.rings import as_points, as_rings, rings_of_triangles
+from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.typing import RuleOption
 
 #: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
@@ -51,6 +51,8 @@ class Overlap:
         The area of the pixel that lies in the polygon, in pixels, above 0 and at most 1: `data`.
     size : (int, int)
         Width and height of the picture.
+    nodata : number, optional
+        What rasters have in pixels without data, unless a method is told another one; that of the `Grid`.
 
     Examples
     --------
@@ -66,6 +68,7 @@ class Overlap:
     pixels: npt.NDArray[Any]
     areas: npt.NDArray[np.float32]
     size: tuple[int, int]
+    nodata: float | None = None
     _room: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]] = field(
         default_factory=list, repr=False, compare=False
     )
@@ -122,11 +125,79 @@ class Overlap:
         xarray or an open dataset of rasterio, of one band, has the number that it names itself. A polygon over none
         but such pixels has the mean NaN.
         """
+        return self._mean_of(self._values_of(raster, nodata))
+
+    def counts(self, raster: npt.ArrayLike | None = None, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
+        """Return how many pixels with data (P,) each polygon has, shares of pixels added up; see `means`.
+
+        Without a raster all pixels count, as in `totals`.
+        """
+        return self.totals() if raster is None else self._added(self.areas * ~np.isnan(self._values_of(raster, nodata)))
+
+    def minima(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
+        """Return the least number (P,) of a raster (H, W) in pixels that each polygon meets; NaN without data."""
+        return self._reduced(np.fmin, self._values_of(raster, nodata))
+
+    def maxima(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
+        """Return the largest number (P,) of a raster (H, W) in pixels that each polygon meets; NaN without data."""
+        return self._reduced(np.fmax, self._values_of(raster, nodata))
+
+    def stdevs(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
+        """Return the standard deviation (P,) of a raster (H, W) over each polygon, of all it holds; NaN without data.
+
+        It is the root of the mean of the squares of the differences to the mean, each weighted by its share.
+        """
         values = self._values_of(raster, nodata)
         is_known = ~np.isnan(values)
-        weights = self._added(self.areas * is_known)
+        weights = self.areas * is_known
+        off = np.where(is_known, values - np.repeat(self._mean_of(values), np.diff(self.starts)), 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return self._added(np.where(is_known, values, 0.0) * self.areas) / weights
+            return np.sqrt(self._added(off**2 * weights) / self._added(weights))
+
+    def majorities(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
+        """Return the number (P,) of a raster (H, W) that takes the largest area of each polygon; NaN without data.
+
+        Of numbers with the same area the least.
+        """
+        values, areas, starts = self._sorted(self._values_of(raster, nodata))
+        result = np.full(len(self), np.nan)
+        if not len(values):
+            return result
+        polygons = np.repeat(np.arange(len(self)), np.diff(starts))
+        is_first = np.ones(len(values), np.bool_)
+        is_first[1:] = (values[1:] != values[:-1]) | (polygons[1:] != polygons[:-1])
+        firsts = np.flatnonzero(is_first)
+        sums = np.add.reduceat(areas, firsts)
+        order = np.lexsort((values[firsts], -sums, polygons[firsts]))  # the largest area first, then the least number
+        own = polygons[firsts][order]
+        is_best = np.ones(len(own), np.bool_)
+        is_best[1:] = own[1:] != own[:-1]
+        result[own[is_best]] = values[firsts][order][is_best]
+        return result
+
+    def quantiles(
+        self, raster: npt.ArrayLike, q: npt.ArrayLike = 0.5, *, nodata: float | None = None
+    ) -> npt.NDArray[np.float64]:
+        """Return quantiles (P,), or (P, Q) of several, of a raster (H, W) over each polygon; NaN without data.
+
+        The least number of the raster up to which a share `q`, 0 to 1, of the polygon's area lies: 0.5, the median,
+        unless given; ``numpy.quantile(..., method="inverted_cdf", weights=)``.
+        """
+        wanted = as_real("q", q)
+        if wanted.ndim > 1 or not ((wanted >= 0) & (wanted <= 1)).all():
+            raise ValueError(f"q must be one number from 0 to 1 or several, got {shown(q)}")
+        values, areas, starts = self._sorted(self._values_of(raster, nodata))
+        sums = np.concatenate([[0.0], np.cumsum(areas)])
+        first, end = starts[:-1], starts[1:]
+        result = np.full((len(self), wanted.size), np.nan)
+        is_full = first < end
+        for i, share in enumerate(wanted.ravel().tolist()):
+            goal = sums[first] + share * (sums[end] - sums[first])
+            at = np.searchsorted(
+                sums[1:], goal - 1e-9
+            )  # areas are multiples of 2**-24: a sum is met, or missed by more
+            result[is_full, i] = values[np.clip(at, first, end - 1)[is_full]]
+        return result[:, 0] if wanted.ndim == 0 else result
 
     def totals(self) -> npt.NDArray[np.float64]:
         """Return the area (P,) of each polygon inside of the frame, in pixels."""
@@ -154,7 +225,9 @@ class Overlap:
 
     def _values_of(self, raster: Any, nodata: float | None) -> npt.NDArray[np.float64]:
         """Return the number (E,) of the pixel of each entry, NaN where it has no data."""
-        if nodata is not None:
+        if nodata is None:
+            nodata = self.nodata
+        else:
             as_number("nodata", nodata)
             nodata = np.asarray(nodata).item()  # a whole number stays one
         if hasattr(raster, "read") and hasattr(raster, "count"):  # of rasterio
@@ -177,23 +250,35 @@ class Overlap:
             values[is_masked.reshape(-1)[self.pixels]] = np.nan
         return values
 
-    def _added(self, entries: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-        """Return the sum over the entries of each polygon."""
+    def _mean_of(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return the mean (P,) of the numbers of entries."""
+        is_known = ~np.isnan(values)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self._added(np.where(is_known, values, 0.0) * self.areas) / self._added(self.areas * is_known)
+
+    def _sorted(
+        self, values: npt.NDArray[np.float64]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+        """Return the numbers of each polygon in their order, the areas of their entries, and where polygons begin."""
+        known = np.flatnonzero(~np.isnan(values))
+        polygons = self.polygons[known]
+        order = known[np.lexsort((values[known], polygons))]
+        starts = np.concatenate([[0], np.cumsum(np.bincount(polygons, minlength=len(self)))]).astype(np.int64)
+        return values[order], self.areas[order].astype(np.float64), starts
+
+    def _reduced(
+        self, ufunc: np.ufunc, values: npt.NDArray[np.float64], empty: float = np.nan
+    ) -> npt.NDArray[np.float64]:
+        """Return what a function makes of the entries of each polygon; `empty` of none."""
         is_full = np.diff(self.starts) > 0
-        result = np.zeros(len(self))
+        result = np.full(len(self), empty)
         if is_full.any():
-            result[is_full] = np.add.reduceat(entries.astype(np.float64), self.starts[:-1][is_full])
+            result[is_full] = ufunc.reduceat(values, self.starts[:-1][is_full])
         return result
 
-
-def numbers_without_data(raster: Any) -> list[float]:
-    """Return the numbers that a raster of xarray says stand for none."""
-    said = getattr(raster, "attrs", None)
-    if not isinstance(said, Mapping):
-        return []
-    found = [said[name] for name in ("_FillValue", "missing_value", "nodata", "nodatavals") if name in said]
-    numbers = np.concatenate([np.ravel(number) for number in found]) if found else np.empty(0)
-    return numbers.tolist() if numbers.dtype.kind in "iuf" else []
+    def _added(self, entries: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        """Return the sum over the entries of each polygon."""
+        return self._reduced(np.add, entries.astype(np.float64), empty=0.0)
 
 
 def overlap(
@@ -201,6 +286,7 @@ def overlap(
     size: int | tuple[int, int] | Grid,
     *,
     triangles: npt.ArrayLike | None = None,
+    crs: object = None,
     rule: RuleOption = "evenodd",
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
@@ -213,8 +299,8 @@ def overlap(
 
     Parameters
     ----------
-    rings, size, rule, origin, subpixel_bits, assume_valid, max_crossings, threads
-        As in `polygons`.
+    rings, size, crs, rule, origin, subpixel_bits, assume_valid, max_crossings, threads
+        As in `polygons`. The `nodata` of a `Grid` is that of the table.
     triangles : array_like of integers, shape (T, 3), optional
         Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
     out : Overlap, optional
@@ -249,8 +335,10 @@ def overlap(
     """
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
     if triangles is None:
-        given = as_rings(rings)
+        given = in_crs_of(size, rings, crs)
     else:
+        if crs is not None:
+            raise ValueError("crs is for polygons, not for triangles=")
         vertices = as_points(rings, "vertices")
         given = rings_of_triangles(vertices, as_checked_triangles(triangles, len(vertices)))
     found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1, max_crossings)
@@ -259,7 +347,8 @@ def overlap(
     prepared.certify(assume_valid=assume_valid)
     if out is not None and not isinstance(out, Overlap):
         raise TypeError(f"out must be an Overlap, got {type(out).__name__}")
-    return list_areas(prepared, [] if out is None else out._room)
+    found_areas = list_areas(prepared, [] if out is None else out._room)
+    return found_areas if not isinstance(size, Grid) else replace(found_areas, nodata=size.nodata)
 
 
 Chunk = tuple[npt.NDArray[Any], npt.NDArray[np.float32]]
@@ -302,7 +391,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
         rooms.append(room)
         done, n_listed = end, n_listed + n_entries
     if len(entries) == 1:
-        return Overlap(starts, *entries[0], size, rooms)
+        return Overlap(starts, *entries[0], size, _room=rooms)
     check_fits((2 * n_listed,), dtype, np.float32)
     return Overlap(starts, np.concatenate([c[0] for c in entries]), np.concatenate([c[1] for c in entries]), size)
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.arrays import apart_from, as_array, as_count, as_size, as_subpixel_bits, as_window
+from topleft._core.base.georeference import crs_text, is_same_crs, transformed
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, empty
 from topleft._core.base.options import Sampling, parse
@@ -48,6 +49,7 @@ def polygons(
     rule: RuleOption = "evenodd",
     values: npt.ArrayLike | Literal["index"] | None = None,
     background: npt.ArrayLike | None = None,
+    crs: object = None,
     sampling: SamplingOption = "center",
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
@@ -75,7 +77,11 @@ def polygons(
         What a pixel gets of the polygon that it lies in: its number, as int32; a number, or its own, of any dtype; its
         colour. Without it the result is a mask.
     background : number or array_like (C,), optional
-        What pixels get that lie in none: 0, or -1 with ``values="index"``, unless given.
+        What pixels get that lie in none: unless given -1 with ``values="index"``, with other values the `nodata` of the
+        `Grid`, or 0.
+    crs : str, int or CRS, optional
+        That of the points, which go to that of the `Grid` by pyproj. Unless given they are in the grid's, and a
+        GeoSeries or GeoDataFrame that says another one is refused.
     sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16"; "area"; "outer" or "inner"
         A pixel is inside when its centre is. With several samples, and with exact areas, masks are the share of the
         pixel that lies inside of any polygon (with "area" the sum of the polygons' shares, at most 1), and colours
@@ -107,7 +113,8 @@ def polygons(
     ------
     ValueError
         For a wrong shape, an unknown option, offsets that do not fit, a ring of fewer than three points, a point
-        that is not finite or lies beyond ``2**60`` sub-pixels, or rings that cross more than `max_crossings` times.
+        that is not finite or lies beyond ``2**60`` sub-pixels, rings that cross more than `max_crossings` times, or
+        another CRS than that of the grid.
     TypeError
         For what is no polygon, and a wrong dtype.
 
@@ -140,7 +147,7 @@ def polygons(
     """
     how = parse(Sampling, "sampling", sampling)
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
-    given = as_rings(rings).apart_from(out)
+    given = in_crs_of(size, rings, crs).apart_from(out)
     found, frame = frame_of(given, size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
     shape = frame.size[::-1]
     if values is None:
@@ -164,6 +171,8 @@ def polygons(
             else:
                 mean_of_samples(prepared, canvas, None, how, is_nonzero=is_nonzero)
         return result
+    if background is None and isinstance(size, Grid) and not isinstance(values, str):
+        background = size.nodata
     paint = as_paint(apart_from(out, "values", values), background, len(found), how)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     warn_if_apart(prepared, given, size)
@@ -171,6 +180,27 @@ def polygons(
         if canvas.size:
             paint_values(prepared, canvas, paint, how, is_nonzero=is_nonzero, assume_valid=assume_valid)
     return result
+
+
+def in_crs_of(size: object, rings: Any, crs: object) -> RingSet:
+    """Return the rings in the CRS of a grid, if that has one.
+
+    Raises
+    ------
+    ValueError
+        If the rings say that they are of another one, and `crs` does not; if `crs` is given and the grid has none.
+    """
+    given, own, of_grid = as_rings(rings), crs_text(crs), size.crs if isinstance(size, Grid) else None
+    if of_grid is None:
+        if own is not None:
+            raise ValueError(f"crs needs a Grid with a CRS, which the points then go to, got crs={own!r}")
+        return given
+    said = crs_text(getattr(rings, "crs", None)) if own is None else own
+    if said is None or is_same_crs(said, of_grid):
+        return given
+    if own is None:
+        raise ValueError(f"rings must be of the CRS of the grid, {of_grid}, got {said}: crs={said!r} transforms them")
+    return RingSet(transformed(given.points, own, of_grid), given.rings, given.polygons)
 
 
 def frame_of(

@@ -298,7 +298,7 @@ class Fragments:
             what follows. A number without `uv`: ids, depth and attributes at that sample, with several a pixel.
         uv : array_like, shape (V, 2) per vertex or (T, 3, 2) per corner; of a scene one for each instance
             Where the vertices lie in the texture: u from left to right, v from the bottom up, 0 to 1.
-        filter : {"trilinear", "bilinear", "nearest"}
+        filter : {"trilinear", "bilinear", "nearest", "pixelated"}
             "trilinear": between texels, and between the two halvings next to the longer side of the pixel's footprint,
             which is that of the analytic derivatives of `uv`.
         wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v

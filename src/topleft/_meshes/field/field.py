@@ -66,7 +66,8 @@ def field(
     window : (width, height), optional
         How large the result is; from `origin` to the end of the grid unless given.
     nodata : number, optional
-        What stands where the mesh is not, instead of NaN. With it integers of faces stay what they are.
+        What stands where the mesh is not; unless given the `nodata` of the `Grid`, or NaN. With it integers of faces
+        stay what they are.
     extent : (x_min, x_max, y_min, y_max), optional
         What the picture shows, data units; the box of the mesh unless given.
     pixel_size : float or (float, float), optional
@@ -124,6 +125,7 @@ def field(
     points_px = grid.to_pixels(points)
     size = _window_of(grid, origin) if window is None else window
     view = View.parse(size, {"subpixel_bits": subpixel_bits, "threads": threads, "origin": origin})
+    nodata = grid.nodata if nodata is None else nodata
     dtype = dtype_of_field(array.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
     empty = nodata_of(nodata, dtype)
     with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
@@ -171,8 +173,8 @@ def height_map(
     Returns
     -------
     ndarray of float64, shape (H, W)
-        z of the surface at the pixel centres (`Grid.around(mesh, pixel_size=spacing)` tells where they are), NaN where
-        there is none.
+        z of the surface at the pixel centres (`Grid.around(mesh, pixel_size=spacing)` tells where they are), where
+        there is none the `nodata` of the `Grid`, or NaN.
 
     Raises
     ------
@@ -208,6 +210,8 @@ def height_map(
         depth = depth_of(heights, *range_of(heights, triangles))
         ids = visible(np.column_stack([points_px, depth]), triangles, view, sink)
         fill_planes(ids, points_px, triangles, heights, view, canvas)
+        if grid.nodata is not None:
+            canvas[ids < 0] = grid.nodata
     return result
 
 

@@ -52,7 +52,26 @@ UNBOUNDED = {
 }
 """What no budget holds for: whoever trusts the file reads it by meshio, and gives its points and triangles."""
 
-FORMATS_OF_EXTRA = (".3mf", ".dae", ".xaml", ".amf")
+FORMATS_OF_EXTRA = (".3mf", ".dae", ".xaml")
+PACKAGES = {".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm"}
+"""Formats that trimesh reads by a package of their own."""
+
+BY_MESHIO = (
+    ".bdf", ".f3grid", ".inp", ".mdpa", ".mesh", ".meshb", ".msh", ".nas", ".su2", ".ugrid", ".vtk", ".vtu",
+)  # fmt: skip
+CONVERTERS = {
+    **dict.fromkeys(
+        (".3ds", ".amf", ".blend", ".fbx", ".lwo", ".x", ".x3d"),
+        "Blender and assimp convert it: assimp export {name}{suffix} {name}.glb",
+    ),
+    **dict.fromkeys(
+        (".abc", ".usd", ".usda", ".usdc", ".usdz", ".wrl"), "Blender converts it: import it, and export glTF"
+    ),
+    ".ifc": "ifcopenshell converts it: IfcConvert {name}.ifc {name}.glb",
+    **dict.fromkeys((".brep", ".iges", ".igs"), "FreeCAD converts it: import it, and export STEP or OBJ"),
+    **dict.fromkeys((".c4d", ".ma", ".max", ".mb", ".skp"), "the program that wrote it exports glTF"),
+}
+"""Formats without a reader, and what makes glTF of them."""
 BINARY_DXF = b"AutoCAD Binary DXF"
 
 NODES_OF_TRIMESH = 4
@@ -78,13 +97,18 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
     try:
         import trimesh
     except ImportError:
-        raise MissingPackageError("reading a mesh needs trimesh: pip install 'topleft[render]'") from None
+        raise MissingPackageError(_needs(source, "'topleft[render]'")) from None
     _check_what_it_is(source, suffix)
     try:
         with quiet():
             scene, double_sided = _scene(trimesh, source, suffix)
             parts = [_sided(part, double_sided) for part in _parts(scene, source)]
     except NotImplementedError:
+        if suffix in BY_MESHIO:
+            raise MissingPackageError(_needs(source, "meshio")) from None
+        if suffix in CONVERTERS:
+            told = CONVERTERS[suffix].format(name=source.path.stem, suffix=source.path.suffix)
+            raise MeshError(f"cannot read {str(source.path)!r}: there is no reader of {suffix}; {told}") from None
         readable = " ".join(sorted(trimesh.available_formats() | {"obj", "ply", "stl", "gltf", "glb"}))
         raise MeshError(
             f"cannot read {str(source.path)!r}: format {source.path.suffix!r} is none of {readable}"
@@ -93,9 +117,13 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
         # trimesh asks for these to guess the encoding of what is not UTF-8: here, of a file that is no text.
         if getattr(error, "name", None) in ("charset_normalizer", "chardet"):
             raise MeshError("it is not text") from error
-        extra = "pip install 'topleft[formats]'" if suffix in FORMATS_OF_EXTRA else f"another package: {error}"
-        raise MissingPackageError(f"reading {source.path.suffix!r} needs {extra}") from error
+        package = "'topleft[formats]'" if suffix in FORMATS_OF_EXTRA else PACKAGES.get(suffix, error.name or str(error))
+        raise MissingPackageError(_needs(source, package)) from error
     return parts
+
+
+def _needs(source: InputFile, package: str) -> str:
+    return f"reading {str(source.path)!r} needs another package: pip install {package}"
 
 
 def _check_what_it_is(source: InputFile, suffix: str) -> None:

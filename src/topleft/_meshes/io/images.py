@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.arrays import as_array
+from topleft._core.base.georeference import geo_tags, nodata_tag
+from topleft._core.base.grid import Grid
 from topleft._core.base.remote import Place, as_place
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.io import png
@@ -42,6 +44,9 @@ PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
     ".tiff": ("TIFF", {"compression": "tiff_adobe_deflate"}),
 }
 
+TYPES = {"s": 2, "H": 3, "d": 12}
+"""The numbers of types of TIFF, by the letter of `struct`."""
+
 #: Pixels a side that libjpeg and WebP encode.
 MOST_SIDE = {".jpg": 65_500, ".jpeg": 65_500, ".webp": 16_383}
 
@@ -52,6 +57,7 @@ def save_image(
     *,
     background: tuple[int, int, int] = (255, 255, 255),
     text: Mapping[str, str] | None = None,
+    grid: Grid | None = None,
 ) -> None:
     """Write a picture or a raw buffer; the file appears whole or not at all.
 
@@ -69,11 +75,15 @@ def save_image(
         What shows through in JPEG, which has no alpha.
     text : mapping of str to str, optional
         Notes that go into a PNG, by keyword; Latin-1.
+    grid : Grid, optional
+        Where the picture lies: a TIFF then is a GeoTIFF with its transform, CRS and number of no data.
 
     Raises
     ------
     ImageError
-        If the format is unknown or cannot hold the array or the text.
+        If the format is unknown or cannot hold the array, the text or the grid.
+    ValueError
+        If the picture has another size than the grid, or the CRS no EPSG code.
     OSError
         If the file cannot be written.
 
@@ -94,6 +104,8 @@ def save_image(
         raise ImageError(f"cannot write {str(place)!r}: format {place.suffix!r} is none of {' '.join(SUFFIXES)}")
     if text and suffix != ".png":
         raise ImageError(f"cannot write {str(place)!r}: text goes into .png only")
+    if grid is not None and suffix not in (".tif", ".tiff"):
+        raise ImageError(f"cannot write {str(place)!r}: a grid goes into .tif only")
     if suffix == ".npz":
         arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
         write_whole(place, lambda file: np.savez_compressed(file, **arrays))
@@ -115,6 +127,8 @@ def save_image(
     from PIL import Image  # 10 ms that PNG does without
 
     kind, options = PILLOW_OPTIONS[suffix]
+    if grid is not None:
+        options = {**options, "tiffinfo": _geo_info(grid, picture)}
     if picture.dtype == np.float32 and picture.ndim == 3:
         first, *others = (Image.fromarray(np.ascontiguousarray(channel)) for channel in np.moveaxis(picture, -1, 0))
         options = {**options, "save_all": True, "append_images": others}
@@ -124,6 +138,20 @@ def save_image(
     encoded = io.BytesIO()
     first.save(encoded, format=kind, **options)
     write_whole(place, lambda file: file.write(encoded.getbuffer()))
+
+
+def _geo_info(grid: Grid, picture: npt.NDArray[Any]) -> Any:
+    """The tags of a GeoTIFF, for Pillow."""
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    if picture.shape[:2] != grid.size[::-1]:
+        raise ValueError(f"image must have the shape of the grid, {grid.size[::-1]}, got {picture.shape[:2]}")
+    tags = geo_tags(grid.crs, grid.transform) | ({} if grid.nodata is None else {42113: nodata_tag(grid.nodata)})
+    info = ImageFileDirectory_v2()
+    for number, (letter, values) in tags.items():
+        info.tagtype[number] = TYPES[letter]
+        info[number] = values.rstrip(b"\0").decode() if letter == "s" else tuple(values)
+    return info
 
 
 def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:

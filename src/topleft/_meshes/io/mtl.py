@@ -1,6 +1,6 @@
 """Reads material libraries of OBJ files (MTL).
 
-Input: text. Output: `Material` by name; a file says little of what it means, so what is not given is not there.
+Input: text. Output: `Material` by name; what a file does not set is off.
 
 Based on: Wavefront Technologies, "Advanced Visualizer Manual", appendix B1, 1995; `Pr`, `Pm`, `map_Pr`, `map_Pm` and
 `norm` as Exocortex proposed them in 2014.
@@ -30,7 +30,7 @@ OPTION_LENGTHS = {
 }  # fmt: skip
 """The most words that an option of a map has."""
 
-UNREAD_MAPS = ("map_Ks", "map_Ns", "map_Ka", "disp", "decal", "refl", "map_disp", "map_refl", "map_Ps", "map_aniso")
+UNREAD_MAPS = ("map_Ks", "map_Ns", "disp", "decal", "refl", "map_disp", "map_refl", "map_Ps", "map_aniso")
 NEARLY_OPAQUE, NEARLY_CLEAR = 250, 5
 """A map of opacity whose values all lie above or below is a cutout."""
 
@@ -61,6 +61,7 @@ class _Entry:
 
     numbers: dict[str, list[float]] = field(default_factory=dict)
     maps: dict[str, _Map] = field(default_factory=dict)
+    has_ambient_map: bool = False
 
 
 def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[], Material]]:
@@ -86,12 +87,16 @@ def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[
         key, rest = words[0], words[1].strip() if len(words) > 1 else ""
         if key == "newmtl":
             own = entries[rest] = _Entry()
+        elif key == "map_Ka":
+            own.has_ambient_map = True
         elif _lower(key) in MAPS:
             own.maps[MAPS[_lower(key)]] = _map_of(rest)
         elif key in UNREAD_MAPS:
             source.notes.add(f"{key} of its materials not read")
         elif key in ("Kd", "Ks", "Ke", "Ns", "d", "Tr", "illum", "Pr", "Pm"):
             own.numbers[key] = _numbers(rest, key)
+    if any(entry.has_ambient_map and "color" not in entry.maps for entry in entries.values()):
+        source.notes.add("map_Ka of its materials not read")  # beside map_Kd exporters repeat its picture
     makers = _Makers(folder, source)
     return {name: _maker(makers, entry) for name, entry in entries.items()}
 

@@ -1,4 +1,4 @@
-"""Reads polygons from files: GeoJSON, and annotations in the format of COCO.
+"""Reads polygons from files: GeoJSON, annotations in the format of COCO, and vector files by pyogrio or fiona.
 
 Input: a path. Output: for each picture its polygons, which of them belong together, and what is said of each.
 """
@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft.errors import MeshError
+from topleft._core.base.georeference import WGS84
+from topleft.errors import MeshError, MissingPackageError
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class PolygonPicture:
     name: str
     size: tuple[int, int] | None  # pixels; None: the polygons are on a plane, y up
     folder: str = ""  # of the image, as the file has it
+    crs: str | None = None  # of the plane, if it is known
     parts: list[ObjectRings] = field(default_factory=list)  # of each object
     objects: list[Mapping[str, Any]] = field(default_factory=list)  # what is said of each
     n_skipped: int = 0  # objects that are no polygons
@@ -58,23 +60,32 @@ class PolygonPicture:
         return np.repeat(np.arange(len(self.parts)), [len(part.counts) for part in self.parts])
 
 
-def load_polygons(path: str | os.PathLike[str], *, has_crowds: bool = True) -> list[PolygonPicture]:
-    """Return the polygons of a GeoJSON file, one picture, or of a file of COCO annotations, a picture for each image.
+VECTOR_SUFFIXES = (".fgb", ".gml", ".gpkg", ".kml", ".parquet", ".shp", ".sqlite")
 
-    Without `has_crowds` annotations of COCO that are crowds are left out.
+
+def load_polygons(
+    path: str | os.PathLike[str], *, has_crowds: bool = True, layer: str | None = None
+) -> list[PolygonPicture]:
+    """Return the polygons of a GeoJSON or a vector file, one picture, or of COCO annotations, one for each image.
+
+    Without `has_crowds` annotations of COCO that are crowds are left out. `layer` is that of a vector file, its first
+    one unless given.
 
     Raises
     ------
     MeshError
-        If the file is neither, or broken.
+        If the file is none of these, or broken.
+    MissingPackageError
+        If it is a vector file, and neither pyogrio nor fiona is installed.
     OSError
         If it cannot be read.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
         raise MeshError(f"{str(path)!r} is {'a folder' if path.is_dir() else 'a pipe or a device'}, not a file")
+    is_vector = path.suffix.lower() in VECTOR_SUFFIXES
     try:
-        content = json.loads(path.read_bytes())
+        content = _vector_content(path, layer) if is_vector else json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
         raise MeshError(f"cannot read {str(path)!r}: {error}") from None
     try:
@@ -87,6 +98,40 @@ def load_polygons(path: str | os.PathLike[str], *, has_crowds: bool = True) -> l
     except (KeyError, TypeError, AttributeError, IndexError, ValueError, OverflowError) as error:
         raise MeshError(f"cannot read {str(path)!r}: something is missing or of a wrong kind ({error!r})") from None
     raise MeshError(f"cannot read {str(path)!r}: it is neither GeoJSON nor annotations in the format of COCO")
+
+
+def _vector_content(path: Path, layer: str | None) -> dict[str, Any]:
+    """A layer of a vector file as what GeoJSON holds."""
+    path.stat()  # that it is missing is told as of other files
+    try:
+        import pyogrio
+        import shapely
+    except ImportError:
+        return _fiona_content(path, layer)
+    try:
+        said, _, geometries, columns = pyogrio.raw.read(str(path), layer=layer, force_2d=True)
+        shapes = shapely.from_wkb(geometries)
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, shapely.errors.ShapelyError) as error:
+        raise MeshError(f"cannot read {str(path)!r}: {' '.join(str(error).split())}") from None
+    rows = [dict(zip(said["fields"], row, strict=True)) for row in zip(*(c.tolist() for c in columns), strict=True)]
+    features = [
+        {"type": "Feature", "geometry": shape and shapely.geometry.mapping(shape), "properties": row}
+        for shape, row in zip(shapes.tolist(), rows or [{}] * len(shapes), strict=True)
+    ]
+    return {"type": "FeatureCollection", "features": features, "own crs": said["crs"]}
+
+
+def _fiona_content(path: Path, layer: str | None) -> dict[str, Any]:
+    try:
+        import fiona
+    except ImportError:
+        raise MissingPackageError(f"reading {str(path)!r} needs another package: pip install pyogrio shapely") from None
+    try:
+        with fiona.open(path, layer=layer) as rows:
+            features = [{"type": "Feature", **row.__geo_interface__} for row in rows]
+            return {"type": "FeatureCollection", "features": features, "own crs": rows.crs.to_string()}
+    except fiona.errors.FionaError as error:
+        raise MeshError(f"cannot read {str(path)!r}: {' '.join(str(error).split())}") from None
 
 
 def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPicture]:
@@ -213,7 +258,18 @@ def _geojson(content: Mapping[str, Any], name: str) -> PolygonPicture:
             picture.add(_joined(parts, f"feature {i}"), said)
         else:
             n_skipped += 1
-    return replace(picture, n_skipped=n_skipped)
+    return replace(picture, n_skipped=n_skipped, crs=_crs_of(content, picture))
+
+
+def _crs_of(content: Mapping[str, Any], picture: PolygonPicture) -> str | None:
+    """The CRS of a vector file, or of GeoJSON: the one it names, as old files do, or degrees of WGS84 if it can be."""
+    if "own crs" in content:
+        return content["own crs"] or None
+    named = (content.get("crs") or {}).get("properties", {}).get("name")
+    if named is not None:
+        return WGS84 if str(named).upper().endswith("CRS84") else str(named)
+    points = np.abs(picture.polygons[0])
+    return WGS84 if (points <= (180, 90)).all() else None
 
 
 def _parts(geometry: Mapping[str, Any]) -> Iterator[list[Any]]:

@@ -182,6 +182,7 @@ class Levels(Sequence[Level]):
                             **{name: array(f"{name}_{i}") for name in ARRAYS},  # type: ignore[arg-type]
                             materials=mesh.materials,
                             crease=mesh.crease,
+                            color_interpolation=mesh.color_interpolation,
                         ),
                         bound,
                         known,

@@ -251,5 +251,6 @@ def level_mesh(corners: Corners, original: Mesh) -> Mesh:
         materials=original.materials,
         material_of_triangle=rows,
         crease=original.crease,
+        color_interpolation=original.color_interpolation,
         **corners.attributes,
     )

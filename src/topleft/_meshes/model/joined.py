@@ -16,6 +16,7 @@ from topleft._core.base.array_types import Array
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import NO_CREASE, Mesh, coincident, with_normals
 from topleft._meshes.model.normals import angle_weighted_normals, moved
+from topleft.typing import EncodingOption
 
 
 def placed_arrays(
@@ -45,14 +46,14 @@ def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     vertices = np.concatenate([part.vertices for part in parts])
     triangles = np.concatenate([part.triangles + np.int32(start) for part, start in zip(parts, starts, strict=True)])
-    colors = None
+    colors, mixed = None, _interpolation_of(parts)
     if any(part.colors is not None for part in parts):
         colors = np.concatenate([_rgba(part) for part in parts])
     uv, uv1 = _joined_uv(parts, "uv"), _joined_uv(parts, "uv1")
     materials, rows = _joined_materials(parts)
     if all(part.normals is not None for part in parts):
         normals = np.concatenate([part.vertex_normals() for part in parts])
-        return Mesh(vertices, triangles, normals, colors, uv, materials, rows, uv1)
+        return Mesh(vertices, triangles, normals, colors, uv, materials, rows, uv1, color_interpolation=mixed)
     own_normals: npt.NDArray[Any] | None = None
     if crease == NO_CREASE and (colors is not None or uv is not None):
         # Vertices of two colours, or on both sides of a seam, stay two, and still share a normal.
@@ -62,7 +63,8 @@ def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:
     first, group = coincident(*(array for array in attributes if array is not None))
     own_normals, uv, uv1 = (None if array is None else array[first] for array in (own_normals, uv, uv1))
     colors = None if colors is None else colors[first]
-    return Mesh(vertices[first], group[triangles], own_normals, colors, uv, materials, rows, uv1, crease=crease)
+    own = vertices[first], group[triangles], own_normals, colors, uv, materials, rows, uv1
+    return Mesh(*own, crease=crease, color_interpolation=mixed)
 
 
 def _joined_materials(parts: list[Mesh]) -> tuple[tuple[Material, ...], npt.NDArray[np.int32] | None]:
@@ -90,6 +92,12 @@ def _joined_uv(parts: list[Mesh], name: str) -> npt.NDArray[np.float32] | None:
             for part, uv in zip(parts, own, strict=True)
         ]
     )
+
+
+def _interpolation_of(parts: list[Mesh]) -> EncodingOption:
+    """What is linear between the colours of all parts: their light, if that holds for each that has some."""
+    own = {part.color_interpolation for part in parts if part.colors is not None}
+    return "linear" if own == {"linear"} else "srgb"
 
 
 def _rgba(part: Mesh) -> npt.NDArray[np.uint8]:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +17,12 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_array, as_checked_triangles, set_read_only, shown
+from topleft._core.base.options import check_choice
 from topleft._core.raster.clusters import Clusters, box_of
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
 from topleft._meshes.model.texture import Texture
+from topleft.typing import EncodingOption
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
@@ -63,6 +65,8 @@ class Mesh:
         Degrees, 0 to 180: where two triangles bend by more at an edge, each side has its own normal, so that the edge
         is sharp; of a mesh without `normals`. 180: no edge is; 0: every one is ("flat"). With less than 180 vertices
         at one place count as one for the normals.
+    color_interpolation : {"srgb", "linear"}
+        What is linear between the colours of the vertices: their sRGB numbers, or their light, as glTF has it.
 
     Raises
     ------
@@ -95,6 +99,7 @@ class Mesh:
     material_of_triangle: I32 | None = None
     uv1: F32 | None = None
     crease: float = NO_CREASE
+    color_interpolation: EncodingOption = "srgb"
 
     if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
 
@@ -109,6 +114,7 @@ class Mesh:
             material_of_triangle: npt.ArrayLike | None = None,
             uv1: npt.ArrayLike | None = None,
             crease: float = NO_CREASE,
+            color_interpolation: EncodingOption = "srgb",
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -129,6 +135,7 @@ class Mesh:
             if getattr(self, name) is not None:
                 keep(self, name, read_only(_uv_array(name, getattr(self, name), len(vertices))))
         keep(self, "crease", as_crease(self.crease))
+        check_choice("color_interpolation", self.color_interpolation, get_args(EncodingOption))
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))

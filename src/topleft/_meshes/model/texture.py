@@ -21,7 +21,7 @@ from topleft._core.base.array_types import F64, U8, U16
 from topleft._core.base.arrays import as_array, set_read_only
 from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.options import parse
-from topleft._core.base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
+from topleft._core.base.texels import FILTER_CODES, MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MAX_TEXTURE_SIZE = 1 << 15
@@ -34,6 +34,12 @@ class Filter(StrEnum):
     NEAREST = "nearest"
     BILINEAR = "bilinear"
     TRILINEAR = "trilinear"
+    PIXELATED = "pixelated"
+
+    @property
+    def has_halves(self) -> bool:
+        """Whether it looks at halvings of the picture."""
+        return self in (Filter.TRILINEAR, Filter.PIXELATED)
 
 
 class Encoding(StrEnum):
@@ -62,7 +68,6 @@ class Wrap(StrEnum):
     MIRROR = "mirror"
 
 
-FILTER_CODES = {Filter.NEAREST: 0, Filter.BILINEAR: 1, Filter.TRILINEAR: 2}  # tl_filter in csrc/shading.h
 WRAP_CODES = {Wrap.REPEAT: 0, Wrap.CLAMP: 1, Wrap.MIRROR: 2}  # tl_wrap in csrc/shading.h
 
 
@@ -74,9 +79,10 @@ class Texture:
     ----------
     image : (H, W), (H, W, 3) or (H, W, 4) array_like of uint8
         sRGB, and opacity; row 0 is the top, where v = 1. Copied.
-    filter : {"trilinear", "bilinear", "nearest"}
+    filter : {"trilinear", "bilinear", "nearest", "pixelated"}
         "trilinear": between the texels and between the two halvings next to the size of the pixel's footprint.
         "bilinear": between the four texels next to the point. "nearest": the texel that the point lies in.
+        "pixelated": "nearest" where texels are larger than a pixel, "trilinear" where they are smaller.
     wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
         What lies beyond 0 and 1.
     encoding : {"srgb", "linear"}
@@ -155,7 +161,7 @@ class Texture:
 
     def compiled_cut_at(self, cutoff: float) -> engine.Mipmap:
         """The same for an alpha test: its halvings let through as much of their area as the picture does."""
-        if not self.has_alpha or self.filter is not Filter.TRILINEAR or not 0 < cutoff <= 1:
+        if not self.has_alpha or not Filter(self.filter).has_halves or not 0 < cutoff <= 1:
             return self.compiled
         cut: dict[float, engine.Mipmap] = self.__dict__.setdefault("_cut", {})
         if cutoff not in cut:
@@ -164,12 +170,12 @@ class Texture:
 
     def _mipmap(self, cutoff: float | None) -> engine.Mipmap:
         height, width = self.image.shape[:2]
-        rows = level_rows(width, height, has_halves=self.filter is Filter.TRILINEAR)
+        rows = level_rows(width, height, has_halves=Filter(self.filter).has_halves)
         texels = texels_of(self.image, rows, light=LIGHT_OF_BYTE[Encoding(self.encoding)])
         if cutoff is not None:
             keep_coverage(texels, rows, 65535 * cutoff, self.wrap)
         wrap_u, wrap_v = (WRAP_CODES[Wrap(one)] for one in self.wrap)
-        filter_code = FILTER_CODES[Filter(self.filter)]
+        filter_code = FILTER_CODES[str(self.filter)]
         table = np.array(rows, dtype=np.int32)
         if self.transform is None:
             return engine.Mipmap(texels, table, filter_code, wrap_u, wrap_v, self.uv_set)

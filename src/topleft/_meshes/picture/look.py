@@ -85,7 +85,7 @@ class ShadingMesh:
     normals : (N, 4) float32
         Unit normals of the vertices, then of creased corners, 0 where there is none, and 1.
     colors : (V, 4) float32, optional
-        sRGB of the vertices, 0 to 255, and opacity, 0 to 1.
+        sRGB of the vertices, 0 to 255, or their light, 0 to 1, and opacity, 0 to 1.
     """
 
     def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
@@ -103,6 +103,8 @@ class ShadingMesh:
         low, high = box.astype(self.positions.dtype)
         self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
+        if self.colors is not None and mesh.color_interpolation == "linear":
+            self.colors[:, :3] = LIGHT_OF_SRGB[mesh.colors[:, :3]]  # type: ignore[index]
         self.tables: dict[tuple[object, ...], tuple[Sequence[Material], engine.ShadingTable]] = {}  # see `table_of`
 
     @cached_property
@@ -195,7 +197,7 @@ def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: boo
         mesh.has_alpha,
         -1.0 if is_mirrored else 1.0,
         mesh.material_of_triangle if surface.is_by_triangle else None,
-        LIGHT_OF_SRGB,
+        None if mesh.color_interpolation == "linear" else LIGHT_OF_SRGB,
     )
     back_side = 1.0 if is_mirrored else -1.0
     table.set_materials([material_row(one, mesh, surface, back_side) for one in surface.materials])

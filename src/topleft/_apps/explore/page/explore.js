@@ -82,7 +82,10 @@ function socketLine(onLost) {
   socket.onclose = () => line.lose();
   return new Promise((resolve, reject) => {
     socket.onopen = () => resolve(line);
-    socket.onerror = () => reject(new Error("the explorer has ended: start it again"));
+    socket.onerror = () => fetch(document.baseURI).then(
+      () => reject(new Error("the page is there, but its WebSocket is blocked: a proxy or an extension between the browser and "
+        + "Python stops it. Open the address without them.")),
+      () => reject(new Error("the explorer has ended: start it again")));
   });
 }
 
@@ -142,6 +145,10 @@ function choose(label, options, value, write) {
   return row(label, box);
 }
 
+// The scenes that Python lists, in their groups, with what they show.
+const sceneOptions = (app) => app.hello.groups.map(([label, rows]) =>
+  make("optgroup", {label}, ...rows.map(([name, title]) => make("option", {value: name, title}, name))));
+
 // A key of colours: [text, [r, g, b]] each.
 const keyOf = (rows) => rows.map(([text, rgb]) => make("span", {}, make("i", {style: `background:rgb(${rgb})`}), text));
 
@@ -185,6 +192,8 @@ function pixelsPart(app, panel) {
   const boxes = findAll("[data-name]"), {methods, scenes} = app.hello;
   let state = {}, chosen = 0, corner = null;  // the triangle that is edited, and its corner that the keys move
   let pixel = null, sample = 0, probed = "a", samples = [], past = [], fitted = "", isRefused = false;
+  let hasEdges = true, whole = {};  // the window that the scene began with
+  const aboutScene = new Map(app.hello.groups.flatMap(([, rows]) => rows));
 
   // -- what is asked --
 
@@ -222,6 +231,7 @@ function pixelsPart(app, panel) {
   function restore(given) {
     [past, corner, chosen] = [[], null, 0];
     [pixel, probed] = [given.size.map((n) => n >> 1), given.other ? "b" : "a"];
+    whole = {size: given.size, origin: given.origin ?? [0, 0]};
     change({...PIXEL_DEFAULTS, ...given}, false);
   }
   async function takeScene(name) {
@@ -232,6 +242,20 @@ function pixelsPart(app, panel) {
     app.say(name);
   }
   const nextScene = (step) => takeScene(scenes.at((Math.max(0, scenes.indexOf(state.scene)) + step) % scenes.length));
+
+  // -- the window --
+
+  // Shows `factor` times as much round a place of the picture, which stays where it is; Python draws it anew.
+  const MOST_SIDE = 256, LEAST_SIDE = 4;
+  function zoom(factor, [x, y] = state.size.map((n, k) => state.origin[k] + n / 2)) {
+    const size = state.size.map((n) => Math.max(LEAST_SIDE, Math.min(MOST_SIDE, Math.round(n * factor))));
+    see(size, [x, y].map((at, k) => Math.round(at - (at - state.origin[k]) * size[k] / state.size[k])));
+  }
+  function see(size, origin) {
+    pixel = pixel?.map((at, k) => at + state.origin[k] - origin[k]);
+    if (pixel?.some((at, k) => at < 0 || at >= size[k])) pixel = null;
+    change({size, origin}, false);
+  }
 
   // -- triangles --
 
@@ -267,7 +291,7 @@ function pixelsPart(app, panel) {
     }
     for (const {key, title, notes, facts, legend, refused} of shown) {
       if (!part.views.has(key)) part.views.set(key, view(key));
-      const one = part.views.get(key), text = facts.map(([words, kind]) => make(`span.${kind}`, {}, words));
+      const one = part.views.get(key), text = facts.map(([words, kind, title = ""]) => make(`span.${kind}`, {title}, words));
       Object.assign(one, {owners: arrays[`${key}_owners`], counts: arrays[`${key}_counts`]});
       one.caption.replaceChildren(make("b", {}, title), make("span", {}, notes), make("div", {}, text));
       one.legend.replaceChildren(...legend.map(([color, words]) =>
@@ -286,7 +310,12 @@ function pixelsPart(app, panel) {
     const canvas = make("canvas"), sheet = svg("svg", {"aria-hidden": "true"});
     const box = make("div.view", {}, canvas, sheet), caption = make("figcaption"), legend = make("div.legend");
     const figure = make("figure.panel", {"data-key": key}, caption, box, legend);
-    let dragged = null;
+    let dragged = null, grabbed = null;
+    const touches = new Map(), span = () => {
+      const [a, b] = [...touches.values()];
+      return {reach: Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY) || 1,
+        middle: place({clientX: (a.clientX + b.clientX) / 2, clientY: (a.clientY + b.clientY) / 2})};
+    };
     const place = ({clientX, clientY}) => {
       const {left, top} = sheet.getBoundingClientRect();
       return [clientX - left, clientY - top].map((value, k) => value / part.cell - 1 + state.origin[k]);
@@ -304,8 +333,17 @@ function pixelsPart(app, panel) {
       return Math.max(0, far.indexOf(Math.min(...far)));
     };
     const isInside = (at) => at.every((value, k) => value >= 0 && value < state.size[k]);
+    sheet.onwheel = (event) => {
+      event.preventDefault();
+      zoom(1.0015 ** Math.max(-300, Math.min(300, event.deltaY)), place(event));
+    };
     sheet.onpointerdown = (event) => {
-      if (event.button) return;
+      touches.set(event.pointerId, event);
+      if (touches.size === 2) return void (dragged = null, grabbed = span());
+      if (event.button || event.shiftKey) {
+        sheet.setPointerCapture(event.pointerId);
+        return void (grabbed = {middle: place(event)});
+      }
       stage.focus({preventScroll: true});
       dragged = nearest(event);
       const [x, y] = at(event);
@@ -322,10 +360,22 @@ function pixelsPart(app, panel) {
       overlay(), controls();
     };
     sheet.onpointermove = (event) => {
+      if (touches.has(event.pointerId)) touches.set(event.pointerId, event);
+      if (grabbed) {
+        const {reach, middle} = touches.size === 2 ? span() : {middle: place(event)}, factor = reach ? grabbed.reach / reach : 1;
+        const origin = state.origin.map((at, k) => at + Math.round(grabbed.middle[k] - middle[k]));
+        if (Math.abs(Math.log(factor)) > 0.1) zoom(factor, middle), grabbed = {...grabbed, reach};
+        else if (`${origin}` !== `${state.origin}`) see(state.size, origin);
+        return;
+      }
       if (dragged !== null) move(dragged, place(event).map(snapped), false);
       else if (event.pointerType === "mouse" && isInside(at(event))) inspect(at(event), key, nearestSample(event));
     };
-    sheet.onpointerup = sheet.onpointercancel = () => { dragged = null; };
+    sheet.onpointerup = sheet.onpointercancel = (event) => {
+      touches.delete(event.pointerId);
+      [dragged, grabbed] = [null, null];
+    };
+    sheet.oncontextmenu = (event) => event.preventDefault();
     return {figure, canvas, sheet, box, caption, legend};
   }
   function inspect(at, key = probed, k = 0) {
@@ -368,7 +418,7 @@ function pixelsPart(app, panel) {
     const outline = (rows) => rows.filter((row) => row.every((i) => isNear(points[i])))
       .map((row) => `M${row.map((i) => points[i].join(" ")).join("L")}Z`).join("");
     const all = outline(state.triangles), own = outline(state.triangles.length > 1 ? [taken()] : []);
-    const kind = [cell, width, height, samples.length].join("-");
+    const kind = [cell, width, height, samples.length, ...state.origin].join("-");
     for (const {sheet, counts} of part.views.values()) {
       if (sheet.dataset.kind !== kind) {
         sheet.dataset.kind = kind;
@@ -379,8 +429,8 @@ function pixelsPart(app, panel) {
       const numbers = [...(isCounted ? counts : [])].flatMap((n, i) => n > 1
         ? [svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}, n)] : []);
       sheet.lastChild.replaceChildren(
-        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: cell < 9 ? "" : all}),
-        svg("path", {class: "edges", d: all}), svg("path", {class: "taken", d: own}),
+        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: cell < 9 || !hasEdges ? "" : all}),
+        svg("path", {class: "edges", d: hasEdges ? all : ""}), svg("path", {class: "taken", d: hasEdges ? own : ""}),
         svg("rect", {class: "ring", fill: "none"}),
         ...points.flatMap((point, i) => isNear(point) ? [grip(point, taken().indexOf(i), cell)] : []),
       );
@@ -391,12 +441,22 @@ function pixelsPart(app, panel) {
   function ruled(width, height, cell, kind) {
     const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
     const lines = cell < 5 ? "" : bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
-    const ruling = svg("path", {class: "lines", d: lines});
+    const ruling = svg("g", {}, svg("path", {class: "lines", d: lines}), ...rims(width, height, cell));
     if (cell < 9 || !samples.length) return [ruling];
     const r = (samples.length > 4 ? 1 : 1.5) / cell, id = `dots-${kind}`;
     const dots = samples.map(([cx, cy]) => svg("circle", {class: "dots", cx, cy, r}));
     const pattern = svg("pattern", {id, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots);
     return [svg("defs", {}, pattern), ruling, svg("rect", {width, height, fill: `url(#${id})`})];
+  }
+  // The numbers of columns and rows, in the margin, as many as have room.
+  function rims(width, height, cell) {
+    const longest = Math.max(...[0, 1].map((k) => `${state.origin[k] + state.size[k]}`.length));
+    const every = [1, 2, 5, 10, 20, 50, 100].find((n) => n * cell >= 8 * longest + 6) ?? 100, size = Math.min(0.6, 9 / cell * 1.1);
+    const text = (number, x, y) => svg("text", {class: "rim", x, y, "font-size": size}, number);
+    const marks = (n, k) => Array.from({length: n}, (_, i) => i).filter((i) => (i + state.origin[k]) % every === 0);
+    if (cell < 5 || longest > 5) return [];
+    return [...marks(width, 0).map((i) => text(i + state.origin[0], i + 0.5, -0.5)),
+      ...marks(height, 1).map((i) => text(i + state.origin[1], -0.5, i + 0.5))];
   }
   function grip([x, y], k, cell) {
     return svg("g", {class: corner !== null && k === corner ? "grip taken" : "grip"},
@@ -427,12 +487,17 @@ function pixelsPart(app, panel) {
       const far = event.shiftKey ? 1 : step(), i = taken()[corner];
       move(i, state.vertices[i].slice(0, 2).map((value, k) => value + far * by[k]));
     } else if (by) {
-      const far = event.shiftKey ? 8 : 1;
-      inspect(state.size.map((n, k) => Math.max(0, Math.min(n - 1, (pixel ?? [0, 0])[k] + far * by[k]))));
+      const far = event.shiftKey ? 8 : 1, next = (pixel ?? [0, 0]).map((at, k) => at + far * by[k]);
+      const beyond = next.map((at, k) => Math.min(0, at) + Math.max(0, at - state.size[k] + 1));
+      if (beyond.some(Boolean)) see(state.size, state.origin.map((at, k) => at + beyond[k]));
+      inspect(next.map((at, k) => at - beyond[k]));
     } else if ("0123".includes(key)) {
       corner = key === "0" || !taken().length ? null : Number(key) - 1;
       overlay();
-    } else if (key === "Tab") nextScene(event.shiftKey ? -1 : 1).catch(told);
+    } else if (key === "PageDown" || key === "PageUp") nextScene(key === "PageUp" ? -1 : 1).catch(told);
+    else if ("+=-".includes(key)) zoom(key === "-" ? 1.25 : 0.8);
+    else if (key === "Home") see(whole.size, whole.origin);
+    else if (key === "e") find(".edged").click();
     else if (key === "f") change({look: state.look === "wireframe" ? "owners" : "wireframe"});
     else if (key === "Escape") boxes[0].focus();
     else if (key in EDIT_KEYS) edit(EDIT_KEYS[key]).catch(told);
@@ -454,6 +519,7 @@ function pixelsPart(app, panel) {
     find(".which").textContent = n ? `Triangle ${chosen} of ${n}` : "No triangle";
     for (const what of ["split", "flip", "remove"]) find(`[data-edit=${what}]`).disabled = !n;
     find("[data-edit=undo]").disabled = !past.length;
+    find(".about").textContent = aboutScene.get(state.scene) ?? "";
     find(".deep").hidden = (state.vertices[0]?.length ?? 2) < 3;
   }
   for (const box of boxes) {
@@ -471,7 +537,7 @@ function pixelsPart(app, panel) {
       box.append(make("optgroup", {label: kind}, ...own.map(({name, summary}) => option(name, name, summary))));
     }
   }
-  boxes[0].append(option(scenes.includes(app.hello.name) ? "from a link" : app.hello.name, ""), ...scenes.map((name) => option(name)));
+  boxes[0].append(option(scenes.includes(app.hello.name) ? "from a link" : app.hello.name, ""), ...sceneOptions(app));
   for (let k = 0; k < 6; k++) {
     const corner = k >> 1, axis = k & 1;
     const box = make("input", {type: "number", step: "any", "aria-label": `corner ${corner + 1}, ${"xy"[axis]}`});
@@ -482,6 +548,9 @@ function pixelsPart(app, panel) {
     };
     find(".coordinates").append(...(axis ? [] : [make("span", {}, `${corner + 1}`)]), box);
   }
+  const zooms = {in: () => zoom(0.8), out: () => zoom(1.25), all: () => see(whole.size, whole.origin)};
+  for (const one of findAll("[data-zoom]")) one.onclick = zooms[one.dataset.zoom];
+  find(".edged").onchange = ({target}) => (hasEdges = target.checked, overlay());
   for (const one of findAll("[data-look]")) one.onclick = () => change({look: one.dataset.look});
   for (const one of findAll("[data-edit]")) one.onclick = () => edit(one.dataset.edit).catch(told);
   for (const one of findAll("[data-save]")) {
@@ -510,13 +579,15 @@ function stepsPart(app, panel) {
   const part = {state: () => view, enter, restore}, view = {scene: "", method: "edge", subpixel_bits: 8, step: null};
   let trace = null, timer = null;
   const canvas = make("canvas"), over = svg("svg", {"aria-hidden": "true"}), now = svg("rect", {class: "now", height: 1});
-  const told = make("p", {role: "status"}), values = make("dl.values"), about = make("p.hint");
+  const told = make("p", {role: "status"}), values = make("dl.values"), about = make("p.hint"), legend = make("div.legend");
   const slider = make("input", {type: "range", min: 0, "aria-label": "Step", oninput: () => go(slider.valueAsNumber)});
   const speed = make("input", {type: "range", min: 0, max: 3, step: 0.25, value: 1});
   const actions = {
-    First: ["⇤", "Home", () => go(0)], "Row back": ["«", "Shift+ArrowLeft", () => leap(-1)], Back: ["‹", "ArrowLeft", () => go(view.step - 1)],
+    First: ["⇤", "Home", () => go(0)], "Triangle back": ["⟪", "PageUp", () => leap(-1, 4)],
+    "Row back": ["«", "Shift+ArrowLeft", () => leap(-1)], Back: ["‹", "ArrowLeft", () => go(view.step - 1)],
     Play: ["▶", " ", toggle],
-    Step: ["›", "ArrowRight", () => go(view.step + 1)], Row: ["»", "Shift+ArrowRight", () => leap(1)], Last: ["⇥", "End", () => go(Infinity)],
+    Step: ["›", "ArrowRight", () => go(view.step + 1)], Row: ["»", "Shift+ArrowRight", () => leap(1)],
+    Triangle: ["⟫", "PageDown", () => leap(1, 4)], Last: ["⇥", "End", () => go(Infinity)],
   };
   const buttons = Object.entries(actions).map(([name, [sign, key, onclick]]) =>
     make("button", {type: "button", title: `${name}: ${key === " " ? "Space" : key}`, "aria-label": name, onclick}, sign));
@@ -525,7 +596,7 @@ function stepsPart(app, panel) {
     const isOn = timer === null && trace !== null;
     clearTimeout(timer);
     timer = null;
-    buttons[3].textContent = isOn ? "❚❚" : "▶";
+    buttons[4].textContent = isOn ? "❚❚" : "▶";
     if (isOn && view.step >= trace.steps.length) go(0);
     if (isOn) tick();
   }
@@ -534,9 +605,9 @@ function stepsPart(app, panel) {
     go(view.step + 1);
     timer = setTimeout(tick, 1000 / 10 ** speed.value);
   }
-  // To the first step of another row, or of another triangle.
-  function leap(way) {
-    const place = (k) => trace.steps[k - 1]?.slice(1, 5).filter((_, i) => i % 3 === 0).join();
+  // To the first step of another row or triangle; from the fourth number on of another triangle.
+  function leap(way, first = 1) {
+    const place = (k) => trace.steps[k - 1]?.slice(first, 5).filter((_, i) => i % 3 === 0).join();
     let k = view.step + way;
     while (k > 0 && k < trace.steps.length && place(k) === place(view.step)) k += way;
     go(k);
@@ -565,7 +636,9 @@ function stepsPart(app, panel) {
       const drawn = app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels;
       const scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : drawn;
       const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view, [width, height] = size;
+      const asked = JSON.stringify([view.scene, method, subpixel_bits]);
       trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
+      if (asked !== JSON.stringify([view.scene, view.method, view.subpixel_bits])) return;  // a link has come in between
       methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
       methods.value = method;
       about.textContent = trace.about;
@@ -573,13 +646,16 @@ function stepsPart(app, panel) {
       over.replaceChildren(...["halo", "edges"].flatMap((name) => trace.outlines.map((points) => svg("polygon", {class: name, points}))), now);
       for (const [name, value] of Object.entries({width, height})) over.parentNode.style.setProperty(`--${name}`, value);
       app.say("");
-      go(view.step ?? trace.steps.findIndex(([, , , isDrawn]) => isDrawn) + 1);
+      const colors = trace.outlines.slice(0, OWNERS.length).map((_, i) => [`triangle ${i}`, OWNERS[i]]);
+      legend.replaceChildren(...keyOf([...colors, ["tested, not drawn", [190, 190, 190]], ["drawn again", TWICE]]));
+      go(view.step ?? 0);
     } catch (error) {
       app.say(error.message, true);
     }
   });
   const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: null}), record());
-  const scenes = choose("scene", [["", "that of Pixels"], ...app.hello.scenes.map((name) => [name])], "", set("scene"));
+  const scenes = choose("scene", [["", "that of Pixels"]], "", set("scene"));
+  scenes.lastChild.append(...sceneOptions(app));
   const chosen = choose("method", [["edge"]], "edge", set("method")), methods = chosen.lastChild;
   const bits = choose("sub-pixel bits", [[0], [1], [2], [4], [8], [12], [16]], 8, set("subpixel_bits", Number));
   const press = (event) => {
@@ -588,7 +664,7 @@ function stepsPart(app, panel) {
     event.preventDefault();
     act();
   };
-  const layout = make("div.layout", {tabIndex: -1, onkeydown: press}, make("div.stage", {}, make("div.magnified", {}, canvas, over)), make("div.side", {},
+  const layout = make("div.layout", {tabIndex: -1, onkeydown: press}, make("div.stage", {}, make("div.magnified", {}, canvas, over), legend), make("div.side", {},
     group("Steps", make("div.segments", {role: "group"}, ...buttons), slider, row("speed", speed)), group("Now", told, values), group("Drawn", scenes, chosen, bits, about)));
   function enter() {
     panel.append(layout);
@@ -669,6 +745,7 @@ function meshPart(app, panel) {
     over.replaceChildren(...["halo", "taken"].map((name) => svg("polygon", {class: name, points: (hit?.corners_px ?? []).join(" ")})));
   }
   async function open(given) {
+    found.replaceChildren(), over.replaceChildren();
     try {
       mesh = await app.line.ask("mesh.open", {name: given?.name}, given ? [new Uint8Array(await given.arrayBuffer())] : []);
     } catch (error) {
@@ -802,7 +879,7 @@ function racePart(app, panel) {
     const {axes, what: text} = known.families[family];
     if (family !== view.family || view.positions.length !== axes.length) view.positions = axes.map(() => 0);
     view.family = family;
-    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once, and as the vertices say before any snap.`;
+    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once, and as the vertices say before any snap. auto snaps vertices to 2^-8 px first, so a pixel whose centre an edge passes that closely may be another triangle's; "auto, exact" snaps nothing and has no wrong pixel.`;
     sliders.replaceChildren(...axes.map(({what, steps, is_continuous}, i) => make("label.slider", {}, make("span", {}, `${what}: `, make("output")), make("input", {
       type: "range", min: 0, max: steps.length - 1, step: is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, target.valueAsNumber),
     }))));

@@ -262,9 +262,10 @@ def _resized(picture: npt.NDArray[np.uint8] | None, size: tuple[int, ...]) -> np
 
 def _filter_of(sampler: Tree) -> FilterOption:
     """What comes nearest to the filters of OpenGL; trilinear unless the file says otherwise."""
+    has_halves = sampler.get("minFilter") not in (NEAREST, LINEAR)
     if sampler.get("magFilter") == NEAREST:
-        return "nearest"
-    return "bilinear" if sampler.get("minFilter") in (NEAREST, LINEAR) else "trilinear"
+        return "nearest" if sampler.get("minFilter") == NEAREST else "pixelated"
+    return "trilinear" if has_halves else "bilinear"
 
 
 def _wrap_of(sampler: Tree) -> tuple[WrapOption, WrapOption]:

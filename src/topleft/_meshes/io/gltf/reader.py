@@ -561,7 +561,7 @@ def _placed(shape: _Shape, matrix: F64, materials: tuple[Any, ...]) -> Mesh:
     own = placed_arrays(shape.positions, shape.triangles, shape.normals, matrix)
     colors = None if shape.colors is None else _srgb_bytes(shape.colors)
     uv, uv1 = (None if rows is None else _upwards(rows) for rows in (shape.uv, shape.uv1))
-    return Mesh(*own, colors, uv, materials, None, uv1)
+    return Mesh(*own, colors, uv, materials, None, uv1, color_interpolation="linear")
 
 
 def _upwards(uv: Array) -> Array:

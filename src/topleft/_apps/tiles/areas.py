@@ -1,0 +1,206 @@
+"""Polygons as a huge raster: which windows each of them may touch, and what a window shows of them.
+
+Input: rings in pixels, of any number of polygons. Output: what `Tiles` needs in the place of triangles, an index of
+windows and a `Painter`; each window is the crop of what `polygons` draws of all of them, to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._apps.tiles.drawing import Painter, Size
+from topleft._apps.tiles.spans import Tiling
+from topleft._core.base.array_types import I32, Array
+from topleft._core.base.arrays import set_aligned
+from topleft._core.base.grid import Extent, Grid
+from topleft._core.base.memory import FRESH, Memory
+from topleft._core.base.options import Sampling, parse
+from topleft._core.polygons.polygons import as_paint, in_crs_of, polygons
+from topleft._core.polygons.rings import RingSet
+
+MOST_SPANS = 1 << 28
+"""Pairs of a polygon and a window that an index lists: 3 GB."""
+
+
+def are_polygons(subject: Any) -> bool:
+    """Whether something is geometries and no mesh: shapely's, GeoJSON, ring offsets of polygons, lists of polygons."""
+    if isinstance(subject, RingSet) or hasattr(subject, "__geo_interface__") or hasattr(subject, "geom_type"):
+        return True
+    if isinstance(subject, Mapping):
+        return "type" in subject
+    if isinstance(subject, tuple) and len(subject) == 3:
+        return np.ndim(subject[0]) == 2 and np.ndim(subject[1]) == 1 and np.ndim(subject[2]) == 1
+    is_array = isinstance(subject, np.ndarray) and subject.dtype == object and subject.ndim == 1
+    if (isinstance(subject, list) or is_array) and len(subject):
+        first = subject[0]
+        return are_polygons(first) or (isinstance(first, list) and len(first) > 0 and np.ndim(first[0]) == 2)
+    return False
+
+
+class Areas:
+    """Polygons in pixels, in the place of the triangles of a mesh."""
+
+    faces: Array | None = None
+    n_components = 2
+
+    def __init__(self, rings: RingSet) -> None:
+        self.rings = rings
+        self.columns = (rings.points,)
+        self.n = self.n_faces = len(rings)
+        self.n_vertices = len(rings.points)
+
+    def parts(self) -> Iterator[Array]:
+        """All that they consist of, in pieces, to be hashed."""
+        yield from (self.rings.points, self.rings.rings, self.rings.polygons)
+
+    def boxes(self) -> npt.NDArray[np.float64]:
+        """The box (N, 4) of each: least x and y, largest x and y; of none without points."""
+        rings, firsts = self.rings, self.rings.rings[self.rings.polygons]
+        box = np.full((self.n, 4), np.nan)
+        is_full = firsts[:-1] < firsts[1:]
+        if is_full.any():
+            box[is_full, :2] = np.minimum.reduceat(rings.points, firsts[:-1][is_full])
+            box[is_full, 2:] = np.maximum.reduceat(rings.points, firsts[:-1][is_full])
+        return box
+
+    def of(self, which: I32) -> RingSet:
+        """Some of the polygons."""
+        rings, polygon_offsets = self.rings.rings, self.rings.polygons
+        own_rings, n_rings = _ranges(polygon_offsets[which], polygon_offsets[which + 1])
+        own_points, n_points = _ranges(rings[own_rings], rings[own_rings + 1])
+        ring_offsets, offsets = (np.concatenate([[0], np.cumsum(n)]).astype(np.int64) for n in (n_points, n_rings))
+        return RingSet(self.rings.points[own_points], ring_offsets, offsets)
+
+
+def _ranges(
+    first: npt.NDArray[np.int64], end: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The whole numbers of ranges, one range after the other, and how many each has."""
+    counts = end - first
+    before = np.cumsum(counts) - counts
+    return np.arange(int(counts.sum())) + np.repeat(first - before, counts), counts
+
+
+def areas_of(subject: Any, grid: Grid | None, crs: object) -> Areas:
+    """Polygons in the pixels of a grid, or as they are."""
+    rings = in_crs_of(grid, subject, crs)
+    return Areas(rings if grid is None else RingSet(grid.to_pixels(rings.points), rings.rings, rings.polygons))
+
+
+def extent_of_polygons(subject: Any) -> Extent:
+    """The box round polygons in units of their own."""
+    points = in_crs_of(None, subject, None).points
+    if not len(points):
+        raise ValueError("no polygons have no extent")
+    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return x_min, x_max, y_min, y_max
+
+
+class AreaIndex:
+    """Which polygons each window of a raster may show; `Tiles` asks it as it asks a `WindowIndex`."""
+
+    is_on_disk = False
+
+    def __init__(self, areas: Areas, tiling: Tiling) -> None:
+        size, window = (
+            np.array(pair) for pair in ((tiling.width, tiling.height), (tiling.window_width, tiling.window_height))
+        )
+        boxes = areas.boxes()
+        with np.errstate(invalid="ignore"):
+            low, high = np.floor(boxes[:, :2] - 1), np.floor(boxes[:, 2:] + 1)  # a point snaps by less than a pixel
+            meets = ((high >= 0) & (low < size)).all(axis=1)
+        low, high = np.maximum(low[meets], 0), np.minimum(high[meets], size - 1)
+        first, end = (low // window).astype(np.int64), (high // window).astype(np.int64) + 1
+        n_across, n_down = (end - first).T
+        counts = n_across * n_down
+        if int(counts.sum()) > MOST_SPANS:
+            raise MemoryError(f"{int(counts.sum())} pairs of a polygon and a window: take larger windows")
+        who = np.repeat(np.arange(len(counts)), counts)
+        place = np.arange(len(who)) - np.repeat(np.cumsum(counts) - counts, counts)
+        row, column = first[who, 1] + place // n_across[who], first[who, 0] + place % n_across[who]
+        window_of = row * tiling.n_columns + column
+        order = np.argsort(window_of, kind="stable")  # the polygons of a window stay in their order
+        self._polygons = np.flatnonzero(meets)[who[order]].astype(np.int32)
+        self.counts = np.bincount(window_of, minlength=tiling.n_rows * tiling.n_columns).reshape(tiling.n_rows, -1)
+        self._starts = np.concatenate([[0], np.cumsum(self.counts)])
+        self._n_columns = tiling.n_columns
+        self.n_spans = len(who)
+
+    def of_window(self, row: int, column: int) -> I32:
+        """The polygons of a window, ascending."""
+        i = row * self._n_columns + column
+        return self._polygons[self._starts[i] : self._starts[i + 1]]
+
+
+@dataclass(frozen=True)
+class AreaPayload:
+    """What a window needs: its polygons, ascending, their points and offsets, and their values."""
+
+    triangles: I32
+    points: Array
+    rings: npt.NDArray[np.int64]
+    polygons: npt.NDArray[np.int64]
+    values: Array | None = None
+
+    __setstate__ = set_aligned
+
+
+class AreaPainter(Painter):
+    """`polygons`: masks, labels or values."""
+
+    own = ("assume_valid", "background", "max_crossings", "rule", "sampling")
+
+    @classmethod
+    def of_kind(cls, kind: str, grid: Grid | None, areas: Areas, values: Any, options: dict[str, Any]) -> AreaPainter:
+        """Return what draws windows of polygons.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If there is no such option, or an option or the values do not fit the kind.
+        """
+        known = (*cls.own, "subpixel_bits")
+        unknown = sorted(options.keys() - set(known))
+        if unknown:
+            raise TypeError(f"polygons have no option {unknown[0]!r}; their options are {', '.join(known)}")
+        if kind not in ("labels", "coverage", "fill"):
+            raise ValueError(f"kind must be 'labels', 'coverage' or 'fill' for polygons, got {kind!r}")
+        if (kind == "fill") != (values is not None):
+            raise ValueError(f"values are for the kind 'fill', which needs them, got {kind!r}")
+        view = {name: options[name] for name in ("subpixel_bits",) if name in options}
+        painter = cls(grid, options, view, 2)
+        how = parse(Sampling, "sampling", options.get("sampling", "center"))
+        if kind == "coverage":
+            is_share = how is Sampling.AREA or how.n_samples > 1
+            painter.dtype, painter.empty = (np.dtype(np.float32), 0.0) if is_share else (np.dtype(bool), False)
+            painter.values = None
+        else:
+            said = options.get("background")
+            if said is None and kind == "fill" and grid is not None:
+                said = grid.nodata
+            paint = as_paint("index" if kind == "labels" else values, said, areas.n, how)
+            painter.values, painter.empty = paint.table, paint.background
+            painter.dtype, painter.channels = paint.table.dtype, paint.table.shape[1:]
+            painter.nodata = float(paint.background) if not painter.channels else None
+        return painter
+
+    values: Array | None
+
+    def gather(self, triangles: Any, which: I32, memory: Memory = FRESH) -> Any:  # noqa: ARG002
+        """Take the polygons of a window out of all of them."""
+        rings = triangles.of(which)
+        values = None if self.values is None else self.values[which]
+        return AreaPayload(which, rings.points, rings.rings, rings.polygons, values)
+
+    def draw(self, payload: Any, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
+        """Return the pixels of a window."""
+        style = {name: value for name, value in self.options.items() if name != "background"}
+        if payload.values is not None:
+            style |= {"values": payload.values, "background": self.empty}
+        rings = RingSet(payload.points, payload.rings, payload.polygons)
+        return polygons(rings, size, origin=origin, threads=threads, out=out, **style)
