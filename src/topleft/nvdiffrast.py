@@ -1,4 +1,4 @@
-"""Run a program for nvdiffrast on the CPU as it is: `python -m topleft.nvdiffrast script.py ...`.
+"""Run a program for nvdiffrast on the CPU as it is: `python -m topleft.nvdiffrast PROGRAM ...`.
 
 `import nvdiffrast.torch` gives it `topleft.torch`, and what it asks of a device "cuda" is done on the CPU: tensors that
 it makes there or moves there, `.cuda()`, and the calls of `torch.cuda` that wait, seed or empty. It says so once.
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program that the first argument names, with the others; returns the exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] in ("-h", "--help"):
-        sys.stderr.write("usage: python -m topleft.nvdiffrast script.py [arguments of the script]\n")
+        sys.stderr.write("usage: python -m topleft.nvdiffrast PROGRAM [its arguments]\n")
         return 0 if given else 2
     if not Path(given[0]).is_file():
         sys.stderr.write(f"topleft.nvdiffrast: there is no file {given[0]!r}\n")

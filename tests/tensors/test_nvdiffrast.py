@@ -47,4 +47,4 @@ def test_program_that_is_not_there_is_named():
 
 def test_without_a_program_says_how_it_is_used():
     assert run().returncode == 2
-    assert run("--help").stderr.startswith("usage: python -m topleft.nvdiffrast script.py")
+    assert run("--help").stderr.startswith("usage: python -m topleft.nvdiffrast PROGRAM")
