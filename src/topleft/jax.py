@@ -282,7 +282,7 @@ def antialias(color: Array, rast: Array, pos: Array, tri: Array, *, edges: Edges
     tri : array of int32, shape (T, 3)
         What was drawn.
     edges : {"silhouette", "area", "straight-through"}
-        As in `topleft.torch.antialias`; "area" for meshes of small triangles.
+        As for `antialias` of `topleft.torch`; "area" for meshes of small triangles.
 
     Returns
     -------
