@@ -28,10 +28,15 @@ typedef struct {
     double eye[4]; /* homogeneous: a place, or with 0 the direction to it */
 } tl_taken;
 
+#define TL_VIEW_BLOCK 16
+
 /* A height grid and who looks over it. */
 typedef struct {
     const double *heights; /* (height, width), NaN where there is none */
     int64_t width;
+    /* (ceil(height / TL_VIEW_BLOCK), n_blocks): the greatest height of cells [b, b + TL_VIEW_BLOCK] along both axes */
+    const double *blocks;
+    int64_t n_blocks;
     double eye[3];         /* column, row and height; at the middles of cells columns and rows are whole; in the grid */
     const double *ways[2]; /* 1 / (k - eye) of each column, and of each row; of none where that is 0 */
     double cell[2];        /* width and height of a cell */

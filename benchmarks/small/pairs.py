@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import argparse
 import statistics
+import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -26,6 +29,11 @@ from benchmarks.report.study import Study
 from benchmarks.report.tables import facts_text, table
 from benchmarks.scenes.arrays import blob_arrays, strewn_arrays
 from benchmarks.scenes.families import NO_SNAP
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
 
 Calls = Mapping[str, Callable[[], object]]
 Scenes = Iterator[tuple[str, Calls]]
@@ -402,7 +410,57 @@ def grids_beside_others() -> Scenes:
     yield "atlas of 200,000 triangles, 1024x1024", bare
     x, y = np.meshgrid(np.arange(1000), np.arange(1000))
     hills = 40 * np.sin(x / 97) * np.cos(y / 83) + 9 * np.sin(x / 23 + y / 31)
-    yield "viewshed of 1000x1000", {"topleft": partial(tl.viewshed, hills, (500.5, 400.5), eye_height=9.0, threads=1)}
+    views = {"topleft": partial(tl.viewshed, hills, (500.5, 400.5), eye_height=9.0, threads=1)}
+    with TemporaryDirectory() as folder:
+        try:
+            views["gdal_viewshed"] = gdal_viewshed(hills, Path(folder))
+        except (ImportError, OSError) as error:
+            print(f"gdal_viewshed: {error}", file=sys.stderr)
+        yield "viewshed of 1000x1000", views
+    mesh = tl.Mesh(vertices, triangles)
+    cameras = tl.viewpoints(mesh, 20)
+    seen = {"topleft visible_faces": partial(tl.visible_faces, mesh, cameras, (512, 512))}
+    try:
+        seen["Open3D RaycastingScene"] = open3d_rays(vertices, triangles, cameras)
+    except ImportError as error:
+        print(f"open3d: {error}", file=sys.stderr)
+    yield "visible triangles of 70,000, 20 views of 512x512", seen
+
+
+def gdal_viewshed(heights: NDArray[Any], folder: Path) -> Callable[[], object]:
+    """The program of GDAL on a GeoTIFF, the eye in the middle of cell (500, 400)."""
+    import rasterio
+
+    path, height = folder / "heights.tif", len(heights)
+    profile = {"driver": "GTiff", "width": heights.shape[1], "height": height, "count": 1, "dtype": "float64"}
+    where = rasterio.Affine(1, 0, 0, 0, -1, height)
+    with rasterio.open(path, "w", **profile, transform=where, crs="EPSG:32632") as file:
+        file.write(heights, 1)
+    words = ["-ox", "500.5", "-oy", f"{height - 400.5}", "-oz", "9", "-tz", "0", "-md", "0", "-cc", "0"]
+    command = ["gdal_viewshed", "-q", *words, str(path), str(folder / "seen.tif")]
+    subprocess.run(command, check=True)
+    return partial(subprocess.run, command, check=True)
+
+
+def open3d_rays(vertices: NDArray[Any], triangles: NDArray[Any], cameras: Sequence[Any]) -> Callable[[], object]:
+    """A ray through the middle of each pixel, and the triangles that are hit counted; on one thread."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(triangles.astype(np.uint32)))
+    x, y = np.meshgrid((np.arange(512) + 0.5) / 256 - 1, 1 - (np.arange(512) + 0.5) / 256)
+    rays = []
+    for camera in cameras:
+        inverse = np.linalg.inv(camera.clip_from_world((512, 512)))
+        near, far = (inverse @ np.stack([x, y, np.full_like(x, z), np.ones_like(x)]).reshape(4, -1) for z in (-1, 1))
+        start, end = (near[:3] / near[3]).T, (far[:3] / far[3]).T
+        rays.append(np.concatenate([start, end - start], axis=1).astype(np.float32))
+
+    def count() -> object:
+        found = [scene.cast_rays(o3d.core.Tensor(own), nthreads=1)["primitive_ids"].numpy() for own in rays]
+        return [np.bincount(ids[ids < len(triangles)], minlength=len(triangles)) for ids in found]
+
+    return count
 
 
 def latitudes(n: int) -> tuple[tuple[NDArray[Any], NDArray[Any]], NDArray[Any]]:
@@ -448,12 +506,20 @@ def add_arguments(pairs: Pairs, parser: argparse.ArgumentParser) -> None:
     add_out(parser)
 
 
+def cpu_seconds() -> float:
+    """CPU time of this process, and of programs that it has run."""
+    if resource is None:
+        return time.process_time()
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
 def run(kind: str, arguments: argparse.Namespace, _: Save) -> Record:
     """Measure milliseconds of each call, round by round."""
     rows = []
     for scene, calls in PAIRS[kind].scenes():
         if any(word in scene for word in arguments.scene):
-            turns = [turn_of(call, time.process_time) for call in calls.values()]
+            turns = [turn_of(call, cpu_seconds) for call in calls.values()]
             times = take_turns(turns, arguments.rounds, PAIRS[kind].seconds)
             rows += [{"scene": scene, "call": name, "ms": own.tolist()} for name, own in zip(calls, times, strict=True)]
     return {"kind": kind} | describe() | {"rows": rows}

@@ -2,7 +2,7 @@
  * In: heights at the middles of cells, a point.  Out: heights above the ground, 0 where the ground is seen.
  *
  * The line to each cell is followed by itself, over every line between the middles of neighbours, along rows and along
- * columns, where the height is between theirs.
+ * columns, where the height is between theirs; but for blocks that lie below what has hidden the cell already.
  *
  * Based on: W. R. Franklin, C. K. Ray, Higher Isn't Necessarily Better: Visibility Algorithms and Experiments, 1994
  * (R3, along both axes). */
@@ -15,31 +15,110 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* The steepest way up from the eye over the lines across one axis: (height - eye) / t, t from 0 at the eye to 1.
- * Heights lie `stride` apart along the axis and `other` across; a NaN hides nothing.  `ways`: 1 / (k - from) for each
- * line k. */
-static double steepest(const tl_terrain *t, const double *ways, double from, double to, double from_other,
-                       double to_other, int64_t stride, int64_t other, double fall, double most)
+TL_INLINE double max_of(double a, double b) { return a > b ? a : b; }
+TL_INLINE double min_of(double a, double b) { return a < b ? a : b; }
+
+/* A line of sight: from the eye to the middle of a cell, along the axis in which it is longer. */
+typedef struct {
+    const double *ways, *other_ways; /* 1 / (k - eye) along, and across */
+    double from, to, from_across, to_across, low, high;
+    double slope, share, way, across_way; /* across a line along; 1 / way; to - from */
+    int64_t stride, across_stride, blocks, across_blocks;
+    double fall;
+} sight;
+
+/* How steep the way up from the eye to a height is, at a share of the line; `per` is 1 / share. */
+TL_INLINE double way_up(double height, double eye, double per, double fall, double share)
 {
-    const double way = to - from;
-    if (way == 0.0)
-        return most;
-    const int64_t first = (int64_t)floor(from < to ? from : to) + 1;
-    const int64_t end = (int64_t)ceil(from < to ? to : from); /* neither the eye nor the cell */
-    const double slope = (to_other - from_other) / way, share = 1.0 / way;
-    const double left = from_other < to_other ? from_other : to_other;
-    const double right = from_other < to_other ? to_other : from_other;
+    return (height - eye) * per - fall * share;
+}
+
+/* The height between two neighbours, from `place` on in steps of `stride`. */
+TL_INLINE double height_between(const double *heights, double place, int64_t stride)
+{
+    const int64_t line = (int64_t)place;
+    const double w = place - (double)line, *const z = heights + line * stride;
+    return w > 0.0 ? z[0] + w * (z[stride] - z[0]) : z[0];
+}
+
+/* The steepest way up over the lines between middles that a part of a line of sight crosses: those of the axis along in
+ * [first, end), and those across from `low` to `high`. */
+static double steepest(const tl_terrain *t, const sight *s, int64_t first, int64_t end, double low, double high,
+                       double most)
+{
     for (int64_t k = first; k < end; k++) {
-        const double at = (double)k - from, exact = from_other + at * slope;
-        const double across = exact < left ? left : exact > right ? right : exact; /* rounding leaves no grid */
-        const int64_t line = (int64_t)across;
-        const double w = across - (double)line;
-        const double *const z = t->heights + k * stride + line * other;
-        const double height = w > 0.0 ? z[0] + w * (z[other] - z[0]) : z[0];
-        const double up = (height - t->eye[2]) * (way * ways[k]) - fall * (at * share);
+        const double at = (double)k - s->from, exact = s->from_across + at * s->slope;
+        const double across = exact < s->low ? s->low : exact > s->high ? s->high : exact; /* rounding leaves no grid */
+        const double height = height_between(t->heights + k * s->stride, across, s->across_stride);
+        const double up = way_up(height, t->eye[2], s->way * s->ways[k], s->fall, at * s->share);
+        most = up > most ? up : most;
+    }
+    if (s->across_way == 0.0)
+        return most;
+    const double least = s->from < s->to ? s->from : s->to, greatest = s->from < s->to ? s->to : s->from;
+    for (int64_t k = (int64_t)ceil(low); k <= (int64_t)floor(high); k++) {
+        if ((double)k <= s->low || (double)k >= s->high) /* the line of the eye, or of the cell */
+            continue;
+        const double part = ((double)k - s->from_across) / s->across_way, exact = s->from + part * s->way;
+        const double along = exact < least ? least : exact > greatest ? greatest : exact;
+        const double height = height_between(t->heights + k * s->across_stride, along, s->stride);
+        const double up = way_up(height, t->eye[2], s->across_way * s->other_ways[k], s->fall, part);
         most = up > most ? up : most;
     }
     return most;
+}
+
+/* The greatest height of the blocks that a part of a line may touch, which lies at [low, high] across a block along. */
+static double block_height(const tl_terrain *t, const sight *s, int64_t block, double low, double high)
+{
+    double most = -INFINITY;
+    for (int64_t b = (int64_t)low / TL_VIEW_BLOCK; b <= (int64_t)high / TL_VIEW_BLOCK; b++)
+        most = max_of(most, t->blocks[block * s->blocks + b * s->across_blocks]);
+    return most;
+}
+
+/* The steepest way up over all of a line, block by block from the eye on: most blocks lie below what hides them. */
+static double follow(const tl_terrain *t, const sight *s)
+{
+    double most = -INFINITY;
+    const double least = s->from < s->to ? s->from : s->to, greatest = s->from < s->to ? s->to : s->from;
+    const int64_t first = (int64_t)floor(least) + 1, end = (int64_t)ceil(greatest);
+    const int64_t near = (int64_t)s->from / TL_VIEW_BLOCK, far = (int64_t)s->to / TL_VIEW_BLOCK;
+    const int64_t step = s->way < 0.0 ? -1 : 1;
+    for (int64_t block = near; block != far + step; block += step) {
+        const double begin = max_of((double)(block * TL_VIEW_BLOCK), least);
+        const double stop = min_of((double)((block + 1) * TL_VIEW_BLOCK), greatest);
+        const double one = s->from_across + (begin - s->from) * s->slope;
+        const double other = s->from_across + (stop - s->from) * s->slope;
+        const double low = max_of(min_of(one, other), s->low), high = min_of(max_of(one, other), s->high);
+        const double above = block_height(t, s, block, low, high) - t->eye[2];
+        const double part = fabs((above > 0.0) == (s->way > 0.0) ? begin - s->from : stop - s->from);
+        if (s->fall >= 0.0 && above * fabs(s->way) <= most * part * (most > 0.0 ? 1.0 - 0x1p-40 : 1.0 + 0x1p-40))
+            continue;
+        const int64_t k = block * TL_VIEW_BLOCK;
+        most =
+            steepest(t, s, k > first ? k : first, k + TL_VIEW_BLOCK < end ? k + TL_VIEW_BLOCK : end, low, high, most);
+    }
+    return most;
+}
+
+static double steepest_to(const tl_terrain *t, double to_x, double to_y, double fall)
+{
+    const double x = t->eye[0], y = t->eye[1], dx = to_x - x, dy = to_y - y;
+    sight s;
+    if (dx == 0.0 && dy == 0.0)
+        return -INFINITY;
+    const int by_row = fabs(dy) > fabs(dx);
+    s.ways = t->ways[by_row], s.other_ways = t->ways[!by_row];
+    s.from = by_row ? y : x, s.to = by_row ? to_y : to_x;
+    s.from_across = by_row ? x : y, s.to_across = by_row ? to_x : to_y;
+    s.low = min_of(s.from_across, s.to_across), s.high = max_of(s.from_across, s.to_across);
+    s.way = s.to - s.from, s.across_way = s.to_across - s.from_across;
+    s.slope = s.across_way / s.way, s.share = 1.0 / s.way;
+    s.stride = by_row ? t->width : 1, s.across_stride = by_row ? 1 : t->width;
+    s.blocks = by_row ? t->n_blocks : 1, s.across_blocks = by_row ? 1 : t->n_blocks;
+    s.fall = fall;
+    return follow(t, &s);
 }
 
 static void view_heights(const tl_terrain *t, int64_t first, int64_t end, double *out)
@@ -54,10 +133,7 @@ static void view_heights(const tl_terrain *t, int64_t first, int64_t end, double
                 out[i] = TL_NAN;
                 continue;
             }
-            const double fall = squared * t->curvature;
-            double most = -INFINITY;
-            most = steepest(t, t->ways[0], x, to_x, y, to_y, 1, t->width, fall, most);
-            most = steepest(t, t->ways[1], y, to_y, x, to_x, t->width, 1, fall, most);
+            const double fall = squared * t->curvature, most = steepest_to(t, to_x, to_y, fall);
             const double above = t->eye[2] + most + fall - t->heights[i];
             out[i] = above > 0.0 ? above : 0.0;
         }

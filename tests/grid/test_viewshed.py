@@ -52,6 +52,29 @@ def test_heights_above_the_line_of_sight_are_those_of_every_crossing(isa, seed):
                 assert found.visible[row, column] == (exact < 0.5)
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize("seed", range(6))
+def test_blocks_that_are_left_out_change_nothing(isa, seed):
+    """Hills of several blocks, with holes, seen from within and from the rim, by all of the curvature or none."""
+    rng = np.random.default_rng(seed)
+    height, width = rng.integers(20, 70, 2).tolist()
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    heights = np.rint(8 * (6 * np.sin(x / 9 + seed) * np.cos(y / 7) + rng.uniform(-1, 1, x.shape))) / 8
+    heights[rng.uniform(size=heights.shape) < 0.01 * (seed % 2)] = -50
+    eye = (
+        float(rng.integers(0, 4 * width - 4) / 4),
+        float(rng.integers(0, 4 * height - 4) / 4),
+        float(rng.integers(2, 9)),
+    )
+    with on(isa):
+        found = tl.viewshed(heights, (eye[0] + 0.5, eye[1] + 0.5, eye[2]))
+        near = tl.viewshed(heights, (eye[0] + 0.5, eye[1] + 0.5, eye[2]), max_distance=12.0)
+    for row, column in zip(rng.integers(0, height, 60).tolist(), rng.integers(0, width, 60).tolist(), strict=True):
+        exact = float(needed(heights, eye, (column, row)))
+        assert found.above[row, column] == pytest.approx(exact, abs=1e-9)
+    assert_same(near.above[~np.isnan(near.above)], found.above[~np.isnan(near.above)])
+
+
 def test_flat_ground_is_seen_and_a_wall_hides_what_lies_behind():
     flat = np.zeros((9, 9))
     assert tl.viewshed(flat, (4.5, 4.5), eye_height=1.0).visible.all()

@@ -152,18 +152,22 @@ def add_taken(const int32_t[:, ::1] seen, const float[:, ::1] depth, const float
         K.add_taken(&taken, &positions[0, 0], &normals[0, 0], &ids[0], first, end, &sums[0, 0], &weights[0])
 
 
-def view_heights(const double[:, ::1] heights, const double[::1] eye, const double[::1] columns, const double[::1] rows,
+VIEW_BLOCK = TL_VIEW_BLOCK
+
+
+def view_heights(const double[:, ::1] heights, const double[:, ::1] blocks, const double[::1] eye, const double[::1] columns, const double[::1] rows,
                  const double[::1] cell, double curvature, double most_squared, int64_t first, int64_t end,
                  double[:, ::1] out):
     """Write how high above the ground of rows [first, end) something is seen from (column, row, height).
 
-    `columns`, `rows`: 1 / (k - eye) of each column k, and of each row.
+    `blocks`: the greatest height of VIEW_BLOCK + 1 cells along both axes. `columns`, `rows`: 1 / (k - eye) of each k.
     """
     cdef tl_terrain terrain
     cdef int k
     if end <= first or not heights.shape[1]:
         return
     terrain.heights, terrain.width = &heights[0, 0], heights.shape[1]
+    terrain.blocks, terrain.n_blocks = &blocks[0, 0], blocks.shape[1]
     terrain.ways[0], terrain.ways[1] = &columns[0], &rows[0]
     terrain.curvature, terrain.most_squared = curvature, most_squared
     for k in range(3):

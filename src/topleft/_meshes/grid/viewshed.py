@@ -144,15 +144,23 @@ def viewshed(
     with np.errstate(divide="ignore"):
         columns, rows = (1 / (np.arange(n) - p) for n, p in zip(own.size, at.tolist(), strict=True))
     place, cell, falls = np.array([*at, z]), np.array(own.pixel_size), curvature / (2 * EARTH_RADIUS)
+    blocks = tops_of(tops_of(np.where(np.isnan(heights), -np.inf, heights)).T).T
+    blocks = np.ascontiguousarray(blocks)
     above: F64 = FRESH.empty("viewshed", heights.shape, np.float64)
 
     def view_rows(first: int, end: int) -> None:
-        engine.view_heights(heights, place, columns, rows, cell, falls, most * most, first, end, above)
+        engine.view_heights(heights, blocks, place, columns, rows, cell, falls, most * most, first, end, above)
 
     n_threads = threads_for(threads, heights.size)
     run_parts(view_rows, len(heights), n_threads)
     with np.errstate(invalid="ignore"):
         return Viewshed(above <= target_height, above, own)
+
+
+def tops_of(heights: F64) -> F64:
+    """The greatest of each VIEW_BLOCK rows and the one behind them."""
+    size = engine.VIEW_BLOCK
+    return np.stack([heights[i : i + size + 1].max(axis=0) for i in range(0, len(heights), size)])
 
 
 def heights_of(terrain: Any, grid: Grid | None, pixel_size: Any) -> tuple[F64, Grid]:
