@@ -97,7 +97,7 @@ def test_batch_leaves_no_spool(processes, tmp_path, monkeypatch):
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_batch_reads_a_file_once(executor, tmp_path, monkeypatch):
     read = []
-    monkeypatch.setattr(jobs, "load", lambda path: read.append(path) or BOX)
+    monkeypatch.setattr(jobs, "load", lambda path, **_: read.append(path) or BOX)
     listed = [tl.Job(str(tmp_path / name), None, SIZE) for name in "aaabbb"]
     results = list(tl.render_batch(listed, executor=executor))
     assert sorted(read) == [str(tmp_path / "a"), str(tmp_path / "b")]
@@ -106,7 +106,7 @@ def test_batch_reads_a_file_once(executor, tmp_path, monkeypatch):
 
 def test_batch_tries_a_broken_file_once(tmp_path, monkeypatch):
     read = []
-    monkeypatch.setattr(jobs, "load", lambda path: read.append(path) or files.load(path))
+    monkeypatch.setattr(jobs, "load", lambda path, **own: read.append(path) or files.load(path, **own))
     listed = [tl.Job(str(tmp_path / "gone.obj"), None, SIZE)] * 3
     summary = tl.render_batch(listed, executor=2, on_error="collect").finish()
     assert [str(result.error) for result in summary.failed] == [f"there is no file {str(tmp_path / 'gone.obj')!r}"] * 3

@@ -54,6 +54,7 @@ def test_metadata_extras_are_the_documented_ones():
         "dask",
         "explore",
         "formats",
+        "jax",
         "peers",
         "render",
         "simplify",

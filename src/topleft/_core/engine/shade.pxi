@@ -319,6 +319,7 @@ def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] tria
     if n_rows == 0 or width == 0 or triangles.shape[0] == 0:
         return
     memset(&target, 0, sizeof(target))
+    memset(&peeled, 0, sizeof(peeled))
     peeled.n_layers, peeled.is_farthest, peeled.plane_px = ids.shape[0], False, height * width
     peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
     target.sink, target.stride_px, target.n_samples = <tl_sink>(TL_SINK_PEEL if is_peeled else 4), width, n_rows * width  # 4: nearest
