@@ -2,7 +2,7 @@
 
 import pytest
 
-import topleft._apps.cli
+import topleft.cli
 from topleft import build_info, testing
 from topleft._core.engine import isa_in_use
 
