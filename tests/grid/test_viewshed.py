@@ -1,5 +1,7 @@
 """Viewsheds against lines of sight that are followed in fractions."""
 
+import shutil
+import subprocess
 from fractions import Fraction
 
 import numpy as np
@@ -73,6 +75,27 @@ def test_blocks_that_are_left_out_change_nothing(isa, seed):
         exact = float(needed(heights, eye, (column, row)))
         assert found.above[row, column] == pytest.approx(exact, abs=1e-9)
     assert_same(near.above[~np.isnan(near.above)], found.above[~np.isnan(near.above)])
+
+
+def test_nearly_all_cells_are_those_that_gdal_sees(tmp_path):
+    """Hills with noise: GDAL goes from neighbour to neighbour, and is off where a line passes between two."""
+    rasterio = pytest.importorskip("rasterio")
+    if shutil.which("gdal_viewshed") is None:
+        pytest.skip("gdal_viewshed is not installed")
+    rng, n = np.random.default_rng(0), 300
+    x, y = np.meshgrid(np.arange(n), np.arange(n))
+    heights = 30 * np.sin(x / 47) * np.cos(y / 41) + 9 * np.sin(x / 13 + y / 19) + rng.normal(0, 0.3, x.shape)
+    profile = {"driver": "GTiff", "width": n, "height": n, "count": 1, "dtype": "float64", "crs": "EPSG:32632"}
+    path, seen = tmp_path / "heights.tif", tmp_path / "seen.tif"
+    with rasterio.open(path, "w", **profile, transform=rasterio.Affine(1, 0, 0, 0, -1, n)) as file:
+        file.write(heights, 1)
+    eye = ["-ox", "150.5", "-oy", f"{n - 120.5}", "-oz", "8"]
+    subprocess.run(["gdal_viewshed", "-q", *eye, "-tz", "0", "-md", "0", "-cc", "0", path, seen], check=True)
+    with rasterio.open(seen) as file:
+        theirs = file.read(1) > 0
+    ours = tl.viewshed(heights, (150.5, 120.5), eye_height=8.0).visible
+    assert 0.05 < ours.mean() < 0.95
+    assert (ours == theirs).mean() > 0.985
 
 
 def test_flat_ground_is_seen_and_a_wall_hides_what_lies_behind():

@@ -28,6 +28,7 @@ from topleft._core.raster.verbs import overdraw, rasterize
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.lod.distance import TriangleTree
 from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.normals import face_normals, unit_or_zero
 from topleft._meshes.picture.render import rasterize_mesh
 from topleft._meshes.scene.adapt import MeshLike, as_mesh
 from topleft.errors import MeshError, MeshWarning
@@ -165,7 +166,7 @@ def bake(
     else:
         values, ids = chart.values_of(values_to_bake(mesh, what))
         if isinstance(what, str) and what.endswith("normal"):
-            values = unit(values)
+            values = unit_or_zero(values.reshape(-1, 3)).astype(np.float32).reshape(values.shape)
         baked = Baked(values, ids, ids >= 0)
     return with_gutter(baked, gutter, chart.n_threads)
 
@@ -246,22 +247,15 @@ def values_to_bake(mesh: Mesh, what: object) -> F32:
 def normals_to_bake(mesh: Mesh) -> F32:
     """The unit normals of vertices (V, 3) or corners (T, 3, 3)."""
     if mesh.is_faceted:
-        return np.repeat(face_normals(mesh)[:, None], 3, axis=1)
+        return np.repeat(faces_of(mesh)[:, None], 3, axis=1)
     corners = mesh.corner_normals()
     found = mesh.vertex_normals() if corners is None else corners.rows[corners.of_corner]
     return np.ascontiguousarray(found, np.float32)
 
 
-def face_normals(mesh: Mesh) -> F32:
+def faces_of(mesh: Mesh) -> F32:
     """The unit normals of triangles, (T, 3); 0 where one has no area."""
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    return unit(np.cross(b - a, c - a)).astype(np.float32)
-
-
-def unit(vectors: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Vectors (..., 3) of length 1; 0 stays."""
-    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
-    return np.divide(vectors, length[..., None], out=np.zeros_like(vectors), where=length[..., None] > 0)
+    return face_normals(mesh.vertices, mesh.triangles).astype(np.float32)
 
 
 def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | None) -> Baked:
@@ -294,7 +288,7 @@ def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | 
     each = values[own] if values.ndim == 3 else values[corners]
     taken = np.einsum("nk,nkc->nc", weights, each)
     if word.endswith("normal"):
-        taken = unit(taken)
+        taken = unit_or_zero(taken).astype(np.float32)
     if word == "tangent_normal":
         taken = in_tangent_frame(chart, ids.reshape(-1)[at], at, taken)
     out = np.zeros((ids.size, taken.shape[1]), np.float32)
@@ -317,14 +311,14 @@ def in_tangent_frame(chart: Chart, own: I32, at: npt.NDArray[np.intp], normals: 
     """Normals (N, 3) along u, along v and outwards, at texels `at` of triangles `own` of the mesh."""
     mesh = chart.mesh
     smooth, _ = chart.values_of(normals_to_bake(mesh))
-    outwards = unit(smooth.reshape(-1, 3)[at].astype(np.float64))
+    outwards = unit_or_zero(smooth.reshape(-1, 3)[at])
     a, b, c = (mesh.vertices[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     ta, tb, tc = (mesh.uv[mesh.triangles[:, k]].astype(np.float64) for k in range(3))  # type: ignore[index]
     (u1, v1), (u2, v2) = (tb - ta).T, (tc - ta).T
     sign = np.where(u1 * v2 - u2 * v1 < 0, -1.0, 1.0)[:, None]
     along_u = (((b - a) * v2[:, None] - (c - a) * v1[:, None]) * sign)[own]
     along_v = (((c - a) * u1[:, None] - (b - a) * u2[:, None]) * sign)[own]
-    tangent = unit(along_u - outwards * np.einsum("ij,ij->i", along_u, outwards)[:, None])
+    tangent = unit_or_zero(along_u - outwards * np.einsum("ij,ij->i", along_u, outwards)[:, None])
     other = np.cross(outwards, tangent)
     other *= np.where(np.einsum("ij,ij->i", other, along_v) < 0, -1.0, 1.0)[:, None]
     axes = (tangent, other, outwards)
@@ -357,7 +351,7 @@ def from_pictures(chart: Chart, pictures: Sequence[tuple[U8, Camera]], blend: st
     mesh = chart.mesh
     positions, ids = chart.values_of(np.ascontiguousarray(mesh.vertices, np.float32))
     points, flat = positions.reshape(-1, 3), ids.reshape(-1)
-    normals = np.append(face_normals(mesh), np.zeros((1, 3), np.float32), axis=0)[flat]
+    normals = np.append(faces_of(mesh), np.zeros((1, 3), np.float32), axis=0)[flat]
     sums, weights = np.zeros((flat.size, 3), np.float32), np.zeros(flat.size, np.float32)
 
     def add(picture: U8, camera: Camera) -> None:

@@ -119,14 +119,15 @@ class PlacedScene:
         view, n = self._view, end - first
         firsts = self._first_vertices[first : end + 1] - self._first_vertices[first]
         found: list[engine.SnappedMesh | None] = [None] * n
-        if view.plan is None and view.grid_bits == view.subpixel_bits and 0 not in view.size:
+        n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
+        is_shared = n_threads <= n  # fewer instances than threads: each is the work of all of them
+        if is_shared and view.plan is None and view.grid_bits == view.subpixel_bits and 0 not in view.size:
             points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
             shape = int(firsts[-1]) * engine.VERTEX_BYTES
             room = FRESH.empty("records", (shape,), np.uint8) if points is None else points
             meshes = [(one.mesh.vertices, one.mesh.triangles) for one in self.scene.instances[first:end]]
             culls, numbers = self._sides[0][first:end], self._numbers[first:end]
             given = meshes, self._clip_from_objects[first:end], culls, numbers, view.engine_viewport(), view.how
-            n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
             parts = run_parts(lambda k, end: engine.project_instances(*given, room, firsts, k, end), n, n_threads)
             found = [mesh for part in parts for mesh in part]
         has_some_sides = self._sides[1]
