@@ -26,6 +26,7 @@ from benchmarks.report.study import Study
 from benchmarks.run.study import STUDY as RUN
 from benchmarks.scenes.cases import CASES
 from benchmarks.small.batch import STUDY as BATCH
+from benchmarks.small.clients import STUDY as CLIENTS
 from benchmarks.small.cluster import STUDY as CLUSTER
 from benchmarks.small.explorer import STUDY as EXPLORER
 from benchmarks.small.gate import STUDY as GATE
@@ -42,7 +43,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, MEMSET, GROWTH, POLYGONS,
-        REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, INSTANCES, GRADIENTS, *PAIRS,
+        REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, CLIENTS, INSTANCES, GRADIENTS, *PAIRS,
     )
 }  # fmt: skip
 

@@ -80,13 +80,16 @@ typedef struct {
     int n_levels;
 } tl_surroundings;
 
-typedef enum { TL_LIGHT_DIRECTION = 0, TL_LIGHT_POINT = 1, TL_LIGHT_WRAPPED = 2 } tl_light_kind;
+typedef enum { TL_LIGHT_DIRECTION = 0, TL_LIGHT_POINT = 1, TL_LIGHT_WRAPPED = 2, TL_LIGHT_SPOT = 3 } tl_light_kind;
 
 typedef struct {
     tl_light_kind kind;
     float at[3]; /* the unit vector to the light, or where it is */
     float color[3];
     float falloff; /* of a point at distance d: the light is divided by 1 + falloff * d^2 */
+    /* A spot is a point whose light is, at the angle a from its unit axis, (cone_scale * cos a + cone_offset)^2, the
+     * sum cut off at 0 and 1. */
+    float axis[3], cone_scale, cone_offset;
 } tl_light;
 
 /* What the colours of the picture tell. */

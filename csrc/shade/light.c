@@ -2,7 +2,7 @@
  * In: a unit normal, where the surface is and from where it is seen.  Out: diffuse light and highlights, linear.
  * Based on: J. H. Lambert, Photometria, 1760; J. F. Blinn, Models of Light Reflection for Computer Synthesized
  * Pictures, 1977; J. Mitchell, G. McTaggart and C. Green, Shading in Valve's Source Engine, 2006 (the wrapped fall-off,
- * there with the power 2). */
+ * there with the power 2); Khronos, glTF extension KHR_lights_punctual, 2018 (the cone of a spot). */
 #ifndef TL_LIGHT_C
 #define TL_LIGHT_C
 
@@ -55,7 +55,7 @@ TL_INLINE vf highlight(const lit_surface *s, const vf *to_light, vf n_dot_l, flo
 /* The unit vector to a light; returns how strong it is there. */
 TL_INLINE vf find_light(const lit_surface *s, const tl_light *light, vf *to_light)
 {
-    if (light->kind != TL_LIGHT_POINT) {
+    if (light->kind != TL_LIGHT_POINT && light->kind != TL_LIGHT_SPOT) {
         for (int k = 0; k < 3; k++)
             to_light[k] = vf_set1(light->at[k]);
         return vf_set1(1.0f);
@@ -66,7 +66,13 @@ TL_INLINE vf find_light(const lit_surface *s, const tl_light *light, vf *to_ligh
              scale = vf_div(vf_set1(1.0f), vf_sqrt(vf_max(squared, vf_set1(0x1p-100f))));
     for (int k = 0; k < 3; k++)
         to_light[k] = vf_mul(to_light[k], scale);
-    return vf_div(vf_set1(1.0f), vf_fma(vf_set1(light->falloff), squared, vf_set1(1.0f)));
+    const vf strength = vf_div(vf_set1(1.0f), vf_fma(vf_set1(light->falloff), squared, vf_set1(1.0f)));
+    if (light->kind == TL_LIGHT_POINT)
+        return strength;
+    const vf away[3] = {vf_set1(-light->axis[0]), vf_set1(-light->axis[1]), vf_set1(-light->axis[2])};
+    const vf cone = vf_fma(vf_set1(light->cone_scale), dot3(away, to_light), vf_set1(light->cone_offset));
+    const vf share = vf_min(vf_max(cone, vf_set1(0.0f)), vf_set1(1.0f));
+    return vf_mul(strength, vf_mul(share, share));
 }
 
 /* The share of a light that a matt surface sends on, from n . l. */

@@ -69,7 +69,7 @@ static void set_mesh(shade_runs *s, const tl_snapped *snapped, const tl_shading 
             note_full(s, m);
     }
     for (int k = 0; k < shading->n_lights; k++)
-        has_points |= shading->lights[k].kind == TL_LIGHT_POINT;
+        has_points |= shading->lights[k].kind == TL_LIGHT_POINT || shading->lights[k].kind == TL_LIGHT_SPOT;
     s->needs_normal = !shows_light || is_lit;
     s->needs_uv = shading->uv && (s->needs_uv || (shows_light && has_texture));
     s->needs_uv1 &= shading->uv1 != NULL;

@@ -62,16 +62,17 @@ def test_points_without_normals_show_their_colours():
 
 
 @pytest.mark.parametrize("space", ["eye", "world"])
-@pytest.mark.parametrize("kind", ["directional", "point"])
+@pytest.mark.parametrize("kind", ["directional", "point", "spot"])
 def test_points_with_normals_are_lit_as_a_mesh_is(kind, space):
     """A sphere of points against one of triangles, whose pixels show the same normals."""
     vertices, triangles = tl.scenes.icosphere(5)
     mesh = tl.Mesh(vertices, triangles, vertices)
     cloud = tl.Points(vertices, normals=vertices, size=4)
     camera = tl.Camera.framing(mesh)
+    cone = {"direction": (-1, -2.2, -3), "inner_deg": 5, "outer_deg": 20} if kind == "spot" else {}
     looks = [
         {},
-        {"lights": [tl.Light((1, 2, 3), kind, (255, 200, 90), 0.9, 0.01, space)], "ambient": 0.1},
+        {"lights": [tl.Light((1, 2, 3), kind, (255, 200, 90), 0.9, 0.01, space, **cone)], "ambient": 0.1},
         {"fog": tl.Fog(2, 5, (10, 20, 90))},
     ]
     for look in looks:

@@ -14,6 +14,8 @@ LIGHTS = {
     "direction": tl.Light((1, 2, 1)),
     "point": POINT,
     "eye direction": tl.Light((1, 0, 1), space="eye"),
+    "spot": tl.Light((-1, 1.5, 2), "spot", falloff=0.2, direction=(0.4, -0.5, -1), inner_deg=3, outer_deg=20),
+    "eye spot": tl.Light((0.5, 1, 0), "spot", direction=(0, -0.1, -1), outer_deg=12, space="eye"),
     "eye point": tl.Light((1, 2, -2), "point", falloff=0.1, space="eye"),
 }
 SCALES = {"as it is": (1, 1, 1), "smaller": (0.7, 0.7, 0.7), "mirrored": (-0.8, 0.8, 0.8), "stretched": (1.2, 0.5, 0.8)}

@@ -21,6 +21,9 @@ NOISE = np.kron(RNG.integers(0, 256, (24, 40, 3)), np.ones((4, 4, 1))).astype(np
 LIGHTS = (
     tl.Light((1, 2, 3), color=(255, 240, 200)),
     tl.Light((-2, 1, 0.5), kind="point", color=(120, 160, 255), intensity=1.5, falloff=0.3),
+    tl.Light(
+        (0.5, 1, 3), "spot", (255, 120, 90), 2.0, falloff=0.1, direction=(-0.2, -0.3, -1), inner_deg=8, outer_deg=24
+    ),
 )
 
 
@@ -322,7 +325,19 @@ def test_shade_several_samples_of_one_triangle_are_as_one():
     [
         (lambda: tl.Light((0, 0, 0)), ValueError, r"at must be a direction, got \(0.0, 0.0, 0.0\)"),
         (lambda: tl.Light((0, 1)), ValueError, r"at must be three finite numbers, got \(0, 1\)"),
-        (lambda: tl.Light((0, 1, 0), kind="spot"), ValueError, "kind must be one of 'directional', 'point', got"),
+        (
+            lambda: tl.Light((0, 1, 0), kind="area"),
+            ValueError,
+            "kind must be one of 'directional', 'point', 'spot', got",
+        ),
+        (lambda: tl.Light((0, 1, 0), "spot"), ValueError, "direction must be given for a spot, and for no other kind"),
+        (
+            lambda: tl.Light((0, 1, 0), direction=(0, 1, 0)),
+            ValueError,
+            "direction must be given for a spot, and for no",
+        ),
+        (lambda: tl.Light((0, 1, 0), "spot", direction=(0, 0, 0)), ValueError, "direction must have a length, got"),
+        (lambda: tl.Light((0, 1, 0), inner_deg=45), ValueError, "0 <= inner_deg < outer_deg <= 90 must hold, got 45"),
         (lambda: tl.Light((0, 1, 0), intensity=-1), ValueError, "intensity must be finite and not negative, got -1"),
         (lambda: tl.Fog(2, 1), ValueError, "near and far must be finite and near < far, got 2 and 1"),
         (lambda: tl.Material(specular=2), ValueError, "specular must lie in 0 to 1, got 2"),

@@ -208,8 +208,12 @@ def lights_at(lights, points, n, camera, ambient):
     for light in lights:
         at, strength = np.array(light.at, np.float64), np.ones((len(n), 1))
         direction = np.broadcast_to(at, n.shape)
-        if light.kind == "point":
+        if light.kind in ("point", "spot"):
             strength = 1 / (1 + light.falloff * ((at - points) ** 2).sum(axis=1, keepdims=True))
+            if light.kind == "spot":
+                cosines = unit_or_zero(points - at) @ unit_or_zero(np.array([light.direction]))[0]
+                inner, outer = np.cos(np.radians([light.inner_deg, light.outer_deg]))
+                strength = strength * np.clip((cosines - outer) / (inner - outer), 0, 1)[:, None] ** 2
             direction = at - points
         direction = unit_or_zero(direction)
         cosine = (n * direction).sum(axis=1, keepdims=True)

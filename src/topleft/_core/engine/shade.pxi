@@ -156,15 +156,17 @@ cdef class ShadingTable:
         self.shading.lights, self.shading.n_lights = &self.headlight, 1
 
     def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]):
-        """Take rows (kind, at, color, falloff)."""
+        """Take rows (kind, at, color, falloff, axis, cone_scale, cone_offset)."""
         cdef tl_light *light
         cdef int k
         self.lights = np.zeros(max(1, len(lights)) * sizeof(tl_light), np.uint8)
         light = <tl_light *>&self.lights[0]
-        for k, (kind, at, color, falloff) in enumerate(lights):
+        for k, (kind, at, color, falloff, axis, scale, offset) in enumerate(lights):
             light[k].kind, light[k].falloff = <tl_light_kind><int>kind, falloff
             copy_floats(light[k].at, at, 3)
             copy_floats(light[k].color, color, 3)
+            copy_floats(light[k].axis, axis, 3)
+            light[k].cone_scale, light[k].cone_offset = scale, offset
         copy_floats(self.shading.ambient, ambient, 3)
         self.shading.lights, self.shading.n_lights = light, len(lights)
 

@@ -1,7 +1,8 @@
 """Lights: directions and points that light comes from, and the depth cue; values, checked once.
 
 Based on: Lambert, J. H., "Photometria", 1760; Mitchell, J., G. McTaggart and C. Green, "Shading in Valve's Source
-Engine", SIGGRAPH 2006 courses (the half-Lambert fall-off of the headlight, there with the power 2).
+Engine", SIGGRAPH 2006 courses (the half-Lambert fall-off of the headlight, there with the power 2); Khronos, glTF
+extension KHR_lights_punctual, 2018 (the cone of a spot).
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ class LightKind(StrEnum):
 
     DIRECTIONAL = "directional"
     POINT = "point"
+    SPOT = "spot"
 
 
 class LightSpace(StrEnum):
@@ -47,15 +49,15 @@ class LightSpace(StrEnum):
 
 @dataclass(frozen=True)
 class Light:
-    """A light that shines from a direction or from a point; without shadows.
+    """A light that shines from a direction, from a point, or from a point within a cone; without shadows.
 
     Parameters
     ----------
     at : (3,) of float
         The direction *to* the light, of any length, or the point where it is. World space, or that of the eye (x right,
         y up, the view along -z).
-    kind : {"directional", "point"}
-        What `at` means.
+    kind : {"directional", "point", "spot"}
+        What `at` means. A spot is a point whose light stays within a cone.
     color : (3,) of 0 to 255
         sRGB.
     intensity : float
@@ -65,11 +67,17 @@ class Light:
         everywhere.
     space : {"world", "eye"}
         "eye": the light moves with the camera.
+    direction : (3,) of float, optional
+        Where a spot shines to, of any length; in the same space.
+    inner_deg, outer_deg : float
+        Of a spot, degrees from its direction, 0 <= inner < outer <= 90: where its light begins to fall off, and where
+        none is left.
 
     Raises
     ------
     ValueError
-        If a number is not finite or outside its range, or the direction has no length.
+        If a number is not finite or outside its range, a direction has no length, or `direction` is given for another
+        kind than "spot", or missing there.
 
     Examples
     --------
@@ -83,6 +91,9 @@ class Light:
     intensity: float = 1.0
     falloff: float = 0.0
     space: str = "world"
+    direction: tuple[float, float, float] | None = None
+    inner_deg: float = 0.0
+    outer_deg: float = 45.0
 
     if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
 
@@ -94,6 +105,9 @@ class Light:
             intensity: float = 1.0,
             falloff: float = 0.0,
             space: SpaceOption = "world",
+            direction: npt.ArrayLike | None = None,
+            inner_deg: float = 0.0,
+            outer_deg: float = 45.0,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -106,6 +120,22 @@ class Light:
             raise ValueError(f"at must be a direction, got {self.at}")
         for name in ("intensity", "falloff"):
             keep(self, name, as_not_negative(name, getattr(self, name)))
+        if (self.kind == LightKind.SPOT) != (self.direction is not None):
+            raise ValueError(f"direction must be given for a spot, and for no other kind, got {self.direction}")
+        if self.direction is not None:
+            keep(self, "direction", tuple(as_vector("direction", self.direction).tolist()))
+            if not any(self.direction):
+                raise ValueError(f"direction must have a length, got {self.direction}")
+        if not 0 <= as_number("inner_deg", self.inner_deg) < as_number("outer_deg", self.outer_deg) <= 90:
+            raise ValueError(f"0 <= inner_deg < outer_deg <= 90 must hold, got {self.inner_deg} and {self.outer_deg}")
+
+    @property
+    def cone(self) -> tuple[float, float]:
+        """Scale and offset of a spot, which sends the square of scale * cosine + offset, cut off at 0 and 1."""
+        if self.kind != LightKind.SPOT:
+            return 0.0, 0.0
+        inner, outer = (engine.cosine_and_sine(angle)[0] for angle in (self.inner_deg, self.outer_deg))
+        return 1 / (inner - outer), -outer / (inner - outer)
 
 
 @dataclass(frozen=True)

@@ -166,15 +166,18 @@ def light_at(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp], options:
 
 def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
     """The cosine of one light at some points (P, 3) in eye space, times its intensity: (P,)."""
-    is_point = light.kind == LightKind.POINT
-    at = np.array([light.at])
+    is_point = light.kind != LightKind.DIRECTIONAL
+    at, axis = np.array([light.at]), np.array([light.direction or (0, 0, 0)])
     if light.space == LightSpace.WORLD:
-        matrix = view if is_point else np.vstack([np.c_[view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
-        at = moved(at, matrix)
+        turn = np.vstack([np.c_[view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
+        at, axis = moved(at, view if is_point else turn), moved(axis, turn)
     way = at - eye if is_point else at
     cosine = light.intensity * np.maximum(engine.row_products(normals, unit_or_zero(way)), 0)
     if not is_point:
         return cosine
+    if light.kind == LightKind.SPOT:
+        scale, offset = light.cone
+        cosine *= (offset - scale * engine.row_products(unit_or_zero(way), unit_or_zero(axis))).clip(0, 1) ** 2
     unit_of_eye = abs(engine.determinant(view[:3, :3])) ** (1 / 3)
     return cosine / (1 + light.falloff * engine.row_products(way, way) / unit_of_eye**2)
 

@@ -35,7 +35,7 @@ from topleft._meshes.model.normals import (
 )
 from topleft._meshes.model.texture import Texture
 
-LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
+LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1, LightKind.SPOT: 3}  # tl_light_kind in csrc/shading.h
 
 EYE = np.eye(4)
 
@@ -288,8 +288,12 @@ class ShadingInputs:
         if lights is None:
             self.shading.set_headlight(TO_HEADLIGHT, max(0.0, 1 - ambient), ambient)
             return
-        placed = lights if world_from_mesh is None else self._lights_by(lights, world_from_mesh)
-        self.shading.set_lights([self._light(light) for light in placed], (ambient,) * 3)
+        place = None
+        if world_from_mesh is not None:
+            # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
+            scale = 1.0 if self.is_in_eye_space else engine.cube_root(abs(engine.determinant(world_from_mesh[:3, :3])))
+            place = engine.inverse(world_from_mesh), scale
+        self.shading.set_lights([self._light(light, place) for light in lights], (ambient,) * 3)
 
     def set_environment(self, environment: Environment | None, world_from_mesh: F64 | None = None) -> None:
         """Take the environment, or what metallic surfaces mirror without one.
@@ -306,33 +310,34 @@ class ShadingInputs:
         diffuse = 0.0 if environment is None else 1.0
         self.shading.set_surroundings(engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
 
-    def _lights_by(self, lights: Sequence[Light], world_from_mesh: F64) -> list[Light]:
-        """The lights as they stand in the space of a mesh, as bright as they are in the world."""
-        mesh_from_world = engine.inverse(world_from_mesh)
-        # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
-        scale = 1.0 if self.is_in_eye_space else engine.cube_root(abs(engine.determinant(world_from_mesh[:3, :3])))
-        placed = []
-        for light in lights:
-            at = np.array([*light.at, light.kind == LightKind.POINT])
-            at = at if light.space == LightSpace.EYE else engine.product(mesh_from_world, at)
-            placed.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * (scale * scale))))
-        return placed
-
-    def _light(self, light: Light) -> tuple[Any, ...]:
+    def _light(self, light: Light, place: tuple[F64, float] | None) -> tuple[Any, ...]:
+        """The row of a light; `place`: of a mesh that stands by a matrix, the inverse, and how long its unit is."""
         rays, at = self.rays, np.array(light.at)
-        in_eye_space = light.space is LightSpace.EYE
+        way = np.zeros(3) if light.direction is None else np.array(light.direction)
+        in_eye_space, falloff = light.space is LightSpace.EYE, light.falloff
+        if place is not None:
+            mesh_from_world, scale = place
+            falloff = float(falloff * (scale * scale))  # as bright as it is in the world
+            if not in_eye_space:
+                at = engine.product(mesh_from_world, np.array([*light.at, light.kind != LightKind.DIRECTIONAL]))[:3]
+                way = way if light.direction is None else engine.product(mesh_from_world[:3, :3], way)
         if light.kind is LightKind.DIRECTIONAL:
-            if in_eye_space or self.is_in_eye_space:
-                at = at if in_eye_space else engine.product(self.view[:3, :3], at)
-                at = engine.product(rays.eye_from.T, at)
-            at = at / engine.length(at)
+            at = self._direction(at, in_eye_space)
         elif in_eye_space:
             at = engine.product(rays.eye_from.T, at - rays.origin) / rays.scale
         else:
             in_space = engine.product(self.view[:3, :3], at) + self.view[:3, 3] if self.is_in_eye_space else at
             at = in_space - self.mesh.center
-        rgb = light_of(light.color)[:3]
-        return LIGHT_CODES[LightKind(light.kind)], at, tuple(light.intensity * c for c in rgb), light.falloff
+        axis = way if light.direction is None else self._direction(way, in_eye_space)
+        color = tuple(light.intensity * c for c in light_of(light.color)[:3])
+        return LIGHT_CODES[LightKind(light.kind)], at, color, falloff, axis, *light.cone
+
+    def _direction(self, way: F64, in_eye_space: bool) -> F64:
+        """A direction of the world, or of eye space, in shading space: a unit vector."""
+        if in_eye_space or self.is_in_eye_space:
+            way = way if in_eye_space else engine.product(self.view[:3, :3], way)
+            way = engine.product(self.rays.eye_from.T, way)
+        return way / engine.length(way)
 
     def set_picture(self, show: int, matcap: Texture | None, background: Color) -> None:
         """Take what the picture tells, and its background."""

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import INT32_MAX, set_read_only, shown
+from topleft._core.base.arrays import INT32_MAX, as_real, check_regular, set_read_only, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.raster.clusters import Backoff
 from topleft._meshes.io.load import load
@@ -111,6 +111,12 @@ class Instance:
         """Return another mesh in the same place, which has been checked."""
         instance = object.__new__(Instance)
         vars(instance).update(vars(self), mesh=mesh)
+        return instance
+
+    def at(self, transform: F64) -> Instance:
+        """Return the same mesh by another matrix, which has been checked."""
+        instance = object.__new__(Instance)
+        vars(instance).update({name: vars(self)[name] for name in ("mesh", "name", "material")}, transform=transform)
         return instance
 
     @cached_property
@@ -262,6 +268,43 @@ class Scene:
         """
         if self.n_triangles > INT32_MAX:
             raise ValueError(f"{what} must have at most {INT32_MAX} triangles, got {self.n_triangles}")
+
+    def with_transforms(self, transforms: npt.ArrayLike) -> Scene:
+        """The scene with its instances elsewhere: meshes and materials are shared, and what is known of them kept.
+
+        Parameters
+        ----------
+        transforms : (N, 4, 4) array_like
+            World from object of each instance.
+
+        Raises
+        ------
+        ValueError
+            If the shape is another, a number is not finite, a last row is not [0, 0, 0, 1], or a matrix is singular.
+
+        Examples
+        --------
+        >>> import numpy as np, topleft as tl
+        >>> scene = tl.Scene([tl.Mesh(*tl.scenes.shape("cube"))])
+        >>> scene.with_transforms([np.diag([2, 2, 2, 1])]).bounds.tolist()
+        [[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]]
+        """
+        placed = as_real("transforms", transforms).copy()
+        if placed.shape != (len(self), 4, 4):
+            raise ValueError(f"transforms must have shape ({len(self)}, 4, 4), got {placed.shape}")
+        if not np.isfinite(placed).all():
+            raise ValueError("transforms must hold finite numbers")
+        if not (placed[:, 3] == [0, 0, 0, 1]).all():
+            raise ValueError("the last row of each of transforms must be [0, 0, 0, 1]")
+        placed.flags.writeable = False
+        for i in np.flatnonzero(np.linalg.matrix_rank(placed[:, :3, :3]) < 3):
+            check_regular(f"transforms[{i}]", placed[i])
+        scene = object.__new__(Scene)
+        instances = tuple(one.at(matrix) for one, matrix in zip(self.instances, placed, strict=True))
+        vars(scene).update(instances=instances, transforms=placed)
+        kept = {"first_ids": self.first_ids, "meshes": self.meshes, "boxes": self.boxes, "backoff": self.backoff}
+        vars(scene).update(kept)
+        return scene
 
     def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
         """Return the scene with other meshes, which stand where these do."""

@@ -1,0 +1,70 @@
+"""Products of poses and colours of floats, the same bits on every processor.
+
+Input: matrices (4, 4), colours as other libraries have them. Output: matrices, sRGB bytes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+F64 = npt.NDArray[np.float64]
+U8 = npt.NDArray[np.uint8]
+
+
+def product(a: npt.ArrayLike, b: npt.ArrayLike) -> F64:
+    """The product of two matrices, or of stacks of them, added up in order: NumPy's own depends on the processor."""
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    total = a[..., :, :1] * b[..., :1, :]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., :, k : k + 1] * b[..., k : k + 1, :]
+    return total
+
+
+def moved(points: npt.ArrayLike, pose: F64) -> F64:
+    """Points (N, 3) where a pose (4, 4) takes them."""
+    points = np.asarray(points, np.float64)
+    x, y, z = points[:, 0:1], points[:, 1:2], points[:, 2:3]
+    columns = pose[:3].T
+    moved: F64 = ((x * columns[0] + y * columns[1]) + z * columns[2]) + columns[3]
+    return moved
+
+
+def srgb_bytes(light: Any) -> npt.NDArray[np.uint8]:
+    """The sRGB bytes of linear light of 0 to 1."""
+    light = np.clip(np.asarray(light, np.float64), 0, 1)
+    srgb = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.rint(255 * srgb).astype(np.uint8)
+
+
+def over(picture: U8, table: bytes, background: Any) -> U8:
+    """A picture (H, W, 4) with other numbers for its colours, laid over a background as they stand.
+
+    Parameters
+    ----------
+    picture : (H, W, 4) uint8
+        Drawn over nothing: its alpha is the share that is covered.
+    table : bytes
+        The new number of each of 256.
+    background : (4,) or (H, W, 4) uint8
+        Its alpha counts as that of a colour: what is drawn is laid over it.
+    """
+    alpha = picture[..., 3]
+    found = np.frombuffer(bytearray(picture.tobytes().translate(table)), np.uint8).reshape(picture.shape)
+    found[..., 3] = 255
+    behind = np.broadcast_to(np.asarray(background, np.uint8), picture.shape)
+    np.copyto(found.view(np.uint32), np.ascontiguousarray(behind).view(np.uint32), where=(alpha == 0)[..., None])
+    rows, columns = np.nonzero((alpha > 0) & (alpha < 255))
+    if len(rows):
+        share = alpha[rows, columns, None].astype(np.uint16)
+        mixed = found[rows, columns] * share + behind[rows, columns] * (255 - share)
+        found[rows, columns] = ((mixed + 127) // 255).astype(np.uint8)
+    return found
+
+
+def light_of_bytes() -> F64:
+    """The linear light, 0 to 1, of each sRGB byte: (256,)."""
+    srgb = np.arange(256) / 255
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

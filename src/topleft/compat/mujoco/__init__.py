@@ -1,0 +1,9 @@
+"""The renderer of MuJoCo, drawn by topleft: ``from topleft.compat.mujoco import Renderer``.
+
+`Renderer` has the calls of `mujoco.Renderer`: colours, depth and segmentation of a scene that MuJoCo has updated,
+without OpenGL, a display or a GPU. Shadows, reflections, haze, lines and labels are not drawn.
+"""
+
+from topleft.compat.mujoco.renderer import Renderer
+
+__all__ = ["Renderer"]

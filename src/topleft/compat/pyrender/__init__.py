@@ -1,0 +1,47 @@
+"""The calls of pyrender, drawn by topleft: ``from topleft.compat import pyrender``.
+
+`OffscreenRenderer(w, h).render(scene, flags)` returns colours and depth as pyrender does, without OpenGL, a display or
+a GPU, and where pyrender is not installed. Depth, ids, culling, blending, textures and metallic-rough materials are
+drawn; shadows, wireframes, lines, normals as lines and text are not, and the viewer is missing.
+"""
+
+from topleft.compat.pyrender.graph import Mesh, Node, Primitive, Scene
+from topleft.compat.pyrender.renderer import OffscreenRenderer
+from topleft.compat.pyrender.values import (
+    GLTF,
+    Camera,
+    DirectionalLight,
+    IntrinsicsCamera,
+    Light,
+    Material,
+    MetallicRoughnessMaterial,
+    OrthographicCamera,
+    PerspectiveCamera,
+    PointLight,
+    RenderFlags,
+    Sampler,
+    SpotLight,
+    Texture,
+)
+
+__all__ = [
+    "GLTF",
+    "Camera",
+    "DirectionalLight",
+    "IntrinsicsCamera",
+    "Light",
+    "Material",
+    "Mesh",
+    "MetallicRoughnessMaterial",
+    "Node",
+    "OffscreenRenderer",
+    "OrthographicCamera",
+    "PerspectiveCamera",
+    "PointLight",
+    "Primitive",
+    "RenderFlags",
+    "Sampler",
+    "Scene",
+    "SpotLight",
+    "Texture",
+]
