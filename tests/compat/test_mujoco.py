@@ -10,7 +10,6 @@ import pytest
 from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
-import topleft as tl
 from topleft.compat.mujoco import Renderer, shapes
 
 SIZE = (64, 48)
@@ -273,15 +272,3 @@ def test_depth_segmentation_and_colors_are_those_of_mujoco():
     assert is_off.sum() < 100
     assert (np.abs(own_depth - depth) <= 1e-4 * depth)[is_inside].all()
     assert np.abs(own_color.astype(int) - color)[is_inside].mean() < 8
-
-
-def test_scene_with_other_transforms_is_drawn_as_a_new_one_is():
-    ball = tl.Mesh(*tl.scenes.icosphere(2))
-    scene = tl.Scene([tl.Instance(ball, color="red"), ball])
-    places = np.stack([np.eye(4)] * 2)
-    places[:, 0, 3] = -1, 2
-    camera = tl.Camera.look_at((0, 0, 9))
-    moved = scene.with_transforms(places)
-    fresh = tl.Scene([tl.Instance(ball, places[0], color="red"), tl.Instance(ball, places[1])])
-    assert_same(tl.render(moved, camera, SIZE), tl.render(fresh, camera, SIZE))
-    assert moved[0].mesh is ball

@@ -297,7 +297,12 @@ class Scene:
         if not (placed[:, 3] == [0, 0, 0, 1]).all():
             raise ValueError("the last row of each of transforms must be [0, 0, 0, 1]")
         placed.flags.writeable = False
-        for i in np.flatnonzero(np.linalg.matrix_rank(placed[:, :3, :3]) < 3):
+        x, y, z = np.moveaxis(placed[:, :3, :3], 2, 0)
+        volume, largest = (
+            np.abs((x * np.cross(y, z)).sum(axis=1)),
+            np.abs(placed[:, :3, :3]).max(axis=(1, 2), initial=0),
+        )
+        for i in np.flatnonzero(volume <= 1e-12 * largest**3):  # the others are regular, far beyond rounding
             check_regular(f"transforms[{i}]", placed[i])
         scene = object.__new__(Scene)
         instances = tuple(one.at(matrix) for one, matrix in zip(self.instances, placed, strict=True))

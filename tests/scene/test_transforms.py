@@ -1,0 +1,37 @@
+"""`Scene.with_transforms`: the same instances elsewhere."""
+
+import numpy as np
+import pytest
+from comparing import assert_same
+
+import topleft as tl
+
+SIZE = (64, 48)
+
+
+def test_scene_with_other_transforms_is_drawn_as_a_new_one_is():
+    ball = tl.Mesh(*tl.scenes.icosphere(2))
+    scene = tl.Scene([tl.Instance(ball, color="red"), ball])
+    places = np.stack([np.eye(4)] * 2)
+    places[:, 0, 3] = -1, 2
+    camera = tl.Camera.look_at((0, 0, 9))
+    moved = scene.with_transforms(places)
+    fresh = tl.Scene([tl.Instance(ball, places[0], color="red"), tl.Instance(ball, places[1])])
+    assert_same(tl.render(moved, camera, SIZE), tl.render(fresh, camera, SIZE))
+    assert moved[0].mesh is ball
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (np.zeros((2, 4, 4)), r"the last row of each of transforms must be \[0, 0, 0, 1\]"),
+        (np.diag([1, 1, 0, 1])[None], r"transforms\[0\] must not be singular"),
+        (np.eye(4), r"transforms must have shape \(1, 4, 4\), got \(4, 4\)"),
+        (np.full((1, 4, 4), np.nan), "transforms must hold finite numbers"),
+    ],
+)
+def test_transforms_of_a_scene_are_checked(change, message):
+    n = len(change) if change.ndim == 3 else 1
+    scene = tl.Scene([tl.Mesh(*tl.scenes.icosphere(0))] * n)
+    with pytest.raises(ValueError, match=message):
+        scene.with_transforms(change)
