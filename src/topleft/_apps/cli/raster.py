@@ -20,7 +20,7 @@ from topleft._apps.tiles.drawing import KINDS
 from topleft._apps.tiles.tiles import WINDOW, Tiles, extent_of, tiles
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import grid_around
-from topleft._core.base.remote import Place, RemotePath, place_of
+from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
 from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, load_polygons
 
@@ -50,7 +50,7 @@ SUFFIXES = (".tif", ".tiff", ".zarr", ".dzi")
 
 def run_raster(options: argparse.Namespace) -> int:
     """Write a raster of a mesh or of polygons, of any size."""
-    path = place_of(options.out)
+    path = location_of(options.out)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
     is_tiff, is_zarr = path.suffix.lower() in (".tif", ".tiff"), path.suffix.lower() == ".zarr"
@@ -84,7 +84,7 @@ def run_raster(options: argparse.Namespace) -> int:
     return 0
 
 
-def write(raster: Tiles, path: Place, options: argparse.Namespace, client: Any) -> Written:
+def write(raster: Tiles, path: Location, options: argparse.Namespace, client: Any) -> Written:
     """Write the raster in the format that the name asks for."""
     progress = True if not options.quiet and sys.stderr.isatty() else None
     how: dict[str, Any] = {

@@ -108,20 +108,20 @@ def draw_fill(
         is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
         has_samples = view.sampling.n_samples > 1
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and not has_samples
-        can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_share(view)))
+        can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_slice(view)))
         if blending.is_needed:
-            is_few = is_drawn and choices.blends_few(snapped, view, palette, is_flat=is_flat)
+            is_large_shapes = is_drawn and choices.blends_large_shapes(snapped, view, palette, is_flat=is_flat)
         else:
-            is_few = is_drawn and choices.fills_few(snapped, view, palette, is_flat=is_flat)
-        if ground is not None and not (can_lay or is_few):
+            is_large_shapes = is_drawn and choices.fills_large_shapes(snapped, view, palette, is_flat=is_flat)
+        if ground is not None and not (can_lay or is_large_shapes):
             lay_ground(canvas, ground)
             ground = None
         if not is_drawn:
             pass
-        elif is_few and not blending.is_needed and ground is not None:
-            fill_few(snapped, view, palette, canvas, ground, transfer)
+        elif is_large_shapes and not blending.is_needed and ground is not None:
+            fill_large_shapes(snapped, view, palette, canvas, ground, transfer)
         elif is_blended:
-            options = blending, transfer, is_few and ground is not None
+            options = blending, transfer, is_large_shapes and ground is not None
             blend(memory, snapped, view, palette, canvas, *options, is_flat=is_flat, ground=ground)
         elif has_samples:
             paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat, ground=ground)
@@ -203,7 +203,7 @@ def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
     pixels[1:] = pixels[:1]
 
 
-def fill_few(
+def fill_large_shapes(
     snapped: Snapped,
     view: View,
     colors: NDArray[Any],
@@ -217,7 +217,7 @@ def fill_few(
     under = engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
 
     def fill_rows(first: int, end: int) -> int:
-        return snapped.mesh.fill_few(pixels, first, end - first, colors, transfer, under, positions)
+        return snapped.mesh.fill_large_shapes(pixels, first, end - first, colors, transfer, under, positions)
 
     if max(run_parts(fill_rows, view.size[1], choices.threads_to_draw(view, snapped, Sink.LABEL))) >= 0:
         snapped.refuse()
@@ -271,7 +271,7 @@ def paint_samples(
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
     drawing = choices.drawing(view, snapped, Sink.LABEL)
     n_threads = drawing.n_threads
-    if is_flat and choices.can_share(view):
+    if is_flat and choices.can_slice(view):
         palette = engine.Palette(colors, transfer)
         if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, ground, n_threads):
             snapped.refuse()
@@ -282,7 +282,7 @@ def paint_samples(
     if is_flat:
         resolve_flat(labels, colors, pixels, transfer, n_threads)
         return
-    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
+    meshes = [snapped.mesh.at_sample(x, y) for x, y in positions.tolist()]
     resolve_gouraud(memory, meshes, labels, colors, pixels, transfer, n_threads)
 
 
@@ -294,28 +294,28 @@ def blend(
     pixels: NDArray[Any],
     blending: Blending,
     transfer: engine.Transfer | None,
-    is_few: bool,
+    is_large_shapes: bool,
     *,
     is_flat: bool,
     ground: NDArray[Any] | None = None,
 ) -> None:
     """Blend coloured triangles into contiguous pixels; with several samples a pixel each is a picture of its own.
 
-    `ground`, for uint8 with one sample a pixel, or `is_few`: the colour that all pixels get before.
+    `ground`, for uint8 with one sample a pixel, or `is_large_shapes`: the colour that all pixels get before.
     """
     n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
     if view.sampling.n_samples == 1:
         pictures, meshes = pixels[None], [snapped.mesh]
     else:
         positions = sample_positions(view.sampling.n_samples, view.grid_bits).tolist()
-        meshes = [snapped.mesh.seen_from(x, y) for x, y in positions]
+        meshes = [snapped.mesh.at_sample(x, y) for x, y in positions]
         pictures = memory.empty("sample colors", (len(meshes), *pixels.shape), colors.dtype)
         pictures[...] = pixels
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
     pixel_bytes = 4 if colors.dtype == np.uint8 else 4 * n_channels
     row_bytes = pixel_bytes * view.size[0]
     lays_ground = ground is not None
-    band_rows = 0 if is_few else choices.rows_to_blend(view, snapped, row_bytes, lays_ground=lays_ground)
+    band_rows = 0 if is_large_shapes else choices.rows_to_blend(view, snapped, row_bytes, lays_ground=lays_ground)
     for mesh, picture in zip(meshes, pictures, strict=True):
         if blend_colors(memory, mesh, colors, picture, blending, n_threads, band_rows, is_flat=is_flat, ground=ground):
             snapped.refuse()
@@ -358,14 +358,14 @@ def blend_colors(
         room = packed[engine.BLENDED_ROWS * width * i :] if packed is not None and band_rows == 0 else packed
         return mesh.blend(
             flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
-            code, is_premultiplied, band_rows, under, room, own, is_few=band_rows == 0,
+            code, is_premultiplied, band_rows, under, room, own, is_large_shapes=band_rows == 0,
         )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0
 
 
 def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> engine.Transfer | None:
-    """Return what is averaged; None when it is the values as they are.
+    """Return how samples are averaged; None for the mean of values.
 
     Raises
     ------

@@ -60,7 +60,7 @@ def draw_planes(
     depths = [None] * n_samples if depth is None else list(depth)
     targets = [engine.Target(sink, plane, z, None) for plane, z in zip(pixels, depths, strict=True)]
     if not is_near:
-        meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
+        meshes = [mesh.at_sample(x, y) for x, y in positions.tolist()]
         bad_rows = [
             max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), height, n_threads))  # type: ignore[misc]
             for s, t in zip(meshes, targets, strict=True)
@@ -82,14 +82,14 @@ def draw_sorted(
     bins = sort_bands(memory, mesh, n_triangles, positions, shape, int(cost_table().plane_bytes) // 8, n_threads)
     if bins.bad_row >= 0:
         return True
-    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
+    meshes = [mesh.at_sample(x, y) for x, y in positions.tolist()]
     run_parts(lambda first, end: engine.draw_bands(meshes, targets, bins, first, end), bins.n_bands, n_threads)
     return False
 
 
 @dataclass(frozen=True, eq=False)
 class SplitSamples:
-    """What several samples a pixel see: the first in each pixel, the others in those that show several triangles."""
+    """The ids and depths of several samples a pixel: the first in each, the others in pixels of several triangles."""
 
     ids: NDArray[np.int32]
     depth: NDArray[np.float32]
@@ -104,7 +104,7 @@ class SplitSamples:
     @property
     def meshes(self) -> list[engine.SnappedMesh]:
         """The mesh as each sample sees it."""
-        return [self.mesh.seen_from(x, y) for x, y in self.positions.tolist()]
+        return [self.mesh.at_sample(x, y) for x, y in self.positions.tolist()]
 
     @cached_property
     def sample_ids(self) -> NDArray[np.int32]:
@@ -170,7 +170,7 @@ def draw_split(
     own = n_parts, n_others, (width + 16) << bins.band_bits
     others = memory.empty("band ids", own, np.int32), memory.empty("band depth", own, np.float32)
     unused = list(zip(*others, strict=True))
-    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
+    meshes = [mesh.at_sample(x, y) for x, y in positions.tolist()]
     target = engine.Target(sink, ids, depth, None)
     run_parts(
         lambda first, end: engine.draw_split_bands(meshes, target, *unused.pop(), split, bins, first, end),
@@ -239,7 +239,7 @@ def draw_means(
     )
     if bins.bad_row >= 0:
         return True
-    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
+    meshes = [mesh.at_sample(x, y) for x, y in positions.tolist()]
     n_parts = max(1, min(n_threads, bins.n_bands))
     labels = list(memory.empty("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
     n_words = (width << bins.band_bits) // 64 + 2
