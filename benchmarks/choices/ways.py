@@ -236,7 +236,7 @@ def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
             cells = np.zeros(height * engine.area_stride(width), np.int64)
             snapped.mesh.draw_area(areas, engine.as_bytes(cells), 0, height, True, True)
         else:
-            sum_areas(memory, snapped.mesh, snapped.n_triangles, areas, 1, is_clamped=True)
+            sum_areas(memory, snapped.mesh, areas, 1, is_clamped=True)
         return (areas,)
 
     return draw_areas

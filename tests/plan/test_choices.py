@@ -285,7 +285,7 @@ def listed_in_bands(vertices, cull="none"):
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     snapped = snap_mesh(KeptMemory(), vertices, triangles, view, with_depth=False, out=None)
     positions = sampling.sample_positions(4, view.grid_bits)
-    bins = sampling.sort_bands(KeptMemory(), snapped.mesh, len(triangles), positions, (16, 16), 64, 1)
+    bins = sampling.SamplePass(KeptMemory(), snapped.mesh, positions, 1).sort_bands((16, 16), 64)
     assert bins.n_bands == 4
     return bins.n_listed
 

@@ -168,7 +168,7 @@ class Fragments:
     def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
         """Return the fragments of each of several samples, and their planes (S, H, W), drawn now if they were not."""
         if self._split is not None:
-            self._set_planes(*self._split.planes(), self._split.meshes)
+            self._set_planes(*self._split.planes(), self._split.drawn.meshes)
             self._split = None
         return self._samples, self._planes
 
@@ -199,7 +199,7 @@ class Fragments:
         """Return the ids and depths of the samples, as drawn."""
         if self._split is not None:
             found = self._split
-            return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.positions))
+            return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.drawn.positions))
         return SeenSamples.of(*(self._sampled()[1] or (self.id[None], self.depth[None])))
 
     def __repr__(self) -> str:
@@ -264,7 +264,7 @@ class Fragments:
     @classmethod
     def of_split(cls, split: SplitSamples, n_vertices: int, n_triangles: int) -> Fragments:
         """Return the fragments of several samples whose planes are drawn when they are asked for."""
-        frags = cls(split.ids, split.depth, split.meshes[0], n_vertices, n_triangles)
+        frags = cls(split.ids, split.depth, split.drawn.meshes[0], n_vertices, n_triangles)
         frags._split = split
         return frags
 

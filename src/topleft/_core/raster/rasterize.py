@@ -24,6 +24,7 @@ from topleft._core.raster.classic import draw_classic, refuse_classic
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.sampling import (
+    SamplePass,
     draw_planes,
     draw_sorted,
     draw_split,
@@ -64,8 +65,8 @@ def draw(
         return snapped.mesh.draw(target, first, end - first)
 
     if in_bands:
-        mesh, n, shape = snapped.mesh, snapped.n_triangles, (height, width)
-        is_bad = draw_sorted(memory, mesh, n, sample_positions(1, view.grid_bits), [target], shape, n_parts)
+        own = SamplePass(memory, snapped.mesh, sample_positions(1, view.grid_bits), n_parts)
+        is_bad = draw_sorted(own, [target], (height, width))
     elif is_sliced and snapped.can_slice:
         is_bad = max(draw_sliced(memory, snapped, target, height, n_parts)) >= 0
     else:
@@ -127,7 +128,7 @@ def draw_area(
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
         n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
-        if sum_areas(memory, snapped.mesh, snapped.n_triangles, canvas, n_threads, is_clamped=is_clamped):
+        if sum_areas(memory, snapped.mesh, canvas, n_threads, is_clamped=is_clamped):
             snapped.refuse()
     view.mark("draw")
     return result
@@ -147,7 +148,7 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
     if view.sampling.n_samples > 1 and view.is_exact:
-        return draw_slice_of_masks(memory, snapped, view, out)
+        return draw_share_of_masks(memory, snapped, view, out)
     if view.sampling.n_samples > 1:
         with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
             draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), canvas)
@@ -157,7 +158,7 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     return result
 
 
-def draw_slice_of_masks(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.float32]:
+def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.float32]:
     """Return the share of samples that triangles cover, from a mask of each sample."""
     n, shape = view.sampling.n_samples, view.size[::-1]
     mask: NDArray[np.bool_] = memory.empty("sample mask", shape, np.bool_)
@@ -200,23 +201,17 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
 
 
 def draw_all_samples(
-    memory: Memory,
+    own: SamplePass,
     snapped: Snapped,
     view: View,
-    positions: NDArray[np.int32],
-    drawing: Drawing,
+    sink: Sink,
     pixels: NDArray[np.int32],
     depth: NDArray[np.float32] | None,
 ) -> None:
     """Clear (S, H, W) planes and draw what each sample sees."""
-    width, height = view.size
-    if not (width and height):
+    if 0 in view.size:
         return
-    sink, n_threads, *_ = drawing
-    is_near = snapped.n_triangles > 0 and choices.can_slice(view)
-    if draw_planes(
-        memory, snapped.mesh, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
-    ):
+    if draw_planes(own, sink, pixels, depth, is_near=snapped.n_triangles > 0 and choices.can_slice(view)):
         snapped.refuse()
     view.mark("draw")
 
@@ -307,23 +302,20 @@ def draw_depth(memory: Memory, snapped: Snapped, view: View, options: FragmentOp
 def draw_samples(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids and depth of every sample: those of the first, and of pixels that show several; or a plane a sample."""
     (width, height), n = view.size, view.sampling.n_samples
-    positions = sample_positions(n, view.grid_bits)
+    own = SamplePass(memory, snapped.mesh, sample_positions(n, view.grid_bits), drawing.n_threads)
     check_fits((n, height, width), np.int32, np.float32)
     can_split = choices.can_split(view, snapped.n_triangles) and not snapped.mesh.is_named
     if can_split and options.ids_out is None and options.depth_out is None:
-        shape, n_threads = (height, width), drawing.n_threads
-        given = snapped.mesh, snapped.n_triangles, positions, drawing.sink, shape, options.background
-        split = draw_split(memory, *given, n_threads)
+        split = draw_split(own, drawing.sink, (height, width), options.background)
         if split is None:
             snapped.refuse()
         view.mark("draw")
         return Fragments.of_split(split, snapped.n_vertices, snapped.n_triangles)
     ids, depth = planes_of(memory, view)
-    draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
+    draw_all_samples(own, snapped, view, drawing.sink, ids, depth)
     lay_background(ids, depth, drawing.sink, options.background)
     copy_planes(ids, depth, options)
-    meshes = [snapped.mesh.at_sample(x, y) for x, y in positions.tolist()]
-    return Fragments.of_samples(ids, depth, meshes, snapped.n_vertices, snapped.n_triangles)
+    return Fragments.of_samples(ids, depth, own.meshes, snapped.n_vertices, snapped.n_triangles)
 
 
 def planes_of(memory: Memory, view: View) -> Buffers:

@@ -578,6 +578,6 @@ def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> N
     for chunk in placed.chunks():
         for mesh in chunk:
             n_threads = count_threads(view.threads, mesh.n_triangles)
-            sum_areas(SCRATCH, mesh, mesh.n_triangles, own, n_threads, is_clamped=True)
+            sum_areas(SCRATCH, mesh, own, n_threads, is_clamped=True)
             canvas += own
     np.minimum(canvas, 1, out=canvas)

@@ -150,7 +150,7 @@ def drawing(memory: KeptMemory, snapped: Snapped, view: View, group: str, sink: 
     shape = view.size[::-1]
     if group == "area":
         areas = memory.empty("pixels", shape, np.float32)
-        return lambda: sum_areas(memory, snapped.mesh, snapped.n_triangles, areas, 1, is_clamped=True)
+        return lambda: sum_areas(memory, snapped.mesh, areas, 1, is_clamped=True)
     dtype = {"mask": np.bool_, "samples": np.float32}.get(group, np.int32)
     pixels = memory.empty("pixels", shape, dtype)
     depth = memory.empty("depth", shape, np.float32) if group == "depth" else None
