@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, shown
+from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import numbers_without_data
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
@@ -23,8 +24,9 @@ from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.draw import cells_for
 from topleft._core.polygons.polygons import Rule, frame_of, in_crs_of, warn_if_apart
-from topleft._core.polygons.prepared import MAX_CROSSINGS, Prepared, prepare
+from topleft._core.polygons.prepared import Prepared, prepare
 from topleft._core.polygons.rings import as_points, rings_of_triangles
+from topleft.errors import MissingPackageError
 from topleft.typing import RuleOption
 
 #: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
@@ -33,7 +35,7 @@ MAX_ENTRIES_AT_ONCE = 1 << 27
 #: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
 MAX_BLOCK_ENTRIES = 1 << 16
 
-#: What the kernel writes beyond the last entry: a whole vector.
+#: Entries that the kernel may write beyond the last one: a whole vector.
 TAIL = 16
 
 
@@ -109,6 +111,23 @@ class Overlap:
         from scipy.sparse import csr_array
 
         return csr_array((self.areas, self.pixels, self.starts), shape=self.shape)
+
+    def to_sparse(self) -> Any:
+        """Return the table as `sparse.COO` (P, H, W) of pydata/sparse, of float32: no picture is made.
+
+        Raises
+        ------
+        MissingPackageError
+            If sparse is not installed.
+        """
+        try:
+            import sparse
+        except ImportError:
+            raise MissingPackageError("to_sparse needs the package sparse: pip install sparse") from None
+        places = np.stack([self.polygons, *self.rows_columns])
+        return sparse.COO(
+            places, self.areas, (len(self), *self.size[::-1]), has_duplicates=False, sorted=True, fill_value=0
+        )
 
     def sums(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
         """Return the integral (P,) of a raster (H, W) over each polygon; pixels without data count as nothing.
@@ -217,7 +236,7 @@ class Overlap:
         return picture.reshape(self.size[::-1])
 
     def _check_pixels(self) -> None:
-        """Raise an error for a table made by hand whose pixels are none; a pass over the entries."""
+        """Raise an error for a table made by hand with pixels outside of the grid; a pass over the entries."""
         n = self.shape[1]
         unsigned = self.pixels.view(f"u{self.pixels.dtype.itemsize}")  # below 0 is beyond
         if len(unsigned) and int(unsigned.max()) >= n:
@@ -269,7 +288,7 @@ class Overlap:
     def _reduced(
         self, ufunc: np.ufunc, values: npt.NDArray[np.float64], empty: float = np.nan
     ) -> npt.NDArray[np.float64]:
-        """Return what a function makes of the entries of each polygon; `empty` of none."""
+        """Return a function's value for the entries of each polygon; `empty` without entries."""
         is_full = np.diff(self.starts) > 0
         result = np.full(len(self), empty)
         if is_full.any():

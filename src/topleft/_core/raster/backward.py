@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 class Given(Protocol):
-    """What a visibility buffer was drawn from: `GivenCorners`."""
+    """The mesh that a visibility buffer was drawn from: `GivenCorners`."""
 
     vertices: Any
     triangles: Any
@@ -39,7 +39,7 @@ class ShownMesh(Protocol):
 
 @dataclass(frozen=True)
 class Backward:
-    """What a picture shows of a mesh: vertices (1, V, 4) as (x w, y w, z, w) in pixels of the picture, and `rast`."""
+    """A mesh in a picture: vertices (1, V, 4) as (x w, y w, z, w) in pixels of the picture, and `rast`."""
 
     given: Given
     vertices: Floats
@@ -105,7 +105,7 @@ class Backward:
         out = tensors.smooth(
             self.grid, as_rule(edges), self.pos, self.rast, tensors.halves_across(self.grid.tri), color
         )
-        return out.reshape(given.shape).astype(np.float32 if given.dtype == np.float32 else np.float64, copy=False)
+        return out.reshape(given.shape).astype(np.float32 if given.dtype.type is np.float32 else np.float64, copy=False)
 
     def smooth_vjp(self, picture: ArrayLike, grad: ArrayLike, edges: EdgesOption) -> tuple[Floats, Floats]:
         """Return the gradients of the picture and of the vertices."""
