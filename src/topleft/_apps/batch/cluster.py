@@ -30,10 +30,10 @@ MESH_KEY = "topleft-mesh"
 """How the keys of tasks begin that hold a mesh."""
 
 GONE = ("cancelled", "lost", "error")
-"""What has become of the future of a mesh that is no longer there."""
+"""States of the future of a mesh that is gone."""
 
 TASK_MS = 200.0
-"""What a task should take: about a hundred times what handing it over costs."""
+"""How long a task should take: about a hundred times as long as handing it over."""
 
 MOST_TOGETHER = 64
 UNKNOWN_TOGETHER = 4
@@ -251,7 +251,7 @@ class ClusterWorkers(Workers):
 
 
 def came_of(task: Any) -> tuple[list[Outcome] | None, BaseException | None]:
-    """What a task has given, or its error; neither of them where it was cancelled or lost with the scheduler."""
+    """The outcomes of a task, or its error; neither where it was cancelled or lost with the scheduler."""
     outcomes, error = result_of(task)
     # workers died while a mesh was made again there, for whatever jobs
     is_of_mesh = type(error).__name__ == "KilledWorker" and str(getattr(error, "task", "")).startswith(MESH_KEY)

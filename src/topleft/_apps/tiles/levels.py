@@ -55,7 +55,7 @@ Progress = Callable[[Step], object]
 
 @dataclass(frozen=True)
 class Written:
-    """What writing a raster did.
+    """How many windows were drawn, kept and left blank.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ def check_executor(executor: Any) -> None:
 
 
 def _on_threads(pool: ThreadPoolExecutor, make: Callable[[int, int, int], None]) -> Submit:
-    """What lets threads make a block."""
+    """A function that submits a block to threads."""
 
     def submit(level: int, row: int, column: int) -> Future[None]:
         return pool.submit(make, level, row, column)
@@ -226,7 +226,7 @@ def _on_threads(pool: ThreadPoolExecutor, make: Callable[[int, int, int], None])
 def _submitter(
     client: Any, raster: Tiles, store: TileStore, prepare: Callable[[Array], Array] | None
 ) -> tuple[Submit, int]:
-    """What lets workers of a cluster draw and write a window, and how many of them at a time."""
+    """A function that submits a window to workers of a cluster, and how many it takes at a time."""
     from topleft._apps.tiles.cluster import ClusterWriters, WriteJob
     from topleft._apps.tiles.dask_array import WindowJob
 

@@ -345,7 +345,7 @@ def world_corners(instance: Instance) -> F64:
 
 
 def as_subject(given: MeshLike | Scene | Points) -> Mesh | Scene | Points:
-    """What is drawn of what is given; of a path what `load` reads, of other things what `as_mesh` makes of them."""
+    """The subject itself, the file that a path names, or the mesh that `as_mesh` makes of it."""
     if isinstance(given, Mesh | Scene | Points):
         return given
     return load(given) if isinstance(given, str | os.PathLike) else as_mesh(given)
