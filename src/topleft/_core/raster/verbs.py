@@ -55,8 +55,8 @@ def coverage(
           of Direct3D; "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`). For `coverage` and
           `overdraw` also "outer": every pixel square that a triangle meets in positive area; "inner": every square
           that lies wholly inside a triangle.
-        * method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
-          `topleft.methods.CLASSICS` names them, and docs/guide/methods.md tells where each of them fails.
+        * method : "auto" (or "topleft"), "edge" or "scanline": the same picture. Or a classic of the literature, to
+          compare with: `topleft.methods.CLASSICS` names them, and docs/guide/methods.md tells where each of them fails.
         * cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
         * clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
         * near_clip, far_clip : bool. Whether that plane cuts.
