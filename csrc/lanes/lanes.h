@@ -47,7 +47,9 @@
  *   vi_add_bytes, vi_max_bytes, vi_min_bytes    unsigned bytes; a sum is at most 255
  *   vf_last_of(a, n)        the last of every n = 2 or 4 lanes, in all of them (scalar: a)
  * vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_nearest(vf), vi_round(vd) conversions; INT32_MIN
- *                           when out of range; the last two to nearest, ties to even */
+ * when
+ *                           out of range; the last two to nearest, ties to even
+ * / */
 #ifndef TL_LANES_H
 #define TL_LANES_H
 
@@ -74,7 +76,6 @@ TL_INLINE vf vf_load_some(vm m, const float *p, int has_room)
 {
     return TL_LANES == 4 && has_room ? vf_load(p) : vf_load_masked(m, p);
 }
-
 #if TL_HALF_LANES
 TL_INLINE hi hi_load_some(hm m, const int32_t *p, int has_room) { return (void)has_room, hi_load_masked(m, p); }
 TL_INLINE hf hf_load_some(hm m, const float *p, int has_room) { return (void)has_room, hf_load_masked(m, p); }

@@ -34,18 +34,6 @@ TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_b
     return TL_LANES > 1 && t->is_narrow && 2.0 * (width + around) * (height + around) < 0x1p50;
 }
 
-/* Cuts the columns [begins, ends) of TL_LANES rows by an edge, whose function is v at column 0 of them, of either
- * geometry.  `inverse`: 1 / |dy|.  Returns the columns to the edge. */
-TL_INLINE vd cut_rows(vd v, double inverse, int is_left, vd *begins, vd *ends)
-{
-    const vd q = vd_mul(v, vd_set1(inverse)), quotient = vd_floor(q);
-    if (is_left)
-        *begins = vd_max(*begins, vd_sub(vd_set1(0.0), quotient));
-    else
-        *ends = vd_min(*ends, vd_add(quotient, vd_set1(1.0)));
-    return q;
-}
-
 /* The columns [first, end) of TL_LANES rows, all within [low, high]. */
 TL_INLINE void find_row_ends(const edges_64 *e, vd rows, double low, double high, int32_t *first, int32_t *end)
 {
@@ -54,7 +42,11 @@ TL_INLINE void find_row_ends(const edges_64 *e, vd rows, double low, double high
         if (e->dy[k] == 0)
             continue;
         const vd v = vd_add(vd_set1((double)e->value[k] + 0.5), vd_mul(vd_set1((double)e->dx[k]), rows));
-        cut_rows(v, 1.0 / fabs((double)e->dy[k]), e->dy[k] < 0, &begins, &ends);
+        const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e->dy[k]))));
+        if (e->dy[k] < 0)
+            begins = vd_max(begins, vd_sub(vd_set1(0.0), quotient));
+        else
+            ends = vd_min(ends, vd_add(quotient, vd_set1(1.0)));
     }
     vi_store(first, vi_round(vd_min(begins, vd_set1(high))));
     vi_store(end, vi_round(vd_max(ends, vd_set1(low))));
@@ -65,20 +57,39 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
     const tl_target own = *shared, *target = &own; /* a copy that no store can change */
     const edges_64 e = setup_edges_64(t, window);
     const vd lanes = vd_from_vi(vi_iota());
+    const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
+    const vd xs = vd_add(vd_set1(x0), ramp(step)), slope_x = vd_set1(t->slope_x);
+    const int is_wide = sink_keeps_order(sink) && t->col1 - t->col0 >= TL_LEAST_WIDE;
+    const double x_left = sample_x(t, window, 0);
     int n_left = 0;
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+    double z_row[TL_MAX_LANES];
     for (int64_t row0 = t->row0; row0 < t->row1; row0 += TL_LANES) {
         const vd rows = vd_add(vd_set1((double)(row0 - t->row0)), lanes);
         find_row_ends(&e, rows, 0.0, (double)(t->col1 - t->col0), first, end);
+        if (sink_has_depth(sink)) {
+            const vd ys = vd_add(vd_set1(sample_y(t, window, row0)), ramp(step));
+            vd_store(z_row, vd_add(vd_set1(t->z[0]), vd_mul(vd_set1(t->slope_y), ys)));
+        }
         const int n = t->row1 - row0 < TL_LANES ? (int)(t->row1 - row0) : TL_LANES;
         for (int k = 0; k < n; k++) {
-            const int64_t from = t->col0 + first[k], to = t->col0 + end[k];
-            if (first[k] >= end[k])
+            const int64_t at = (row0 + k) * target->stride_px + t->col0;
+            if (!sink_has_depth(sink)) {
+                if (first[k] < end[k])
+                    put_plain(target, sink, at + first[k], end[k] - first[k], t->id);
                 continue;
-            if (sink_has_depth(sink))
-                n_left = put_plane(t, window, target, sink, row0 + k, from, to, n_left);
-            else
-                put_plain(target, sink, (row0 + k) * target->stride_px + from, to - from, t->id);
+            }
+            if (is_wide && first[k] < end[k] && looks_wide(target, end[k] - first[k], n_left)) {
+                const plane_row row = {z_row[k], t->slope_x, x_left, step, t->id};
+                n_left = put_wide(&row, target, sink, row0 + k, t->col0 + first[k], t->col0 + end[k]);
+                continue;
+            }
+            n_left -= n_left > 0;
+            const vd z = vd_set1(z_row[k]);
+            for (int32_t col = first[k]; col < end[k]; col += TL_LANES) {
+                const vd x = vd_add(xs, vd_set1(col * step));
+                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), t->id);
+            }
         }
     }
 }

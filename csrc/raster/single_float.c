@@ -244,8 +244,12 @@ TL_INLINE unsigned find_single_ends(const single_triangle *t, int64_t row0, int3
         if (e->dy[k] == 0.0)
             continue;
         const vd v = vd_add(vd_set1(e->v[k]), vd_mul(vd_set1(e->dx[k]), rows));
-        const vd q = cut_rows(v, t->inverse[k], e->dy[k] < 0.0, &begins, &ends);
+        const vd q = vd_mul(v, vd_set1(t->inverse[k])), quotient = vd_floor(q);
         doubted = vm_or(doubted, vd_ge(vd_set1(e->band[k]), vd_abs(vd_off_integer(q))));
+        if (e->dy[k] < 0.0)
+            begins = vd_max(begins, vd_sub(low, quotient));
+        else
+            ends = vd_min(ends, vd_add(quotient, vd_set1(1.0)));
     }
     vi_store(first, vi_round(vd_min(begins, high)));
     vi_store(end, vi_round(vd_max(ends, low)));

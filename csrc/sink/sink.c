@@ -351,16 +351,16 @@ TL_INLINE int put_wide(const plane_row *r, const tl_target *target, tl_sink sink
                                    : put_wide_farthest(r, target, row, first, end);
 }
 
-/* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x.  `n_left`: of put_wide at the row before; returns
- * it for the next one. */
-TL_INLINE int put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
-                        int64_t row, int64_t first, int64_t end, int n_left)
+/* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x. */
+TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                         int64_t row, int64_t first, int64_t end)
 {
     const double step = (double)((int64_t)2 << window->subpixel_bits), x = sample_x(t, window, first);
     const double z = t->z[0] + t->slope_y * sample_y(t, window, row);
-    if (sink_keeps_order(sink) && t->col1 - t->col0 >= TL_LEAST_WIDE && looks_wide(target, end - first, n_left)) {
+    if (sink_keeps_order(sink) && end - first >= TL_LEAST_WIDE && looks_wide(target, end - first, 0)) {
         const plane_row wide = {z, t->slope_x, sample_x(t, window, 0), step, t->id};
-        return put_wide(&wide, target, sink, row, first, end);
+        put_wide(&wide, target, sink, row, first, end);
+        return;
     }
     const vd z_row = vd_set1(z), slope_x = vd_set1(t->slope_x);
     const vd steps = ramp(step);
@@ -369,7 +369,6 @@ TL_INLINE int put_plane(const tl_triangle *t, const tl_window *window, const tl_
         const vd xs = vd_add(vd_set1(x + (double)(col - first) * step), steps);
         put_depths(target, sink, at + col, vm_first(end - col), sum_depth(z_row, vd_mul(slope_x, xs)), t->id);
     }
-    return n_left - (n_left > 0);
 }
 
 /* A span with depth from the exact weights. */
@@ -408,7 +407,7 @@ TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_
     if (!sink_has_depth(sink))
         put_plain(target, sink, row * target->stride_px + first, end - first, t->id);
     else if (t->has_plane)
-        put_plane(t, window, target, sink, row, first, end, 0);
+        put_plane(t, window, target, sink, row, first, end);
     else
         put_weighted(t, window, target, sink, row, first, end);
 }
