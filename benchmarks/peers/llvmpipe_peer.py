@@ -6,6 +6,8 @@ the pictures back into NumPy arrays. The vertex shader turns y over, so that row
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from benchmarks.peers import Drawing
@@ -57,6 +59,16 @@ def environment(threads: int) -> dict[str, str]:
             "GALLIUM_DRIVER": "llvmpipe"}  # fmt: skip
 
 
+def llvmpipe_context() -> Any:
+    """A context without a display. RuntimeError where OpenGL runs on something else than llvmpipe."""
+    import moderngl
+
+    context = moderngl.create_standalone_context(require=330, backend="egl")
+    if "llvmpipe" not in context.info["GL_RENDERER"]:
+        raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
+    return context
+
+
 def clip_from_input(scene: Scene) -> np.ndarray:
     """The matrix (4, 4) that also turns the picture over: OpenGL's row 0 is at the bottom."""
     width, height = scene.size
@@ -73,9 +85,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:
         return draw_by_llvmpipe(scene, threads)
     import moderngl
 
-    context = moderngl.create_standalone_context(require=330, backend="egl")
-    if "llvmpipe" not in context.info["GL_RENDERER"]:
-        raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
+    context = llvmpipe_context()
     width, height = scene.size
     vertices, triangles = scene.vertices, scene.triangles
     if scene.task == "smooth-fill":  # corners of its own for every triangle: a colour per vertex is one per triangle

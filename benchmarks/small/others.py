@@ -164,16 +164,18 @@ def objects_beside_bop() -> Scenes:
 
 def gradients_beside_deodr() -> Scenes:
     """Forward and backward of colours and silhouettes, the loss left out, beside DEODR."""
+    makers: dict[str, Callable[..., Callable[[], object]]] = {
+        f"topleft.torch, {edges}": partial(step_of_topleft, edges=edges)
+        for edges in ("silhouette", "area", "straight-through")
+    } | {"DEODR": step_of_deodr}
     for n_triangles, size in ((10_000, (512, 512)), (70_000, (512, 512)), (100_000, HD)):
         clip, triangles = wavy_ball(n_triangles, *size)
-        steps: dict[str, Callable[[], object]] = {
-            f"topleft.torch, {edges}": step_of_topleft(clip, triangles, size, edges)
-            for edges in ("silhouette", "area", "straight-through")
-        }
-        try:
-            steps["DEODR"] = step_of_deodr(clip, triangles, size)
-        except ImportError as error:
-            print(f"deodr: {error}", file=sys.stderr)
+        steps = {}
+        for name, make in makers.items():
+            try:
+                steps[name] = make(clip, triangles, size)
+            except ImportError as error:
+                print(f"{name}: {error}", file=sys.stderr)
         yield f"{n_triangles} triangles, {size[0]}x{size[1]}", steps
 
 
@@ -284,14 +286,11 @@ def wavy_ball(n_triangles: int, width: int, height: int) -> tuple[Any, Any]:
     """A wavy ball in clip space, (V, 4) float32, and its triangles."""
     import topleft as tl
 
-    n = int((n_triangles / 2) ** 0.5)
-    theta, phi = np.meshgrid(np.linspace(0, np.pi, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij")
-    r = 1 + 0.15 * np.sin(5 * theta) * np.cos(4 * phi)
-    axes = [r * np.sin(theta) * np.cos(phi), r * np.cos(theta), r * np.sin(theta) * np.sin(phi)]
-    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1, 1)
-    triangles = np.concatenate([i + [0, 1, n + 2], i + [0, n + 2, n + 1]]).astype(np.int32)
+    (points, triangles), _ = latitudes(int((n_triangles / 2) ** 0.5))
+    x, y, z = points.T.astype(np.float64)
+    r = 1 + 0.15 * np.sin(5 * np.arccos(y)) * np.cos(4 * np.arctan2(z, x))
     camera = tl.Camera.look_at((0, 0.5, 3.0), (0, 0, 0), fov_y_deg=50)
-    clip = tl.scenes.to_clip(np.stack(axes, -1).reshape(-1, 3), camera.clip_from_world((width, height)))
+    clip = tl.scenes.to_clip(r[:, None] * points, camera.clip_from_world((width, height)))
     return clip.astype(np.float32), triangles
 
 
