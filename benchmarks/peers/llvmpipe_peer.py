@@ -6,11 +6,9 @@ the pictures back into NumPy arrays. The vertex shader turns y over, so that row
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from benchmarks.peers import Drawing
+from benchmarks.peers import Drawing, llvmpipe_context
 from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "moderngl"
@@ -57,16 +55,6 @@ def environment(threads: int) -> dict[str, str]:
     """0 rasterizer threads: the calling thread draws."""
     return {"LP_NUM_THREADS": str(threads if threads > 1 else 0), "LIBGL_ALWAYS_SOFTWARE": "1",
             "GALLIUM_DRIVER": "llvmpipe"}  # fmt: skip
-
-
-def llvmpipe_context() -> Any:
-    """A context without a display. RuntimeError where OpenGL runs on something else than llvmpipe."""
-    import moderngl
-
-    context = moderngl.create_standalone_context(require=330, backend="egl")
-    if "llvmpipe" not in context.info["GL_RENDERER"]:
-        raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
-    return context
 
 
 def clip_from_input(scene: Scene) -> np.ndarray:

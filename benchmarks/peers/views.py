@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers import Drawing
-from benchmarks.peers.llvmpipe_peer import llvmpipe_context
+from benchmarks.peers import Drawing, llvmpipe_context
 from benchmarks.scenes.cases import Scene
 
 LIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])

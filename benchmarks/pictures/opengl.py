@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
-from benchmarks.peers.llvmpipe_peer import llvmpipe_context
+from benchmarks.peers import llvmpipe_context
 from benchmarks.pictures.scenes import SIZE, PictureScene
 from topleft._core.base.color import DEFAULT_COLOR
 from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT
