@@ -29,6 +29,9 @@ from topleft._meshes.model.points import Points
 from topleft._meshes.model.pose import as_pose
 from topleft._meshes.scene.adapt import MeshLike, as_mesh, is_mesh_like
 
+IN_PLACE = np.eye(4)
+"""World from object of what stands where its vertices are."""
+
 
 @dataclass(frozen=True, eq=False)
 class Instance:
@@ -68,7 +71,7 @@ class Instance:
     """
 
     mesh: Mesh
-    transform: F64 = field(default_factory=lambda: np.eye(4))
+    transform: F64 = field(default_factory=lambda: IN_PLACE)
     name: str | None = None
     material: Material | None = None
     color: InitVar[ColorLike | None] = None
@@ -89,9 +92,9 @@ class Instance:
     def __post_init__(self, color: ColorLike | None) -> None:
         if not isinstance(self.mesh, Mesh):
             raise TypeError(f"mesh must be a Mesh, got {shown(self.mesh)}: topleft.as_mesh makes one of others")
-        if not isinstance(self.name, str | None):
+        if not (self.name is None or isinstance(self.name, str)):
             raise TypeError(f"name must be a str or None, got {shown(self.name)}")
-        if not isinstance(self.material, Material | None):
+        if not (self.material is None or isinstance(self.material, Material)):
             raise TypeError(f"material must be a Material or None, got {shown(self.material)}")
         if color is not None:
             if self.material is not None:
