@@ -20,7 +20,7 @@ from topleft._core.base.arrays import as_count, shown
 from topleft._meshes.camera.camera import CameraLike, as_camera
 from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Scene, as_meshes, meshes_of, scene_of
+from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
 from topleft.typing import CullOption
 
 
@@ -146,6 +146,7 @@ def visible_faces(
     camera = np.repeat(np.arange(len(rows), dtype=np.int32), n_seen)
     none = [np.empty(0, np.int32)]
     face, pixels = (np.concatenate(none + [row[k] for row in rows]) for k in range(2))
-    firsts = np.cumsum([0, *(len(one.vertices) for one in meshes_of(subject))])
-    corners = [one.triangles + np.int32(first) for one, first in zip(meshes_of(subject), firsts.tolist(), strict=False)]
+    meshes = [one.mesh for one in scene]
+    firsts = np.cumsum([0, *(len(one.vertices) for one in meshes)])
+    corners = [one.triangles + np.int32(first) for one, first in zip(meshes, firsts.tolist(), strict=False)]
     return VisibleFaces(camera, face, pixels, (len(rows), n_faces), np.concatenate(corners))

@@ -22,10 +22,11 @@ from topleft._meshes.camera.matrices import box_corners
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.holes import without_holes
-from topleft._meshes.picture.render import DEFAULT_SIZE, rasterize_shot
+from topleft._meshes.picture.instances import rasterize_shot
+from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Instance, Scene, scene_of
+from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import CullOption
 
 Window = tuple[int, int, int, int]
@@ -266,7 +267,7 @@ def object_masks(
     if not 0 <= as_number("beyond", beyond) < np.inf:
         raise ValueError(f"beyond must be a number of pictures, 0 or more, got {beyond}")
     shot = Shot.of(scene, camera, size, takes_points=False)
-    whole, (width, height) = scene_of(shot.subject), shot.size
+    whole, (width, height) = shot.scene, shot.size
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
     instance, boxes = seen_in(whole, shot.camera, shot.size, options)
     n_visible = np.bincount(instance.reshape(-1) + 1, minlength=len(whole) + 1)[1:].astype(np.int64)
