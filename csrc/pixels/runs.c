@@ -81,6 +81,7 @@ typedef struct {
     int has_far_texels; /* some are asked for before they are read */
     int is_plain;       /* edge functions and normals of vertices are all that runs need */
     int n_runs, n_special;
+    float most_shortest;    /* of RUN_SHORTEST of the runs that set_plain_runs has set, INFINITY of others */
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
     /* vectors of runs begin with a cache line: one across two takes twice as long */
@@ -810,12 +811,23 @@ TL_INLINE vf load_plain_normal(const shade_runs *s, int slot, int k, vf *normal)
     return vf_of_bits(c[3]);
 }
 
+TL_INLINE float largest_lane(vf a)
+{
+    float lanes[TL_MAX_LANES], most;
+    vf_store(lanes, a);
+    most = lanes[0];
+    for (int lane = 1; lane < TL_LANES; lane++)
+        most = most < lanes[lane] ? lanes[lane] : most;
+    return most;
+}
+
 /* The same of runs that need no more than normals of vertices, where none is special: 0 if one is.  Passes of few
  * operations, so that those of several vectors of runs overlap. */
 TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
 {
     const int end = TL_LANES + s->n_runs;
     vm is_special = vm_first(0);
+    vf most = vf_set1(0.0f);
     keep_corners(s, fetches, 1);
     if (fetches)
         fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
@@ -848,7 +860,9 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
         q[1] = load_plain_normal(s, slot, 1, normal[1]);
         q[2] = load_plain_normal(s, slot, 2, normal[2]);
         put_normals(s, slot, vf_from_vi(vi_load(s->ints[RUN_SUM] + slot)), q, (const vf(*)[3])normal);
+        most = vf_max(most, vf_load(s->floats[RUN_SHORTEST] + slot));
     }
+    s->most_shortest = largest_lane(most);
     return 1;
 }
 
@@ -859,6 +873,7 @@ TL_ONCE void set_runs(shade_runs *s, int64_t row)
     const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
     const int is_exact = s->snapped->mesh.exact != NULL;
     s->n_special = 0;
+    s->most_shortest = INFINITY;
     if (!s->n_runs)
         return;
     /* the rest of the last vector: a triangle that is there */

@@ -14,23 +14,16 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_size, shown
+from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent, save_image
+from topleft._core.base.array_types import Array, MeshLike
+from topleft._core.base.arrays import as_scale, as_size, shown
+from topleft._core.base.defaults import DEFAULT_SIZE
+from topleft._core.base.notes import listening, tell
+from topleft._core.base.options import check_layers
 from topleft._core.base.remote import Place, as_place, place_of
-from topleft._core.raster.verbs import Rasterizer
-from topleft._meshes.camera.camera import Camera
-from topleft._meshes.io.images import save_image
 from topleft._meshes.io.layer_files import layer_paths, save_layers
-from topleft._meshes.io.load import as_scale, load
-from topleft._meshes.io.notes import listening, tell
-from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.model.points import Points
-from topleft._meshes.picture.layers import check_layers, draw_layers
-from topleft._meshes.picture.render import DEFAULT_SIZE, render
-from topleft._meshes.picture.transparent import render_transparent
+from topleft._meshes.picture.layers import draw_layers
 from topleft._meshes.picture.view_layers import gbuffer_of
-from topleft._meshes.scene.adapt import MeshLike, as_mesh
-from topleft._meshes.scene.scene import Scene
 from topleft.typing import LayerOption
 
 CameraMaker = Callable[[Any, tuple[int, int]], Camera]

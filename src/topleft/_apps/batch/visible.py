@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import Mesh, Scene, as_mesh
 from topleft._apps.batch.batch import render_batch
 from topleft._apps.batch.jobs import Job
-from topleft._core.base.array_types import I32
+from topleft._core.base.array_types import I32, MeshLike
 from topleft._core.base.arrays import as_count, shown
+from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._meshes.camera.camera import CameraLike, as_camera
-from topleft._meshes.picture.render import DEFAULT_SIZE
-from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
 from topleft.typing import CullOption
 
 
@@ -128,8 +127,8 @@ def visible_faces(
     least = as_count("min_pixels", min_pixels)
     if not isinstance(cameras, Iterable) or isinstance(cameras, str | bytes | np.ndarray):
         raise TypeError(f"cameras must be an iterable of Camera, got {shown(cameras)}")
-    subject = as_meshes(mesh)
-    scene = scene_of(subject)
+    subject: Mesh | Scene = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    scene = subject if isinstance(subject, Scene) else Scene([subject])
     scene.check_counted("a scene whose visible triangles are counted")
     n_faces = scene.n_triangles
     layers = ("triangle",) if len(scene) == 1 else ("triangle", "instance")

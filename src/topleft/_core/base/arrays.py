@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import os
 from collections.abc import Iterable
+from numbers import Real
 from pathlib import Path
 from typing import Any, cast
 
@@ -240,6 +241,39 @@ def as_number(name: str, value: object) -> float:
     if array.ndim:
         raise TypeError(f"{name} must be a number, got {shown(value)}")
     return float(array)
+
+
+def as_scale(scale: object) -> float:
+    """A scale, if it is one."""
+    factor = as_number("scale", scale)
+    if not 0 < factor < np.inf:
+        raise ValueError(f"scale must be a positive number, got {scale!r}")
+    return factor
+
+
+def as_seconds(time: float) -> float:
+    """A time, if it is one."""
+    seconds = as_number("time", time)
+    if not 0 <= seconds < np.inf:
+        raise ValueError(f"time must be a number of seconds, 0 or more, got {time!r}")
+    return seconds
+
+
+def as_crease(value: float) -> float:
+    """Return a crease angle, degrees.
+
+    Raises
+    ------
+    TypeError
+        If it is no number.
+    ValueError
+        If it is outside of 0 to 180.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(f"crease must be an angle in degrees, got {value!r}")
+    if not 0 <= value <= 180:
+        raise ValueError(f"crease must lie in 0 to 180 degrees, got {value!r}")
+    return float(value)
 
 
 def as_count(name: str, value: object, smallest: int = 1) -> int:

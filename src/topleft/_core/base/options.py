@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import IntEnum, StrEnum
 from functools import cache, cached_property
-from typing import TypeVar
+from typing import TypeVar, get_args
+
+from topleft._core.base.arrays import as_names
+from topleft.typing import LayerOption
 
 
 class Sampling(StrEnum):
@@ -128,3 +132,22 @@ def check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
     if not (isinstance(value, str) and value in choices):
         *others, last = (f'"{choice}"' for choice in choices)
         raise ValueError(f"{name} must be {', '.join(others)} or {last}, got {value!r}")
+
+
+LAYER_NAMES: tuple[str, ...] = get_args(LayerOption)
+"""Names of the layers of a view."""
+
+
+def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names of layers, each once.
+
+    Raises
+    ------
+    ValueError
+        If there is no such layer.
+    """
+    checked = tuple(dict.fromkeys(as_names("layers", names)))
+    for name in checked:
+        if name not in LAYER_NAMES:
+            raise ValueError(f"layers must be some of {', '.join(LAYER_NAMES)}, got {name!r}")
+    return checked

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, shown
+from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import numbers_without_data
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
@@ -23,7 +24,7 @@ from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.draw import cells_for
 from topleft._core.polygons.polygons import Rule, frame_of, in_crs_of, warn_if_apart
-from topleft._core.polygons.prepared import MAX_CROSSINGS, Prepared, prepare
+from topleft._core.polygons.prepared import Prepared, prepare
 from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.typing import RuleOption
 

@@ -14,13 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.arrays import apart_from, as_array, as_count, as_size, as_subpixel_bits, as_window
+from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import crs_text, is_same_crs, transformed
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, empty
 from topleft._core.base.options import Sampling, parse
 from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.polygons.draw import add_shares, draw_labels, draw_mask
-from topleft._core.polygons.prepared import MAX_CROSSINGS, Frame, Prepared, prepare
+from topleft._core.polygons.prepared import Frame, Prepared, prepare
 from topleft._core.polygons.rings import RingSet, as_rings
 from topleft._core.raster.rasterize import canvas_of, open_canvas
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, sample_positions

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.memory import SCRATCH, Memory, times_that_fit
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.polygons.rings import RingSet
@@ -15,10 +16,6 @@ from topleft._core.polygons.rings import RingSet
 #: Points, and pixels, that are worth a thread: below, one is done before the other has begun.
 MIN_POINTS_PER_THREAD = 50_000
 MIN_PIXELS_PER_THREAD = 1 << 20
-
-
-#: How often rings may cross where areas are exact: 4 s of one core.
-MAX_CROSSINGS = 50_000_000
 
 
 @dataclass(frozen=True, slots=True)

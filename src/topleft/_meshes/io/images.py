@@ -14,17 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.arrays import as_array
+from topleft._core.base.defaults import SUFFIXES
 from topleft._core.base.georeference import geo_tags, nodata_tag
 from topleft._core.base.grid import Grid
 from topleft._core.base.remote import Place, as_place
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.io import png
 from topleft.errors import ImageError
-
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
-BUFFER_SUFFIXES = (".npy", ".npz")
-SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES
-"""What `save_image` writes, by the end of the name."""
 
 BYTES = ("uint8 (H, W)", "uint8 (H, W, 3)", "uint8 (H, W, 4)")
 HOLDS: Mapping[str, tuple[str, ...]] = {

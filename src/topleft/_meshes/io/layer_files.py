@@ -18,8 +18,9 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_number
+from topleft._core.base.defaults import SUFFIXES
 from topleft._core.base.remote import Place, as_place, place_of
-from topleft._meshes.io.images import SUFFIXES, save_image
+from topleft._meshes.io.images import save_image
 from topleft.errors import ImageError
 
 RANGES = {"camera_normal": (-1.0, 1.0), "world_normal": (-1.0, 1.0), "barycentric": (0.0, 1.0)}

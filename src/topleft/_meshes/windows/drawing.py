@@ -17,8 +17,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from topleft._apps.tiles.ahead import kept_memory
-from topleft._apps.tiles.blocks import Triangles
 from topleft._core.base.array_types import F64, I32, Array
 from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._core.base.grid import Grid
@@ -28,6 +26,8 @@ from topleft._core.raster.rasterize import Asked, draw_fragments
 from topleft._core.raster.verbs import coverage, fill, overdraw
 from topleft._core.raster.view import View
 from topleft._meshes.field.field import depth_of, dtype_of_field, fill_planes, is_per_face, nodata_of, visible
+from topleft._meshes.windows.ahead import kept_memory
+from topleft._meshes.windows.blocks import Triangles
 
 Size = tuple[int, int]
 

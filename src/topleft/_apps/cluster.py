@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from topleft._core.engine.isa import build_info
+from topleft import build_info
 from topleft.errors import MissingPackageError, TopleftError
 
 MOST_RESTARTS = 5
