@@ -33,13 +33,13 @@
 /* Twice the area of unsnapped triangles, in the units that their edge functions are integers of. */
 #define TL_UNIT_AREA 0x1p24
 
-/* What no step of theirs to the next column exceeds, in units. */
+/* The most that one of their steps to the next column is, in units. */
 #define TL_MOST_STEP 0x1p36
 
 /* |E| below this stay int32, with the step to anywhere else in the box. */
 #define TL_INT32_BOX 0x1p30f
 
-/* What interpolated normals that cancel are shorter than, and rounding could have made. */
+/* Interpolated normals that cancel are shorter: rounding could have made them. */
 #define TL_NO_NORMAL 1e-6f
 
 enum {                                /* coefficients of runs, float32 */
@@ -166,13 +166,13 @@ TL_INLINE void put_three(shade_runs *s, int first, int slot, const vf *q, vf a0,
     put(s, first + 2, slot, vf_mul(q[2], a2));
 }
 
-/* What TL_LANES runs have in common with their triangles. */
+/* The constants that TL_LANES runs have from their triangles. */
 typedef struct {
     _Alignas(64) int32_t corners[3][TL_MAX_LANES];
     vf q[3], normal[3][3], area, col_step[3], row_step[3];
 } run_setup;
 
-/* What perspective makes of a value along a column or a row: the sum of the steps of the weights times the value. */
+/* The step of a value in perspective along a column or a row: the sum of the steps of the weights times the value. */
 TL_INLINE vf gradient_of(const vf *step, const vf *value)
 {
     return vf_fma(step[0], value[0], vf_fma(step[1], value[1], vf_mul(step[2], value[2])));
@@ -388,7 +388,7 @@ TL_INLINE void set_tangents(shade_runs *s, int slot, const run_setup *r, const f
     put(s, first + 6, slot, vf_mul(hand, turn));
 }
 
-/* What only full materials and holes need. */
+/* For full materials and holes alone. */
 static void set_more_attributes(shade_runs *s, int slot, const run_setup *r)
 {
     const tl_shading *shading = s->shading;
@@ -936,7 +936,7 @@ TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t c
     e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
 }
 
-/* What edge functions of the unsnapped lack. */
+/* Adds the constants of edge functions of vertices that are not snapped. */
 TL_INLINE void find_rests(const shaded_lanes *p, vf *rest)
 {
     const vi in_block = vi_set1((int32_t)(p->s->window->x_px & (TL_RUN_BLOCK - 1))), last = vi_set1(TL_RUN_BLOCK - 1);

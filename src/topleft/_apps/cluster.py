@@ -63,7 +63,7 @@ def quiet() -> Iterator[None]:
 
 
 def result_of(task: Any) -> tuple[Any, BaseException | None]:
-    """Return what a task has given, or its error; neither of them where it was cancelled or lost with the scheduler."""
+    """Return a task's result, or its error; neither where it was cancelled or lost with the scheduler."""
     try:
         if task.status == "finished":
             return task.result(), None

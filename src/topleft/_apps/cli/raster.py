@@ -17,7 +17,7 @@ from topleft._apps.cli.report import complain
 from topleft._apps.tiles.tiles import Tiles, tiles
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import grid_around
-from topleft._core.base.remote import Place, RemotePath, place_of
+from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
 from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, load_polygons
 from topleft._meshes.windows.blocks import triangles_of
@@ -53,7 +53,7 @@ DIRECT_KINDS = [one for one in get_args(RasterKindOption) if one not in ("field"
 
 def run_raster(options: argparse.Namespace) -> int:
     """Write a raster of a mesh or of polygons, of any size."""
-    path = place_of(options.out)
+    path = location_of(options.out)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
     is_tiff, is_zarr = path.suffix.lower() in (".tif", ".tiff"), path.suffix.lower() == ".zarr"
@@ -87,7 +87,7 @@ def run_raster(options: argparse.Namespace) -> int:
     return 0
 
 
-def write(raster: Tiles, path: Place, options: argparse.Namespace, client: Any) -> Written:
+def write(raster: Tiles, path: Location, options: argparse.Namespace, client: Any) -> Written:
     """Write the raster in the format that the name asks for."""
     progress = True if not options.quiet and sys.stderr.isatty() else None
     how: dict[str, Any] = {

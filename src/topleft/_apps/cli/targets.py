@@ -22,7 +22,7 @@ from topleft._apps.cli.arguments import UsageError, meant
 from topleft._core.base.color import DEFAULT_COLOR
 from topleft._core.base.defaults import DEFAULT_CREASE, DEFAULT_POINT_SIZE, SUFFIXES
 from topleft._core.base.options import Sampling
-from topleft._core.base.remote import Place, RemotePath, place_of
+from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.whole_file import remove_stale_parts
 from topleft._meshes.io.limits.budget import LIMITS
 from topleft._meshes.io.references import read_picture
@@ -308,7 +308,7 @@ def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
 
 def _pattern(out: str, options: argparse.Namespace) -> str:
     """OUT as a file name with {name}, {view}, {index} and {layer} where several pictures need them."""
-    path = place_of(out)
+    path = location_of(out)
     check_words("OUT", path, ("name", "folder", "view", "index", "layer"))
     is_folder = out.endswith(("/", "\\")) or not path.suffix or (isinstance(path, Path) and path.is_dir())
     if not out or (path.suffix.lower() not in SUFFIXES and not is_folder):
@@ -327,7 +327,7 @@ def _pattern(out: str, options: argparse.Namespace) -> str:
     return str(path.with_name(stem + path.suffix))
 
 
-def check_words(what: str, path: Place, known: Sequence[str]) -> None:
+def check_words(what: str, path: Location, known: Sequence[str]) -> None:
     """Raise a `UsageError` for a word in braces that stands for nothing, unless a folder is called so."""
     folder = Path()
     for part in path.parts if isinstance(path, Path) else (str(path),):
@@ -349,7 +349,7 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
         If two pictures would have the same name, or a picture that of a mesh, or a folder cannot be written to.
     """
     owner_of: dict[str, str] = {}
-    targets: list[tuple[Place, str]] = [
+    targets: list[tuple[Location, str]] = [
         (file, group.source) for group in groups for job in group.jobs for file in job.files
     ]
     targets += [(path, str(path)) for path in others]

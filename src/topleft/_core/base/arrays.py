@@ -27,7 +27,7 @@ DEVICES = {2: "CUDA device", 4: "OpenCL device", 7: "Vulkan device", 8: "Metal d
 
 
 def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
-    """Return what NumPy makes of `values`, aligned for the kernels, without a copy where it can."""
+    """Return `values` as a NumPy array, aligned for the kernels, without a copy where it can."""
     if not isinstance(values, np.ndarray) and (hasattr(values, "__dlpack__") or hasattr(values, "__array__")):
         values = array_of_tensor(name, values)
     try:
@@ -332,7 +332,7 @@ def as_names(name: str, values: object) -> tuple[str, ...]:
 
 
 def shown(value: object) -> str:
-    """What a message says of a wrong value: the value if it is short, else its type, and its shape if it has one."""
+    """Return a wrong value as messages show it: the value if it is short, else its type, and shape."""
     if isinstance(value, str | int | float | bool | tuple | list | None) and len(text := repr(value)) <= 60:
         return text
     shape = getattr(value, "shape", None)

@@ -52,7 +52,7 @@ class ClipDepth(StrEnum):
 
 
 class Per(StrEnum):
-    """What a row of colours belongs to."""
+    """The owner of a row of colours."""
 
     AUTO = "auto"
     TRIANGLE = "triangle"
@@ -60,7 +60,7 @@ class Per(StrEnum):
 
 
 class Blend(StrEnum):
-    """What a triangle's colour does to the colour of a pixel; in the order of `tl_blend` in ``csrc/topleft.h``."""
+    """How a triangle's colour changes that of a pixel; in the order of `tl_blend` in ``csrc/topleft.h``."""
 
     REPLACE = "replace"
     OVER = "over"
@@ -78,21 +78,21 @@ class Alpha(StrEnum):
 
 
 class Resolve(StrEnum):
-    """What of the colours of a pixel's samples is averaged: the values, or the light that sRGB values stand for."""
+    """How a pixel's samples are averaged: their values, or the light that sRGB values stand for."""
 
     VALUES = "values"
     LINEAR = "linear"
 
 
 class PointShape(StrEnum):
-    """What a point covers."""
+    """The shape of a point."""
 
     DISC = "disc"
     SQUARE = "square"
 
 
 class Sink(IntEnum):
-    """What happens to a covered sample; the numbers are `tl_sink` in ``csrc/topleft.h``."""
+    """How a covered sample changes the buffers; the numbers are `tl_sink` in ``csrc/topleft.h``."""
 
     MASK = 0
     COUNT = 1

@@ -29,7 +29,7 @@ from topleft.typing import RuleOption, SamplingOption
 
 
 class Rule(StrEnum):
-    """What is inside of rings that wind round a point so many times."""
+    """The fill rule: which winding numbers are inside."""
 
     EVENODD = "evenodd"
     NONZERO = "nonzero"
@@ -37,7 +37,7 @@ class Rule(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """What polygons are painted with: a row of `table` each, and one for where none is."""
+    """The values of polygons: a row of `table` each, and one for pixels of none."""
 
     table: npt.NDArray[Any]  # (P, ...), of the picture's dtype
     background: npt.NDArray[Any]  # a row
@@ -224,7 +224,7 @@ def frame_of(
 
 
 def warn_if_apart(prepared: Prepared, given: RingSet, size: object) -> None:
-    """Warn the caller's caller of polygons of which none meets a pixel of a grid."""
+    """Warn the caller's caller when no polygon meets a pixel of the grid."""
     if not isinstance(size, Grid) or not len(given.points) or 0 in size.size or prepared.frame.origin != (0, 0):
         return
     left, top, right, bottom = prepared.compiled.boxes_px.T
@@ -268,7 +268,7 @@ def mean_of_samples(
     table = None if paint is None else np.concatenate([paint.table, paint.background[None]]).astype(np.float32)
     out.fill(0)
     for at in positions:
-        prepared.compiled.seen_from(*at)
+        prepared.compiled.at_sample(*at)
         if mask is not None:
             draw_binary(prepared, mask, Sampling.CENTER, is_nonzero=is_nonzero, assume_valid=False)
             np.add(out, mask, out=out)
@@ -279,7 +279,7 @@ def mean_of_samples(
 
 
 def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
-    """Return what polygons are painted with."""
+    """Return the values that polygons are painted with."""
     if isinstance(values, str):
         if values != "index":
             raise ValueError(f"values must be 'index', a number or an array, got {values!r}")

@@ -48,7 +48,7 @@ class Prepared:
         return threads_for(self.frame, self.n_points)
 
     def certify(self, *, assume_valid: bool) -> None:
-        """Find out of which polygons the rings do not meet, and what the area of each ring counts."""
+        """Find the polygons with rings that do not meet, and the sign of each ring's area."""
         compiled, n = self.compiled, len(self)
         compiled.make_weights(self.frame.max_crossings)
         n_words = 0 if assume_valid else compiled.certify_words()

@@ -17,7 +17,7 @@ from topleft._core.base.arrays import as_real, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.options import check_layers
-from topleft._core.base.remote import Place
+from topleft._core.base.remote import Location
 from topleft._core.polygons.rle import to_rle
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import CameraLike, as_camera
@@ -66,7 +66,7 @@ class ViewLayers(Mapping[str, Array]):
 
     def save(
         self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None
-    ) -> tuple[Place, ...]:
+    ) -> tuple[Location, ...]:
         """Write the layers, or one of them, and return the files; see `topleft._meshes.io.layer_files.save_layers`.
 
         Raises
