@@ -491,11 +491,13 @@ def rasterize_shot(
     *,
     depth_test: DepthTestOption | None = "less",
     background_depth: float | None = None,
+    is_split: bool = True,
     **options: Any,
 ) -> Fragments:
     """Return the visibility buffer of what is drawn; options as those of `rasterize`, without `transform`.
 
-    `material`: whose backs are culled, instead of those that the meshes have. `rasterizer` and `out`: for a mesh alone.
+    `material`: whose backs are culled, instead of those that the meshes have. `rasterizer` and `out`: for a mesh alone,
+    as `is_split` of `View`.
     """
     if not shot.is_mesh:
         placed, view = place(shot.scene, shot.camera, shot.size, options, material=material)
@@ -503,7 +505,7 @@ def rasterize_shot(
     out = options.pop("out", None)
     with lent(rasterizer, shot.size) as memory:
         placed, _ = place(shot.scene, shot.camera, shot.size, options, material=material)
-        drawn = draw_one(memory, placed, depth_test, background_depth, out, is_split=True)
+        drawn = draw_one(memory, placed, depth_test, background_depth, out, is_split=is_split)
     return drawn if placed.bent is None else BentFragments(drawn, placed.bent[0], shot.scene[0].mesh)
 
 

@@ -196,4 +196,4 @@ def rasterize_mesh(
         return draw_cloud(shot.cloud, shot.camera, shot.size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     shot = shot.within(tolerance, cull=cull, **window)
-    return rasterize_shot(shot, rasterizer, cull=cull, threads=threads, **view)
+    return rasterize_shot(shot, rasterizer, is_split=False, cull=cull, threads=threads, **view)
