@@ -87,8 +87,8 @@ def scaling_rows(record: Record) -> Table:
 
 
 def tutorial_rows(record: Record) -> Table:
-    """A row for each method and pure twin: pictures a second."""
-    rows = record["tutorial"]
+    """A row for each method and pure twin, without variants: pictures a second."""
+    rows = [row for row in record["tutorial"] if "/" not in row["method"]]
     base = next((row["fills"] for row in rows if row["method"] == "point_in_triangle"), None)
     cells = []
     for row in rows:

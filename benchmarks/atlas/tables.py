@@ -16,6 +16,9 @@ Row = dict[str, Any]
 
 NEVER = "-"
 
+COARSE = "auto, 0 bits"
+"""Whole pixels: the first table says where it fails; its figures are those of the snap alone."""
+
 
 def lines(record: Record) -> Iterator[str]:
     """The report of one record, Markdown."""
@@ -73,7 +76,11 @@ def production_text(record: Record) -> str:
     """What the engine makes of every family: the worst of all steps."""
     rows = []
     for facts in record["families"]:
-        for row in (row for row in record["maps"] if row["family"] == facts["name"] and row["entry"] in PRODUCTION):
+        for row in (
+            row
+            for row in record["maps"]
+            if row["family"] == facts["name"] and row["entry"] in PRODUCTION and row["entry"] != COARSE
+        ):
             steps, wrong = steps_of(facts), row["wrong"]
             worst = max((i for i, n in enumerate(wrong) if n is not None), key=lambda i: wrong[i] / facts["n_px"][i])
             share = f"{percent(wrong[worst], facts['n_px'][worst])}" + (f" at {steps[worst]}" if wrong[worst] else "")

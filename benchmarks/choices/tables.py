@@ -67,19 +67,6 @@ def asked_of(row: Row) -> str:
     return str(row["verb"]) if row["sampling"] == "center" else f"{row['verb']} {row['sampling']}"
 
 
-def kinds_text(record: Record) -> str:
-    """Mean and worst ratio of each choice by kind of scene."""
-    kinds = list(dict.fromkeys(row["kind"] for row in record["rows"]))
-    rows = []
-    for choice, own in by_choice(record).items():
-        cells = [choice]
-        for kind in kinds:
-            some = [row["ratio"] for row in own if row["kind"] == kind]
-            cells.append(f"{sum(some) / len(some):.2f} / {max(some):.2f}" if some else "-")
-        rows.append(cells)
-    return table_text(["choice", *kinds], rows)
-
-
 def misses_text(record: Record) -> str:
     """The scenes in which another way takes a sixth less time or more."""
     rows = [
@@ -122,6 +109,7 @@ def plans_text(record: Record) -> str:
         [row["scene"], f"{row['n_triangles']:,}", row["indices"], f"{row['plan_ms']:.3g}", f"{row['without_ms']:.3g}",
          f"{row['with_ms']:.3g}", f"{row['saves_us']:.1f}"]
         for row in record["plans"]
+        if row["n_triangles"] >= 1000  # what smaller ones save is lost in noise
     ]  # fmt: skip
     head = ["scene", "triangles", "indices", "`tl.plan` ms", "`rasterize` ms", "with `plan=` ms", "saves us"]
     return table_text(head, rows)
@@ -130,7 +118,6 @@ def plans_text(record: Record) -> str:
 PARTS: Mapping[str, Callable[[Record], str]] = {
     "choice-facts": facts_text,
     "choice-summary": summary_text,
-    "choice-kinds": kinds_text,
     "choice-misses": misses_text,
     "plan-estimates": estimates_text,
     "plan-overhead": plans_text,

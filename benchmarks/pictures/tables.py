@@ -57,7 +57,7 @@ def sheets_text(record: Record) -> str:
 def sheet_text(row: Record) -> str:
     """One of them, with what is in it."""
     address = f"../images/pictures-{row['scene']}.png"
-    return f"`{row['scene']}`: {row['what']}\n\n![{row['what']}: topleft, llvmpipe, difference]({address})"
+    return f"![{row['scene']}, {row['what']}: topleft, llvmpipe, difference]({address})"
 
 
 PARTS: Mapping[str, Callable[[Record], str]] = {

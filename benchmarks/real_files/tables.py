@@ -15,6 +15,9 @@ from benchmarks.report.tables import facts_text, left_table, number, table_text
 N_EXAMPLES = 2
 """Files that a row of a table of lines names."""
 
+N_LINES = 10
+"""Lines that the documentation shows, of the most files; the page of a run has all."""
+
 Row = dict[str, Any]
 
 
@@ -44,8 +47,8 @@ def summary(record: Record) -> str:
     )
 
 
-def lines_of(record: Record, outcome: str) -> str:
-    """A row for each kind of line that a command printed, with how many files and the first of them."""
+def lines_of(record: Record, outcome: str, n_most: int | None = None) -> str:
+    """A row for each kind of line that a command printed, of most files first, with the first of them."""
     kinds: dict[str, list[str]] = {}
     for row in record["files"]:
         if row["outcome"] == outcome:
@@ -55,7 +58,9 @@ def lines_of(record: Record, outcome: str) -> str:
         [f"`{kind}`", str(len(files)), ", ".join(list(dict.fromkeys(files))[:N_EXAMPLES])]
         for kind, files in sorted(kinds.items(), key=lambda entry: (-len(entry[1]), entry[0]))
     ]
-    return left_table(["line", "files", "such as"], rows) if rows else "None."
+    n_more = len(rows) - len(rows[:n_most])
+    more = f"\n\n{n_more} more lines, of {sum(int(row[1]) for row in rows[n_most:])} files." if n_more else ""
+    return left_table(["line", "files", "such as"], rows[:n_most]) + more if rows else "None."
 
 
 def kinds_of(line: str, file: str, outcome: str) -> Iterator[str]:
@@ -119,7 +124,7 @@ def lines(record: Record) -> Iterator[str]:
 PARTS = {
     "folders": summary,
     "suffixes": suffixes,
-    "refused": lambda record: lines_of(record, "refused"),
-    "warned": lambda record: lines_of(record, "drawn"),
+    "refused": lambda record: lines_of(record, "refused", N_LINES),
+    "warned": lambda record: lines_of(record, "drawn", N_LINES),
     "facts": facts_text,
 }

@@ -58,6 +58,7 @@ CullOption: TypeAlias = Literal["none", "back", "front"]
 DepthTestOption: TypeAlias = Literal["less", "greater"]
 MethodOption: TypeAlias = Literal[
     "auto",
+    "topleft",
     "edge",
     "scanline",
     "point_in_triangle",

@@ -23,7 +23,7 @@ from topleft._meshes.picture.layers import LAYERS
 from topleft._meshes.picture.shade import Shading
 from topleft._meshes.plan.plan import OUTPUTS
 from topleft._meshes.windows.drawing import KINDS
-from topleft.methods import CLASSICS, METHODS
+from topleft.methods import ALIASES, CLASSICS, METHODS
 
 #: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_read_from_the_types`.
 TAKEN = {
@@ -37,7 +37,7 @@ TAKEN = {
     "FilterOption": Filter,
     "LayerOption": LAYERS,
     "LightKindOption": LightKind,
-    "MethodOption": [*METHODS, *CLASSICS],
+    "MethodOption": [*METHODS, *ALIASES, *CLASSICS],
     "OnErrorOption": OnError,
     "OrderOption": Order,
     "OutputOption": OUTPUTS,

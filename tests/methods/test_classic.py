@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft.methods import CLASSICS, load_kernel
+from topleft.methods import CLASSICS, find_method, load_kernel
 from topleft.methods.classics.classic_kernels import FORMS, draw
 
 EVERY_CLASSIC = pytest.mark.parametrize("name", CLASSICS)
@@ -258,3 +258,9 @@ def test_line_is_nowhere_further_than_half_a_pixel_off():
 def test_line_bad_end_raises(ends, kind, message):
     with pytest.raises(kind, match=message):
         tl.bresenham_line(*ends)
+
+
+def test_topleft_is_another_word_for_auto():
+    triangle = [[1, 1], [9, 2], [3, 8]], [[0, 1, 2]], (10, 10)
+    assert np.array_equal(tl.coverage(*triangle, method="topleft"), tl.coverage(*triangle))
+    assert find_method("topleft") is find_method("auto")

@@ -1,13 +1,15 @@
-"""Talks to a Dask cluster: whether its workers can draw, and what came of a task.
+"""Talks to a Dask cluster: whether its workers can draw, what came of a task, and sending it again when it was lost.
 
 Input: a `dask.distributed.Client`, which is the caller's and is not imported for its name. Output: results and errors.
 """
 
 from __future__ import annotations
 
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from typing import Any
 
@@ -79,3 +81,25 @@ def wait_for_scheduler(client: Any, is_over: Callable[[], bool]) -> None:
     """Wait while a client has lost its scheduler, unless it is over: until then it forgets what it is given."""
     while client.status == "connecting" and not is_over():
         time.sleep(WAIT_S)
+
+
+def send_again(client: Any, send: Callable[[], None], promise: Future[Any], is_over: Callable[[], bool]) -> None:
+    """Send a lost task once more as soon as there is a scheduler, in a thread; cancel its promise if all is over."""
+
+    def again() -> None:
+        try:
+            wait_for_scheduler(client, is_over)
+            if is_over() or promise.done():
+                promise.cancel()
+            else:
+                send()
+        except BaseException as error:
+            if not promise.done():
+                promise.set_exception(error)
+
+    threading.Thread(target=again, daemon=True).start()
+
+
+def lost(what: str, n_sent: int) -> TopleftError:
+    """The error of a task that was lost too often."""
+    return TopleftError(f"the cluster has lost {what} {n_sent} times")

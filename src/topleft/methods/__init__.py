@@ -123,6 +123,9 @@ METHODS = {
     )
 }
 
+ALIASES = {"topleft": "auto"}
+"""Further words of ``method=``: the library by its name, in tables beside other methods."""
+
 PINEDA = METHODS["edge"].source
 GIESEN = "F. Giesen, Optimizing the basic rasterizer, 2013"
 TUTORIAL_2 = "xterminal86, Software 3D renderer tutorial, part 2: Triangle, 2023"
@@ -271,7 +274,7 @@ def find_method(name: object) -> Method:
     ValueError
         If there is no such method.
     """
-    method = {**METHODS, **CLASSICS}.get(name) if isinstance(name, str) else None
+    method = {**METHODS, **CLASSICS}.get(ALIASES.get(name, name)) if isinstance(name, str) else None
     if method is None:
         raise ValueError(
             f"method must be one of {', '.join(map(repr, METHODS))}, got {name!r}; "

@@ -31,7 +31,7 @@ Progress = Callable[["Result"], object]
 
 
 class OnError(StrEnum):
-    """What an error of a job does."""
+    """Whether an error of a job is raised or collected."""
 
     RAISE = "raise"
     COLLECT = "collect"

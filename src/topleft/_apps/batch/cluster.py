@@ -22,18 +22,18 @@ from typing import Any
 from topleft import Level, Levels, Mesh, plan
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
 from topleft._apps.batch.workers import N_SPOOLED, Jobs, Workers, coarser_levels_of, needs_levels
-from topleft._apps.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
+from topleft._apps.cluster import MOST_RESTARTS, check_workers, lost, quiet, result_of, send_again
 from topleft._meshes.lod.levels import keep_levels
-from topleft.errors import MissingPackageError, TopleftError
+from topleft.errors import MissingPackageError
 
 MESH_KEY = "topleft-mesh"
 """How the keys of tasks begin that hold a mesh."""
 
 GONE = ("cancelled", "lost", "error")
-"""What has become of the future of a mesh that is no longer there."""
+"""States of the future of a mesh that is gone."""
 
 TASK_MS = 200.0
-"""What a task should take: about a hundred times what handing it over costs."""
+"""How long a task should take: about a hundred times as long as handing it over."""
 
 MOST_TOGETHER = 64
 UNKNOWN_TOGETHER = 4
@@ -118,6 +118,8 @@ class ClusterWorkers(Workers):
     def _send(
         self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int = 0, n_trials: int = 0
     ) -> None:
+        if n_restarts:
+            self._forget_cancelled()
         with_levels = needs_levels(jobs[0][1])
         held = self._hold(jobs[0][1].scene, with_levels)
         light = [(index, replace(job, scene=None) if held is not None else job) for index, job in jobs]
@@ -157,28 +159,13 @@ class ClusterWorkers(Workers):
             promise.set_result(outcomes)
         elif error is None and not self._ends and n_restarts < MOST_RESTARTS:
             self._is_trying = self._is_trying or n_trials > 0
-            again = partial(self._send_again, jobs, promise, n_restarts + 1, n_trials)
-            threading.Thread(target=again, daemon=True).start()
+            again = partial(self._send, jobs, promise, n_restarts + 1, n_trials)
+            send_again(self._client, again, promise, lambda: self._ends)
         elif type(error).__name__ == "KilledWorker" and n_trials < MOST_TRIALS and not self._ends:
             self._suspect(jobs, promise, n_trials + 1)
         else:
-            promise.set_exception(error or TopleftError(f"the cluster has lost the job {1 + n_restarts} times"))
+            promise.set_exception(error or lost("the job", 1 + n_restarts))
         self._try_next()
-
-    def _send_again(
-        self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int, n_trials: int
-    ) -> None:
-        """Send jobs once more as soon as there is a scheduler; until then a client forgets what it is given."""
-        try:
-            wait_for_scheduler(self._client, lambda: self._ends)
-            if self._ends or promise.done():
-                promise.cancel()
-                return
-            self._forget_cancelled()
-            self._send(jobs, promise, n_restarts, n_trials)
-        except BaseException as error:
-            if not promise.done():
-                promise.set_exception(error)
 
     def _suspect(self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_trials: int) -> None:
         """Let each job be tried by itself, and no two at a time: workers died over them, but maybe for another job."""
@@ -264,7 +251,7 @@ class ClusterWorkers(Workers):
 
 
 def came_of(task: Any) -> tuple[list[Outcome] | None, BaseException | None]:
-    """What a task has given, or its error; neither of them where it was cancelled or lost with the scheduler."""
+    """The outcomes of a task, or its error; neither where it was cancelled or lost with the scheduler."""
     outcomes, error = result_of(task)
     # workers died while a mesh was made again there, for whatever jobs
     is_of_mesh = type(error).__name__ == "KilledWorker" and str(getattr(error, "task", "")).startswith(MESH_KEY)

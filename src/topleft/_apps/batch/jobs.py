@@ -130,13 +130,13 @@ def as_job(item: object, index: int) -> Job:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of one job: the picture, unless it went to a file, or the error."""
+    """The result of one job: the picture, unless it went to a file, or the error."""
 
     index: int
     picture: Array | dict[str, Array] | None = None
     error: Exception | None = None
     warnings: tuple[str, ...] = ()
-    """What its mesh lacks of its file."""
+    """Warnings of its mesh file."""
     seconds: float = 0.0
 
 
@@ -287,6 +287,6 @@ def _clear_frames(error: BaseException | None) -> None:
 
 
 def _opaque(options: Mapping[str, Any]) -> tuple[int, int, int]:
-    """What JPEG shows for the background: white if it is transparent."""
+    """The background of a JPEG: white if it is transparent."""
     color = tuple(options.get("background", (255, 255, 255)))
     return color[:3] if len(color) < 4 or color[3] else (255, 255, 255)

@@ -244,7 +244,7 @@ class Spool:
 
     @property
     def token(self) -> str:
-        """What tells this batch from others."""
+        """The name of this batch among others."""
         return self._folder
 
     def hold(self, scene: Any, with_levels: bool = False) -> Any:

@@ -80,7 +80,7 @@ def hearing_sigterm() -> Iterator[None]:
 
 
 def run_info(_: argparse.Namespace) -> int:
-    """Print what was built and what runs."""
+    """Print which instruction sets were built, and the one in use."""
     for name, value in build_info().items():
         if isinstance(value, Mapping):
             print(f"{name}:", *(f"  {key}: {item}" for key, item in value.items()), sep="\n")

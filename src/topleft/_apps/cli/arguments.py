@@ -79,7 +79,7 @@ MAX_VIEWS = 100_000
 
 
 class UsageError(TopleftError):
-    """What was asked for makes no sense."""
+    """The arguments contradict each other, or name nothing."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -100,7 +100,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def meant(word: str, known: Iterable[str]) -> str:
-    """What a person may have meant by a word that is not known, as the end of a message."""
+    """The known word that is nearest to an unknown one, as the end of a message."""
     from difflib import get_close_matches  # 3 ms that only errors need
 
     found = get_close_matches(word, list(known), 1)

@@ -53,7 +53,7 @@ def mesh_of(path: str) -> Mesh:
 
 
 def drawn(baked: Baked, options: argparse.Namespace) -> npt.NDArray[Any]:
-    """What the file holds."""
+    """The values as the file holds them."""
     suffix = Path(options.out).suffix.lower()
     if suffix == ".npy" or (suffix in (".tif", ".tiff") and options.what in ("position", "triangle")):
         return baked.values

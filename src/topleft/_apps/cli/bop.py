@@ -20,7 +20,7 @@ from topleft.errors import MeshError
 BOP_HELP = """\
 SCENE is a folder of BOP's format with scene_camera.json and scene_gt.json, as test/000001 is; models are
 DIR/obj_000001.ply and so on. OUT gets the content of scene_gt_info.json: pixels, visible shares and boxes of each
-object of each image. What shows is what no other object of scene_gt.json hides: the tools of BOP ask the measured depth
+object of each image. Objects of scene_gt.json hide each other: the tools of BOP ask the measured depth
 instead. Where there is a depth/000001.png, px_count_valid counts its pixels that are not 0.
 
 examples:

@@ -1,4 +1,4 @@
-"""`topleft doctor`: what a report of a bug needs, and whether this installation draws what it should."""
+"""`topleft doctor`: the facts that a bug report needs, and whether this installation draws the right pixels."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from topleft._core.raster.costs import save_costs
 
 
 def run_explain(options: argparse.Namespace) -> int:
-    """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""
+    """Print how a view of a mesh is drawn: the choice of each stage, its reason and its time."""
     mesh = MeshSource(options.mesh)()
     if isinstance(mesh, Points):
         raise UsageError(f"{options.mesh!r} holds points, of which there is no plan")

@@ -20,7 +20,7 @@ from topleft._core.base.whole_file import write_whole
 from topleft.errors import TopleftError
 
 MOST_LACKS = 8
-"""What meshes lack that one line tells, without --warnings all."""
+"""Warnings in one line, without --warnings all."""
 
 TOLD = (TopleftError, OSError, ValueError, MemoryError)
 """Errors whose message says enough; of others a line has the name of their kind, too."""
@@ -42,7 +42,7 @@ def complain_of_lacks(lines: Sequence[str], *, is_each_told: bool = False) -> No
 
 
 def one_line(error: BaseException) -> str:
-    """What is wrong, in one line."""
+    """The error in one line."""
     if isinstance(error, MemoryError):
         return "not enough memory for a mesh or picture of this size"
     if isinstance(error, OSError) and error.strerror:

@@ -127,7 +127,7 @@ class Orbit:
 
 
 WHITE, BACKDROP = (255, 255, 255, 255), (196, 212, 232, 255)
-"""What is behind a mesh, and behind one that is white: it is not grey, as white faces are under white light."""
+"""Backgrounds of a mesh, and of a white one: not grey, as white faces are under white light."""
 
 NEARLY_WHITE = 240
 

@@ -178,7 +178,7 @@ def draw_cells(cells: NDArray[Any] | None, width: int, height: int, scale: int, 
 
 
 def text_of(value: Any) -> str:
-    """What is written into a pixel: nothing for False, 0, -1 and what is not finite."""
+    """The text of a pixel: empty for False, 0, -1 and numbers that are not finite."""
     number = float(value)
     if value.dtype.kind == "b" or not np.isfinite(number) or number == 0 or (value.dtype.kind == "i" and number < 0):
         return ""

@@ -1,4 +1,4 @@
-"""Makes what is shown of what is given: arrays, a mesh, a file, the name of a scene, or a link that was copied."""
+"""Turns its input into content of the page: arrays, a mesh, a file, the name of a scene, or a link that was copied."""
 
 from __future__ import annotations
 

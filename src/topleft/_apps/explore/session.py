@@ -1,4 +1,4 @@
-"""What is shown, and what one page has of it.
+"""The content that is shown, and the state of one page.
 
 In: arrays, a mesh or the name of a scene. Out: `Content`, which all pages of an explorer share, and a `Session` for
 each page.
@@ -35,7 +35,7 @@ class Content:
     tab : str
         Which part of the page is shown first: "pixels", "steps", "mesh" or "race".
     pixels : dict
-        Of the part Pixels: what a link would restore, without what is left at its default.
+        Of the part Pixels: the state that a link restores, without defaults.
     mesh : Mesh or None
         Of the part Mesh.
     name : str

@@ -1,7 +1,7 @@
 """Records how a method draws, step by step: for a teacher who plays, pauses and goes back.
 
 In: triangles in pixels and the name of a method. Out: `Trace`, the steps of the method's pure twin with the numbers
-that decide each of them. Nothing is computed here: what is shown is what the twin did.
+that decide each of them. Nothing is computed here: the page shows the steps of the twin.
 """
 
 from __future__ import annotations

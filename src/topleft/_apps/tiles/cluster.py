@@ -1,20 +1,18 @@
 """Writes windows of a raster on the workers of a Dask cluster, to a folder that all of them see, or a store.
 
-Input: a client, and windows as jobs that carry what they need. Output: the chunks; the windows that are there, as they
-come. A window whose worker dies is drawn elsewhere; what was on the way when a scheduler died is sent again.
+Input: a client, and windows as jobs that carry what they need. Output: the chunks, and a future of each window. A
+window whose worker dies is drawn elsewhere; what was on the way when a scheduler died is sent again.
 """
 
 from __future__ import annotations
 
-import queue
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from topleft._apps.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
-from topleft.errors import TopleftError
-
-Block = tuple[int, int, int]
+from topleft._apps.cluster import MOST_RESTARTS, check_workers, lost, quiet, result_of, send_again
 
 
 @dataclass(frozen=True)
@@ -38,45 +36,51 @@ def run_write(job: WriteJob) -> None:
     job()
 
 
-def write_on_cluster(client: Any, make: Callable[[Block], WriteJob], blocks: Iterator[Block]) -> Iterator[Block]:
-    """Write windows, two more than twice as many at a time as there are threads; yield each when it is there.
+class ClusterWriters:
+    """Workers of a cluster that write windows.
 
     Raises
     ------
     MissingPackageError, TopleftError
-        If a worker lacks the package, or has another version; if the scheduler was lost too often.
-    KilledWorker
-        If workers die over a window.
+        If a worker lacks the package, or has another version.
     """
-    check_workers(client)
-    done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    running: dict[str, tuple[Any, Block, int]] = {}  # the task, and how often its window was sent
 
-    def send(block: Block, n_sent: int) -> None:
+    def __init__(self, client: Any) -> None:
+        check_workers(client)
+        self._client = client
+        self.n_most = 2 * max(1, sum(client.nthreads().values())) + 2
+        """How many windows are on the way at a time."""
+
+    def submit(self, job: WriteJob) -> Future[None]:
+        """Return the future of a window.
+
+        Its error is `KilledWorker` if workers die over it, `TopleftError` if the scheduler was lost too often.
+        """
+        promise: Future[None] = Future()
+        promise.add_done_callback(_tell_waiters)
+        self._send(job, promise, 1)
+        return promise
+
+    def _send(self, job: WriteJob, promise: Future[None], n_sent: int) -> None:
         with quiet():
-            task = client.submit(run_write, make(block), pure=False)
-        running[task.key] = task, block, n_sent
-        task.add_done_callback(done.put)
+            task = self._client.submit(run_write, job, pure=False)
 
-    n_most = 2 * max(1, sum(client.nthreads().values())) + 2
-    try:
-        while True:
-            while len(running) < n_most and (block := next(blocks, None)) is not None:
-                send(block, 1)
-            if not running:
+        def end(done: Any) -> None:
+            is_written, error = done.status == "finished", result_of(done)[1]
+            if promise.done():
                 return
-            task, block, n_sent = running.pop(done.get().key)
-            is_written, error = task.status == "finished", result_of(task)[1]
-            if error is not None:
-                raise error
             if is_written:
-                yield block
-                continue
-            if n_sent > MOST_RESTARTS:
-                _, row, column = block
-                raise TopleftError(f"the cluster has lost the window in row {row}, column {column} {n_sent} times")
-            wait_for_scheduler(client, lambda: False)
-            send(block, n_sent + 1)
-    finally:
-        if running:
-            client.cancel([task for task, _, _ in running.values()])
+                promise.set_result(None)
+            elif error is None and n_sent <= MOST_RESTARTS:
+                send_again(self._client, partial(self._send, job, promise, n_sent + 1), promise, lambda: False)
+            else:
+                promise.set_exception(error or lost(f"the window in row {job.row}, column {job.column}", n_sent))
+
+        promise.add_done_callback(lambda made: task.cancel() if made.cancelled() else None)
+        task.add_done_callback(end)
+
+
+def _tell_waiters(promise: Future[None]) -> None:
+    """Let `wait` learn that a promise was cancelled, as an executor would."""
+    if promise.cancelled():
+        promise.set_running_or_notify_cancel()

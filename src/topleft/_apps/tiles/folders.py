@@ -32,13 +32,13 @@ PART = re.compile(r"\.(.+)\.[0-9a-f]{8}\.part")
 """The name of a chunk that is being written: `write_whole`."""
 
 MARK = re.compile(rb"topleft: ([^;]*);")
-"""What stands in a file of ours."""
+"""The mark of a file of topleft."""
 
 MARK_BYTES = 4096
 """How far from its beginning at most."""
 
 NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
-"""What a file system without locks answers."""
+"""Errors of file systems without locks."""
 
 
 class Folder(ABC):
@@ -89,7 +89,7 @@ class Folder(ABC):
                 raise FileExistsError(f"{self.place(name)} was not written by topleft: move it, or write elsewhere")
 
     def remove(self) -> None:
-        """Remove the chunks; what tells whose they are goes last."""
+        """Remove the chunks, the manifest last."""
         for name in sorted(filter(is_own, self.names()), key=lambda name: "/" not in name):
             self.delete(name)
 
@@ -281,7 +281,7 @@ def _take(file: int) -> bool:
 
 
 def fingerprints_at(folder: DiskFolder, file: Path) -> list[tuple[object, str | None]]:
-    """What is there of a folder and a file, and the fingerprint of its raster; None where it is not ours."""
+    """The folder and the file where they exist, with the fingerprint of the raster; None if they are not topleft's."""
     found: list[tuple[object, str | None]] = []
     if folder.exists():
         manifest = folder.get(MANIFEST)

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
 
 
+Submit = Callable[[int, int, int], "Future[None]"]
+"""Begins to make a block of a level, by its row and column."""
+
+
 @dataclass(frozen=True)
 class Step:
     """A block that is written.
@@ -51,7 +55,7 @@ Progress = Callable[[Step], object]
 
 @dataclass(frozen=True)
 class Written:
-    """What writing a raster did.
+    """How many windows were drawn, kept and left blank.
 
     Attributes
     ----------
@@ -161,17 +165,16 @@ def write_levels(
             for level, blocks in enumerate(there):
                 listed = [(level, row, column) for row, column in np.argwhere(blocks).tolist()]
                 kept: set[tuple[int, int, int]] = set()
-                for _ in _in_turn(pool, partial(note_whole, store, kept), iter(listed), n_threads):
+                for _ in _in_turn(_on_threads(pool, partial(note_whole, store, kept)), iter(listed), n_threads):
                     pass
                 waiting = [block for block in listed if block not in kept]
                 n_kept, n_done = n_kept + len(kept) * (level == 0), n_done + len(kept)
                 if bar is not None:
                     bar.begin(n_done)
-                for done in (
-                    _in_turn(pool, make, iter(waiting), n_threads)
-                    if executor is None or level
-                    else _on_workers(executor, raster, store, prepare, iter(waiting))
-                ):
+                submit, n_most = _on_threads(pool, make), n_threads
+                if executor is not None and level == 0:
+                    submit, n_most = _submitter(executor, raster, store, prepare)
+                for done in _in_turn(submit, iter(waiting), n_most):
                     n_drawn, n_done = n_drawn + (level == 0), n_done + 1
                     if tell is not None:
                         tell(Step(*done, n_done, n_blocks))
@@ -211,38 +214,37 @@ def check_executor(executor: Any) -> None:
         raise TypeError(f"executor must be a dask.distributed.Client or None, got {shown(executor)}")
 
 
-def _on_workers(
-    client: Any,
-    raster: Tiles,
-    store: TileStore,
-    prepare: Callable[[Array], Array] | None,
-    blocks: Iterator[tuple[int, int, int]],
-) -> Iterator[tuple[int, int, int]]:
-    """Let workers of a cluster draw and write windows; yield each when it is there."""
-    from topleft._apps.tiles.cluster import WriteJob, write_on_cluster
+def _on_threads(pool: ThreadPoolExecutor, make: Callable[[int, int, int], None]) -> Submit:
+    """A function that submits a block to threads."""
+
+    def submit(level: int, row: int, column: int) -> Future[None]:
+        return pool.submit(make, level, row, column)
+
+    return submit
+
+
+def _submitter(
+    client: Any, raster: Tiles, store: TileStore, prepare: Callable[[Array], Array] | None
+) -> tuple[Submit, int]:
+    """A function that submits a window to workers of a cluster, and how many it takes at a time."""
+    from topleft._apps.tiles.cluster import ClusterWriters, WriteJob
     from topleft._apps.tiles.dask_array import WindowJob
 
-    seen = store.seen_from_elsewhere()
+    seen, writers = store.seen_from_elsewhere(), ClusterWriters(client)
 
-    def make(block: tuple[int, int, int]) -> WriteJob:
-        _, row, column = block
-        return WriteJob(seen, WindowJob(raster, row, column), row, column, prepare)
+    def submit(_: int, row: int, column: int) -> Future[None]:
+        return writers.submit(WriteJob(seen, WindowJob(raster, row, column), row, column, prepare))
 
-    return write_on_cluster(client, make, blocks)
+    return submit, writers.n_most
 
 
-def _in_turn(
-    pool: ThreadPoolExecutor,
-    make: Callable[[int, int, int], None],
-    blocks: Iterator[tuple[int, int, int]],
-    n_threads: int,
-) -> Iterator[tuple[int, int, int]]:
-    """Make blocks, so many at a time as there are threads; yield each when it is there."""
+def _in_turn(submit: Submit, blocks: Iterator[tuple[int, int, int]], n_most: int) -> Iterator[tuple[int, int, int]]:
+    """Make blocks, so many at a time; yield each when it is there."""
     running: dict[Future[None], tuple[int, int, int]] = {}
     try:
         while True:
-            while len(running) < n_threads and (block := next(blocks, None)) is not None:
-                running[pool.submit(make, *block)] = block
+            while len(running) < n_most and (block := next(blocks, None)) is not None:
+                running[submit(*block)] = block
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -250,6 +252,8 @@ def _in_turn(
                 future.result()
                 yield block
     finally:
+        for future in running:
+            future.cancel()
         wait(running)
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 DAMAGES = (ValueError, OSError, RuntimeError, SyntaxError, EOFError, zlib.error, struct.error)
-"""What zlib, NumPy, numcodecs and Pillow raise for a tile that is not what was written."""
+"""Errors of zlib, NumPy, numcodecs and Pillow for a damaged tile."""
 
 LARGE_BYTES = 1 << 28
 """Rasters below are taken for as large as their pixels; of others tiles of a window are compressed to see."""
@@ -179,7 +179,7 @@ class TileStore(ABC):
         return found
 
     def gone(self, name: str) -> FileNotFoundError:
-        """What is said of a tile that is not there any more."""
+        """The error of a tile that has been removed."""
         place = self.folder.place(name)
         return FileNotFoundError(f"{place} has gone while the raster was written: resume=True writes it again")
 

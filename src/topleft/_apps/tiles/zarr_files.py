@@ -132,7 +132,7 @@ def check_halves(window: tuple[int, int], n_levels: int, size: tuple[int, int]) 
 
 
 def fingerprint_in(folder: Folder) -> str | None:
-    """What the metadata says of the raster; None where it is not ours."""
+    """The entry of topleft in the metadata; None if there is none."""
     try:
         return str(json.loads(folder.get("zarr.json") or b"")["attributes"]["topleft"]["fingerprint"])
     except (ValueError, KeyError, TypeError, RecursionError):
@@ -185,7 +185,7 @@ def write_metadata(raster: Tiles, store: ZarrStore, codec: list[dict[str, Any]],
 
 
 def _multiscales(raster: Tiles, store: ZarrStore) -> dict[str, Any]:
-    """What OME-Zarr says of levels: a pixel of level k is 2**k of those of level 0."""
+    """The levels as OME-Zarr lists them: a pixel of level k is 2**k of those of level 0."""
     step = (1.0, 1.0) if raster.grid is None else raster.grid.pixel_size[::-1]
     tail = [1.0] * len(store.channels)
     axes = [{"name": name, "type": "space"} for name in "yx"]

@@ -126,7 +126,7 @@ class ScratchMemory(FreshMemory):
 
 
 class MemoryOf:
-    """Another memory, under names of its own: what it holds outlives what others ask that one for."""
+    """Another memory, under names of its own: its buffers are not overwritten by users of the other names."""
 
     def __init__(self, memory: Memory, owner: str) -> None:
         self.memory, self.owner = memory, owner

@@ -46,7 +46,7 @@ class Baked:
     Attributes
     ----------
     values : (H, W, C) float32; of pictures uint8; of "triangle" (H, W) int32
-        What the mesh has there, and in the gutter what the nearest texel has; 0, or -1 for triangles, elsewhere.
+        The values of the mesh there, in the gutter those of the nearest texel; 0, or -1 for triangles, elsewhere.
     triangle : (H, W) int32
         The triangle of each texel, -1 in the gutter and elsewhere.
     mask : (H, W) bool

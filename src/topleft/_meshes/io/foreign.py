@@ -44,7 +44,7 @@ NO_TRIANGLES = {
     ".dxf": "it is a drawing, of which only curves could be read",
     ".binvox": "it holds voxels: make a mesh of them, by trimesh's VoxelGrid.marching_cubes say",
 }
-"""What trimesh may read that is no mesh."""
+"""Objects of trimesh that are no mesh."""
 
 UNBOUNDED = {
     **dict.fromkeys((".xdmf", ".xmf"), "it names files wherever they lie"),
@@ -180,7 +180,7 @@ def _check_3dxml(archive: zipfile.ZipFile, budget: Budget) -> None:
 
 
 def _check_models(archive: zipfile.ZipFile, source: InputFile) -> None:
-    """Count what the models of a 3MF file place, and refuse those whose objects are elsewhere."""
+    """Count the objects that the models of a 3MF file place, and refuse models with objects in other files."""
     models = [row for row in archive.infolist() if row.filename.lower().endswith(".model")]
     main = next((row for row in models if "3d/3dmodel.model" in row.filename.lower()), None)
     if main is None:
@@ -202,7 +202,7 @@ def _check_models(archive: zipfile.ZipFile, source: InputFile) -> None:
 
 
 class Model3MF:
-    """What a model of a 3MF file declares, counted element by element and not kept.
+    """Counts the elements of a model of a 3MF file, and keeps none.
 
     Raises
     ------
@@ -245,7 +245,7 @@ class Model3MF:
 
 
 def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | None]:
-    """What trimesh reads of a file, and whether all materials have two sides, or None: each says so itself.
+    """The meshes that trimesh reads of a file, and whether all materials have two sides, or None: each says so itself.
 
     COLLADA is read after its polygons have been cut; of the sides of its materials trimesh reads nothing.
     """

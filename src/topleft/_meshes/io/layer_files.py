@@ -104,7 +104,7 @@ def save_layers(
 
 
 def _stored(path: Location, name: str, array: Array, scale: float | None) -> tuple[Array, dict[str, str] | None]:
-    """What goes into the file, and the notes that tell what it means."""
+    """The array as the file holds it, and notes on its scale."""
     suffix = path.suffix.lower()
     if suffix in (".npy", ".npz") or array.dtype == np.uint8:
         return array, None

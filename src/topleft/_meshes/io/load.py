@@ -136,7 +136,7 @@ def load(
 
 
 def scaled(mesh: Mesh | Points, scale: float) -> Mesh | Points:
-    """What was read with coordinates times a scale, rounded once to their own type."""
+    """The mesh or points with coordinates times a scale, rounded once to their own type."""
     with np.errstate(over="ignore"):
         if isinstance(mesh, Points):
             positions = mesh.positions
@@ -174,7 +174,7 @@ def _mesh(source: InputFile, crease: float) -> Mesh | Points:
 
 
 def _parts(source: InputFile) -> list[Mesh]:
-    """What a reader makes of the file; it is imported when a file needs it."""
+    """The meshes of the file; readers are imported when a file needs them."""
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
             from topleft._meshes.io.gltf.reader import read_gltf
@@ -231,7 +231,7 @@ def _points(source: InputFile) -> Points:
 
 
 def reading(source: InputFile, read: Callable[[], Made]) -> Made:
-    """What a reader makes of a file; whatever goes wrong in it is told in one line.
+    """The result of a reader; its errors become one line.
 
     Raises
     ------

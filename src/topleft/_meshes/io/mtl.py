@@ -57,7 +57,7 @@ class _Map:
 
 @dataclass
 class _Entry:
-    """What a library says of a material."""
+    """A material as its library has it."""
 
     numbers: dict[str, list[float]] = field(default_factory=dict)
     maps: dict[str, _Map] = field(default_factory=dict)

@@ -24,7 +24,7 @@ from topleft.errors import ImageError
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 COLOR_TYPES = {(): 0, (2,): 4, (3,): 2, (4,): 6}
-"""What stands in the header, by the axes after height and width."""
+"""Colour types of the header, by the axes after height and width."""
 
 COMPRESSORS = ("auto", "isal", "zlib")
 

@@ -180,7 +180,7 @@ def _coco_parts(segmentation: Any, size: tuple[int, int], name: object) -> Objec
 
 
 class ContentError(ValueError):
-    """What a file says that cannot be."""
+    """A contradiction in a file."""
 
 
 def _read_counts(text: str, name: object) -> npt.NDArray[np.int64]:

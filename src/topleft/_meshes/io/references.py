@@ -60,7 +60,7 @@ class Moment(NamedTuple):
 
 
 class InputFile:
-    """A mesh file, the files beside it, what may be taken from them, and what was missing.
+    """A mesh file and the files beside it, with their limits and notes of missing ones.
 
     Parameters
     ----------

@@ -158,7 +158,7 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
 
 
 def stored(corners: Corners, mesh: Mesh) -> Corners:
-    """The corners with their points as the mesh of the level has them: what is drawn is what is measured."""
+    """The corners with their points as the mesh of the level has them, so the bound is that of the drawn points."""
     return corners._replace(points=corners.points.astype(mesh.vertices.dtype).astype(np.float64))
 
 

@@ -44,7 +44,7 @@ class Material:
     unlit : bool
         The colour shows as it is, whatever the light.
     alpha_cutoff : float, optional
-        0 to 1: what has less opacity in the texture is cut out, and what is behind it shows. Unless given everything is
+        0 to 1: texels of less opacity are holes, through which one sees. Unless given everything is
         opaque.
     opacity : float
         0 to 1, times the opacity of the texture and of the colours of the vertices; looked at by "mask" and "blend".

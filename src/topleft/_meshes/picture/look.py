@@ -280,22 +280,17 @@ class ShadingInputs:
         """Have the opacity of the surface in the alpha of the picture; all materials are full."""
         self.shading.set_wants_opacity()
 
-    def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64 | None = None) -> None:
-        """Take the lights, in shading space.
-
-        `world_from_mesh`: (4, 4) for a mesh that stands in the world by a matrix.
-        """
+    def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64) -> None:
+        """Take the lights, in shading space; `world_from_mesh`: (4, 4), where the mesh stands."""
         if lights is None:
             self.shading.set_headlight(TO_HEADLIGHT, max(0.0, 1 - ambient), ambient)
             return
-        place = None
-        if world_from_mesh is not None:
-            # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
-            scale = 1.0 if self.is_in_eye_space else engine.cube_root(abs(engine.determinant(world_from_mesh[:3, :3])))
-            place = engine.inverse(world_from_mesh), scale
+        # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
+        scale = 1.0 if self.is_in_eye_space else engine.cube_root(abs(engine.determinant(world_from_mesh[:3, :3])))
+        place = engine.inverse(world_from_mesh), scale
         self.shading.set_lights([self._light(light, place) for light in lights], (ambient,) * 3)
 
-    def set_environment(self, environment: Environment | None, world_from_mesh: F64 | None = None) -> None:
+    def set_environment(self, environment: Environment | None, world_from_mesh: F64) -> None:
         """Take the environment, or what metallic surfaces mirror without one.
 
         `world_from_mesh`: as for `set_lights`.
@@ -304,23 +299,21 @@ class ShadingInputs:
         rows = self.rays.eye_from
         if own.space is LightSpace.WORLD:
             rows = engine.product(engine.inverse(self.view[:3, :3]), rows)
-            rows = rows if world_from_mesh is None else engine.product(world_from_mesh[:3, :3], rows)
+            rows = engine.product(world_from_mesh[:3, :3], rows)
         rows = engine.product(own.axes, rows / engine.cube_root(abs(engine.determinant(rows))))
         texels, table = own.levels or (None, None)
         diffuse = 0.0 if environment is None else 1.0
         self.shading.set_surroundings(engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
 
-    def _light(self, light: Light, place: tuple[F64, float] | None) -> tuple[Any, ...]:
-        """The row of a light; `place`: of a mesh that stands by a matrix, the inverse, and how long its unit is."""
+    def _light(self, light: Light, place: tuple[F64, float]) -> tuple[Any, ...]:
+        """The row of a light; `place`: mesh from world, and how long the unit of the mesh is."""
         rays, at = self.rays, np.array(light.at)
         way = np.zeros(3) if light.direction is None else np.array(light.direction)
-        in_eye_space, falloff = light.space is LightSpace.EYE, light.falloff
-        if place is not None:
-            mesh_from_world, scale = place
-            falloff = float(falloff * (scale * scale))  # as bright as it is in the world
-            if not in_eye_space:
-                at = engine.product(mesh_from_world, np.array([*light.at, light.kind != LightKind.DIRECTIONAL]))[:3]
-                way = way if light.direction is None else engine.product(mesh_from_world[:3, :3], way)
+        in_eye_space, (mesh_from_world, scale) = light.space is LightSpace.EYE, place
+        falloff = float(light.falloff * (scale * scale))  # as bright as it is in the world
+        if not in_eye_space:
+            at = engine.product(mesh_from_world, np.array([*light.at, light.kind != LightKind.DIRECTIONAL]))[:3]
+            way = way if light.direction is None else engine.product(mesh_from_world[:3, :3], way)
         if light.kind is LightKind.DIRECTIONAL:
             at = self._direction(at, in_eye_space)
         elif in_eye_space:

@@ -139,7 +139,7 @@ class AreaIndex:
 
 @dataclass(frozen=True)
 class AreaPayload:
-    """What a window needs: its polygons, ascending, their points and offsets, and their values."""
+    """The content of a window: its polygons, ascending, their points and offsets, and their values."""
 
     triangles: I32
     points: Array

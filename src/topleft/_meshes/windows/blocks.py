@@ -175,7 +175,7 @@ class MappedArray:
 
 
 def sent(array: Array) -> Array | MappedArray:
-    """Return what stands for an array in a file, of which other processes map their own; others as they are."""
+    """Return where a mapped array lies in its file, for other processes to map; other arrays as they are."""
     base: Any = array
     while isinstance(base, np.ndarray) and base.base is not None and not isinstance(base.base, mmap.mmap):
         base = base.base

@@ -38,7 +38,7 @@ RANGE_ROWS = 1 << 20
 
 @dataclass(frozen=True)
 class Payload:
-    """What a window needs of the mesh: its triangles, ascending, their corners, and values of either."""
+    """The content of a window: its triangles, ascending, their corners, and values of either."""
 
     triangles: I32
     corners: Array
@@ -49,7 +49,7 @@ class Payload:
 
 @dataclass
 class Painter:
-    """One kind of raster: what its options are, what its pixels are, how a window is drawn."""
+    """One kind of raster: its options, its pixels, and how a window is drawn."""
 
     grid: Grid | None
     options: dict[str, Any]
@@ -63,9 +63,9 @@ class Painter:
 
     dtype: Any = field(default=np.dtype(bool), init=False)
     empty: Any = field(default=False, init=False)
-    """What a pixel without triangles has: a number, or one a channel."""
+    """The value of a pixel without triangles: a number, or one a channel."""
     nodata: float | None = field(default=None, init=False)
-    """What a file calls the pixels without data, where it can tell."""
+    """The number of pixels without data in a file, if there is one."""
     channels: tuple[int, ...] = field(default=(), init=False)
     low: float = field(default=np.inf, init=False)
     high: float = field(default=-np.inf, init=False)

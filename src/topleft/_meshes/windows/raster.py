@@ -216,7 +216,7 @@ class WindowedRaster:
 
     @property
     def fingerprint(self) -> str:
-        """What tells this raster from those of other meshes, values, options and windows."""
+        """A hash of the mesh, the values, the options and the size of windows."""
         if self._fingerprint is None:
             painter = self.painter
             words = (1, self.kind, self.size, self.window_size, self.grid, sorted(painter.options.items(), key=str))

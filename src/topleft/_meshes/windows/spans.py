@@ -57,7 +57,7 @@ class Tiling:
 
     @property
     def numbers(self) -> tuple[int, int, int, int, int]:
-        """What the engine takes."""
+        """The numbers in the order of the engine."""
         return self.width, self.height, self.window_width, self.window_height, self.subpixel_bits
 
 

@@ -226,7 +226,7 @@ def uv_sets_of(row: Tree) -> tuple[int, int]:
 
 
 def cutoff_of(cutoff: float) -> dict[str, float]:
-    """What a material says of a cutoff: one above 1 hides what is opaque, too, as that of 1 hides what is clear."""
+    """The options of a material with a cutoff; one above 1 hides opaque surfaces, too."""
     return {"alpha_cutoff": _share(cutoff)} if cutoff <= 1 else {"alpha_cutoff": 1.0, "opacity": 0.0}
 
 
@@ -261,7 +261,7 @@ def _resized(picture: npt.NDArray[np.uint8] | None, size: tuple[int, ...]) -> np
 
 
 def _filter_of(sampler: Tree) -> FilterOption:
-    """What comes nearest to the filters of OpenGL; trilinear unless the file says otherwise."""
+    """The filter that is nearest to those of OpenGL; trilinear unless the file says otherwise."""
     has_halves = sampler.get("minFilter") not in (NEAREST, LINEAR)
     if sampler.get("magFilter") == NEAREST:
         return "nearest" if sampler.get("minFilter") == NEAREST else "pixelated"

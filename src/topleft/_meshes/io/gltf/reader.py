@@ -46,7 +46,7 @@ WITHOUT_LOOK = (
     "KHR_xmp", "FB_ngon_", "EXT_structural_", "EXT_mesh_features", "EXT_instance_features", "KHR_physics_",
     "OMI_physics_", "KHR_materials_variants", "EXT_meshopt_compression", "KHR_meshopt_compression",
 )  # fmt: skip
-"""Beginnings of the names of extensions that say nothing of the look: what a file is without them is what it shows."""
+"""Beginnings of the names of extensions that do not change the look of a file."""
 
 MAY_BE_LEFT_OUT = (
     *WITHOUT_LOOK,
@@ -176,7 +176,7 @@ def _chunks(content: bytes, source: InputFile) -> tuple[bytes, bytes | None]:
 
 
 def _check_extensions(tree: Tree, source: InputFile) -> None:
-    """Raise an error for what the file cannot do without, and note what it can."""
+    """Raise an error for extensions that the file requires and the reader lacks, and note the others."""
     for name in tree.get("extensionsRequired", []):
         if name not in READ_EXTENSIONS and not str(name).startswith(MAY_BE_LEFT_OUT):
             raise MeshError(

@@ -1,1 +1,1 @@
-"""What a file may take: counted over all of it, and unpacked no further."""
+"""Limits of a file, counted over all of it: beyond them it is not unpacked."""

@@ -35,7 +35,7 @@ BROKEN = (zipfile.BadZipFile, tarfile.TarError, EOFError, NotImplementedError, R
 
 
 class SupportsRead(Protocol):
-    """What pieces can be read of."""
+    """A stream that gives its content in pieces."""
 
     def read(self, size: int, /) -> bytes:
         """The next bytes, none at the end."""

@@ -36,7 +36,7 @@ LIMITS = {
 
 
 class Budget:
-    """What one file, with all that it names and holds, has taken of its limits.
+    """The part of its limits that a file, with all that it names and holds, has used.
 
     Parameters
     ----------
