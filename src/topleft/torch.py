@@ -529,7 +529,8 @@ def antialias(
         raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(across.shape)}")
     given, points_of, vertices = same_dtype(color, (rast, len(tri)), pos)
     rule, mesh = EdgeRule[edges.replace("-", "_").upper()], vertices if vertices.ndim == 3 else vertices[None]
-    out = smooth(given, points_of, mesh, tri, across, int(rule), float(pos_gradient_boost))
+    of_edges = [across.to(torch.int32), *outline(mesh.detach(), tri, across, *color.shape[1:3])]
+    out = smooth(given, points_of, mesh, tri, of_edges, int(rule), float(pos_gradient_boost))
     return out.to(color.dtype)
 
 
@@ -547,7 +548,7 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
     -------
     tensor of int32, shape (T, 3)
         Column i belongs to the edge that corner i is not on: 3 times the other triangle there plus its corner that is
-        not on it, -1 if there is none.
+        not on it, -1 if there is none; -2 less that where the two are wound differently, or there are more.
 
     Raises
     ------
@@ -798,35 +799,48 @@ def halves_across(tri: Tensor) -> Tensor:
 
 
 @operator(
-    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor across, int rule, float boost) -> Tensor",
-    lambda color, rast, pos, tri, across, rule, boost: like(color, color),  # noqa: ARG005
+    "(Tensor pos, Tensor tri, Tensor across, int height, int width) -> (Tensor, Tensor)",
+    lambda pos, tri, across, height, width: (  # noqa: ARG005
+        pos.new_empty((*pos.shape[:2], 2), dtype=torch.float64),
+        tri.new_empty((len(pos), len(tri)), dtype=torch.int32),
+    ),
+)
+def outline(pos: Tensor, tri: Tensor, across: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
+    """Return where vertices are, and what the edges of triangles are."""
+    grid = PixelGrid(triangles_of(tri, pos.shape[1]), len(pos), height, width, threads_of(0, len(pos) * height * width))
+    found = tensors.outline_of(grid, numpy_of(pos), numpy_of(across.to(torch.int32)))
+    return torch.from_numpy(found.places), torch.from_numpy(found.edges)
+
+
+@operator(
+    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor[] outline, int rule, float boost) -> Tensor",
+    lambda color, rast, pos, tri, outline, rule, boost: like(color, color),  # noqa: ARG005
 )
 def smooth(
     color: Tensor,
     rast: Tensor,
     pos: Tensor,
     tri: Tensor,
-    across: Tensor,
+    outline: Sequence[Tensor],
     rule: int,
     boost: float,  # noqa: ARG001
 ) -> Tensor:
     """Return the picture with smooth silhouettes."""
-    grid = grid_of(tri, rast, pos.shape[1])
-    arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color))
-    return torch.from_numpy(tensors.smooth(grid, EdgeRule(rule), *arrays))
+    grid, edges = grid_of(tri, rast, pos.shape[1]), tensors.Outline(*map(numpy_of, outline))
+    return torch.from_numpy(tensors.smooth(grid, EdgeRule(rule), edges, *map(numpy_of, (pos, rast, color))))
 
 
 @operator(
-    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor across, int rule, Tensor g_out) -> (Tensor, Tensor)",
-    lambda color, rast, pos, tri, across, rule, g_out: (like(color, color), like(pos, pos)),  # noqa: ARG005
+    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor[] outline, int rule, Tensor g_out)"
+    " -> (Tensor, Tensor)",
+    lambda color, rast, pos, tri, outline, rule, g_out: (like(color, color), like(pos, pos)),  # noqa: ARG005
 )
 def smooth_vjp(
-    color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, across: Tensor, rule: int, g_out: Tensor
+    color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, outline: Sequence[Tensor], rule: int, g_out: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Return the gradients of the colours and of `pos`."""
-    grid = grid_of(tri, rast, pos.shape[1])
-    arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color, g_out))
-    g_color, g_pos = tensors.smooth_vjp(grid, EdgeRule(rule), *arrays)
+    grid, edges = grid_of(tri, rast, pos.shape[1]), tensors.Outline(*map(numpy_of, outline))
+    g_color, g_pos = tensors.smooth_vjp(grid, EdgeRule(rule), edges, *map(numpy_of, (pos, rast, color, g_out)))
     return torch.from_numpy(g_color), torch.from_numpy(g_pos)
 
 
@@ -885,14 +899,15 @@ def pull_look(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
 
 def keep_edges(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
     """Keep what `smooth_vjp` takes."""
-    *kept, ctx.rule, ctx.boost = inputs
-    ctx.save_for_backward(*kept)
+    *kept, outline, ctx.rule, ctx.boost = inputs
+    ctx.save_for_backward(*kept, *outline)
 
 
 def pull_edges(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
     """Return the gradients of what `smooth` takes."""
-    g_color, g_pos = smooth_vjp(*ctx.saved_tensors, ctx.rule, g_out)
-    return g_color, None, g_pos if ctx.boost == 1 else ctx.boost * g_pos, None, None, None, None
+    *given, across, places, edges = ctx.saved_tensors
+    g_color, g_pos = smooth_vjp(*given, [across, places, edges], ctx.rule, g_out)
+    return g_color, None, g_pos if ctx.boost == 1 else ctx.boost * g_pos, None, [None] * 3, None, None
 
 
 points_of_ids.register_autograd(pull_points, setup_context=keep_points)

@@ -2,6 +2,7 @@
 
 MOST_LEVELS = TL_MOST_LEVELS
 SUMS_OF_FACE = TL_SUMS_OF_FACE
+IDS_ROOM = TL_IDS_ROOM
 
 
 cdef const void *first_of(array: object):
@@ -117,11 +118,18 @@ cdef class GradientView:
         with nogil:
             K.grad_texels_vjp(&view, &t, &sums.sums)
 
-    def edges(self, const int32_t[:, ::1] across, uint8_t[::1] known, int32_t[:, ::1] scratch, int rule,
+    def outline(self, const int32_t[:, ::1] across, double[:, ::1] places, int32_t[::1] outline):
+        """Write places of vertices (V, 2) in pixels, and what edges of triangles (T) are, for `edges`."""
+        if across.shape[0]:
+            with nogil:
+                K.grad_outline(&self.view, &across[0, 0], &places[0, 0] if places.shape[0] else NULL, &outline[0])
+
+    def edges(self, mesh: tuple[Array, Array, Array], int32_t[:, ::1] scratch, int rule,
               arrays: tuple[Array | None, ...], GradientSums sums or None, int64_t first, int64_t end):
         """Write rows of a picture with smooth silhouettes; with sums, of the gradients of its colours.
 
-        `scratch`: (2, W). `arrays`: rast, color, out; with sums rast, color, gradients of out, gradients of color.
+        `mesh`: across, places, outline. `scratch`: (3, W + IDS_ROOM). `arrays`: rast, color, out; with sums rast,
+        color, gradients of out, gradients of color.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_edges e
@@ -129,9 +137,8 @@ cdef class GradientView:
         if first >= end or view.width == 0:
             return
         e.rast, e.color, e.n_channels = first_of(arrays[0]), first_of(arrays[1]), arrays[1].shape[2]
-        if across.shape[0]:
-            e.across, e.known = &across[0, 0], &known[0]
-        e.labels, e.rule = &scratch[0, 0], <tl_pair_rule>rule
+        e.across, e.places, e.outline = <const int32_t *>first_of(mesh[0]), <const double *>first_of(mesh[1]), <const int32_t *>first_of(mesh[2])
+        e.ids, e.rule = &scratch[0, 0], <tl_pair_rule>rule
         if sums is None:
             e.out = <void *>first_of(arrays[2])
             with nogil:
