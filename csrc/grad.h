@@ -83,6 +83,21 @@ typedef struct {
     void *g_color;
 } tl_grad_edges;
 
+/* A picture of attributes with smooth silhouettes beside another one. */
+enum { TL_LOSS_ROWS = 8, TL_LOSS_WINDOW = TL_LOSS_ROWS + 4 };
+typedef struct {
+    const int32_t *ids; /* as grad_points takes them */
+    int64_t step, first_id;
+    const void *attr; /* (n_attr, n_columns) */
+    int64_t n_attr, n_columns;
+    tl_grad_edges edges; /* but for its pictures */
+    const void *target;  /* (height, width, n_columns) */
+    double scale;        /* gradients are those of the sum of squares times half of it */
+    void *scratch;       /* TL_LOSS_WINDOW rows of pixels of 8 + 4 n_columns numbers */
+    tl_grad_sums *faces; /* TL_SUMS_OF_FACE columns: scratch */
+    tl_grad_sums *of_points, *of_edges, *of_attr;
+} tl_grad_loss;
+
 /* Areas of triangles in pixels, each times the values of the triangle, NULL for 1. */
 typedef struct {
     const double *points_px;  /* (n_points, 2), finite */

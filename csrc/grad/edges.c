@@ -234,8 +234,7 @@ TL_INLINE void edges_of_band(const tl_grad_view *view, const tl_grad_edges *e, t
     }
 }
 
-/* See kernels.h. */
-static void grad_edges(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums)
+static void smooth_rows(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums)
 {
     const int64_t size = (view->is_f64 ? 8 : 4) * e->n_channels * view->width;
     char *target = (char *)(e->g_out ? e->g_color : e->out) + view->first_row * size;
@@ -247,6 +246,12 @@ static void grad_edges(const tl_grad_view *view, const tl_grad_edges *e, tl_grad
         edges_of_band(view, e, sums, 1);
     else
         edges_of_band(view, e, sums, 0);
+}
+
+/* See kernels.h. */
+static void grad_edges(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums)
+{
+    smooth_rows(view, e, sums);
     if (e->g_out)
         leave_band(sums);
 }

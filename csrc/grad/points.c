@@ -114,7 +114,18 @@ static void points_of_ids(const tl_grad_view *view, const id_rows *ids, void *co
 
 /* Numbers of runs, about their first pixel and with its total as 1: u and v times the total there, what they change by
  * with the column and with the row, what the total does, and z/w. */
-enum { POINT_U, POINT_U_X, POINT_U_Y, POINT_V, POINT_V_X, POINT_V_Y, POINT_TOTAL_X, POINT_TOTAL_Y, POINT_ZW, POINT_ZW_X };
+enum {
+    POINT_U,
+    POINT_U_X,
+    POINT_U_Y,
+    POINT_V,
+    POINT_V_X,
+    POINT_V_Y,
+    POINT_TOTAL_X,
+    POINT_TOTAL_Y,
+    POINT_ZW,
+    POINT_ZW_X
+};
 
 /* q_k of the triangles of TL_LANES runs about their first pixels, as load_seen_triangle has them; z and w. */
 TL_INLINE void load_run_triangles(const tl_grad_view *view, const grad_span *s, int r, vd q[3][3], vd *z, vd *w)
@@ -246,7 +257,7 @@ TL_INLINE void points_of_span(const tl_grad_view *view, const grad_span *s, floa
 
 static void points_in_lanes(const tl_grad_view *view, const id_rows *ids, float *rast, float *rast_db)
 {
-    grad_span s;
+    grad_span s = {.bad_id = -1};
     for (s.row = view->first_row; s.row < view->end_row; s.row++)
         for (s.first = 0; s.first < view->width; s.first += TL_GRAD_SPAN) {
             const int64_t at = 4 * (s.row * view->width + s.first);
@@ -348,8 +359,7 @@ TL_INLINE void pull_depth(const grad_triangle *t, const double *sums, double by_
 }
 
 /* Gradients of the corners of a triangle from its sums: q_k = v_i x v_j. */
-static void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices,
-                              int is_f64)
+static void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices, int is_f64)
 {
     grad_triangle t;
     double *to[3], g[3][3] = {{0}}, by_q[3][3], g_z[3], g_w[3];
@@ -371,7 +381,7 @@ static void close_triangle(const tl_grad_view *view, int32_t id, const double *s
 }
 
 /* Gradients of a_k, in units of the total, and of z/w, at the pixels of a span: a row of four each. */
-TL_INLINE void pull_span(const tl_grad_view *view, const grad_span *s, const float *g_rast, float *rows)
+TL_INLINE void pull_span(const tl_grad_view *view, grad_span *s, const float *g_rast)
 {
     const vi order = order_of_quads();
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), z_most = vf_set1((float)view->z_most);
@@ -394,15 +404,14 @@ TL_INLINE void pull_span(const tl_grad_view *view, const grad_span *s, const flo
         out[3] = vf_select(vm_and(vf_ge(z_most, at.zw), vf_ge(at.zw, vf_sub(zero, z_most))), g[2], zero);
         for (int k = 0; k < 4; k++)
             out[k] = vf_select(p.is_shown, out[k], zero);
-        store_some_quads(rows + 4 * p.x, p.n, out);
+        store_some_quads(s->rows + 4 * p.x, p.n, out);
     }
 }
 
 #define TL_COUNT_16 {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}
 
 /* Adds the rows of the runs of a span to the sums of their triangles. */
-TL_INLINE void close_span(const tl_grad_view *view, const grad_span *s, const float *rows, const double *inverses,
-                          tl_grad_sums *faces)
+TL_INLINE void close_span(const tl_grad_view *view, const grad_span *s, const double *inverses, tl_grad_sums *faces)
 {
     static const float columns[TL_SUMMED] = TL_COUNT_16;
     const double y = middle_at(view, 1, s->row);
@@ -418,8 +427,8 @@ TL_INLINE void close_span(const tl_grad_view *view, const grad_span *s, const fl
         for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) { /* some at a time, in float32 */
             const int n = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
             float sum[4] = {0}, sum_x[4] = {0};
-            sum_quads(rows + 4 * i, n, sum);
-            sum_weighed_quads(rows + 4 * i, columns, 1, n, sum_x);
+            sum_quads(s->rows + 4 * i, n, sum);
+            sum_weighed_quads(s->rows + 4 * i, columns, 1, n, sum_x);
             for (int k = 0; k < 4; k++) {
                 all.a[k] += (double)sum[k];
                 all.a_x[k] += (double)sum_x[k] + (double)(i - s->begins[r]) * (double)sum[k];
@@ -435,10 +444,8 @@ TL_INLINE void close_span(const tl_grad_view *view, const grad_span *s, const fl
 
 static int64_t pull_points_in_lanes(const tl_grad_view *view, const tl_grad_points *p)
 {
-    grad_span s;
-    float rows[4 * TL_GRAD_ROOM];
-    double inverses[TL_GRAD_ROOM];
-    s.bad_id = -1;
+    grad_span s = {.bad_id = -1};
+    double inverses[TL_GRAD_ROOM] = {0};
     for (s.row = view->first_row; s.row < view->end_row; s.row++)
         for (s.first = 0; s.first < view->width; s.first += TL_GRAD_SPAN) {
             const int64_t at = 4 * (s.row * view->width + s.first);
@@ -446,8 +453,8 @@ static int64_t pull_points_in_lanes(const tl_grad_view *view, const tl_grad_poin
             list_runs_of(&s, 0, 0, (const float *)p->rast + at);
             find_corners(&s, view, view->n_vertices);
             set_point_numbers(view, &s, inverses);
-            pull_span(view, &s, (const float *)p->g_rast + at, rows);
-            close_span(view, &s, rows, inverses, p->faces);
+            pull_span(view, &s, (const float *)p->g_rast + at);
+            close_span(view, &s, inverses, p->faces);
         }
     return s.bad_id;
 }
@@ -480,18 +487,27 @@ TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p,
     return run.bad_id;
 }
 
-/* See kernels.h. */
-static int64_t grad_points_vjp(const tl_grad_view *view, const tl_grad_points *p)
+static int64_t pull_point_rows(const tl_grad_view *view, const tl_grad_points *p)
 {
-    int64_t bad_id;
     if (view->is_f64)
-        bad_id = pull_points(view, p, p->g_db != 0, 1);
-    else
-        bad_id = p->g_db ? pull_points(view, p, 1, 0) : pull_points_in_lanes(view, p);
+        return pull_points(view, p, p->g_db != 0, 1);
+    return p->g_db ? pull_points(view, p, 1, 0) : pull_points_in_lanes(view, p);
+}
+
+/* Ends a band: from sums of triangles to those of their corners. */
+static void close_points(const tl_grad_view *view, const tl_grad_points *p)
+{
     for (int64_t i = 0; i < p->faces->n; i++)
         close_triangle(view, p->faces->rows[i], p->faces->sums + TL_SUMS_OF_FACE * i, p->vertices, view->is_f64);
     leave_band(p->faces);
     leave_band(p->vertices);
+}
+
+/* See kernels.h. */
+static int64_t grad_points_vjp(const tl_grad_view *view, const tl_grad_points *p)
+{
+    const int64_t bad_id = pull_point_rows(view, p);
+    close_points(view, p);
     return bad_id;
 }
 

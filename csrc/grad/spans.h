@@ -26,13 +26,14 @@
 typedef struct {
     int64_t row, first; /* of the picture; the first one's column */
     int n, n_runs;
-    int64_t bad_id; /* as of pixel_run */
+    int64_t bad_id;                /* as of pixel_run */
     int before[TL_GRAD_SPAN];      /* of each vector: how many runs have begun before it */
     unsigned starts[TL_GRAD_SPAN]; /* and the lanes where one begins */
     _Alignas(64) int32_t ids[TL_GRAD_ROOM];
     _Alignas(64) int32_t begins[TL_GRAD_ROOM];
     _Alignas(64) int32_t corners[3][TL_GRAD_ROOM];
     _Alignas(64) float numbers[TL_RUN_NUMBERS][TL_GRAD_ROOM];
+    _Alignas(64) float rows[4 * TL_GRAD_ROOM]; /* four numbers a pixel, to be summed up */
 } grad_span;
 
 /* Some pixels of a span, and which run each lane has. */
@@ -57,8 +58,8 @@ TL_INLINE vi ids_of_numbers(vf number)
 {
     const vf last = vf_set1((float)TL_LAST_EXACT_ID);
     vi id = vi_sub(vi_floor(vf_min(number, last)), vi_set1(1));
-    id = vi_select(vf_lt(last, number),
-                   vi_add(vi_bits_of_vf(number), vi_set1(TL_LAST_EXACT_ID - TL_BITS_OF_LAST - 1)), id);
+    id = vi_select(vf_lt(last, number), vi_add(vi_bits_of_vf(number), vi_set1(TL_LAST_EXACT_ID - TL_BITS_OF_LAST - 1)),
+                   id);
     return vi_select(vf_ge(number, vf_set1(1.0f)), id, vi_set1(-1));
 }
 
@@ -143,7 +144,8 @@ TL_INLINE void list_runs_of(grad_span *s, const int32_t *ids, int64_t first_id, 
 /* Finds the corners of runs; what has none below n_rows shows nothing from then on. */
 TL_INLINE void find_corners(grad_span *s, const tl_grad_view *view, int64_t n_rows)
 {
-    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(view->n_triangles)), rows = vi_set1(clamped_to_int(n_rows));
+    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(view->n_triangles)),
+             rows = vi_set1(clamped_to_int(n_rows));
     for (int r = 0; r < s->n_runs; r += TL_LANES) {
         const vi id = vi_load(s->ids + r), id_3 = vi_add(id, vi_add(id, id));
         const vm wanted = vm_and(vm_first(s->n_runs - r), vm_and_not(vm_all(), vi_eq(id, none)));

@@ -251,7 +251,7 @@ TL_INLINE int64_t pull_values(const tl_grad_view *view, const tl_grad_values *v,
 }
 
 /* Gradients of `rast` at the pixels of a span; and those of n attributes, a row of four each. */
-TL_INLINE void pull_value_span(const grad_span *s, const float *g_out, float *g_rast, float *rows, int n)
+TL_INLINE void pull_value_span(grad_span *s, const float *g_out, float *g_rast, int n)
 {
     const vi order = order_of_quads();
     const vf zero = vf_set1(0.0f);
@@ -276,13 +276,13 @@ TL_INLINE void pull_value_span(const grad_span *s, const float *g_out, float *g_
         for (int c = n; c < 4; c++)
             g[c] = zero;
         store_some_quads(g_rast + 4 * p.x, p.n, out);
-        store_some_quads(rows + 4 * p.x, p.n, g);
+        store_some_quads(s->rows + 4 * p.x, p.n, g);
     }
 }
 
 /* Adds the rows of the runs of a span to the sums of their corners, some at a time in float32. */
-TL_INLINE void close_value_span(const tl_grad_view *view, const grad_span *s, const float *rast, const float *rows,
-                                tl_grad_sums *sums, int n)
+TL_INLINE void close_value_span(const tl_grad_view *view, const grad_span *s, const float *rast, tl_grad_sums *sums,
+                                int n)
 {
     for (int r = 0; r < s->n_runs; r++) {
         double all[3][4] = {{0}}, *to[3];
@@ -291,9 +291,9 @@ TL_INLINE void close_value_span(const tl_grad_view *view, const grad_span *s, co
         for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) {
             const int n_pixels = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
             float sum[3][4] = {{0}};
-            sum_weighed_quads(rows + 4 * i, rast + 4 * i, 4, n_pixels, sum[0]);
-            sum_weighed_quads(rows + 4 * i, rast + 4 * i + 1, 4, n_pixels, sum[1]);
-            sum_quads(rows + 4 * i, n_pixels, sum[2]);
+            sum_weighed_quads(s->rows + 4 * i, rast + 4 * i, 4, n_pixels, sum[0]);
+            sum_weighed_quads(s->rows + 4 * i, rast + 4 * i + 1, 4, n_pixels, sum[1]);
+            sum_quads(s->rows + 4 * i, n_pixels, sum[2]);
             for (int k = 0; k < 3; k++)
                 for (int c = 0; c < 4; c++)
                     all[k][c] += (double)sum[k][c];
@@ -309,29 +309,31 @@ TL_INLINE void close_value_span(const tl_grad_view *view, const grad_span *s, co
 TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int n)
 {
     grad_span s = {.row = view->first_row - 1, .first = view->width, .bad_id = -1};
-    float rows[4 * TL_GRAD_ROOM];
     while (next_value_span(view, v, &s, n)) {
         const int64_t at = s.row * view->width + s.first;
-        pull_value_span(&s, (const float *)v->out + n * at, (float *)v->g_rast + 4 * at, rows, n);
-        close_value_span(view, &s, (const float *)v->rast + 4 * at, rows, sums, n);
+        pull_value_span(&s, (const float *)v->out + n * at, (float *)v->g_rast + 4 * at, n);
+        close_value_span(view, &s, (const float *)v->rast + 4 * at, sums, n);
     }
     return s.bad_id;
+}
+
+static int64_t pull_value_rows(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
+{
+    if (view->is_f64)
+        return pull_values(view, v, sums, 1);
+    switch (has_few_values(v) && !v->out_da ? v->n_columns : 0) {
+    case 1: return pull_values_in_lanes(view, v, sums, 1);
+    case 2: return pull_values_in_lanes(view, v, sums, 2);
+    case 3: return pull_values_in_lanes(view, v, sums, 3);
+    case 4: return pull_values_in_lanes(view, v, sums, 4);
+    default: return pull_values(view, v, sums, 0);
+    }
 }
 
 /* See kernels.h. */
 static int64_t grad_values_vjp(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
-    int64_t bad_id;
-    if (view->is_f64)
-        bad_id = pull_values(view, v, sums, 1);
-    else
-        switch (has_few_values(v) && !v->out_da ? v->n_columns : 0) {
-        case 1: bad_id = pull_values_in_lanes(view, v, sums, 1); break;
-        case 2: bad_id = pull_values_in_lanes(view, v, sums, 2); break;
-        case 3: bad_id = pull_values_in_lanes(view, v, sums, 3); break;
-        case 4: bad_id = pull_values_in_lanes(view, v, sums, 4); break;
-        default: bad_id = pull_values(view, v, sums, 0);
-        }
+    const int64_t bad_id = pull_value_rows(view, v, sums);
     leave_band(sums);
     return bad_id;
 }

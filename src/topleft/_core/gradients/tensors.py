@@ -226,7 +226,7 @@ def texels_vjp(look: TexelLook, g_out: Array) -> tuple[list[Array], Array, Array
 
 @dataclass(frozen=True)
 class Outline:
-    """What edges are in some pictures: `across` (T, 3); places (B or 1, V, 2) and `edges` (B or 1, T) of `outline_of`."""
+    """What edges are in some pictures: `across` (T, 3), `places` (B or 1, V, 2), `edges` (B or 1, T): `outline_of`."""
 
     across: NDArray[np.int32]
     places: NDArray[np.float64]
@@ -274,6 +274,47 @@ def smooth_vjp(
 
     grid.bands.add_up(work, g_pos, 6)
     return g_color, g_pos
+
+
+def squares(
+    grid: PixelGrid,
+    rule: EdgeRule,
+    outline: Outline,
+    pos: Array,
+    ids: Sequence[tuple[NDArray[np.int32], int]],
+    attr: Array,
+    target: Array,
+    *,
+    is_flipped: bool,
+) -> tuple[float, Array, Array]:
+    """Return the mean squared difference of pictures of attributes from others, and the gradients of `pos` and `attr`.
+
+    What `points`, `values`, `smooth` and their products give, a few rows at a time: no picture is made.
+    """
+    of_points, of_edges, g_attr = (np.zeros(one.shape, one.dtype) for one in (pos, pos, attr))
+    n_vertices, n_rows, n = pos.shape[1], attr.shape[1], attr.shape[2]
+
+    def work(band: Band) -> tuple[list[engine.GradientSums], float]:
+        i, width = band.picture, grid.width
+        faces = sums_of(len(grid.tri), engine.SUMS_OF_FACE, band, width, "faces")
+        sums = [
+            sums_of(n_vertices, 4, band, 3 * width, "points"),
+            sums_of(n_vertices, 4, band, 6 * width, "edges"),
+            sums_of(n_rows, n, band, 3 * width),
+        ]
+        scratch = (
+            empty((3, width + engine.IDS_ROOM), np.int32),
+            empty((engine.LOSS_WINDOW * width * (8 + 4 * n),), pos.dtype),
+        )
+        own, first = ids[i]
+        found = grid.view(of(pos, i)).loss(
+            (own, is_flipped, first), of(attr, i), outline.of_picture(i), (int(rule), 2 / target.size), target[i],
+            scratch, (faces, *sums), band.first, band.end,
+        )  # fmt: skip
+        return sums, found
+
+    found = sum(grid.bands.add_up_all(work, [of_points, of_edges, g_attr])) if target.size else 0.0
+    return found / max(1, target.size), of_points + of_edges, g_attr
 
 
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -1,0 +1,1 @@
+"""What `topleft.torch` stands on: operators of PyTorch, and checks of its tensors."""
