@@ -17,10 +17,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, get_args
 
+from topleft import DepthLayers, peel
 from topleft._core.base.arrays import as_pair
 from topleft._core.base.threads import parse_threads
 from topleft._core.gradients.tensors import EdgeRule, TexelFilter, TexelsBeyond
-from topleft._core.raster.peel import DepthLayers, peel
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption, LossOption
 

@@ -15,11 +15,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from topleft import rasterize as draw
 from topleft._core.base.arrays import check_rows
 from topleft._core.gradients import tensors
 from topleft._core.gradients.bands import MIN_PX_PER_THREAD
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
-from topleft._core.raster.verbs import rasterize as draw
 
 
 def threads_of(threads: int | None, n_px: int) -> int:
