@@ -103,7 +103,7 @@ class Backward:
         """Return a picture with smooth silhouettes."""
         given, color = self.as_picture(picture)
         out = tensors.smooth(self.grid, as_rule(edges), self.outline(), self.pos, self.rast, color)
-        return out.reshape(given.shape).astype(np.float32 if given.dtype == np.float32 else np.float64, copy=False)
+        return out.reshape(given.shape).astype(np.float32 if given.dtype.type is np.float32 else np.float64, copy=False)
 
     def smooth_vjp(self, picture: ArrayLike, grad: ArrayLike, edges: EdgesOption) -> tuple[Floats, Floats]:
         """Return the gradients of the picture and of the vertices."""
