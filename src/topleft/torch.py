@@ -1,7 +1,7 @@
 """PyTorch tensors on the CPU, in the calls and the conventions of nvdiffrast: `import topleft.torch as dr`.
 
 In and out: tensors of float32 (or float64) on the CPU, read without a copy. Each function is one call of the engine,
-which also computes its gradients, in float64, with the same bits for every number of threads. They are custom operators
+which also computes its gradients, with the same bits for every number of threads. They are custom operators
 of PyTorch (``torch.ops.topleft``), so `torch.compile` and `torch.vmap` take them. Needs PyTorch 2.5:
 ``pip install 'topleft[torch]'``.
 
@@ -183,8 +183,9 @@ def rasterize(
     Notes
     -----
     The engine decides the id after it has snapped vertices to 1/256 pixel, under the top-left rule. Weights, z/w and
-    derivatives are those of the vertices as given, computed in float64 and clamped: weights to a sum of at most 1, z/w
-    to -1..1. float32 counts to 2**24: bits of larger ids are counted on from those of 2**24, as in nvdiffrast.
+    derivatives are those of the vertices as given, clamped: weights to a sum of at most 1, z/w to -1..1. Of float32 a
+    run of pixels is set up in float64, and its pixels are float32: within 2**-21 of float64. float32 counts to 2**24:
+    bits of larger ids are counted on from those of 2**24, as in nvdiffrast.
 
     Examples
     --------

@@ -71,12 +71,15 @@ def test_rasterize_is_the_loop_over_pixels_and_triangles(scene):
     np.testing.assert_allclose(rast_db[0].numpy()[same], expected_db[same], rtol=1e-6, atol=1e-7)
 
 
-def test_rasterize_of_float32_is_that_of_float64_rounded():
+def test_rasterize_of_float32_is_that_of_float64_within_its_bound():
     pos, tri = cube(torch.float32)
-    found = dr.rasterize(CTX, pos, tri, (20, 28))
-    exact = dr.rasterize(CTX, pos.double(), tri, (20, 28))
-    assert [one.dtype for one in found] == [torch.float32] * 2
-    assert all(torch.equal(one, other.float()) for one, other in zip(found, exact, strict=True))
+    rast, rast_db = dr.rasterize(CTX, pos, tri, (20, 28))
+    exact, exact_db = dr.rasterize(CTX, pos.double(), tri, (20, 28))
+    assert rast.dtype == rast_db.dtype == torch.float32
+    assert torch.equal(rast[..., 3].double(), exact[..., 3])
+    np.testing.assert_allclose(rast[..., :3].numpy(), exact[..., :3].numpy(), rtol=0, atol=2.0**-21)
+    # A derivative is a difference of two products, each a few roundings of float32 off.
+    np.testing.assert_allclose(rast_db.numpy(), exact_db.numpy(), rtol=0, atol=2.0**-20 * exact_db.abs().max().item())
 
 
 def test_rasterize_row_0_is_at_the_bottom():

@@ -1,1 +1,1 @@
-"""What `topleft.torch` stands on: operators of PyTorch, and checks of its tensors."""
+"""The operators of PyTorch that `topleft.torch` calls, with the checks of its tensors."""
