@@ -55,6 +55,23 @@ def step_of_topleft(clip: Any, triangles: Any, size: tuple[int, int], edges: str
     return step
 
 
+def step_of_loss(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:
+    """Return a call of a loss with its gradients, in one."""
+    import torch
+
+    import topleft.torch as dr
+
+    context, tri = dr.RasterizeContext(threads=1, output_db=False), torch.from_numpy(triangles)
+    pos, colors = torch.from_numpy(clip)[None].requires_grad_(), torch.rand(1, len(clip), 3, requires_grad=True)
+    across, target = dr.antialias_construct_topology_hash(tri), torch.rand(1, size[1], size[0], 3)
+
+    def step() -> None:
+        pos.grad = colors.grad = None
+        dr.photometric_loss(context, pos, tri, colors, target, across).backward()
+
+    return step
+
+
 def step_of_deodr(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None] | None:
     """Return the same of DEODR, None where it is not installed; the silhouettes are found before."""
     try:
@@ -93,6 +110,7 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
         clip, triangles = blob(n_triangles, width, height)
         steps = {f"topleft.torch, {edges}": step_of_topleft(clip, triangles, (width, height), edges)
                  for edges in ("silhouette", "area", "straight-through")}  # fmt: skip
+        steps["topleft.torch, a loss in one, area"] = step_of_loss(clip, triangles, (width, height))
         peer = step_of_deodr(clip, triangles, (width, height))
         steps |= {"DEODR": peer} if peer else {}
         times: dict[str, list[float]] = {name: [] for name in steps}
