@@ -14,6 +14,7 @@ torch = pytest.importorskip("torch")
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
 from topleft._core.raster.verbs import rasterize as draw  # noqa: E402
+from topleft._torch import operators  # noqa: E402
 
 CTX = dr.RasterizeContext(threads=1)
 F64 = torch.float64
@@ -110,7 +111,7 @@ def test_rasterize_of_ranges_has_ids_of_the_whole_tri():
 def test_rasterize_reads_tensors_without_a_copy(monkeypatch):
     pos, tri = cube(torch.float32)
     seen = []
-    monkeypatch.setattr(dr, "draw", lambda v, t, *rest, **more: seen.append((v, t)) or draw(v, t, *rest, **more))
+    monkeypatch.setattr(operators, "draw", lambda v, t, *rest, **more: seen.append((v, t)) or draw(v, t, *rest, **more))
     dr.rasterize(CTX, pos, tri, (8, 8))
     assert [one.ctypes.data for one in seen[0]] == [pos.data_ptr(), tri.data_ptr()]
 
