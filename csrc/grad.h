@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-enum { TL_MOST_LEVELS = 32 };
+enum { TL_MOST_LEVELS = 32, TL_IDS_ROOM = 32 };
 
 typedef enum { TL_TEXEL_NEAREST, TL_TEXEL_LINEAR, TL_TEXEL_LEVEL, TL_TEXEL_LEVELS } tl_texel_filter;
 typedef enum { TL_EDGE_WRAP, TL_EDGE_CLAMP, TL_EDGE_ZERO, TL_EDGE_CUBE } tl_texel_edge;
@@ -32,8 +32,8 @@ typedef struct {
     int64_t n, n_columns;
 } tl_grad_sums;
 
-/* The numbers that a triangle sums up: X0, Y0; gradients of q_k by X, by Y, and there; of z; of w. */
-enum { TL_SUMS_OF_FACE = 17 };
+/* The numbers that a triangle sums up: X0, Y0; gradients of a_k, three times, and of z/w: times X, times Y, and alone. */
+enum { TL_SUMS_OF_FACE = 14 };
 
 /* Gradients of where pixels lie in triangles.  g_db may be NULL. */
 typedef struct {
@@ -69,9 +69,12 @@ typedef struct {
 /* Pairs of neighbours across silhouettes. */
 typedef struct {
     const void *rast;
-    const int32_t *across; /* (n_triangles, 3): of the edge opposite to a corner 3 * the other triangle + its corner */
-    uint8_t *known;        /* (n_triangles): what has been found of a triangle, 0 before */
-    int32_t *labels;       /* (2, width): scratch */
+    /* (n_triangles, 3), of the edge opposite to a corner: 3 * the other triangle + its corner, -1 for none; -2 less that
+     * where the two are wound differently or there are more */
+    const int32_t *across;
+    const double *places;   /* (n_vertices, 2): pixels */
+    const int32_t *outline; /* (n_triangles): see grad_outline */
+    int32_t *ids;           /* (3, width + TL_IDS_ROOM): scratch */
     tl_pair_rule rule;
     const void *color;
     int64_t n_channels;
@@ -79,6 +82,21 @@ typedef struct {
     const void *g_out; /* backward, NULL forward */
     void *g_color;
 } tl_grad_edges;
+
+/* A picture of attributes with smooth silhouettes beside another one. */
+enum { TL_LOSS_ROWS = 8, TL_LOSS_WINDOW = TL_LOSS_ROWS + 4 };
+typedef struct {
+    const int32_t *ids; /* as grad_points takes them */
+    int64_t step, first_id;
+    const void *attr; /* (n_attr, n_columns) */
+    int64_t n_attr, n_columns;
+    tl_grad_edges edges; /* but for its pictures */
+    const void *target;  /* (height, width, n_columns) */
+    double scale;        /* gradients are those of the sum of squares times half of it */
+    void *scratch;       /* TL_LOSS_WINDOW rows of pixels of 8 + 4 n_columns numbers */
+    tl_grad_sums *faces; /* TL_SUMS_OF_FACE columns: scratch */
+    tl_grad_sums *of_points, *of_edges, *of_attr;
+} tl_grad_loss;
 
 /* Areas of triangles in pixels, each times the values of the triangle, NULL for 1. */
 typedef struct {

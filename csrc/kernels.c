@@ -40,6 +40,8 @@
 #include "blend/fill_shapes.c"
 #include "grad/area_vjp.c"
 #include "grad/edges.c"
+#include "grad/loss.c"
+#include "grad/outline.c"
 #include "grad/points.c"
 #include "grad/textures.c"
 #include "grad/values.c"
@@ -164,7 +166,9 @@ const tl_kernels TL_KERNELS = {
     .grad_values_vjp = grad_values_vjp,
     .grad_texels = grad_texels,
     .grad_texels_vjp = grad_texels_vjp,
+    .grad_outline = grad_outline,
     .grad_edges = grad_edges,
+    .grad_loss = grad_loss,
     .grad_area = grad_area,
     .touch_texels = touch_texels,
     .average_texels = average_texels,

@@ -167,7 +167,7 @@ def gradients_beside_deodr() -> Scenes:
     makers: dict[str, Callable[..., Callable[[], object]]] = {
         f"topleft.torch, {edges}": partial(step_of_topleft, edges=edges)
         for edges in ("silhouette", "area", "straight-through")
-    } | {"DEODR": step_of_deodr}
+    } | {"topleft.torch, a loss in one, area": step_of_loss, "DEODR": step_of_deodr}
     for n_triangles, size in ((10_000, (512, 512)), (70_000, (512, 512)), (100_000, HD)):
         clip, triangles = wavy_ball(n_triangles, *size)
         steps = {}
@@ -310,6 +310,23 @@ def step_of_topleft(clip: Any, triangles: Any, size: tuple[int, int], edges: str
         rast, _ = dr.rasterize(context, pos, tri, size[::-1])
         out, _ = dr.interpolate(colors, rast, tri)
         dr.antialias(out, rast, pos, tri, topology_hash=across, edges=edges).backward(g)
+
+    return step
+
+
+def step_of_loss(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:
+    """Return a call of a loss with its gradients, in one."""
+    import torch
+
+    import topleft.torch as dr
+
+    context, tri = dr.RasterizeContext(threads=1, output_db=False), torch.from_numpy(triangles)
+    pos, colors = torch.from_numpy(clip)[None].requires_grad_(), torch.rand(1, len(clip), 3, requires_grad=True)
+    across, target = dr.antialias_construct_topology_hash(tri), torch.rand(1, size[1], size[0], 3)
+
+    def step() -> None:
+        pos.grad = colors.grad = None
+        dr.photometric_loss(context, pos, tri, colors, target, across).backward()
 
     return step
 

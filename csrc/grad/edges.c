@@ -14,11 +14,13 @@
 #include <string.h>
 
 #include "topleft.h"
-#include "lanes/inline.h"
+#include "grad/outline.c"
 #include "grad/pairs.c"
 #include "grad/pixels.h"
+#include "grad/spans.h"
+#include "lanes/lanes.h"
 
-#define TL_COMPARED 16 /* labels at a time */
+#define TL_NO_ID -2 /* stands for a number that is no triangle's */
 
 /* Adds share * (colour of `from` - colour of `to`). */
 TL_INLINE void take_color(const tl_grad_edges *e, int64_t to, int64_t from, double share, int is_f64)
@@ -105,6 +107,65 @@ static void pull_straight(const tl_grad_view *view, const tl_grad_edges *e, cons
     }
 }
 
+/* Ids of a row of pixels: -1 for none, less for a number that is no triangle's. */
+TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *ids, int is_f64)
+{
+    const int64_t first = row * view->width;
+    const vi end = vi_set1(clamped_to_int(view->n_triangles));
+    int64_t x = 0;
+    for (; !is_f64 && x + TL_LANES <= view->width; x += TL_LANES) {
+        vf columns[4];
+        load_columns_f32((const float *)e->rast + 4 * (first + x), 4, columns);
+        const vi id = ids_of_numbers(columns[3]);
+        vi_store(ids + x, vi_select(vi_gt(end, id), id, vi_set1(TL_NO_ID)));
+    }
+    for (; x < view->width; x++) {
+        const int32_t id = id_of_label(get_label(e->rast, first + x, is_f64), is_f64);
+        ids[x] = id < view->n_triangles ? id : TL_NO_ID;
+    }
+}
+
+/* Whether the surface plainly runs on from one triangle to another, or neither has an edge that counts. */
+TL_INLINE vm runs_on(const tl_grad_edges *e, vm m, vi id, vi other, vi outlines)
+{
+    const vi none = vi_set1(0);
+    const vm is_within = vm_and(m, vi_eq(vi_and(outlines, vi_set1(TL_SILHOUETTES)), none));
+    if (e->rule == TL_PAIR_SILHOUETTE || !vm_any(is_within))
+        return is_within;
+    const vm is_pair = vm_and(is_within, vm_and(vi_gt(id, vi_set1(-1)), vi_gt(other, vi_set1(-1))));
+    const vi id_3 = vi_add(id, vi_add(id, id)), other_3 = vi_add(other, vi_add(other, other));
+    vm found = vm_first(0);
+    for (int k = 0; k < 3; k++) {
+        const vi corner = vi_sub(vi_gather(is_pair, e->across + k, id_3), other_3);
+        found = vm_or(found, vm_and(is_pair, vi_gt_unsigned(vi_set1(3), corner)));
+    }
+    return found;
+}
+
+/* Lists the columns below n where two rows of ids have a pair to look at; returns how many. */
+TL_INLINE int64_t list_pairs(const tl_grad_edges *e, const int32_t *ids, const int32_t *others, int64_t n,
+                             int32_t *columns)
+{
+    const vi beyond = vi_set1(TL_NO_ID), none = vi_set1(-1);
+    int64_t n_found = 0;
+    for (int64_t x = 0; x < n; x += TL_LANES) {
+        const vi id = vi_load(ids + x), other = vi_load(others + x);
+        vm m = vm_and_not(vm_first(n - x), vi_eq(id, other));
+        m = vm_and(m, vm_and(vi_gt(id, beyond), vi_gt(other, beyond)));
+        if (!vm_any(m))
+            continue;
+        if (e->rule != TL_PAIR_STRAIGHT) {
+            const vi outlines = vi_or(vi_gather(vm_and(m, vi_gt(id, none)), e->outline, id),
+                                      vi_gather(vm_and(m, vi_gt(other, none)), e->outline, other));
+            m = vm_and(m, vi_gt(outlines, none)); /* both have corners */
+            m = vm_and_not(m, runs_on(e, m, id, other, outlines));
+        }
+        vi_compress(columns + n_found, m, vi_add(vi_iota(), vi_set1((int32_t)x)));
+        n_found += __builtin_popcount(vm_bits(m));
+    }
+    return n_found;
+}
+
 /* Two rows of pixels that meet, or one whose columns do: first the lower row, or the left columns. */
 typedef struct {
     const tl_grad_view *view;
@@ -112,28 +173,16 @@ typedef struct {
     tl_grad_sums *sums;
     int64_t row;
     int axis; /* 0: columns meet */
-    const int32_t *labels, *others;
+    const int32_t *ids, *others;
 } meeting;
 
-/* Whether the surface plainly runs on from one triangle to the other. */
-TL_INLINE int runs_on(const tl_grad_view *view, const tl_grad_edges *e, int32_t id, int32_t other)
-{
-    if (other < 0 || silhouettes_of(view, e, id) || silhouettes_of(view, e, other))
-        return 0;
-    const int32_t *across = e->across + 3 * (int64_t)id;
-    return across[0] / 3 == other || across[1] / 3 == other || across[2] / 3 == other;
-}
-
 /* What the pixels of a column do. */
-static void meet(const meeting *m, int64_t x)
+TL_INLINE void meet(const meeting *m, int64_t x, int is_f64)
 {
     const tl_grad_view *view = m->view;
     const tl_grad_edges *e = m->edges;
-    const int is_f64 = view->is_f64;
     const int64_t first = m->row * view->width + x, second = first + (m->axis ? view->width : 1);
-    const int32_t id = id_of_label(m->labels[x], is_f64), other = id_of_label(m->others[x], is_f64);
-    if (id == other || (id >= 0 && !is_there(view, e, id)) || (other >= 0 && !is_there(view, e, other)))
-        return;
+    const int32_t id = m->ids[x], other = m->others[x];
     const int is_flipped =
         id < 0 || (other >= 0 && get_real(e->rast, 4 * second + 2, is_f64) < get_real(e->rast, 4 * first + 2, is_f64));
     tl_pair pair = {is_flipped ? second : first,
@@ -145,14 +194,11 @@ static void meet(const meeting *m, int64_t x)
                     {(double)x + 0.5, (double)m->row + 0.5}};
     pair.middle[m->axis] += is_flipped;
     tl_pair_edge edge;
-    if (e->rule == TL_PAIR_SILHOUETTE && !silhouettes_of(view, e, is_flipped ? other : id))
-        return;
     if (e->rule == TL_PAIR_STRAIGHT) {
         pull_straight(view, e, &pair, m->sums);
         return;
     }
-    if (e->rule == TL_PAIR_AREA ? runs_on(view, e, pair.id, pair.far_id) || !find_area_edge(view, e, &pair, &edge)
-                                : !find_silhouette(view, e, &pair, &edge))
+    if (e->rule == TL_PAIR_AREA ? !find_area_edge(view, e, &pair, &edge) : !find_silhouette(view, e, &pair, &edge))
         return;
     if (e->g_out) {
         pull_pair(view, e, &pair, &edge, m->sums, is_f64);
@@ -164,53 +210,48 @@ static void meet(const meeting *m, int64_t x)
         take_color(e, pair.far, pair.near, edge.far, is_f64);
 }
 
-/* The pairs of n columns; labels are compared some at a time. */
-static void meet_row(const meeting *m, int64_t n)
+/* The pairs of n columns. */
+TL_INLINE void meet_row(const meeting *m, int64_t n, int is_f64)
 {
-    for (int64_t x = 0; x < n;) {
-        int32_t differs = 0;
-        if (x + TL_COMPARED <= n) {
-            for (int k = 0; k < TL_COMPARED; k++)
-                differs |= m->labels[x + k] ^ m->others[x + k];
-            if (!differs) {
-                x += TL_COMPARED;
-                continue;
-            }
-        }
-        for (const int64_t end = n - x < TL_COMPARED ? n : x + TL_COMPARED; x < end; x++)
-            if (m->labels[x] != m->others[x])
-                meet(m, x);
+    int32_t *columns = m->edges->ids + 2 * (m->view->width + TL_IDS_ROOM);
+    const int64_t n_pairs = list_pairs(m->edges, m->ids, m->others, n, columns);
+    for (int64_t i = 0; i < n_pairs; i++)
+        meet(m, columns[i], is_f64);
+}
+
+TL_INLINE void edges_of_band(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums, int is_f64)
+{
+    const int64_t width = view->width, room = width + TL_IDS_ROOM;
+    const int64_t top = view->end_row < view->height ? view->end_row + 1 : view->height;
+    const int64_t bottom = view->first_row > 0 ? view->first_row - 1 : 0;
+    for (int64_t row = bottom; row < top; row++) {
+        int32_t *ids = e->ids + row % 2 * room;
+        load_ids(view, e, row, ids, is_f64);
+        if (row > bottom)
+            meet_row(&(meeting){view, e, sums, row - 1, 1, e->ids + (row + 1) % 2 * room, ids}, width, is_f64);
+        if (row >= view->first_row && row < view->end_row)
+            meet_row(&(meeting){view, e, sums, row, 0, ids, ids + 1}, width - 1, is_f64);
     }
 }
 
-TL_INLINE void load_labels(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *labels)
+static void smooth_rows(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums)
 {
-    const int64_t first = row * view->width;
+    const int64_t size = (view->is_f64 ? 8 : 4) * e->n_channels * view->width;
+    char *target = (char *)(e->g_out ? e->g_color : e->out) + view->first_row * size;
+    const char *source = (const char *)(e->g_out ? e->g_out : e->color) + view->first_row * size;
+    memcpy(target, source, (size_t)((view->end_row - view->first_row) * size));
+    if (!e->g_out && e->rule == TL_PAIR_STRAIGHT)
+        return;
     if (view->is_f64)
-        for (int64_t x = 0; x < view->width; x++)
-            labels[x] = get_label(e->rast, first + x, 1);
+        edges_of_band(view, e, sums, 1);
     else
-        for (int64_t x = 0; x < view->width; x++)
-            labels[x] = get_label(e->rast, first + x, 0);
+        edges_of_band(view, e, sums, 0);
 }
 
 /* See kernels.h. */
 static void grad_edges(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums)
 {
-    const int64_t width = view->width, size = (view->is_f64 ? 8 : 4) * e->n_channels * width;
-    const int64_t top = view->end_row < view->height ? view->end_row + 1 : view->height;
-    const int64_t bottom = view->first_row > 0 ? view->first_row - 1 : 0;
-    char *target = (char *)(e->g_out ? e->g_color : e->out) + view->first_row * size;
-    const char *source = (const char *)(e->g_out ? e->g_out : e->color) + view->first_row * size;
-    memcpy(target, source, (size_t)((view->end_row - view->first_row) * size));
-    for (int64_t row = bottom; row < top && (e->g_out || e->rule != TL_PAIR_STRAIGHT); row++) {
-        const int32_t *labels = e->labels + row % 2 * width, *below = e->labels + (row + 1) % 2 * width;
-        load_labels(view, e, row, e->labels + row % 2 * width);
-        if (row > bottom)
-            meet_row(&(meeting){view, e, sums, row - 1, 1, below, labels}, width);
-        if (row >= view->first_row && row < view->end_row)
-            meet_row(&(meeting){view, e, sums, row, 0, labels, labels + 1}, width - 1);
-    }
+    smooth_rows(view, e, sums);
     if (e->g_out)
         leave_band(sums);
 }

@@ -23,16 +23,6 @@
 #define TL_HANDOVER 0.6          /* width of the hand-over about 45 degrees, in the cosine of twice the angle */
 #define TL_WALK_STEPS 256        /* of a walk */
 
-/* What `known` holds of a triangle. */
-enum {
-    TL_KNOWN_EDGES = 7, /* bit k: the edge opposite to corner k is a silhouette */
-    TL_HAS_EDGES = 8,
-    TL_HAS_SIDE = 16,
-    TL_IS_FRONT = 32, /* its side: front, back, or neither */
-    TL_IS_BACK = 64,
-    TL_IS_AHEAD = 128, /* all of its corners have w > 0 */
-};
-
 /* Two neighbours. */
 typedef struct {
     int64_t near, far;      /* pixels */
@@ -49,71 +39,12 @@ typedef struct {
     double near_by[2], far_by[2];   /* what they change by with t and with the slope */
 } tl_pair_edge;
 
-static int32_t facing_of(const tl_grad_view *view, uint8_t *known, int32_t id)
-{
-    if (known[id] & TL_HAS_SIDE)
-        return known[id];
-    double p[3][3];
-    int flags = TL_HAS_SIDE;
-    for (int k = 0; k < 3; k++)
-        for (int c = 0; c < 3; c++)
-            p[k][c] = get_real(view->pos, 4 * (int64_t)view->tri[3 * (int64_t)id + k] + (c == 2 ? 3 : c), view->is_f64);
-    const double area = p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) +
-                        p[0][1] * (p[1][2] * p[2][0] - p[1][0] * p[2][2]) +
-                        p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
-    flags |= area > 0.0 ? TL_IS_FRONT : area < 0.0 ? TL_IS_BACK : 0;
-    flags |= p[0][2] > 0.0 && p[1][2] > 0.0 && p[2][2] > 0.0 ? TL_IS_AHEAD : 0;
-    return known[id] |= (uint8_t)flags;
-}
-
-/* Whether nothing lies on the other side of an edge, 3 * triangle + corner. */
-static int is_silhouette(const tl_grad_view *view, const tl_grad_edges *e, int32_t id, int k)
-{
-    const int32_t other = e->across[3 * (int64_t)id + k];
-    if (other < 0 || other >= 3 * view->n_triangles || !has_corners(view, view->n_vertices, other / 3))
-        return 1;
-    const int32_t own = facing_of(view, e->known, id), across = facing_of(view, e->known, other / 3);
-    const int32_t *a = view->tri + 3 * (int64_t)id, *b = view->tri + 3 * (int64_t)(other / 3);
-    const int is_reversed = a[(k + 1) % 3] != b[(other % 3 + 1) % 3];
-    const int is_same = (own & TL_IS_FRONT && across & TL_IS_FRONT) || (own & TL_IS_BACK && across & TL_IS_BACK);
-    const int is_turned = (own & TL_IS_FRONT && across & TL_IS_BACK) || (own & TL_IS_BACK && across & TL_IS_FRONT);
-    return is_reversed ? is_turned : is_same;
-}
-
-/* The silhouettes of a triangle, bit by bit; none of one that does not exist. */
-TL_INLINE int silhouettes_of(const tl_grad_view *view, const tl_grad_edges *e, int32_t id)
-{
-    if (!(e->known[id] & TL_HAS_EDGES)) {
-        int found = TL_HAS_EDGES;
-        for (int k = 0; k < 3; k++)
-            found |= is_silhouette(view, e, id, k) << k;
-        e->known[id] |= (uint8_t)found;
-    }
-    return e->known[id] & TL_KNOWN_EDGES;
-}
-
-/* Whether a triangle exists, and its corners do. */
-TL_INLINE int is_there(const tl_grad_view *view, const tl_grad_edges *e, int32_t id)
-{
-    return id < view->n_triangles && (e->known[id] & TL_HAS_EDGES || has_corners(view, view->n_vertices, id));
-}
-
-/* Where a vertex is: pixels of the picture. */
-TL_INLINE void place_vertex(const tl_grad_view *view, int32_t vertex, double *px)
-{
-    const double w = get_real(view->pos, 4 * (int64_t)vertex + 3, view->is_f64);
-    for (int axis = 0; axis < 2; axis++) {
-        const double at = get_real(view->pos, 4 * (int64_t)vertex + axis, view->is_f64);
-        px[axis] = (at / w - view->shift[axis]) / (2.0 * view->scale[axis]);
-    }
-}
-
 /* The corners of a triangle about a pair. */
-TL_INLINE void place_corners(const tl_grad_view *view, const tl_pair *pair, int32_t id, double *along, double *beside)
+TL_INLINE void place_corners(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, int32_t id,
+                             double *along, double *beside)
 {
     for (int k = 0; k < 3; k++) {
-        double px[2];
-        place_vertex(view, view->tri[3 * (int64_t)id + k], px);
+        const double *px = e->places + 2 * (int64_t)view->tri[3 * (int64_t)id + k];
         along[k] = pair->flip * (px[pair->axis] - pair->middle[pair->axis]);
         beside[k] = px[1 - pair->axis] - pair->middle[1 - pair->axis];
     }
@@ -160,10 +91,10 @@ TL_INLINE void set_vertices(const tl_grad_view *view, int32_t id, int k, tl_pair
 static int find_silhouette(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, tl_pair_edge *edge)
 {
     double along[3], beside[3];
-    const int allowed = silhouettes_of(view, e, pair->id);
-    if (!allowed || !(facing_of(view, e->known, pair->id) & TL_IS_AHEAD))
+    const int allowed = e->outline[pair->id] & TL_SILHOUETTES;
+    if (!allowed || !(e->outline[pair->id] & TL_IS_AHEAD))
         return 0;
-    place_corners(view, pair, pair->id, along, beside);
+    place_corners(view, e, pair, pair->id, along, beside);
     const int k = exit_edge(along, beside, allowed & steep_edges(along, beside, pair->axis), edge);
     if (k < 0)
         return 0;
@@ -206,17 +137,17 @@ static int walk_edge(const tl_grad_view *view, const tl_grad_edges *e, const tl_
     double along[3];
     int32_t id = pair->id;
     for (int step = 0; step <= TL_WALK_STEPS; step++) {
-        if (!(facing_of(view, e->known, id) & TL_IS_AHEAD))
+        if (!(e->outline[id] & TL_IS_AHEAD))
             return -1;
-        place_corners(view, pair, id, along, beside);
+        place_corners(view, e, pair, id, along, beside);
         const int k = exit_edge(along, beside, 7, edge);
         if (k < 0)
             return -1;
-        const int32_t half = 3 * id + k, other = e->across[half];
+        const int32_t other = e->across[3 * (int64_t)id + k];
         set_vertices(view, id, k, edge);
         const double low = beside[(k + 1) % 3], high = beside[(k + 2) % 3];
         beside[0] = low < high ? low : high, beside[1] = low < high ? high : low;
-        if (silhouettes_of(view, e, id) >> k & 1 || e->across[other] != half || step == TL_WALK_STEPS)
+        if (other < 0 || e->outline[id] >> k & 1 || step == TL_WALK_STEPS)
             return 1;
         if (other / 3 == pair->far_id)
             return 0;

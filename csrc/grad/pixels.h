@@ -10,6 +10,14 @@
 #include "topleft.h"
 #include "lanes/inline.h"
 
+/* What `outline` holds of a triangle; -1: it does not exist. */
+enum {
+    TL_SILHOUETTES = 7, /* bit k: the edge opposite to corner k is one */
+    TL_SIDE_SHIFT = 3,
+    TL_SIDES = 3 << TL_SIDE_SHIFT, /* 1: front, 2: back, 0: neither */
+    TL_IS_AHEAD = 32,              /* all of its corners have w > 0 */
+};
+
 #define TL_LAST_EXACT_ID (1 << 24) /* the largest that float32 counts up to; from there on its bits are counted */
 #define TL_BITS_OF_LAST 0x4B800000
 
@@ -141,6 +149,8 @@ TL_INLINE void leave_band(tl_grad_sums *sums)
     for (int64_t i = 0; i < sums->n; i++)
         sums->slot_of[sums->rows[i]] = -1;
 }
+
+TL_INLINE int32_t clamped_to_int(int64_t a) { return a < INT32_MAX ? (int32_t)a : INT32_MAX; }
 
 TL_INLINE double clamped(double a, double low, double high) { return a < low ? low : a > high ? high : a; }
 

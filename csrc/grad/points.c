@@ -17,8 +17,9 @@
 #include <string.h>
 
 #include "topleft.h"
-#include "lanes/inline.h"
 #include "grad/pixels.h"
+#include "grad/spans.h"
+#include "lanes/lanes.h"
 
 /* A triangle about a pixel. */
 typedef struct {
@@ -85,7 +86,7 @@ typedef struct {
     int64_t step, first_id;
 } id_rows;
 
-TL_INLINE void points_of_ids(const tl_grad_view *view, const id_rows *ids, void *const *out, int is_f64)
+static void points_of_ids(const tl_grad_view *view, const id_rows *ids, void *const *out)
 {
     grad_triangle t;
     pixel_run run = before_shown(view);
@@ -104,11 +105,168 @@ TL_INLINE void points_of_ids(const tl_grad_view *view, const id_rows *ids, void 
             run.id = (int32_t)(id + ids->first_id), run.n = x - run.column, run.at = run.row * view->width + run.column;
             if (!has_corners(view, view->n_vertices, run.id))
                 continue;
-            load_seen_triangle(view, run.id, middle_at(view, 0, run.column), y, &t, is_f64);
+            load_seen_triangle(view, run.id, middle_at(view, 0, run.column), y, &t, 1);
             for (int64_t i = 0; i < run.n; i++)
-                store_point(view, &t, &run, i, 2.0 * view->scale[0] * (double)i, out, is_f64);
+                store_point(view, &t, &run, i, 2.0 * view->scale[0] * (double)i, out, 1);
         }
     }
+}
+
+/* Numbers of runs, about their first pixel and with its total as 1: u and v times the total there, what they change by
+ * with the column and with the row, what the total does, and z/w. */
+enum {
+    POINT_U,
+    POINT_U_X,
+    POINT_U_Y,
+    POINT_V,
+    POINT_V_X,
+    POINT_V_Y,
+    POINT_TOTAL_X,
+    POINT_TOTAL_Y,
+    POINT_ZW,
+    POINT_ZW_X
+};
+
+/* q_k of the triangles of TL_LANES runs about their first pixels, as load_seen_triangle has them; z and w. */
+TL_INLINE void load_run_triangles(const tl_grad_view *view, const grad_span *s, int r, vd q[3][3], vd *z, vd *w)
+{
+    const vd columns = vd_from_vi(vi_add(vi_load(s->begins + r), vi_set1((int32_t)s->first)));
+    const vd middle = vd_add(vd_mul(vd_set1(2.0), columns), vd_set1(1.0));
+    const vd x0 = vd_add(vd_mul(middle, vd_set1(view->scale[0])), vd_set1(view->shift[0]));
+    const vd y0 = vd_set1(middle_at(view, 1, s->row));
+    vd x[3], y[3];
+    for (int k = 0; k < 3; k++) {
+        vi bits[4];
+        vi_load_records(view->pos, 16, s->corners[k] + r, bits);
+        z[k] = vd_from_vf(vf_of_bits(bits[2])), w[k] = vd_from_vf(vf_of_bits(bits[3]));
+        x[k] = vd_sub(vd_from_vf(vf_of_bits(bits[0])), vd_mul(x0, w[k]));
+        y[k] = vd_sub(vd_from_vf(vf_of_bits(bits[1])), vd_mul(y0, w[k]));
+    }
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        q[k][0] = vd_sub(vd_mul(y[i], w[j]), vd_mul(w[i], y[j]));
+        q[k][1] = vd_sub(vd_mul(w[i], x[j]), vd_mul(x[i], w[j]));
+        q[k][2] = vd_sub(vd_mul(x[i], y[j]), vd_mul(y[i], x[j]));
+    }
+}
+
+TL_INLINE vd sum_of_three(vd a, vd b, vd c) { return vd_add(vd_add(a, b), c); }
+TL_INLINE vd one_for_zero(vd a)
+{
+    const vd zero = vd_set1(0.0);
+    return vd_select(vm_and(vd_ge(a, zero), vd_ge(zero, a)), vd_set1(1.0), a);
+}
+
+/* Stores a number of runs, 0 for those that show nothing. */
+TL_INLINE void set_number(grad_span *s, int r, int number, vm m, vd value)
+{
+    vf_store(s->numbers[number] + r, vf_select(m, vf_from_vd(value), vf_set1(0.0f)));
+}
+
+/* Sets the numbers of runs; `inverses`: 1 / total, or NULL. */
+TL_INLINE void set_point_numbers(const tl_grad_view *view, grad_span *s, double *inverses)
+{
+    const vd step[2] = {vd_set1(2.0 * view->scale[0]), vd_set1(2.0 * view->scale[1])};
+    for (int r = 0; r < s->n_runs; r += TL_LANES) {
+        const vm m = vm_and(vm_first(s->n_runs - r), vi_gt(vi_load(s->ids + r), vi_set1(-1)));
+        vd q[3][3], z[3], w[3], sum[3], products[3];
+        if (!vm_any(m)) {
+            for (int k = 0; k <= POINT_ZW_X; k++)
+                vf_store(s->numbers[k] + r, vf_set1(0.0f));
+            continue;
+        }
+        load_run_triangles(view, s, r, q, z, w);
+        for (int c = 0; c < 3; c++)
+            sum[c] = sum_of_three(q[0][c], q[1][c], q[2][c]);
+        const vd inverse = vd_div(vd_set1(1.0), one_for_zero(sum[2]));
+        if (inverses)
+            vd_store(inverses + r, inverse);
+        for (int k = 0; k < 2; k++) {
+            set_number(s, r, 3 * k + POINT_U, m, vd_mul(q[k][2], inverse));
+            for (int axis = 0; axis < 2; axis++)
+                set_number(s, r, 3 * k + POINT_U_X + axis, m, vd_mul(vd_mul(q[k][axis], step[axis]), inverse));
+            set_number(s, r, POINT_TOTAL_X + k, m, vd_mul(vd_mul(sum[k], step[k]), inverse));
+        }
+        for (int k = 0; k < 3; k++)
+            products[k] = vd_mul(w[k], q[k][2]);
+        const vd under = one_for_zero(sum_of_three(products[0], products[1], products[2]));
+        for (int c = 0; c < 3; c += 2) {
+            for (int k = 0; k < 3; k++)
+                products[k] = vd_mul(z[k], q[k][c]);
+            const vd over = sum_of_three(products[0], products[1], products[2]);
+            set_number(s, r, c ? POINT_ZW : POINT_ZW_X, m, vd_div(c ? over : vd_mul(over, step[0]), under));
+        }
+    }
+}
+
+/* Where TL_LANES pixels lie. */
+typedef struct {
+    vf x, inverse, u, v, zw; /* inverse: of the total */
+} lane_points;
+
+TL_INLINE lane_points points_of_lanes(const span_lanes *p)
+{
+    lane_points at = {.x = from_begin(p)};
+    const vf one = vf_set1(1.0f), total = vf_fma(pick_number(p, POINT_TOTAL_X), at.x, one);
+    at.inverse = vf_div(one, total);
+    at.u = vf_mul(vf_fma(pick_number(p, POINT_U_X), at.x, pick_number(p, POINT_U)), at.inverse);
+    at.v = vf_mul(vf_fma(pick_number(p, POINT_V_X), at.x, pick_number(p, POINT_V)), at.inverse);
+    at.zw = vf_fma(pick_number(p, POINT_ZW_X), at.x, pick_number(p, POINT_ZW));
+    return at;
+}
+
+TL_INLINE vf within(vf a, float most) { return vf_min(vf_max(a, vf_set1(-most)), vf_set1(most)); }
+TL_INLINE vf within_one(vf a) { return vf_min(vf_max(a, vf_set1(0.0f)), vf_set1(1.0f)); }
+
+/* What the weights of pixels change by. */
+TL_INLINE void store_slopes(const span_lanes *p, const lane_points *at, float *out)
+{
+    vf slopes[4];
+    for (int k = 0; k < 4; k++) {
+        const vf change = vf_mul(k < 2 ? at->u : at->v, pick_number(p, POINT_TOTAL_X + k % 2));
+        const vf slope = vf_mul(vf_sub(pick_number(p, k / 2 * 3 + POINT_U_X + k % 2), change), at->inverse);
+        slopes[k] = vf_select(p->is_shown, slope, vf_set1(0.0f));
+    }
+    store_some_quads(out + 4 * p->x, p->n, slopes);
+}
+
+/* Writes `rast` and, unless it is NULL, `rast_db` of a span. */
+TL_INLINE void points_of_span(const tl_grad_view *view, const grad_span *s, float *rast, float *rast_db)
+{
+    const vi order = order_of_quads(), last = vi_set1(TL_LAST_EXACT_ID);
+    const vf zero = vf_set1(0.0f);
+    for (int i = 0; i * TL_LANES < s->n; i++) {
+        const span_lanes p = lanes_of_span(s, i, order, 1);
+        const lane_points at = points_of_lanes(&p);
+        vf out[4] = {within_one(at.u), within_one(at.v), within(at.zw, (float)view->z_most), zero};
+        const vf sum = vf_add(out[0], out[1]);
+        if (vm_any(vf_lt(vf_set1(1.0f), sum))) {
+            const vf divisor = vf_max(sum, vf_set1(1.0f));
+            out[0] = vf_div(out[0], divisor), out[1] = vf_div(out[1], divisor);
+        }
+        const vi id = vi_add(vi_pick(s->ids + p.first, p.run), vi_set1(1));
+        const vf large = vf_of_bits(vi_add(id, vi_set1(TL_BITS_OF_LAST - TL_LAST_EXACT_ID)));
+        out[3] = vf_select(vi_gt(id, last), large, vf_from_vi(id));
+        for (int k = 0; k < 4; k++)
+            out[k] = vf_select(p.is_shown, out[k], zero);
+        store_some_quads(rast + 4 * p.x, p.n, out);
+        if (rast_db)
+            store_slopes(&p, &at, rast_db);
+    }
+}
+
+static void points_in_lanes(const tl_grad_view *view, const id_rows *ids, float *rast, float *rast_db)
+{
+    grad_span s = {.bad_id = -1};
+    for (s.row = view->first_row; s.row < view->end_row; s.row++)
+        for (s.first = 0; s.first < view->width; s.first += TL_GRAD_SPAN) {
+            const int64_t at = 4 * (s.row * view->width + s.first);
+            s.n = view->width - s.first < TL_GRAD_SPAN ? (int)(view->width - s.first) : TL_GRAD_SPAN;
+            list_runs_of(&s, ids->lowest + ids->step * s.row + s.first, ids->first_id, 0);
+            find_corners(&s, view, view->n_vertices);
+            set_point_numbers(view, &s, 0);
+            points_of_span(view, &s, rast + at, rast_db ? rast_db + at : 0);
+        }
 }
 
 /* See kernels.h. */
@@ -118,9 +276,9 @@ static void grad_points(const tl_grad_view *view, const int32_t *ids, int64_t st
     const id_rows rows = {ids, step, first_id};
     void *const out[2] = {rast, rast_db};
     if (view->is_f64)
-        points_of_ids(view, &rows, out, 1);
+        points_of_ids(view, &rows, out);
     else
-        points_of_ids(view, &rows, out, 0);
+        points_in_lanes(view, &rows, rast, rast_db);
 }
 
 /* Gradients at a pixel, of `rast` and of `rast_db`. */
@@ -130,9 +288,8 @@ typedef struct {
 
 /* What a row of pixels sums up. */
 typedef struct {
-    double a[3], a_x[3]; /* gradients of a_k, and times X */
+    double a[4], a_x[4]; /* gradients of a_k and of z/w, and times X */
     double q[3][2];      /* of q_k alone */
-    double z[3], w[3];
 } row_sums;
 
 /* Adds the gradients at X. */
@@ -142,7 +299,7 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
     const double a[3] = {plane_at(t->q[0], x), plane_at(t->q[1], x), plane_at(t->q[2], x)};
     const double total = plane_at(t->sum, x), r = total == 0.0 ? 0.0 : 1.0 / total;
     const double u = a[0] * r, v = a[1] * r;
-    double g_u = g->u, g_v = g->v, g_total = 0.0, g_a[3];
+    double g_u = g->u, g_v = g->v, g_total = 0.0, g_a[4] = {0};
     const double u_in = clamped(u, 0.0, 1.0), v_in = clamped(v, 0.0, 1.0), sum = u_in + v_in;
     if (u != u_in || v != v_in || sum > 1.0) {
         const double scale = sum > 1.0 ? 1.0 / sum : 1.0;
@@ -161,47 +318,145 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
     if (g->zw != 0.0) {
         const double under = t->w[0] * a[0] + t->w[1] * a[1] + t->w[2] * a[2];
         const double zw = (t->z[0] * a[0] + t->z[1] * a[1] + t->z[2] * a[2]) / (under == 0.0 ? 1.0 : under);
-        const double g_over = under != 0.0 && fabs(zw) <= view->z_most ? g->zw / under : 0.0, g_under = -g_over * zw;
-        for (int k = 0; k < 3 && g_over != 0.0; k++) {
-            g_a[k] += g_over * t->z[k] + g_under * t->w[k];
-            s->z[k] += g_over * a[k], s->w[k] += g_under * a[k];
-        }
+        g_a[3] = under != 0.0 && fabs(zw) <= view->z_most ? g->zw : 0.0;
     }
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 4; k++)
         s->a[k] += g_a[k], s->a_x[k] += g_a[k] * x;
 }
 
 /* Adds what a run has summed up at Y, its X beginning `from` off the triangle's, to the triangle's sums. */
 TL_INLINE void close_row(const row_sums *s, double from, double y, double *sums)
 {
-    for (int k = 0; k < 3; k++) {
-        sums[2 + 3 * k] += s->a_x[k] + from * s->a[k] + s->q[k][0];
-        sums[3 + 3 * k] += y * s->a[k] + s->q[k][1];
+    for (int k = 0; k < 4; k++) {
+        sums[2 + 3 * k] += s->a_x[k] + from * s->a[k] + (k < 3 ? s->q[k][0] : 0.0);
+        sums[3 + 3 * k] += y * s->a[k] + (k < 3 ? s->q[k][1] : 0.0);
         sums[4 + 3 * k] += s->a[k];
-        sums[11 + k] += s->z[k], sums[14 + k] += s->w[k];
+    }
+}
+
+/* Gradients of q_k, of z_k and of w_k, from the sums of a triangle.  z/w is sum z_k a_k / D, with D = sum w_k a_k the
+ * same at every pixel: the determinant of the corners. */
+TL_INLINE void pull_depth(const grad_triangle *t, const double *sums, double by_q[3][3], double *g_z, double *g_w)
+{
+    const double *moments = sums + 11;
+    double under = 0.0, g_under = 0.0;
+    memcpy(by_q, sums + 2, 9 * sizeof *sums);
+    for (int k = 0; k < 3; k++)
+        under += t->w[k] * t->q[k][2], g_z[k] = g_w[k] = 0.0;
+    if (under == 0.0 || (moments[0] == 0.0 && moments[1] == 0.0 && moments[2] == 0.0))
+        return;
+    for (int k = 0; k < 3; k++) {
+        for (int c = 0; c < 3; c++) {
+            g_z[k] += t->q[k][c] * moments[c] / under;
+            by_q[k][c] += t->z[k] * moments[c] / under;
+        }
+        g_under -= t->z[k] * g_z[k] / under;
+    }
+    for (int k = 0; k < 3; k++) {
+        by_q[k][2] += g_under * t->w[k];
+        g_w[k] = g_under * t->q[k][2];
     }
 }
 
 /* Gradients of the corners of a triangle from its sums: q_k = v_i x v_j. */
-TL_INLINE void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices,
-                              int is_f64)
+static void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices, int is_f64)
 {
     grad_triangle t;
-    double *to[3], g[3][3] = {{0}};
+    double *to[3], g[3][3] = {{0}}, by_q[3][3], g_z[3], g_w[3];
     load_seen_triangle(view, id, sums[0], sums[1], &t, is_f64);
     corner_sums(view, vertices, id, to);
+    pull_depth(&t, sums, by_q, g_z, g_w);
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const double *d = sums + 2 + 3 * k;
+        const double *d = by_q[k];
         g[i][0] += t.y[j] * d[2] - t.w[j] * d[1], g[i][1] += t.w[j] * d[0] - t.x[j] * d[2];
         g[i][2] += t.x[j] * d[1] - t.y[j] * d[0];
         g[j][0] += d[1] * t.w[i] - d[2] * t.y[i], g[j][1] += d[2] * t.x[i] - d[0] * t.w[i];
         g[j][2] += d[0] * t.y[i] - d[1] * t.x[i];
     }
     for (int k = 0; k < 3; k++) {
-        to[k][0] += g[k][0], to[k][1] += g[k][1], to[k][2] += sums[11 + k];
-        to[k][3] += g[k][2] + sums[14 + k] - (sums[0] * g[k][0] + sums[1] * g[k][1]);
+        to[k][0] += g[k][0], to[k][1] += g[k][1], to[k][2] += g_z[k];
+        to[k][3] += g[k][2] + g_w[k] - (sums[0] * g[k][0] + sums[1] * g[k][1]);
     }
+}
+
+/* Gradients of a_k, in units of the total, and of z/w, at the pixels of a span: a row of four each. */
+TL_INLINE void pull_span(const tl_grad_view *view, grad_span *s, const float *g_rast)
+{
+    const vi order = order_of_quads();
+    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), z_most = vf_set1((float)view->z_most);
+    for (int i = 0; i * TL_LANES < s->n; i++) {
+        const span_lanes p = lanes_of_span(s, i, order, 1);
+        const lane_points at = points_of_lanes(&p);
+        const vf u = within_one(at.u), v = within_one(at.v), sum = vf_add(u, v);
+        const vm is_kept[2] = {vf_eq(u, at.u), vf_eq(v, at.v)}, is_over = vf_lt(one, sum);
+        vf g[4], out[4];
+        load_some_quads(g_rast + 4 * p.x, p.n, g);
+        if (vm_any(vm_or(is_over, vm_and_not(vm_all(), vm_and(is_kept[0], is_kept[1]))))) {
+            const vf scale = vf_div(one, vf_max(sum, one)), both = vf_fma(g[0], u, vf_mul(g[1], v));
+            const vf g_sum = vf_select(is_over, vf_mul(vf_mul(both, scale), scale), zero);
+            for (int k = 0; k < 2; k++)
+                g[k] = vf_select(is_kept[k], vf_sub(vf_mul(g[k], scale), g_sum), zero);
+        }
+        const vf total = vf_fma(g[0], at.u, vf_mul(g[1], at.v));
+        out[0] = vf_mul(vf_sub(g[0], total), at.inverse), out[1] = vf_mul(vf_sub(g[1], total), at.inverse);
+        out[2] = vf_mul(vf_sub(zero, total), at.inverse);
+        out[3] = vf_select(vm_and(vf_ge(z_most, at.zw), vf_ge(at.zw, vf_sub(zero, z_most))), g[2], zero);
+        for (int k = 0; k < 4; k++)
+            out[k] = vf_select(p.is_shown, out[k], zero);
+        store_some_quads(s->rows + 4 * p.x, p.n, out);
+    }
+}
+
+#define TL_COUNT_16 {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}
+
+/* Adds the rows of the runs of a span to the sums of their triangles. */
+TL_INLINE void close_span(const tl_grad_view *view, const grad_span *s, const double *inverses, tl_grad_sums *faces)
+{
+    static const float columns[TL_SUMMED] = TL_COUNT_16;
+    const double y = middle_at(view, 1, s->row);
+    for (int r = 0; r < s->n_runs; r++) {
+        if (s->ids[r] < 0)
+            continue;
+        const double x = middle_at(view, 0, s->first + s->begins[r]);
+        const int is_new = faces->slot_of[s->ids[r]] < 0;
+        double *sums = sums_of(faces, s->ids[r]);
+        row_sums all = {{0}, {0}, {{0}}};
+        if (is_new)
+            sums[0] = x, sums[1] = y;
+        for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) { /* some at a time, in float32 */
+            const int n = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
+            float sum[4] = {0}, sum_x[4] = {0};
+            sum_quads(s->rows + 4 * i, n, sum);
+            sum_weighed_quads(s->rows + 4 * i, columns, 1, n, sum_x);
+            for (int k = 0; k < 4; k++) {
+                all.a[k] += (double)sum[k];
+                all.a_x[k] += (double)sum_x[k] + (double)(i - s->begins[r]) * (double)sum[k];
+            }
+        }
+        for (int k = 0; k < 4; k++) {
+            all.a[k] *= k < 3 ? inverses[r] : 1.0;
+            all.a_x[k] *= (k < 3 ? inverses[r] : 1.0) * 2.0 * view->scale[0];
+        }
+        close_row(&all, x - sums[0], y - sums[1], sums);
+    }
+}
+
+static int64_t pull_points_in_lanes(const tl_grad_view *view, const tl_grad_points *p)
+{
+    grad_span s = {.bad_id = -1};
+    double inverses[TL_GRAD_ROOM] = {0};
+    for (s.row = view->first_row; s.row < view->end_row; s.row++)
+        for (s.first = 0; s.first < view->width; s.first += TL_GRAD_SPAN) {
+            const int64_t at = 4 * (s.row * view->width + s.first);
+            s.n = view->width - s.first < TL_GRAD_SPAN ? (int)(view->width - s.first) : TL_GRAD_SPAN;
+            list_runs_of(&s, 0, 0, (const float *)p->rast + at);
+            find_corners(&s, view, view->n_vertices);
+            set_point_numbers(view, &s, inverses);
+            pull_span(view, &s, (const float *)p->g_rast + at);
+            close_span(view, &s, inverses, p->faces);
+        }
+    return s.bad_id;
 }
 
 TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p, int has_db, int is_f64)
@@ -229,19 +484,31 @@ TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p,
         }
         close_row(&s, x - sums[0], y - sums[1], sums);
     }
+    return run.bad_id;
+}
+
+static int64_t pull_point_rows(const tl_grad_view *view, const tl_grad_points *p)
+{
+    if (view->is_f64)
+        return pull_points(view, p, p->g_db != 0, 1);
+    return p->g_db ? pull_points(view, p, 1, 0) : pull_points_in_lanes(view, p);
+}
+
+/* Ends a band: from sums of triangles to those of their corners. */
+static void close_points(const tl_grad_view *view, const tl_grad_points *p)
+{
     for (int64_t i = 0; i < p->faces->n; i++)
-        close_triangle(view, p->faces->rows[i], p->faces->sums + TL_SUMS_OF_FACE * i, p->vertices, is_f64);
+        close_triangle(view, p->faces->rows[i], p->faces->sums + TL_SUMS_OF_FACE * i, p->vertices, view->is_f64);
     leave_band(p->faces);
     leave_band(p->vertices);
-    return run.bad_id;
 }
 
 /* See kernels.h. */
 static int64_t grad_points_vjp(const tl_grad_view *view, const tl_grad_points *p)
 {
-    if (view->is_f64)
-        return p->g_db ? pull_points(view, p, 1, 1) : pull_points(view, p, 0, 1);
-    return p->g_db ? pull_points(view, p, 1, 0) : pull_points(view, p, 0, 0);
+    const int64_t bad_id = pull_point_rows(view, p);
+    close_points(view, p);
+    return bad_id;
 }
 
 #endif

@@ -1,7 +1,7 @@
 /* Attributes of vertices at pixels, and what they change by; and backwards.
  * In: `rast`, `rast_db`, attributes.  Out: pictures; backward: gradients of `rast` and `rast_db`, sums by row.
  *
- * Of three attributes of float32 the number is a constant: what a run needs of its triangle stays in registers. */
+ * Up to four attributes of float32 take the lanes of spans.h, and float32; others float64. */
 #ifndef TL_GRAD_VALUES_C
 #define TL_GRAD_VALUES_C
 
@@ -9,8 +9,9 @@
 #include <string.h>
 
 #include "topleft.h"
-#include "lanes/inline.h"
 #include "grad/pixels.h"
+#include "grad/spans.h"
+#include "lanes/lanes.h"
 
 #define TL_FEW_COLUMNS 4
 
@@ -60,19 +61,16 @@ TL_INLINE void values_of_run(const tl_grad_values *v, const pixel_run *run, cons
     }
 }
 
-/* n_few: the number of attributes where it is a constant, or 0. */
-TL_INLINE int64_t values_of(const tl_grad_view *view, const tl_grad_values *v, int n_few, int is_f64)
+TL_INLINE int64_t values_of(const tl_grad_view *view, const tl_grad_values *v, int is_f64)
 {
-    const int64_t n_columns = n_few ? n_few : v->n_columns;
+    const int64_t n_columns = v->n_columns;
     int64_t rows[3];
     pixel_run run = before_shown(view);
     clear_band(view, v->out, n_columns);
     clear_band(view, v->out_da, 2 * v->n_wanted);
     while (next_shown(view, v->rast, v->n_attr, &run, is_f64)) {
         attr_rows(view, run.id, n_columns, rows);
-        if (n_few)
-            values_of_run(v, &run, rows, 0, n_few, n_columns, is_f64);
-        for (int64_t c = 0; !n_few && c < n_columns; c += TL_FEW_COLUMNS) {
+        for (int64_t c = 0; c < n_columns; c += TL_FEW_COLUMNS) {
             const int64_t n = n_columns - c;
             values_of_run(v, &run, rows, c, n < TL_FEW_COLUMNS ? (int)n : TL_FEW_COLUMNS, n_columns, is_f64);
         }
@@ -81,12 +79,106 @@ TL_INLINE int64_t values_of(const tl_grad_view *view, const tl_grad_values *v, i
     return run.bad_id;
 }
 
+/* Sets the numbers of the runs of a span: of each attribute the last corner's, and what it changes by with u and v. */
+TL_INLINE void set_value_numbers(const tl_grad_values *v, grad_span *s, int n)
+{
+    const vf zero = vf_set1(0.0f);
+    for (int r = 0; r < s->n_runs; r += TL_LANES) {
+        const vm m = vm_and(vm_first(s->n_runs - r), vi_gt(vi_load(s->ids + r), vi_set1(-1)));
+        for (int c = 0; c < n; c++) {
+            vf at[3];
+            for (int k = 0; k < 3; k++) {
+                const vi row = vi_mul(vi_load(s->corners[k] + r), vi_set1(n));
+                at[k] = vf_of_bits(vi_gather(m, (const int32_t *)v->attr + c, row));
+            }
+            vf_store(s->numbers[3 * c] + r, at[2]);
+            for (int k = 0; k < 2; k++)
+                vf_store(s->numbers[3 * c + 1 + k] + r, vf_select(m, vf_sub(at[k], at[2]), zero));
+        }
+    }
+}
+
+/* The next span of a band, after those before it; 0 when there are no more. */
+TL_INLINE int next_value_span(const tl_grad_view *view, const tl_grad_values *v, grad_span *s, int n)
+{
+    s->first += s->n;
+    if (s->first >= view->width)
+        s->first = 0, s->row++;
+    if (s->row >= view->end_row || view->width == 0)
+        return 0;
+    s->n = view->width - s->first < TL_GRAD_SPAN ? (int)(view->width - s->first) : TL_GRAD_SPAN;
+    list_runs_of(s, 0, 0, (const float *)v->rast + 4 * (s->row * view->width + s->first));
+    find_corners(s, view, v->n_attr);
+    set_value_numbers(v, s, n);
+    return 1;
+}
+
+/* Writes n columns of pixels, four in the order of quads. */
+TL_INLINE void store_columns(float *p, int n_pixels, const vf *columns, int n)
+{
+    float some[4 * TL_MAX_LANES];
+    float *to = n_pixels < TL_LANES ? some : p;
+    if (n == 4)
+        store_some_quads(to, TL_LANES, columns);
+    else if (n == 3)
+        vf_store_triples(to, columns);
+    else if (n == 2)
+        vf_store_pairs(to, columns);
+    else
+        vf_store(to, columns[0]);
+    if (to != p)
+        copy_rows(p, some, n_pixels, n);
+}
+
+/* n attributes, at most TL_FEW_COLUMNS, of float32. */
+TL_INLINE int64_t values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, int n)
+{
+    const vi order = n == 4 ? order_of_quads() : vi_iota();
+    grad_span s = {.row = view->first_row - 1, .first = view->width, .bad_id = -1};
+    clear_band(view, v->out_da, 2 * v->n_wanted);
+    while (next_value_span(view, v, &s, n)) {
+        const int64_t at = s.row * view->width + s.first;
+        for (int i = 0; i * TL_LANES < s.n; i++) {
+            const span_lanes p = lanes_of_span(&s, i, order, n == 4);
+            const float *rast = (const float *)v->rast + 4 * (at + p.x);
+            vf uv[4], out[TL_FEW_COLUMNS];
+            if (n == 4)
+                load_some_quads(rast, p.n, uv);
+            else
+                load_some_columns(rast, 4, p.n, uv);
+            for (int c = 0; c < n; c++) {
+                const vf by_v = vf_fma(uv[1], pick_number(&p, 3 * c + 2), pick_number(&p, 3 * c));
+                out[c] = vf_select(p.is_shown, vf_fma(uv[0], pick_number(&p, 3 * c + 1), by_v), vf_set1(0.0f));
+            }
+            store_columns((float *)v->out + n * (at + p.x), p.n, out, n);
+        }
+        for (int r = 0; v->n_wanted && r < s.n_runs; r++) {
+            pixel_run run = {.id = s.ids[r], .at = at + s.begins[r], .n = s.begins[r + 1] - s.begins[r]};
+            int64_t rows[3];
+            if (run.id < 0)
+                continue;
+            attr_rows(view, run.id, n, rows);
+            slopes_of_run(v, &run, rows, 0);
+        }
+    }
+    return s.bad_id;
+}
+
+/* Whether numbers of attributes are below 2^31. */
+TL_INLINE int has_few_values(const tl_grad_values *v) { return v->n_attr < INT32_MAX / TL_FEW_COLUMNS; }
+
 /* See kernels.h. */
 static int64_t grad_values(const tl_grad_view *view, const tl_grad_values *v)
 {
     if (view->is_f64)
-        return values_of(view, v, 0, 1);
-    return v->n_columns == 3 ? values_of(view, v, 3, 0) : values_of(view, v, 0, 0);
+        return values_of(view, v, 1);
+    switch (has_few_values(v) ? v->n_columns : 0) {
+    case 1: return values_in_lanes(view, v, 1);
+    case 2: return values_in_lanes(view, v, 2);
+    case 3: return values_in_lanes(view, v, 3);
+    case 4: return values_in_lanes(view, v, 4);
+    default: return values_of(view, v, 0);
+    }
 }
 
 /* The gradients that derivatives of attributes give at the pixels of a run. */
@@ -138,37 +230,112 @@ TL_INLINE void pull_run(const tl_grad_values *v, const pixel_run *run, const int
     }
 }
 
-TL_INLINE int64_t pull_values(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int n_few,
-                              int is_f64)
+TL_INLINE int64_t pull_values(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int is_f64)
 {
-    const int64_t n_columns = n_few ? n_few : v->n_columns;
     double *to[3];
     int64_t rows[3];
     pixel_run run = before_shown(view);
     clear_band(view, v->g_rast, 4);
     clear_band(view, v->g_rast_db, 4);
     while (next_shown(view, v->rast, v->n_attr, &run, is_f64)) {
-        attr_rows(view, run.id, n_columns, rows);
+        attr_rows(view, run.id, v->n_columns, rows);
         corner_sums(view, sums, run.id, to);
-        if (n_few)
-            pull_run(v, &run, rows, 0, n_few, n_columns, to, is_f64);
-        for (int64_t c = 0; !n_few && c < n_columns; c += TL_FEW_COLUMNS) {
-            const int64_t n = n_columns - c;
-            pull_run(v, &run, rows, c, n < TL_FEW_COLUMNS ? (int)n : TL_FEW_COLUMNS, n_columns, to, is_f64);
+        for (int64_t c = 0; c < v->n_columns; c += TL_FEW_COLUMNS) {
+            const int64_t n = v->n_columns - c;
+            pull_run(v, &run, rows, c, n < TL_FEW_COLUMNS ? (int)n : TL_FEW_COLUMNS, v->n_columns, to, is_f64);
         }
         if (v->out_da)
             pull_slopes(v, &run, rows, to, is_f64);
     }
-    leave_band(sums);
     return run.bad_id;
+}
+
+/* Gradients of `rast` at the pixels of a span; and those of n attributes, a row of four each. */
+TL_INLINE void pull_value_span(grad_span *s, const float *g_out, float *g_rast, int n)
+{
+    const vi order = order_of_quads();
+    const vf zero = vf_set1(0.0f);
+    for (int i = 0; i * TL_LANES < s->n; i++) {
+        const span_lanes p = lanes_of_span(s, i, order, 1);
+        float column[TL_MAX_LANES];
+        vf g[4] = {zero, zero, zero, zero}, out[4] = {zero, zero, zero, zero};
+        if (n == 4)
+            load_some_quads(g_out + n * p.x, p.n, g);
+        else
+            load_some_columns(g_out + n * p.x, n, p.n, g);
+        for (int c = 0; c < n; c++) {
+            if (n < 4 && TL_LANES > 1) {
+                vf_store(column, g[c]);
+                g[c] = vf_pick(column, order);
+            }
+            for (int k = 0; k < 2; k++)
+                out[k] = vf_fma(g[c], pick_number(&p, 3 * c + 1 + k), out[k]);
+        }
+        for (int k = 0; k < 2; k++)
+            out[k] = vf_select(p.is_shown, out[k], zero);
+        for (int c = n; c < 4; c++)
+            g[c] = zero;
+        store_some_quads(g_rast + 4 * p.x, p.n, out);
+        store_some_quads(s->rows + 4 * p.x, p.n, g);
+    }
+}
+
+/* Adds the rows of the runs of a span to the sums of their corners, some at a time in float32. */
+TL_INLINE void close_value_span(const tl_grad_view *view, const grad_span *s, const float *rast, tl_grad_sums *sums,
+                                int n)
+{
+    for (int r = 0; r < s->n_runs; r++) {
+        double all[3][4] = {{0}}, *to[3];
+        if (s->ids[r] < 0)
+            continue;
+        for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) {
+            const int n_pixels = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
+            float sum[3][4] = {{0}};
+            sum_weighed_quads(s->rows + 4 * i, rast + 4 * i, 4, n_pixels, sum[0]);
+            sum_weighed_quads(s->rows + 4 * i, rast + 4 * i + 1, 4, n_pixels, sum[1]);
+            sum_quads(s->rows + 4 * i, n_pixels, sum[2]);
+            for (int k = 0; k < 3; k++)
+                for (int c = 0; c < 4; c++)
+                    all[k][c] += (double)sum[k][c];
+        }
+        corner_sums(view, sums, s->ids[r], to);
+        for (int c = 0; c < n; c++) {
+            to[0][c] += all[0][c], to[1][c] += all[1][c];
+            to[2][c] += all[2][c] - all[0][c] - all[1][c];
+        }
+    }
+}
+
+TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int n)
+{
+    grad_span s = {.row = view->first_row - 1, .first = view->width, .bad_id = -1};
+    while (next_value_span(view, v, &s, n)) {
+        const int64_t at = s.row * view->width + s.first;
+        pull_value_span(&s, (const float *)v->out + n * at, (float *)v->g_rast + 4 * at, n);
+        close_value_span(view, &s, (const float *)v->rast + 4 * at, sums, n);
+    }
+    return s.bad_id;
+}
+
+static int64_t pull_value_rows(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
+{
+    if (view->is_f64)
+        return pull_values(view, v, sums, 1);
+    switch (has_few_values(v) && !v->out_da ? v->n_columns : 0) {
+    case 1: return pull_values_in_lanes(view, v, sums, 1);
+    case 2: return pull_values_in_lanes(view, v, sums, 2);
+    case 3: return pull_values_in_lanes(view, v, sums, 3);
+    case 4: return pull_values_in_lanes(view, v, sums, 4);
+    default: return pull_values(view, v, sums, 0);
+    }
 }
 
 /* See kernels.h. */
 static int64_t grad_values_vjp(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
-    if (view->is_f64)
-        return pull_values(view, v, sums, 0, 1);
-    return v->n_columns == 3 ? pull_values(view, v, sums, 3, 0) : pull_values(view, v, sums, 0, 0);
+    const int64_t bad_id = pull_value_rows(view, v, sums);
+    leave_band(sums);
+    return bad_id;
 }
 
 #endif

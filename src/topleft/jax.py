@@ -304,6 +304,11 @@ def antialias(color: Array, rast: Array, pos: Array, tri: Array, *, edges: Edges
     return smooth(edges, color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)
 
 
+def outline_of(grid: PixelGrid, pos: Any) -> tensors.Outline:
+    """Return what the edges of triangles are."""
+    return tensors.outline_of(grid, pos, tensors.halves_across(grid.tri))
+
+
 def rule_of(edges: str) -> EdgeRule:
     """Return the rule of a word."""
     return EdgeRule[edges.replace("-", "_").upper()]
@@ -315,7 +320,7 @@ def smooth(edges: str, color: Array, rast: Array, pos: Array, tri: Array) -> Any
 
     def run(color: Any, rast: Any, pos: Any, tri: Any) -> Any:
         grid = grid_of(tri, rast, pos.shape[1])
-        return tensors.smooth(grid, rule_of(edges), pos, rast, tensors.halves_across(grid.tri), color)
+        return tensors.smooth(grid, rule_of(edges), outline_of(grid, pos), pos, rast, color)
 
     return call(run, like(color), color, rast, pos, tri)
 
@@ -331,7 +336,7 @@ def smooth_backward(edges: str, kept: Any, g: Array) -> Any:
 
     def run(color: Any, rast: Any, pos: Any, tri: Any, g: Any) -> Any:
         grid = grid_of(tri, rast, pos.shape[1])
-        return tensors.smooth_vjp(grid, rule_of(edges), pos, rast, tensors.halves_across(grid.tri), color, g)
+        return tensors.smooth_vjp(grid, rule_of(edges), outline_of(grid, pos), pos, rast, color, g)
 
     g_color, g_pos = call(run, like(color, pos), *kept, g)
     return g_color, jnp.zeros_like(rast), g_pos, no_gradient(tri)

@@ -1,7 +1,7 @@
 """PyTorch tensors on the CPU, in the calls and the conventions of nvdiffrast: `import topleft.torch as dr`.
 
 In and out: tensors of float32 (or float64) on the CPU, read without a copy. Each function is one call of the engine,
-which also computes its gradients, in float64, with the same bits for every number of threads. They are custom operators
+which also computes its gradients, with the same bits for every number of threads. They are custom operators
 of PyTorch (``torch.ops.topleft``), so `torch.compile` and `torch.vmap` take them. Needs PyTorch 2.5:
 ``pip install 'topleft[torch]'``.
 
@@ -14,28 +14,48 @@ High-Performance Differentiable Rendering", ACM Transactions on Graphics, 2020.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
 from topleft import DepthLayers, peel
-from topleft import rasterize as draw
-from topleft._core.base.arrays import as_pair, check_rows
+from topleft._core.base.arrays import as_pair
 from topleft._core.base.threads import parse_threads
-from topleft._core.gradients import tensors
-from topleft._core.gradients.bands import MIN_PX_PER_THREAD
-from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
+from topleft._core.gradients.tensors import EdgeRule, TexelFilter, TexelsBeyond
 from topleft.errors import MissingPackageError
-from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption
+from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption, LossOption
 
 try:
     import torch
     from torch import Tensor
 except ImportError:
     raise MissingPackageError("topleft.torch needs PyTorch: pip install torch") from None
+
+from topleft._torch.checks import (
+    INTS,
+    KINDS,
+    as_diff_attrs,
+    as_mip,
+    check,
+    check_texture,
+    check_tri,
+    is_cube_map,
+    is_tensor,
+    len_of,
+    same_dtype,
+)
+from topleft._torch.operators import (
+    draw_ids,
+    each,
+    halves_across,
+    interpolate_values,
+    joined,
+    look_up,
+    outline,
+    points_of_ids,
+    smooth,
+    squares,
+    threads_of,
+)
 
 __all__ = [
     "DepthPeeler",
@@ -46,15 +66,12 @@ __all__ = [
     "antialias_construct_topology_hash",
     "get_log_level",
     "interpolate",
+    "photometric_loss",
     "rasterize",
     "set_log_level",
     "texture",
     "texture_construct_mip",
 ]
-
-#: The largest id that float32 counts up to; the bits of larger ones are counted on from there.
-LAST_EXACT_ID = 1 << 24
-BITS_OF_LAST = 0x4B800000
 
 #: `DepthPeeler` draws so many layers at first, and doubles them up to what `topleft.peel` keeps.
 FIRST_LAYERS, MOST_LAYERS = 4, 16
@@ -166,8 +183,9 @@ def rasterize(
     Notes
     -----
     The engine decides the id after it has snapped vertices to 1/256 pixel, under the top-left rule. Weights, z/w and
-    derivatives are those of the vertices as given, computed in float64 and clamped: weights to a sum of at most 1, z/w
-    to -1..1. float32 counts to 2**24: bits of larger ids are counted on from those of 2**24, as in nvdiffrast.
+    derivatives are those of the vertices as given, clamped: weights to a sum of at most 1, z/w to -1..1. Of float32 a
+    run of pixels is set up in float64, and its pixels are float32: within 2**-21 of float64. float32 counts to 2**24:
+    bits of larger ids are counted on from those of 2**24, as in nvdiffrast.
 
     Examples
     --------
@@ -522,15 +540,100 @@ def antialias(
     fits = is_tensor(pos) and pos.ndim in (2, 3) and pos.shape[-1] == 4 and len_of(pos) in (1, len(color))
     check("pos", pos, f"(V, 4), (1, V, 4) or ({len(color)}, V, 4)", fits)
     check_tri(tri)
+    rule = rule_of(edges)
+    across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
+    given, points_of, vertices = same_dtype(color, (rast, len(tri)), pos)
+    mesh = vertices if vertices.ndim == 3 else vertices[None]
+    of_edges = [across.to(torch.int32), *outline(mesh.detach(), tri, across, *color.shape[1:3])]
+    out = smooth(given, points_of, mesh, tri, of_edges, int(rule), float(pos_gradient_boost))
+    return out.to(color.dtype)
+
+
+def photometric_loss(
+    glctx: RasterizeContext,
+    pos: Tensor,
+    tri: Tensor,
+    attr: Tensor,
+    target: Tensor,
+    topology_hash: Tensor | None = None,
+    *,
+    loss: LossOption = "l2",
+    edges: EdgesOption = "area",
+) -> Tensor:
+    """Return how far pictures of a mesh are off others: `rasterize`, `interpolate`, `antialias` and a loss in one.
+
+    Rows are drawn, compared and led back a few at a time: no picture is kept, so it takes less time and memory than
+    the functions one after the other. Its gradients have the same bits.
+
+    Parameters
+    ----------
+    glctx : RasterizeContext
+        As in `rasterize`.
+    pos : tensor of float32 or float64, shape (B, V, 4)
+        As in `rasterize`.
+    tri : tensor of int32 or int64, shape (T, 3)
+        Indices of rows of `pos` and of `attr`.
+    attr : tensor of float32 or float64, shape (V, K), (1, V, K) or (B, V, K)
+        Colours, or other numbers, of the vertices; ones for a silhouette.
+    target : tensor, shape (B, H, W, K)
+        What the pictures are to be; row 0 is the bottom row. It gets no gradient.
+    topology_hash : tensor, shape (T, 3), optional
+        As in `antialias`.
+    loss : {"l2"}
+        The mean of the squared differences.
+    edges : {"area", "silhouette", "straight-through"}
+        As in `antialias`.
+
+    Returns
+    -------
+    tensor, shape ()
+        Gradients reach `pos` and `attr`.
+
+    Raises
+    ------
+    TypeError
+        For what is no tensor, is not on the CPU, or has a wrong dtype.
+    ValueError
+        For a wrong shape, an unknown option, or a vertex in use that is not finite.
+    IndexError
+        For a triangle that names a vertex or a row of `attr` that does not exist.
+
+    Examples
+    --------
+    >>> pos = torch.tensor([[[-1.0, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]]], requires_grad=True)
+    >>> context, tri = RasterizeContext(), torch.tensor([[0, 1, 2]])
+    >>> photometric_loss(context, pos, tri, torch.ones(3, 1), torch.zeros(1, 2, 2, 1)).item()
+    1.0
+    """
+    check_mesh(glctx, pos, tri, None)
+    check("target", target, "(B, H, W, K)", is_tensor(target) and target.ndim == 4 and len(target) == len(pos))
+    fits = (
+        is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, len(pos)) and attr.shape[-1] == target.shape[3]
+    )
+    check("attr", attr, f"(V, {target.shape[3]}), with 1 or {len(pos)} before", fits)
+    if loss not in get_args(LossOption):
+        raise ValueError(f"loss must be 'l2', got {loss!r}")
+    rule, (height, width) = rule_of(edges), target.shape[1:3]
+    across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
+    mesh, values, wished = same_dtype(pos, attr if attr.ndim == 3 else attr[None], target.detach())
+    ids = draw_ids(pos.detach(), tri, None, height, width, glctx.threads or 0)
+    of_edges = [across.to(torch.int32), *outline(mesh.detach(), tri, across, height, width)]
+    found: Tensor = squares(mesh, tri, values, wished, ids, of_edges, int(rule), glctx.threads or 0)[0]
+    return found
+
+
+def rule_of(edges: str) -> EdgeRule:
+    """Return the rule of a word."""
     if edges not in get_args(EdgesOption):
         raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
-    across = halves_across(tri) if topology_hash is None else topology_hash
-    if across.shape != tri.shape:
-        raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(across.shape)}")
-    given, points_of, vertices = same_dtype(color, (rast, len(tri)), pos)
-    rule, mesh = EdgeRule[edges.replace("-", "_").upper()], vertices if vertices.ndim == 3 else vertices[None]
-    out = smooth(given, points_of, mesh, tri, across, int(rule), float(pos_gradient_boost))
-    return out.to(color.dtype)
+    return EdgeRule[edges.replace("-", "_").upper()]
+
+
+def checked_hash(topology_hash: Tensor, tri: Tensor) -> Tensor:
+    """Return what lies across edges, of the shape of `tri`."""
+    if topology_hash.shape != tri.shape:
+        raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(topology_hash.shape)}")
+    return topology_hash
 
 
 def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
@@ -547,7 +650,7 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
     -------
     tensor of int32, shape (T, 3)
         Column i belongs to the edge that corner i is not on: 3 times the other triangle there plus its corner that is
-        not on it, -1 if there is none.
+        not on it, -1 if there is none; -2 less that where the two are wound differently, or there are more.
 
     Raises
     ------
@@ -564,393 +667,12 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
     return halves_across(tri)
 
 
-# Operators: tensors to the engine and back. `threads` is that of a context, 0 where PyTorch's number counts.
-
-
-def threads_of(threads: int | None, n_px: int) -> int:
-    """Return how many threads draw some pixels: those asked for, or as many of PyTorch's as pay."""
-    return threads or max(1, min(torch.get_num_threads(), n_px // MIN_PX_PER_THREAD))
-
-
-def numpy_of(tensor: Tensor | None) -> Any:
-    """Return the array that a tensor is, contiguous; None for None."""
-    return None if tensor is None else tensor.detach().resolve_neg().contiguous().numpy()
-
-
-def triangles_of(tri: Tensor, n_vertices: int) -> NDArray[np.int32]:
-    """Return triangles whose vertices exist."""
-    if tri.dtype == torch.int64 and tri.numel() and not -(2**31) <= int(tri.min()) <= int(tri.max()) < 2**31:
-        raise IndexError(f"triangles must hold indices in [0, {n_vertices}), got {int(tri.min())} to {int(tri.max())}")
-    array: NDArray[np.int32] = numpy_of(tri.to(torch.int32))
-    check_rows(array, n_vertices)
-    return array
-
-
-def grid_of(tri: Tensor, pixels: Tensor, n_vertices: int) -> PixelGrid:
-    """Return the pictures (B, H, W, ...) of triangles."""
-    b, h, w = pixels.shape[:3]
-    return PixelGrid(triangles_of(tri, n_vertices), b, h, w, threads_of(0, b * h * w))
-
-
-def each(pos: Tensor, tri: Tensor, ranges: Tensor | None) -> list[tuple[Any, Any]]:
-    """Return of each picture its vertices and triangles; arrays share the memory of the tensors."""
-    vertices, triangles = numpy_of(pos), numpy_of(tri)
-    if ranges is None:
-        return [(one, triangles) for one in vertices]
-    return [(vertices, triangles[first : first + count]) for first, count in ranges.tolist()]
-
-
-def joined(pictures: list[NDArray[np.int32]], shape: tuple[int, ...]) -> NDArray[np.int32]:
-    """Return pictures as one array; of one picture itself."""
-    return (
-        pictures[0][None] if len(pictures) == 1 else np.stack(pictures) if pictures else np.empty((0, *shape), np.int32)
-    )
-
-
-def operator(signature: str, fake: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
-    """Make an operator of a function; `fake` tells the shapes of its results. A sample of `torch.vmap` is a call."""
-
-    def made(function: Callable[..., Any]) -> Any:
-        op = torch.library.custom_op(f"topleft::{function.__name__}", function, mutates_args=(), schema=signature)
-        op.register_fake(fake)
-
-        def one_by_one(info: Any, in_dims: Sequence[Any], *args: Any) -> tuple[Any, Any]:
-            found = [op(*sample(args, in_dims, i)) for i in range(info.batch_size)]
-            if isinstance(found[0], Tensor):
-                return torch.stack(found), 0
-            return type(found[0])(map(torch.stack, zip(*found, strict=True))), type(found[0])(0 for _ in found[0])
-
-        op.register_vmap(one_by_one)
-        return op
-
-    return made
-
-
-def sample(args: Sequence[Any], dims: Sequence[Any], i: int) -> list[Any]:
-    """Return the arguments of one sample of a batch."""
-    return [
-        sample(arg, dim, i) if isinstance(arg, list | tuple) and isinstance(dim, list | tuple)
-        else arg if dim is None else arg.select(dim, i)
-        for arg, dim in zip(args, dims, strict=True)
-    ]  # fmt: skip
-
-
-def once(*_: Any) -> None:
-    """Refuse gradients of gradients."""
-    raise NotImplementedError("topleft.torch has first derivatives: gradients of its gradients are not computed")
-
-
-def like(tensor: Tensor | None, other: Tensor) -> Tensor:
-    """Return memory as a tensor has it, or none."""
-    return other.new_empty(0) if tensor is None else torch.empty_like(tensor, memory_format=torch.contiguous_format)
-
-
-def tensor_of(array: Any, other: Tensor) -> Tensor:
-    """Return the tensor that an array is, without elements for None."""
-    return other.new_empty(0) if array is None else torch.from_numpy(array)
-
-
-@operator(
-    "(Tensor pos, Tensor tri, Tensor? ranges, int height, int width, int threads) -> Tensor",
-    lambda pos, tri, ranges, height, width, threads: pos.new_empty(  # noqa: ARG005
-        (len(pos if ranges is None else ranges), height, width), dtype=torch.int32
-    ),
-)
-def draw_ids(pos: Tensor, tri: Tensor, ranges: Tensor | None, height: int, width: int, threads: int) -> Tensor:
-    """Return which triangle of its range shows in each pixel, int32 (B, H, W), -1 for none; row 0 on top."""
-    n = threads_of(threads, height * width)
-    drawn = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, ranges)]
-    return torch.from_numpy(joined(drawn, (height, width)))
-
-
-@operator(
-    "(Tensor pos, Tensor tri, Tensor ids, Tensor? ranges, bool with_db) -> (Tensor, Tensor)",
-    lambda pos, tri, ids, ranges, with_db: (  # noqa: ARG005
-        pos.new_empty((*ids.shape, 4)),
-        pos.new_empty((*ids.shape, 4 if with_db else 0)),
-    ),
-)
-def points_of_ids(pos: Tensor, tri: Tensor, ids: Tensor, ranges: Tensor | None, with_db: bool) -> tuple[Tensor, Tensor]:
-    """Return `rast` and `rast_db`."""
-    grid = grid_of(tri, ids, pos.shape[-2])
-    firsts = [0] * len(ids) if ranges is None else ranges[:, 0].tolist()
-    vertices = numpy_of(pos if ranges is None else pos[None])
-    pictures = list(zip(numpy_of(ids), firsts, strict=True))
-    rast, rast_db = tensors.points(grid, vertices, pictures, is_flipped=True, with_db=with_db)
-    return torch.from_numpy(rast), torch.from_numpy(rast_db)
-
-
-@operator(
-    "(Tensor pos, Tensor tri, Tensor rast, Tensor g_rast, Tensor? g_db) -> Tensor",
-    lambda pos, tri, rast, g_rast, g_db: like(pos, pos),  # noqa: ARG005
-)
-def points_vjp(pos: Tensor, tri: Tensor, rast: Tensor, g_rast: Tensor, g_db: Tensor | None) -> Tensor:
-    """Return the gradient of `pos`."""
-    vertices = pos if pos.ndim == 3 else pos[None]
-    slopes = numpy_of(g_db) if g_db is not None and g_db.numel() else None
-    grid = grid_of(tri, rast, pos.shape[-2])
-    found = tensors.points_vjp(grid, numpy_of(vertices), numpy_of(rast), numpy_of(g_rast), slopes)
-    return torch.from_numpy(found).reshape(pos.shape)
-
-
-@operator(
-    "(Tensor attr, Tensor rast, Tensor tri, Tensor? rast_db, int[] wanted) -> (Tensor, Tensor)",
-    lambda attr, rast, tri, rast_db, wanted: (  # noqa: ARG005
-        attr.new_empty((*rast.shape[:3], attr.shape[2])),
-        attr.new_empty((*rast.shape[:3], 2 * len(wanted))),
-    ),
-)
-def interpolate_values(
-    attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Tensor | None, wanted: list[int]
-) -> tuple[Tensor, Tensor]:
-    """Return attributes, and what they change by."""
-    grid = grid_of(tri, rast, attr.shape[1])
-    out, out_da = tensors.values(grid, numpy_of(attr), numpy_of(rast), numpy_of(rast_db), wanted)
-    return torch.from_numpy(out), torch.from_numpy(out_da)
-
-
-@operator(
-    "(Tensor attr, Tensor rast, Tensor tri, Tensor? rast_db, int[] wanted, Tensor g_out, Tensor? g_da)"
-    " -> (Tensor, Tensor, Tensor)",
-    lambda attr, rast, tri, rast_db, wanted, g_out, g_da: (  # noqa: ARG005
-        like(attr, attr),
-        like(rast, attr),
-        like(rast if g_da is not None else None, attr),
-    ),
-)
-def interpolate_vjp(
-    attr: Tensor,
-    rast: Tensor,
-    tri: Tensor,
-    rast_db: Tensor | None,
-    wanted: list[int],
-    g_out: Tensor,
-    g_da: Tensor | None,
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Return the gradients of `attr`, `rast` and `rast_db`."""
-    grid = grid_of(tri, rast, attr.shape[1])
-    slopes = numpy_of(rast_db if g_da is not None else None)
-    given = numpy_of(attr), numpy_of(rast), numpy_of(g_out), slopes, numpy_of(g_da)
-    g_attr, g_rast, g_db = tensors.values_vjp(grid, *given, wanted)
-    return torch.from_numpy(g_attr), torch.from_numpy(g_rast), tensor_of(g_db, attr)
-
-
-def look_of(
-    levels: Sequence[Tensor], uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, how: int, beyond: int
-) -> TexelLook:
-    """Return what the engine looks up."""
-    where = numpy_of(uv), numpy_of(uv_da), numpy_of(bias)
-    return TexelLook(
-        [numpy_of(one) for one in levels],
-        TexelFilter(how),
-        TexelsBeyond(beyond),
-        *where,
-        threads_of(0, uv[..., 0].numel()),
-    )
-
-
-@operator(
-    "(Tensor[] levels, Tensor uv, Tensor? uv_da, Tensor? bias, int how, int beyond) -> Tensor",
-    lambda levels, uv, uv_da, bias, how, beyond: uv.new_empty((*uv.shape[:3], levels[0].shape[-1])),  # noqa: ARG005
-)
-def look_up(
-    levels: Sequence[Tensor], uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, how: int, beyond: int
-) -> Tensor:
-    """Return a texture at each pixel."""
-    return torch.from_numpy(tensors.texels(look_of(levels, uv, uv_da, bias, how, beyond)))
-
-
-@operator(
-    "(Tensor[] levels, Tensor uv, Tensor? uv_da, Tensor? bias, int how, int beyond, Tensor g_out) -> Tensor[]",
-    lambda levels, uv, uv_da, bias, how, beyond, g_out: [  # noqa: ARG005
-        *(like(one, uv) for one in levels), like(uv, uv), like(uv_da, uv), like(bias, uv)
-    ],
-)  # fmt: skip
-def look_up_vjp(
-    levels: Sequence[Tensor],
-    uv: Tensor,
-    uv_da: Tensor | None,
-    bias: Tensor | None,
-    how: int,
-    beyond: int,
-    g_out: Tensor,
-) -> list[Tensor]:
-    """Return the gradients of the levels, of uv, of the footprints and of the biases."""
-    look = look_of(levels, uv, uv_da, bias, how, beyond)
-    g_levels, *where = tensors.texels_vjp(look, numpy_of(g_out))
-    return [*map(torch.from_numpy, g_levels), *(tensor_of(one, uv) for one in where)]
-
-
-#: Triangles, and what lies across their edges, of the last calls.
-known: deque[tuple[NDArray[np.int32], NDArray[np.int32]]] = deque(maxlen=4)
-
-
-@operator("(Tensor tri) -> Tensor", lambda tri: tri.new_empty(tri.shape, dtype=torch.int32))
-def halves_across(tri: Tensor) -> Tensor:
-    """Return the triangle across each edge."""
-    own = numpy_of(tri.to(torch.int32))
-    for triangles, across in list(known):
-        if triangles.shape == own.shape and np.array_equal(triangles, own):
-            return torch.from_numpy(across.copy())
-    found = tensors.halves_across(own)
-    known.append((own.copy(), found))
-    return torch.from_numpy(found.copy())
-
-
-@operator(
-    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor across, int rule, float boost) -> Tensor",
-    lambda color, rast, pos, tri, across, rule, boost: like(color, color),  # noqa: ARG005
-)
-def smooth(
-    color: Tensor,
-    rast: Tensor,
-    pos: Tensor,
-    tri: Tensor,
-    across: Tensor,
-    rule: int,
-    boost: float,  # noqa: ARG001
-) -> Tensor:
-    """Return the picture with smooth silhouettes."""
-    grid = grid_of(tri, rast, pos.shape[1])
-    arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color))
-    return torch.from_numpy(tensors.smooth(grid, EdgeRule(rule), *arrays))
-
-
-@operator(
-    "(Tensor color, Tensor rast, Tensor pos, Tensor tri, Tensor across, int rule, Tensor g_out) -> (Tensor, Tensor)",
-    lambda color, rast, pos, tri, across, rule, g_out: (like(color, color), like(pos, pos)),  # noqa: ARG005
-)
-def smooth_vjp(
-    color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, across: Tensor, rule: int, g_out: Tensor
-) -> tuple[Tensor, Tensor]:
-    """Return the gradients of the colours and of `pos`."""
-    grid = grid_of(tri, rast, pos.shape[1])
-    arrays = map(numpy_of, (pos, rast, across.to(torch.int32), color, g_out))
-    g_color, g_pos = tensors.smooth_vjp(grid, EdgeRule(rule), *arrays)
-    return torch.from_numpy(g_color), torch.from_numpy(g_pos)
-
-
-# What backward calls
-
-
-def filled(gradient: Tensor | None, shape: Sequence[int], other: Tensor) -> Tensor:
-    """Return a gradient, zeros for None."""
-    return other.new_zeros(shape) if gradient is None else gradient
-
-
-def keep_points(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:
-    """Keep what `points_vjp` takes."""
-    ctx.set_materialize_grads(False)
-    ctx.save_for_backward(inputs[0], inputs[1], output[0])
-
-
-def pull_points(ctx: Any, g_rast: Tensor | None, g_db: Tensor | None) -> tuple[Any, ...]:
-    """Return the gradients of what `points_of_ids` takes."""
-    pos, tri, rast = ctx.saved_tensors
-    return points_vjp(pos, tri, rast, filled(g_rast, rast.shape, rast), g_db), None, None, None, None
-
-
-def keep_values(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:  # noqa: ARG001
-    """Keep what `interpolate_vjp` takes."""
-    ctx.set_materialize_grads(False)
-    attr, rast, tri, rast_db, ctx.wanted = inputs
-    ctx.save_for_backward(attr, rast, tri, rast_db)
-
-
-def pull_values(ctx: Any, g_out: Tensor | None, g_da: Tensor | None) -> tuple[Any, ...]:
-    """Return the gradients of what `interpolate_values` takes."""
-    attr, rast, tri, rast_db = ctx.saved_tensors
-    given = filled(g_out, (*rast.shape[:3], attr.shape[2]), attr)
-    has_da = g_da is not None and len(ctx.wanted) > 0
-    g_attr, g_rast, g_db = interpolate_vjp(attr, rast, tri, rast_db, ctx.wanted, given, g_da if has_da else None)
-    return g_attr, g_rast, None, g_db if has_da else None, None
-
-
-def keep_look(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
-    """Keep what `look_up_vjp` takes."""
-    levels, uv, uv_da, bias, ctx.how, ctx.beyond = inputs
-    ctx.n_levels = len(levels)
-    ctx.save_for_backward(uv, uv_da, bias, *levels)
-
-
-def pull_look(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
-    """Return the gradients of what `look_up` takes."""
-    uv, uv_da, bias, *levels = ctx.saved_tensors
-    found = look_up_vjp(levels, uv, uv_da, bias, ctx.how, ctx.beyond, g_out)
-    g_uv, g_da, g_bias = found[ctx.n_levels :]
-    return (
-        found[: ctx.n_levels], g_uv, None if uv_da is None else g_da, None if bias is None else g_bias, None, None
-    )  # fmt: skip
-
-
-def keep_edges(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
-    """Keep what `smooth_vjp` takes."""
-    *kept, ctx.rule, ctx.boost = inputs
-    ctx.save_for_backward(*kept)
-
-
-def pull_edges(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
-    """Return the gradients of what `smooth` takes."""
-    g_color, g_pos = smooth_vjp(*ctx.saved_tensors, ctx.rule, g_out)
-    return g_color, None, g_pos if ctx.boost == 1 else ctx.boost * g_pos, None, None, None, None
-
-
-points_of_ids.register_autograd(pull_points, setup_context=keep_points)
-interpolate_values.register_autograd(pull_values, setup_context=keep_values)
-look_up.register_autograd(pull_look, setup_context=keep_look)
-smooth.register_autograd(pull_edges, setup_context=keep_edges)
-for vjp in (points_vjp, interpolate_vjp, look_up_vjp, smooth_vjp):
-    vjp.register_autograd(once)
-
-
 def points(
     glctx: RasterizeContext, pos: Tensor, tri: Tensor, ranges: Tensor | None, ids: Tensor, *, grad_db: bool
 ) -> tuple[Tensor, Tensor]:
     """Return `rast` and `rast_db` of ids (B, H, W) with row 0 on top."""
     rast, rast_db = points_of_ids(pos, tri, ids, ranges, glctx.output_db)
     return rast, rast_db if grad_db else rast_db.detach()
-
-
-# Checks
-
-
-def is_tensor(value: object) -> bool:
-    """Tell whether this is a tensor of PyTorch."""
-    return isinstance(value, Tensor)
-
-
-def is_cube_map(tex: object) -> bool:
-    """Tell whether this is a tensor (B, 6, N, N, C)."""
-    return isinstance(tex, Tensor) and tex.ndim == 5 and tex.shape[1] == 6 and tex.shape[2] == tex.shape[3] > 0
-
-
-def len_of(tensor: Tensor) -> int:
-    """Return the number of pictures of (B, N, K), 1 for (N, K)."""
-    return len(tensor) if tensor.ndim == 3 else 1
-
-
-#: What tensors may hold, and the words for it; those of attributes, textures and colours come in half precision, too.
-FLOATS = (torch.float32, torch.float64), "float32 or float64"
-INTS = (torch.int32, torch.int64), "int32 or int64"
-KINDS = (*FLOATS[0], torch.float16, torch.bfloat16), "float16, bfloat16, float32 or float64"
-
-
-def check(name: str, value: object, wish: str, has_shape: object, kinds: tuple[tuple[Any, ...], str] = FLOATS) -> None:
-    """Raise an error unless this is a tensor of numbers on the CPU that has the shape wished for."""
-    if not isinstance(value, Tensor):
-        raise TypeError(f"{name} must be a torch.Tensor, got {type(value).__name__}")
-    if value.device.type != "cpu":
-        raise TypeError(f"{name} must be on the CPU, got device {str(value.device)!r}: pass {name}.cpu()")
-    if value.dtype not in kinds[0]:
-        hint = f": pass {name}.float() / 255" if value.dtype == torch.uint8 else ""
-        raise TypeError(f"{name} must be {kinds[1]}, got {value.dtype}{hint}")
-    if not has_shape:
-        raise ValueError(f"{name} must have shape {wish}, got {tuple(value.shape)}")
-
-
-def check_tri(tri: Tensor) -> None:
-    """Check triangles, but for their indices."""
-    check("tri", tri, "(T, 3)", is_tensor(tri) and tri.ndim == 2 and tri.shape[1] == 3, INTS)
 
 
 def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> None:
@@ -967,70 +689,3 @@ def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -
     for i, (first, count) in enumerate(ranges.tolist()):
         if not 0 <= first <= first + count <= len(tri):
             raise ValueError(f"ranges must lie within the {len(tri)} triangles, row {i} is {[first, count]}")
-
-
-def same_dtype(*given: Any) -> list[Any]:
-    """Return tensors in the widest of their dtypes, float32 at least; None stays.
-
-    A pair is `rast` with the number of its triangles, whose ids change with the dtype.
-    """
-    kinds = [one[0].dtype if isinstance(one, tuple) else one.dtype for one in given if one is not None]
-    dtype = torch.float64 if torch.float64 in kinds else torch.float32
-    return [
-        None if one is None else with_ids(one[0], one[1], dtype) if isinstance(one, tuple) else one.to(dtype)
-        for one in given
-    ]
-
-
-def with_ids(rast: Tensor, n_triangles: int, dtype: torch.dtype) -> Tensor:
-    """Return `rast` in another dtype: float32 counts up to 2**24, and from there on its bits are counted."""
-    if rast.dtype == dtype or n_triangles <= LAST_EXACT_ID:
-        return rast.to(dtype)
-    bits = rast[..., 3].detach().contiguous().view(torch.int32).double() - BITS_OF_LAST + LAST_EXACT_ID
-    ids = torch.where(rast[..., 3] > LAST_EXACT_ID, bits, rast[..., 3].double())
-    return torch.cat([rast[..., :3].to(dtype), ids[..., None]], -1)
-
-
-def check_texture(tex: Tensor, uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, boundary_mode: str) -> None:
-    """Check what `texture` is given."""
-    if boundary_mode not in get_args(BoundaryOption):
-        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
-    is_cube = boundary_mode == "cube"
-    n_axes = 3 if is_cube else 2
-    check("uv", uv, f"(B, H, W, {n_axes})", is_tensor(uv) and uv.ndim == 4 and uv.shape[3] == n_axes)
-    n_pictures = len(uv)
-    if is_cube:
-        wish = f"(1, 6, N, N, C) or ({n_pictures}, 6, N, N, C) with boundary_mode 'cube'"
-        fits = is_cube_map(tex) and len(tex) in (1, n_pictures)
-    else:
-        wish = f"(1, Ht, Wt, C) or ({n_pictures}, Ht, Wt, C)"
-        fits = is_tensor(tex) and tex.ndim == 4 and len(tex) in (1, n_pictures) and 0 not in tex.shape[1:]
-    check("tex", tex, wish, fits, KINDS)
-    of_uv_da = (*uv.shape[:3], 2 * n_axes)
-    for name, given, shape in (("uv_da", uv_da, of_uv_da), ("mip_level_bias", bias, tuple(uv.shape[:3]))):
-        if given is not None:
-            check(name, given, str(tuple(shape)), is_tensor(given) and tuple(given.shape) == tuple(shape))
-
-
-def as_mip(tex: Tensor, mip: Sequence[Tensor], max_mip_level: int | None) -> Sequence[Tensor]:
-    """Check the levels after a texture."""
-    height, width = tex.shape[-3:-1]
-    for k, level in enumerate(mip):
-        height, width = max(1, height // 2), max(1, width // 2)
-        wish = (*tex.shape[:-3], height, width, tex.shape[-1])
-        check(f"mip[{k}]", level, str(wish), is_tensor(level) and tuple(level.shape) == wish, KINDS)
-    return mip[:max_mip_level]
-
-
-def as_diff_attrs(diff_attrs: str | Sequence[int] | None, n_attrs: int) -> list[int]:
-    """Return the columns whose derivatives are wanted."""
-    if diff_attrs is None:
-        return []
-    if isinstance(diff_attrs, str):
-        if diff_attrs != "all":
-            raise ValueError(f"diff_attrs must be 'all', integers or None, got {diff_attrs!r}")
-        return list(range(n_attrs))
-    wanted = [int(k) for k in diff_attrs]
-    if any(not -n_attrs <= k < n_attrs for k in wanted):
-        raise IndexError(f"diff_attrs must lie in [0, {n_attrs}), the number of attributes, got {wanted}")
-    return [k % n_attrs for k in wanted]

@@ -24,6 +24,7 @@ __all__ = [
     "FitOption",
     "LayerOption",
     "LightKindOption",
+    "LossOption",
     "MethodOption",
     "OnErrorOption",
     "OrderOption",
@@ -142,5 +143,6 @@ ZarrCompressionOption: TypeAlias = Literal["gzip", "zstd", "none"]
 # `topleft.torch`, in the words of nvdiffrast
 
 BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero", "cube"]
+LossOption: TypeAlias = Literal["l2"]
 EdgesOption: TypeAlias = Literal["silhouette", "area", "straight-through"]
 FilterModeOption: TypeAlias = Literal["auto", "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"]

@@ -104,13 +104,19 @@ def test_words_of_topleft_torch_are_taken_and_no_others():
         shape = (1, 6, 2, 2, 1) if cube else (1, 2, 2, 1)
         points = torch.ones(1, 1, 1, 3) if cube else uv
         dr.texture(torch.zeros(shape), points, boundary_mode=boundary, filter_mode="linear")
+    pos, ones = torch.tensor([[[-1.0, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]]]), torch.ones(1, 3, 1)
+    given = dr.RasterizeContext(), pos, torch.tensor([[0, 1, 2]]), ones, torch.ones(1, 2, 2, 1)
+    for loss in get_args(words.LossOption):
+        assert dr.photometric_loss(*given, loss=loss).item() == 0
+    with pytest.raises(ValueError, match="must be"):
+        dr.photometric_loss(*given, loss="wrong")
     for wrong in ({"filter_mode": "wrong"}, {"boundary_mode": "wrong"}):
         with pytest.raises(ValueError, match="must be"):
             dr.texture(torch.zeros(1, 2, 2, 1), uv, **wrong)
 
 
 def test_every_type_is_tested():
-    assert set(words.__all__) == {*TAKEN, *READ, "BoundaryOption", "FilterModeOption"}
+    assert set(words.__all__) == {*TAKEN, *READ, "BoundaryOption", "FilterModeOption", "LossOption"}
 
 
 def public_callables():

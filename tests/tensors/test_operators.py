@@ -201,3 +201,60 @@ def test_unknown_rules_are_refused():
         dr.antialias(
             torch.ones(1, 2, 2, 1), torch.zeros(1, 2, 2, 4), torch.ones(3, 4), torch.tensor([[0, 1, 2]]), edges="all"
         )
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("edges", EDGES)
+@pytest.mark.parametrize(("dtype", "channels"), [(torch.float32, 3), (torch.float32, 5), (torch.float64, 1)])
+def test_loss_in_one_has_the_bits_of_its_parts(isa, edges, dtype, channels):
+    pos, tri, _ = sphere(2, dtype)
+    generator = torch.Generator().manual_seed(3)
+    attr = torch.rand(pos.shape[1], channels, generator=generator, dtype=dtype)
+    target, found = torch.rand(2, 93, 70, channels, generator=generator, dtype=dtype), []
+    with on(isa):
+        for in_one in (True, False):
+            given = [one.clone().requires_grad_() for one in (pos, attr)]
+            if in_one:
+                loss = dr.photometric_loss(CTX, given[0], tri, given[1], target, edges=edges)
+            else:
+                rast, _ = dr.rasterize(CTX, given[0], tri, (93, 70))
+                out, _ = dr.interpolate(given[1], rast, tri)
+                loss = (dr.antialias(out, rast, given[0], tri, edges=edges) - target).square().mean()
+            found.append((loss.detach(), *torch.autograd.grad(loss, given)))
+    assert abs(found[0][0] - found[1][0]) < 1e-6
+    assert found[0][1].any()
+    assert torch.equal(found[0][1], found[1][1])
+    assert torch.equal(found[0][2], found[1][2])
+
+
+@pytest.mark.parametrize("size", [(600, 300), (7, 3), (1, 1)])
+def test_loss_in_one_of_any_threads_and_size_has_the_bits_of_its_parts(threads, size):
+    pos, tri, colours = sphere()
+    target, found = torch.zeros(1, *size, 3), []
+    for n in (1, 3):
+        threads(n)
+        given = [one.clone().requires_grad_() for one in (pos, colours)]
+        found.append(torch.autograd.grad(5 * dr.photometric_loss(CTX, given[0], tri, given[1], target), given))
+    given = [one.clone().requires_grad_() for one in (pos, colours)]
+    rast, _ = dr.rasterize(CTX, given[0], tri, size)
+    out = dr.antialias(dr.interpolate(given[1], rast, tri)[0], rast, given[0], tri, edges="area")
+    parts = torch.autograd.grad(out.square().mean(), given)
+    assert all(torch.equal(a, b) for a, b in zip(found[0], found[1], strict=True))
+    assert all(torch.equal(a, 5 * b) for a, b in zip(found[0], parts, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "message"),
+    [
+        ({"target": torch.zeros(2, 4, 4, 3)}, ValueError, "target must have shape (B, H, W, K), got (2, 4, 4, 3)"),
+        ({"attr": torch.zeros(3, 2)}, ValueError, "attr must have shape (V, 3), with 1 or 1 before, got (3, 2)"),
+        ({"loss": "l3"}, ValueError, "loss must be 'l2', got 'l3'"),
+        ({"edges": "none"}, ValueError, "edges must be 'silhouette', 'area' or 'straight-through', got 'none'"),
+        ({"attr": torch.zeros(2, 3)}, IndexError, "[0, 2)"),
+    ],
+)
+def test_loss_of_wrong_arguments_raises(change, kind, message):
+    pos, tri = torch.tensor([[[-1.0, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]]]), torch.tensor([[0, 1, 2]])
+    given = {"pos": pos, "tri": tri, "attr": torch.ones(3, 3), "target": torch.zeros(1, 4, 4, 3)} | change
+    with pytest.raises(kind, match=re.escape(message)):
+        dr.photometric_loss(CTX, **given)

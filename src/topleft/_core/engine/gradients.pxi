@@ -2,6 +2,8 @@
 
 MOST_LEVELS = TL_MOST_LEVELS
 SUMS_OF_FACE = TL_SUMS_OF_FACE
+IDS_ROOM = TL_IDS_ROOM
+LOSS_WINDOW = TL_LOSS_WINDOW
 
 
 cdef const void *first_of(array: object):
@@ -117,11 +119,18 @@ cdef class GradientView:
         with nogil:
             K.grad_texels_vjp(&view, &t, &sums.sums)
 
-    def edges(self, const int32_t[:, ::1] across, uint8_t[::1] known, int32_t[:, ::1] scratch, int rule,
+    def outline(self, const int32_t[:, ::1] across, double[:, ::1] places, int32_t[::1] outline):
+        """Write places of vertices (V, 2) in pixels, and what edges of triangles (T) are, for `edges`."""
+        if across.shape[0]:
+            with nogil:
+                K.grad_outline(&self.view, &across[0, 0], &places[0, 0] if places.shape[0] else NULL, &outline[0])
+
+    def edges(self, mesh: tuple[Array, Array, Array], int32_t[:, ::1] scratch, int rule,
               arrays: tuple[Array | None, ...], GradientSums sums or None, int64_t first, int64_t end):
         """Write rows of a picture with smooth silhouettes; with sums, of the gradients of its colours.
 
-        `scratch`: (2, W). `arrays`: rast, color, out; with sums rast, color, gradients of out, gradients of color.
+        `mesh`: across, places, outline. `scratch`: (3, W + IDS_ROOM). `arrays`: rast, color, out; with sums rast,
+        color, gradients of out, gradients of color.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_edges e
@@ -129,9 +138,9 @@ cdef class GradientView:
         if first >= end or view.width == 0:
             return
         e.rast, e.color, e.n_channels = first_of(arrays[0]), first_of(arrays[1]), arrays[1].shape[2]
-        if across.shape[0]:
-            e.across, e.known = &across[0, 0], &known[0]
-        e.labels, e.rule = &scratch[0, 0], <tl_pair_rule>rule
+        e.across, e.places = <const int32_t *>first_of(mesh[0]), <const double *>first_of(mesh[1])
+        e.outline = <const int32_t *>first_of(mesh[2])
+        e.ids, e.rule = &scratch[0, 0], <tl_pair_rule>rule
         if sums is None:
             e.out = <void *>first_of(arrays[2])
             with nogil:
@@ -140,6 +149,39 @@ cdef class GradientView:
         e.g_out, e.g_color = first_of(arrays[2]), <void *>first_of(arrays[3])
         with nogil:
             K.grad_edges(&view, &e, &sums.sums)
+
+
+    def loss(self, ids: tuple[Array, bool, int], attr: Array, mesh: tuple[Array, Array, Array], codes: tuple[int, float],
+             target: Array, scratch: tuple[Array, Array], sums: tuple[GradientSums, ...], int64_t first,
+             int64_t end) -> float:
+        """Return the sum of squares of what rows of a picture of `attr` (V, K) are off `target`; adds gradients to sums.
+
+        `ids`: those of the picture, whether row 0 is on top, what is added to them. `mesh` and `scratch[0]` are those
+        of `edges`, `codes` the rule and what squares count by; `scratch[1]` holds LOSS_WINDOW rows of 8 + 4 K numbers a
+        pixel. `sums`: by triangle, SUMS_OF_FACE columns; by vertex, of points and of edges; by row of `attr`.
+        """
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef tl_grad_loss l
+        cdef const int32_t[:, ::1] rows = ids[0]
+        cdef int32_t[:, ::1] of_edges = scratch[0]
+        cdef GradientSums faces = sums[0], points = sums[1], edges = sums[2], values = sums[3]
+        cdef double found
+        memset(&l, 0, sizeof(l))
+        if first >= end or view.width == 0:
+            return 0.0
+        l.step, l.first_id = view.width, ids[2]
+        l.ids = &rows[0, 0]
+        if ids[1]:
+            l.ids, l.step = &rows[rows.shape[0] - 1, 0], -l.step
+        l.attr, l.n_attr, l.n_columns = first_of(attr), attr.shape[0], attr.shape[1]
+        l.edges.across, l.edges.places = <const int32_t *>first_of(mesh[0]), <const double *>first_of(mesh[1])
+        l.edges.outline, l.edges.rule = <const int32_t *>first_of(mesh[2]), <tl_pair_rule><int>codes[0]
+        l.edges.ids, l.edges.n_channels = &of_edges[0, 0], l.n_columns
+        l.target, l.scale, l.scratch = first_of(target), codes[1], <void *>first_of(scratch[1])
+        l.faces, l.of_points, l.of_edges, l.of_attr = &faces.sums, &points.sums, &edges.sums, &values.sums
+        with nogil:
+            found = K.grad_loss(&view, &l)
+        return found
 
 
 cdef class GradientSums:

@@ -6,9 +6,9 @@ the size of a picture alone, so every number of threads gives the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ MIN_PX_PER_THREAD = 1 << 15
 WAITING_BANDS = 4
 
 Array = NDArray[Any]
+Found = TypeVar("Found")
 
 
 class Band(NamedTuple):
@@ -60,24 +61,28 @@ class Bands:
 
         rows_per_px: how many rows a pixel has a share in at most.
         """
-        bad, n_rows, n_columns = -1, out.shape[1], out.shape[2]
 
-        def part(first: int, end: int) -> list[tuple[int, engine.GradientSums, int]]:
-            done = []
-            for band in some[first:end]:
-                sums = sums_of(n_rows, n_columns, band, rows_per_px * self.width)
-                found = work(band, sums)
-                done.append((band.picture, sums, -1 if found is None else found))
-            return done
+        def with_sums(band: Band) -> tuple[list[engine.GradientSums], int | None]:
+            sums = sums_of(out.shape[1], out.shape[2], band, rows_per_px * self.width)
+            found = work(band, sums)
+            return [sums], found
 
-        some: list[Band] = []
+        return max((bad for bad in self.add_up_all(with_sums, [out]) if bad is not None), default=-1)
+
+    def add_up_all(
+        self, work: Callable[[Band], tuple[Sequence[engine.GradientSums], Found]], outs: Sequence[Array]
+    ) -> list[Found]:
+        """Add the sums that `work` returns of each band to `outs`; returns what it returns besides."""
+        results: list[Found] = []
         at_a_time = self.threads * WAITING_BANDS if self.threads > 1 else 1
         for start in range(0, len(self.all), at_a_time):
             some = self.all[start : start + at_a_time]
-            for picture, sums, found in chain.from_iterable(run_parts(part, len(some), self.threads)):
-                sums.add_to(out[picture if len(out) > 1 else 0])
-                bad = max(bad, found)
-        return bad
+            parts = run_parts(lambda first, end, some=some: [work(b) for b in some[first:end]], len(some), self.threads)
+            for band, (sums, found) in zip(some, chain.from_iterable(parts), strict=True):
+                for own, out in zip(sums, outs, strict=True):
+                    own.add_to(out[band.picture if len(out) > 1 else 0])
+                results.append(found)
+        return results
 
 
 def sums_of(n_rows: int, n_columns: int, band: Band, width: int, name: str = "rows") -> engine.GradientSums:

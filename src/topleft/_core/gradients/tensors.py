@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from topleft._core import engine
 from topleft._core.base.memory import empty
+from topleft._core.base.threads import run_parts
 from topleft._core.gradients.bands import Array, Band, Bands, sums_of
 
 
@@ -223,40 +224,104 @@ def texels_vjp(look: TexelLook, g_out: Array) -> tuple[list[Array], Array, Array
     return g_levels, g_uv, g_da, g_bias  # type: ignore[return-value]
 
 
-def smooth(grid: PixelGrid, rule: EdgeRule, pos: Array, rast: Array, across: NDArray[np.int32], color: Array) -> Array:
-    """Return colours (B, H, W, C) with smooth silhouettes; `across` is that of `halves_across`."""
+@dataclass(frozen=True)
+class Outline:
+    """What edges are in some pictures: `across` (T, 3), `places` (B or 1, V, 2), `edges` (B or 1, T): `outline_of`."""
+
+    across: NDArray[np.int32]
+    places: NDArray[np.float64]
+    edges: NDArray[np.int32]
+
+    def of_picture(self, picture: int) -> tuple[Array, Array, Array]:
+        """Return what the engine takes of a picture."""
+        return self.across, of(self.places, picture), of(self.edges, picture)
+
+
+def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outline:
+    """Return which edges of triangles are silhouettes, and where vertices are; `across` is that of `halves_across`."""
+    places, edges = empty((*pos.shape[:2], 2), np.float64), empty((len(pos), len(grid.tri)), np.int32)
+    run_parts(
+        lambda first, end: [grid.view(pos[i]).outline(across, places[i], edges[i]) for i in range(first, end)],
+        len(pos),
+        grid.bands.threads,
+    )
+    return Outline(across, places, edges)
+
+
+def smooth(grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, rast: Array, color: Array) -> Array:
+    """Return colours (B, H, W, C) with smooth silhouettes."""
     out = empty(color.shape, color.dtype)
 
     def work(band: Band) -> None:
-        i = band.picture
-        known, scratch = np.zeros(len(grid.tri), np.uint8), np.empty((2, grid.width), np.int32)
+        i, scratch = band.picture, empty((3, grid.width + engine.IDS_ROOM), np.int32)
         arrays = rast[i], color[i], out[i]
-        grid.view(of(pos, i)).edges(across, known, scratch, int(rule), arrays, None, band.first, band.end)
+        grid.view(of(pos, i)).edges(outline.of_picture(i), scratch, int(rule), arrays, None, band.first, band.end)
 
     grid.bands.run(work)
     return out
 
 
 def smooth_vjp(
-    grid: PixelGrid, rule: EdgeRule, pos: Array, rast: Array, across: NDArray[np.int32], color: Array, g_out: Array
+    grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, rast: Array, color: Array, g_out: Array
 ) -> tuple[Array, Array]:
     """Return the gradients of the colours and of `pos`."""
     g_color, g_pos = empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)
 
     def work(band: Band, sums: engine.GradientSums) -> None:
-        i = band.picture
-        known, scratch = np.zeros(len(grid.tri), np.uint8), np.empty((2, grid.width), np.int32)
+        i, scratch = band.picture, empty((3, grid.width + engine.IDS_ROOM), np.int32)
         arrays = rast[i], color[i], g_out[i], g_color[i]
-        grid.view(of(pos, i)).edges(across, known, scratch, int(rule), arrays, sums, band.first, band.end)
+        grid.view(of(pos, i)).edges(outline.of_picture(i), scratch, int(rule), arrays, sums, band.first, band.end)
 
     grid.bands.add_up(work, g_pos, 6)
     return g_color, g_pos
 
 
+def squares(
+    grid: PixelGrid,
+    rule: EdgeRule,
+    outline: Outline,
+    pos: Array,
+    ids: Sequence[tuple[NDArray[np.int32], int]],
+    attr: Array,
+    target: Array,
+    *,
+    is_flipped: bool,
+) -> tuple[float, Array, Array]:
+    """Return the mean squared difference of pictures of attributes from others, and the gradients of `pos` and `attr`.
+
+    What `points`, `values`, `smooth` and their products give, a few rows at a time: no picture is made.
+    """
+    of_points, of_edges, g_attr = (np.zeros(one.shape, one.dtype) for one in (pos, pos, attr))
+    n_vertices, n_rows, n = pos.shape[1], attr.shape[1], attr.shape[2]
+
+    def work(band: Band) -> tuple[list[engine.GradientSums], float]:
+        i, width = band.picture, grid.width
+        faces = sums_of(len(grid.tri), engine.SUMS_OF_FACE, band, width, "faces")
+        sums = [
+            sums_of(n_vertices, 4, band, 3 * width, "points"),
+            sums_of(n_vertices, 4, band, 6 * width, "edges"),
+            sums_of(n_rows, n, band, 3 * width),
+        ]
+        scratch = (
+            empty((3, width + engine.IDS_ROOM), np.int32),
+            empty((engine.LOSS_WINDOW * width * (8 + 4 * n),), pos.dtype),
+        )
+        own, first = ids[i]
+        found = grid.view(of(pos, i)).loss(
+            (own, is_flipped, first), of(attr, i), outline.of_picture(i), (int(rule), 2 / target.size), target[i],
+            scratch, (faces, *sums), band.first, band.end,
+        )  # fmt: skip
+        return sums, found
+
+    found = sum(grid.bands.add_up_all(work, [of_points, of_edges, g_attr])) if target.size else 0.0
+    return found / max(1, target.size), of_points + of_edges, g_attr
+
+
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return of each edge 3 * the triangle across it + the corner there that it is opposite to, int32 (T, 3); -1: none.
 
-    Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next.
+    Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next; there, and
+    where two triangles are wound differently, it is -2 less that.
     """
     ends = np.sort(np.stack([np.roll(tri, -1, 1), np.roll(tri, -2, 1)], -1).reshape(-1, 2).astype(np.int64), axis=1)
     key = ends[:, 0] << 32 | ends[:, 1]
@@ -266,6 +331,8 @@ def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
     sizes = np.diff(np.append(starts, len(key)))
     following = np.arange(1, len(key) + 1)
     following[starts + sizes - 1] = np.where(sizes > 1, starts, -1)
+    first = np.roll(tri, -1, 1).reshape(-1)[order]
+    is_odd = (np.repeat(sizes, sizes) > 2) | (first == first[following])
     found = np.empty(len(key), np.int32)
-    found[order] = np.where(following < 0, -1, order[following])
+    found[order] = np.where(following < 0, -1, np.where(is_odd, -2 - order[following], order[following]))
     return found.reshape(tri.shape)

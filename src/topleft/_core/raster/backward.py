@@ -102,18 +102,20 @@ class Backward:
     def smooth(self, picture: ArrayLike, edges: EdgesOption) -> NDArray[Any]:
         """Return a picture with smooth silhouettes."""
         given, color = self.as_picture(picture)
-        out = tensors.smooth(
-            self.grid, as_rule(edges), self.pos, self.rast, tensors.halves_across(self.grid.tri), color
-        )
+        out = tensors.smooth(self.grid, as_rule(edges), self.outline(), self.pos, self.rast, color)
         return out.reshape(given.shape).astype(np.float32 if given.dtype.type is np.float32 else np.float64, copy=False)
 
     def smooth_vjp(self, picture: ArrayLike, grad: ArrayLike, edges: EdgesOption) -> tuple[Floats, Floats]:
         """Return the gradients of the picture and of the vertices."""
         given, color = self.as_picture(picture)
         g_out = self.as_grad("grad", grad, *given.shape[2:]).reshape(color.shape)
-        across = tensors.halves_across(self.grid.tri)
-        g_color, g_pos = tensors.smooth_vjp(self.grid, as_rule(edges), self.pos, self.rast, across, color, g_out)
+        outline = self.outline()
+        g_color, g_pos = tensors.smooth_vjp(self.grid, as_rule(edges), outline, self.pos, self.rast, color, g_out)
         return g_color.reshape(given.shape), self.to_vertices(g_pos)
+
+    def outline(self) -> tensors.Outline:
+        """Return what the edges of the mesh are."""
+        return tensors.outline_of(self.grid, self.pos, tensors.halves_across(self.grid.tri))
 
     def as_picture(self, picture: ArrayLike) -> tuple[NDArray[Any], Floats]:
         """Return a picture as it is, and as (1, H, W, C) float64."""

@@ -1,0 +1,117 @@
+/* What edges need to know of a mesh in a view: where its vertices are, which side of a triangle is seen, and which of its
+ * edges are silhouettes.
+ * In: vertices, triangles, which one lies across each edge.  Out: places in pixels, a number by triangle. */
+#ifndef TL_GRAD_OUTLINE_C
+#define TL_GRAD_OUTLINE_C
+
+#include <stdint.h>
+
+#include "topleft.h"
+#include "grad/pixels.h"
+#include "lanes/lanes.h"
+
+/* x, y, z, w of some vertices; all of them exist. */
+TL_INLINE void load_vertices_of(const tl_grad_view *view, const int32_t *vertices, vd *columns, int is_f64)
+{
+    vi bits[4];
+    if (is_f64) {
+        vd_load_records(view->pos, 4, vertices, columns);
+        return;
+    }
+    vi_load_records(view->pos, 16, vertices, bits);
+    for (int k = 0; k < 4; k++)
+        columns[k] = vd_from_vf(vf_of_bits(bits[k]));
+}
+
+/* Pixels of the picture. */
+TL_INLINE void place_vertices(const tl_grad_view *view, double *places, int is_f64)
+{
+    int32_t rows[TL_MAX_LANES];
+    double px[2][TL_MAX_LANES];
+    vd columns[4];
+    for (int64_t i = 0; i < view->n_vertices; i += TL_LANES) {
+        const int64_t n = view->n_vertices - i < TL_LANES ? view->n_vertices - i : TL_LANES;
+        for (int64_t k = 0; k < TL_LANES; k++)
+            rows[k] = (int32_t)(k < n ? i + k : i);
+        load_vertices_of(view, rows, columns, is_f64);
+        for (int axis = 0; axis < 2; axis++)
+            vd_store(px[axis], vd_div(vd_sub(vd_div(columns[axis], columns[3]), vd_set1(view->shift[axis])),
+                                      vd_set1(2.0 * view->scale[axis])));
+        for (int64_t k = 0; k < n; k++)
+            places[2 * (i + k)] = px[0][k], places[2 * (i + k) + 1] = px[1][k];
+    }
+}
+
+/* The sign of TL_LANES numbers: 1 above 0, 2 below, 0 else. */
+TL_INLINE vi sign_code(vd area)
+{
+    const vd zero = vd_set1(0.0);
+    const vi one = vi_set1(1), two = vi_set1(2), none = vi_set1(0);
+    const vm is_up = vd_ge(area, zero), is_down = vd_ge(zero, area);
+    return vi_select(vm_and_not(is_up, is_down), one, vi_select(vm_and_not(is_down, is_up), two, none));
+}
+
+/* Sides of triangles; what lies behind the eye and what does not exist. */
+TL_INLINE void face_triangles(const tl_grad_view *view, int32_t *outline, int is_f64)
+{
+    const vd zero = vd_set1(0.0);
+    int32_t rows[3][TL_MAX_LANES], sides[TL_MAX_LANES];
+    vd p[3][4];
+    for (int64_t i = 0; i < view->n_triangles; i += TL_LANES) {
+        const int64_t n = view->n_triangles - i < TL_LANES ? view->n_triangles - i : TL_LANES;
+        for (int64_t lane = 0; lane < TL_LANES; lane++) {
+            const int64_t id = lane < n ? i + lane : i;
+            const int is_there = has_corners(view, view->n_vertices, (int32_t)id);
+            for (int k = 0; k < 3; k++)
+                rows[k][lane] = is_there ? view->tri[3 * id + k] : 0;
+        }
+        if (!view->n_vertices)
+            return;
+        for (int k = 0; k < 3; k++)
+            load_vertices_of(view, rows[k], p[k], is_f64);
+        const vd a = vd_sub(vd_mul(p[1][1], p[2][3]), vd_mul(p[1][3], p[2][1]));
+        const vd b = vd_sub(vd_mul(p[1][3], p[2][0]), vd_mul(p[1][0], p[2][3]));
+        const vd c = vd_sub(vd_mul(p[1][0], p[2][1]), vd_mul(p[1][1], p[2][0]));
+        const vd area = vd_add(vd_add(vd_mul(p[0][0], a), vd_mul(p[0][1], b)), vd_mul(p[0][3], c));
+        vi side = sign_code(area), ahead = vi_set1(TL_IS_AHEAD);
+        for (int k = 0; k < 3; k++) { /* w > 0 */
+            const vm is_behind = vd_ge(zero, p[k][3]);
+            ahead = vi_select(vm_and_not(vd_ge(p[k][3], zero), is_behind), ahead, vi_set1(0));
+        }
+        side = vi_or(vi_shift_left(side, TL_SIDE_SHIFT), ahead);
+        vi_store(sides, side);
+        for (int64_t lane = 0; lane < n; lane++)
+            outline[i + lane] = has_corners(view, view->n_vertices, (int32_t)(i + lane)) ? sides[lane] : -1;
+    }
+}
+
+/* Whether nothing lies on the other side of an edge: `half` stands in `across` of triangle `id`, corner `k`. */
+TL_INLINE int is_silhouette(const tl_grad_view *view, const int32_t *outline, int32_t id, int k, int32_t half)
+{
+    const int32_t other = half < -1 ? -2 - half : half;
+    if (other < 0 || other >= 3 * view->n_triangles || outline[other / 3] < 0)
+        return 1;
+    const int32_t own = outline[id] & TL_SIDES, across = outline[other / 3] & TL_SIDES;
+    if (half >= 0)
+        return (own | across) == TL_SIDES;
+    const int32_t *a = view->tri + 3 * (int64_t)id, *b = view->tri + 3 * (int64_t)(other / 3);
+    const int is_reversed = a[(k + 1) % 3] != b[(other % 3 + 1) % 3];
+    return is_reversed ? (own | across) == TL_SIDES : own && own == across;
+}
+
+/* See kernels.h. */
+static void grad_outline(const tl_grad_view *view, const int32_t *across, double *places, int32_t *outline)
+{
+    if (view->is_f64) {
+        place_vertices(view, places, 1);
+        face_triangles(view, outline, 1);
+    } else {
+        place_vertices(view, places, 0);
+        face_triangles(view, outline, 0);
+    }
+    for (int64_t i = 0; i < view->n_triangles; i++)
+        for (int k = 0; k < 3 && outline[i] >= 0; k++)
+            outline[i] |= is_silhouette(view, outline, (int32_t)i, k, across[3 * i + k]) << k;
+}
+
+#endif

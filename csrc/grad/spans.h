@@ -1,0 +1,207 @@
+/* Parts of rows in lanes: runs of pixels that show one triangle, and numbers of runs, which reach their pixels by a load
+ * and a permutation.
+ * In: ids of pixels, triangles.  Out: runs, the corners of their triangles.
+ *
+ * Numbers are float32.  A run ends with its span, and spans begin at multiples of TL_GRAD_SPAN: nothing depends on how
+ * many lanes there are.  Vectors of four numbers a pixel are loaded and stored as they lie in memory; lane k then has
+ * pixel vi_quad_slot(k).
+ *
+ * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013. */
+#ifndef TL_GRAD_SPANS_H
+#define TL_GRAD_SPANS_H
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "grad/pixels.h"
+#include "lanes/lanes.h"
+
+#define TL_GRAD_SPAN 256 /* pixels */
+#define TL_GRAD_ROOM (TL_GRAD_SPAN + 2 * TL_MAX_LANES)
+#define TL_RUN_NUMBERS 12
+#define TL_SUMMED 16 /* pixels that are summed up in float32; their sums in float64 */
+
+/* Runs of some pixels of a row, those that show nothing with id -1; run r begins at begins[r] of the span. */
+typedef struct {
+    int64_t row, first; /* of the picture; the first one's column */
+    int n, n_runs;
+    int64_t bad_id;                /* as of pixel_run */
+    int before[TL_GRAD_SPAN];      /* of each vector: how many runs have begun before it */
+    unsigned starts[TL_GRAD_SPAN]; /* and the lanes where one begins */
+    _Alignas(64) int32_t ids[TL_GRAD_ROOM];
+    _Alignas(64) int32_t begins[TL_GRAD_ROOM];
+    _Alignas(64) int32_t corners[3][TL_GRAD_ROOM];
+    _Alignas(64) float numbers[TL_RUN_NUMBERS][TL_GRAD_ROOM];
+    _Alignas(64) float rows[4 * TL_GRAD_ROOM]; /* four numbers a pixel, to be summed up */
+} grad_span;
+
+/* Some pixels of a span, and which run each lane has. */
+typedef struct {
+    const grad_span *span;
+    int x, n; /* the first one, and how many there are, at most TL_LANES */
+    int first;
+    vi run, pixel; /* pixel: 0, 1, 2 and so on, or in the order of quads */
+    vm is_shown;
+} span_lanes;
+
+TL_INLINE vi order_of_quads(void)
+{
+    int32_t slots[TL_MAX_LANES];
+    for (int k = 0; k < TL_LANES; k++)
+        slots[k] = vi_quad_slot(k);
+    return vi_load(slots);
+}
+
+/* The ids of TL_LANES pixels of `rast`, -1 for none. */
+TL_INLINE vi ids_of_numbers(vf number)
+{
+    const vf last = vf_set1((float)TL_LAST_EXACT_ID);
+    vi id = vi_sub(vi_floor(vf_min(number, last)), vi_set1(1));
+    id = vi_select(vf_lt(last, number), vi_add(vi_bits_of_vf(number), vi_set1(TL_LAST_EXACT_ID - TL_BITS_OF_LAST - 1)),
+                   id);
+    return vi_select(vf_ge(number, vf_set1(1.0f)), id, vi_set1(-1));
+}
+
+/* Copies n rows of k numbers. */
+TL_INLINE void copy_rows(float *to, const float *from, int n, int k)
+{
+    if (n > 0)
+        memcpy(to, from, (size_t)(n * k) * sizeof *to);
+}
+
+/* n <= TL_LANES rows of `stride` numbers as columns; zeros beyond. */
+TL_INLINE void load_some_columns(const float *p, int stride, int n, vf *columns)
+{
+    float some[4 * TL_MAX_LANES + 4];
+    if (stride == 1 || n < TL_LANES || TL_LANES == 1) {
+        memset(some, 0, sizeof some);
+        copy_rows(some, p, n, stride);
+        p = some;
+    }
+    if (stride == 1)
+        columns[0] = vf_load(p);
+    else
+        load_columns_f32(p, stride, columns);
+}
+
+/* The same of four numbers, in the order of quads; and back. */
+TL_INLINE void load_some_quads(const float *p, int n, vf *columns)
+{
+    float some[4 * TL_MAX_LANES];
+    vi bits[4];
+    if (n < TL_LANES) {
+        memset(some, 0, sizeof some);
+        copy_rows(some, p, n, 4);
+        p = some;
+    }
+    vi_load_quads((const int32_t *)p, bits);
+    for (int k = 0; k < 4; k++)
+        columns[k] = vf_of_bits(bits[k]);
+}
+TL_INLINE void store_some_quads(float *p, int n, const vf *columns)
+{
+    float some[4 * TL_MAX_LANES];
+    vi bits[4];
+    for (int k = 0; k < 4; k++)
+        bits[k] = vi_bits_of_vf(columns[k]);
+    if (n == TL_LANES) {
+        vi_store_quads((int32_t *)p, bits);
+        return;
+    }
+    vi_store_quads((int32_t *)some, bits);
+    copy_rows(p, some, n, 4);
+}
+
+/* Lists the runs of a span: of a row of ids, to which first_id is added, or of numbers of `rast`. */
+TL_INLINE void list_runs_of(grad_span *s, const int32_t *ids, int64_t first_id, const float *rast)
+{
+    const vi none = vi_set1(-1);
+    vi before = vi_set1(INT32_MIN);
+    s->n_runs = 0;
+    for (int x = 0, i = 0; x < s->n; x += TL_LANES, i++) {
+        const int n = s->n - x < TL_LANES ? s->n - x : TL_LANES;
+        const vm inside = vm_first(n);
+        vi id;
+        if (rast) {
+            vf columns[4];
+            load_some_columns(rast + 4 * x, 4, n, columns);
+            id = ids_of_numbers(columns[3]);
+        } else {
+            id = n < TL_LANES ? vi_load_masked(inside, ids + x) : vi_load(ids + x);
+            id = vi_select(vi_gt(id, none), vi_add(id, vi_set1((int32_t)first_id)), none);
+        }
+        const vm starts = vm_and_not(inside, vi_eq(id, vi_shift_in(id, before)));
+        vi_compress(s->ids + s->n_runs, starts, id);
+        vi_compress(s->begins + s->n_runs, starts, vi_add(vi_iota(), vi_set1(x)));
+        s->before[i] = s->n_runs, s->starts[i] = vm_bits(starts);
+        s->n_runs += __builtin_popcount(vm_bits(starts));
+        before = id;
+    }
+    s->begins[s->n_runs] = s->n;
+}
+
+/* Finds the corners of runs; what has none below n_rows shows nothing from then on. */
+TL_INLINE void find_corners(grad_span *s, const tl_grad_view *view, int64_t n_rows)
+{
+    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(view->n_triangles)),
+             rows = vi_set1(clamped_to_int(n_rows));
+    for (int r = 0; r < s->n_runs; r += TL_LANES) {
+        const vi id = vi_load(s->ids + r), id_3 = vi_add(id, vi_add(id, id));
+        const vm wanted = vm_and(vm_first(s->n_runs - r), vm_and_not(vm_all(), vi_eq(id, none)));
+        vm found = vm_and(wanted, vm_and(vi_gt(id, none), vi_gt(end, id)));
+        for (int k = 0; k < 3; k++) {
+            const vi corner = vi_gather(found, view->tri + k, id_3);
+            found = vm_and(found, vi_gt_unsigned(rows, corner));
+            vi_store(s->corners[k] + r, corner);
+        }
+        for (int k = 0; k < 3; k++) /* those of others are read, too */
+            vi_store(s->corners[k] + r, vi_select(found, vi_load(s->corners[k] + r), vi_set1(0)));
+        if (vm_any(vm_and_not(wanted, found)))
+            for (int k = 0; k < TL_LANES; k++)
+                if (vm_bits(vm_and_not(wanted, found)) >> k & 1)
+                    s->bad_id = s->ids[r + k];
+        vi_store(s->ids + r, vi_select(found, id, none));
+    }
+}
+
+/* The pixels of vector i; is_quads: in the order of quads. */
+TL_INLINE span_lanes lanes_of_span(const grad_span *s, int i, vi pixel, int is_quads)
+{
+    const unsigned starts = s->starts[i];
+    const int begins = (int)(starts & 1);
+    span_lanes p = {.span = s, .x = i * TL_LANES, .first = s->before[i] - 1 + begins, .pixel = pixel};
+    int32_t runs[TL_MAX_LANES];
+    p.n = s->n - p.x < TL_LANES ? s->n - p.x : TL_LANES;
+    p.run = vi_sub(vi_prefix_count(starts), vi_set1(begins));
+    if (is_quads && TL_LANES > 1) {
+        vi_store(runs, p.run);
+        p.run = vi_pick(runs, pixel);
+    }
+    p.is_shown = vi_gt(vi_pick(s->ids + p.first, p.run), vi_set1(-1));
+    return p;
+}
+
+TL_INLINE vf pick_number(const span_lanes *p, int k) { return vf_pick(p->span->numbers[k] + p->first, p->run); }
+
+/* How far pixels lie from the first one of their run. */
+TL_INLINE vf from_begin(const span_lanes *p)
+{
+    return vf_from_vi(vi_sub(vi_add(p->pixel, vi_set1(p->x)), vi_pick(p->span->begins + p->first, p->run)));
+}
+
+/* Sums of rows of four numbers, and of these times one of each row of `weights`. */
+TL_INLINE void sum_quads(const float *rows, int n, float *sum)
+{
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 4; k++)
+            sum[k] += rows[4 * i + k];
+}
+TL_INLINE void sum_weighed_quads(const float *rows, const float *weights, int stride, int n, float *sum)
+{
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 4; k++)
+            sum[k] += rows[4 * i + k] * weights[stride * i];
+}
+
+#endif

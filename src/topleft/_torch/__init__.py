@@ -1,0 +1,1 @@
+"""The operators of PyTorch that `topleft.torch` calls, with the checks of its tensors."""
