@@ -44,10 +44,16 @@ typedef struct {
     tl_cull cull;
 } tl_cluster_view;
 
-/* What a view does with a cluster. */
-enum { TL_FATE_OUTSIDE, TL_FATE_TURNED, TL_FATE_BACK, TL_FATE_FRONT, TL_N_FATES };
+/* What a view shows of a cluster. */
+typedef enum {
+    TL_VISIBILITY_OUTSIDE,
+    TL_VISIBILITY_CULLED,
+    TL_VISIBILITY_BACK,
+    TL_VISIBILITY_FRONT,
+    TL_N_VISIBILITIES
+} tl_visibility;
 
-/* What a pass draws of a clustered mesh. */
+/* The clusters that one pass draws. */
 typedef struct tl_cluster_pass {
     const tl_clustered *mesh;
     const tl_cluster_view *seen;

@@ -61,7 +61,7 @@ static const tl_isa_unit UNITS[TL_N_ISA] = {
 };
 
 #if defined(__x86_64__)
-/* What the CPU and the operating system tell, by hand: __builtin_cpu_supports needs a library that clang
+/* Features of the CPU and the operating system, by hand: __builtin_cpu_supports needs a library that clang
  * for Windows does not link. */
 typedef struct {
     unsigned ecx_1, ebx_7, ecx_7, ecx_extended; /* registers of cpuid */

@@ -4,13 +4,13 @@
 
 #include <stdint.h>
 
-/* What a transform makes of a vertex: x, y, depth, and its place: x and y as int32, rounded to 2^-18 px and clamped to
+/* A transformed vertex: x, y, depth, and its place: x and y as int32, rounded to 2^-18 px and clamped to
  * 2^12 px. */
 #define TL_PLACED 4
 #define TL_PLACE_BITS 18
 #define TL_PLACE_LIMIT_PX 4096
 
-/* What was decided how. */
+/* How many decisions were made by each means. */
 typedef struct tl_exact_counts {
     int64_t n_triangles;  /* that were drawn, of each pass */
     int64_t n_on_grid;    /* of which all vertices lie on 2^-8 px, where others of their vector were in doubt */
@@ -20,7 +20,7 @@ typedef struct tl_exact_counts {
     int64_t n_integers;   /* signs that only integers of 2176 bits told */
 } tl_exact_counts;
 
-/* What clip planes leave of triangles: fans over points of their own, in order of their source triangle. */
+/* Triangles that clip planes have cut: fans over points of their own, in order of their source triangle. */
 typedef struct tl_exact_pieces {
     double *points;     /* (n_points, 3) */
     double *inv_w;      /* (n_points,) */

@@ -20,7 +20,7 @@
 #include "mesh/reach.c"
 #include "raster/bin.c"
 #include "raster/sides.c"
-#include "few/few.c"
+#include "large_shapes/large_shapes.c"
 #include "area/area.c"
 #include "points/cloud.c"
 #include "pixels/composite.c"
@@ -37,7 +37,7 @@
 #include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 #include "blend/blend.c"
-#include "blend/fill_few.c"
+#include "blend/fill_shapes.c"
 #include "grad/area_vjp.c"
 #include "grad/edges.c"
 #include "grad/points.c"
@@ -90,7 +90,7 @@ const tl_kernels TL_KERNELS = {
     .write_counts = write_counts,
     .draw_area = draw_area,
     .blend = blend,
-    .fill_few = fill_few,
+    .fill_large_shapes = fill_large_shapes,
     .inverse_w = inverse_ws,
     .barycentric = barycentric,
     .interpolate = interpolate,

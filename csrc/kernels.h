@@ -48,7 +48,7 @@ typedef struct tl_kernels {
     /* Counts some clusters, one of each `step`, by what a view does with them, whatever hides them: outside of the
      * window, turned away and culled, showing their backs, the others. */
     void (*survey_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int64_t step,
-                            int64_t n_of[TL_N_FATES]);
+                            int64_t n_of[TL_N_VISIBILITIES]);
 
     /* Counts of the same clusters those that the window may show, and in *n_hidden those of them that all lie behind
      * what the target shows. */
@@ -74,7 +74,7 @@ typedef struct tl_kernels {
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of
      * 0.  A bad row of a mesh whose vertices are not snapped may also be that of one that is not finite; it is drawn
      * without clusters and not to SAMPLES. */
-    int64_t (*draw)(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share);
+    int64_t (*draw)(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice);
 
     /* The numbers of vertices [first, end) as float64 in `points`, or NULL: they stay where they are.  Returns how many
      * cannot be drawn: what is not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are
@@ -140,10 +140,11 @@ typedef struct tl_kernels {
     /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
     int64_t (*blend)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas);
 
-    /* Fills the canvas, whose ground is no NULL, with the flat colours of a few triangles: tl_are_few.  2^sample_bits
-     * samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as `draw` does. */
-    int64_t (*fill_few)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
-                        const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer);
+    /* Fills the canvas, whose ground is no NULL, with the flat colours of a few triangles: tl_is_large_shapes.
+     * 2^sample_bits samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as
+     * `draw` does. */
+    int64_t (*fill_large_shapes)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
+                                 const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer);
 
     /* 1/w of vertices [first, end) of clip space, for tl_vertex_set; nothing of it is checked. */
     void (*inverse_w)(const tl_source *source, int64_t first, int64_t end, double *out);
@@ -155,7 +156,7 @@ typedef struct tl_kernels {
     void (*interpolate)(const tl_snapped *snapped, const tl_window *window, const int32_t *ids, const float *values,
                         int n_values, int per_corner, float background, float *out);
 
-    /* What values change by along x and y at n pixels: (n, n_values, 2), 0 where ids are -1. */
+    /* Derivatives of values along x and y at n pixels: (n, n_values, 2), 0 where ids are -1. */
     void (*fill_slopes)(const tl_sloped *values, const int32_t *ids, const float *weights, int64_t n, float *out);
 
     /* The values (n, n_channels) of an array at n pixels where ids are not -1: uv (n, 2), and where there are halvings
@@ -182,7 +183,7 @@ typedef struct tl_kernels {
     void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
                         const tl_transfer *transfer, void *pixels);
 
-    /* What is seen through the layers of n pixels. */
+    /* The composite of the layers of n pixels. */
     void (*composite)(const tl_composite *layers, int64_t n, void *pixels);
 
     /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */

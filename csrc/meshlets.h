@@ -75,7 +75,7 @@ typedef struct {
     int32_t sample_x_fx, sample_y_fx; /* where in a pixel it is sampled, from the centre */
 } tl_meshlet_pass;
 
-/* What one unit does, which is compiled for AVX-512 with VBMI alone. */
+/* The kernels of the unit that is compiled for AVX-512 with VBMI alone. */
 typedef struct {
     /* Grows triangles order[first] to order[end - 1] into meshlets: at most tl_most_meshlets of them, with a record of
      * TL_N_BOUNDS numbers each.  `numbers`: (n_vertices,), negative; room: TL_GROW_ROOM bytes.  Returns how many. */

@@ -36,7 +36,7 @@ typedef enum { TL_POLYGON_CENTER = 0, TL_POLYGON_OUTER = 1, TL_POLYGON_INNER = 2
 
 #define TL_SPAN_WAIT 256
 
-/* What labels are computed in: no bytes of it mean anything between two calls. */
+/* Scratch of labels: no bytes of it mean anything between two calls. */
 #define TL_LABEL_EDGES 4096
 #define TL_LABEL_ROWS 1024
 #define TL_LABEL_ROOM 65536
@@ -72,7 +72,7 @@ typedef struct {
     double *shares;      /* (width + 16,) */
 } tl_piece_scratch;
 
-/* What is painted: value of a polygon is values[i], or its number when that is NULL. */
+/* The values to paint: that of polygon i is values[i], or i when that is NULL. */
 typedef struct {
     const int32_t *listed; /* the polygons listed[first] to listed[end - 1]; NULL: first to end - 1 */
     int64_t first, end;
@@ -89,7 +89,7 @@ typedef struct {
     tl_piece_scratch *pieces; /* OUTER, INNER */
 } tl_label_job;
 
-/* What is computed of shares: the areas of each pixel that lie in polygons. */
+/* A job of shares: the areas of each pixel that lie in polygons. */
 typedef struct {
     const int32_t *listed; /* as above */
     int64_t first, end;

@@ -53,7 +53,7 @@ typedef struct {
     int is_unlit;
     float cutoff;              /* samples with less opacity are left out by draw_cutout; 0: none */
     const tl_texture *texture; /* or NULL, as all of them */
-    /* What follows, and textures with a transform or of the second set, are read where `is_full` alone. */
+    /* The rest, and textures with a transform or of the second set, are read where `is_full` alone. */
     int is_full;
     int is_metallic; /* glTF's metallic-rough surface, instead of the highlight above */
     float metallic, roughness;
@@ -89,7 +89,7 @@ typedef struct {
     float falloff; /* of a point at distance d: the light is divided by 1 + falloff * d^2 */
 } tl_light;
 
-/* What the colours of the picture tell. */
+/* The meaning of the picture's colours. */
 typedef enum { TL_SHOW_LIGHT = 0, TL_SHOW_NORMALS = 1, TL_SHOW_MATCAP = 2 } tl_show;
 
 typedef struct {

@@ -77,7 +77,7 @@ typedef struct {
     int near_clip, far_clip;
 } tl_view;
 
-/* What is left of the triangles that a clip plane cuts: fans of triangles over their own vertices, in order of
+/* Triangles that a clip plane has cut: fans of triangles over their own vertices, in order of
  * their source triangle. */
 typedef struct {
     tl_vertex *vertices; /* (n_vertices,) */
@@ -95,10 +95,10 @@ typedef struct {
  * it holds the whole square.  The last two have no depth and no order: they draw masks and counts. */
 typedef enum { TL_TEST_SAMPLE = 0, TL_TEST_OUTER = 1, TL_TEST_INNER = 2 } tl_test;
 
-/* What drawing asks now and then: whether to go on. */
+/* How drawing is given up: polled now and then. */
 typedef struct tl_pause {
-    int64_t left_px;               /* about how many pixels are drawn before it asks again */
-    int (*ask)(struct tl_pause *); /* sets left_px anew; unless it returns 0 the picture is given up */
+    int64_t left_px;                /* about how many pixels are drawn before the next poll */
+    int (*poll)(struct tl_pause *); /* sets left_px anew; unless it returns 0 the picture is given up */
 } tl_pause;
 
 /* The part of the picture that a buffer shows, in whole pixels. */
@@ -122,17 +122,17 @@ static inline void tl_count_work(const tl_window *window, int64_t n_px)
  * what else they return means nothing. */
 static inline int tl_is_given_up(const tl_window *window)
 {
-    return window->pause && window->pause->left_px < 0 && window->pause->ask(window->pause);
+    return window->pause && window->pause->left_px < 0 && window->pause->poll(window->pause);
 }
 
-/* What setup and cull of a triangle take, and to shade a pixel. */
+/* The work of setup and cull of a triangle, and of shading a pixel. */
 #define TL_SETUP_PX 32
 #define TL_SHADE_PX 32
 
 typedef enum { TL_CULL_NONE = 0, TL_CULL_BACK = 1, TL_CULL_FRONT = 2 } tl_cull;
 typedef enum { TL_METHOD_AUTO = 0, TL_METHOD_EDGE = 1, TL_METHOD_SCANLINE = 2 } tl_method;
 
-/* What happens to a covered sample. */
+/* How a covered sample changes the buffers. */
 typedef enum {
     TL_SINK_MASK = 0,     /* uint8 = 1; a bit in `covered` until the last pass */
     TL_SINK_COUNT = 1,    /* int32 += 1 */
@@ -221,31 +221,31 @@ static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGM
 
 /* Where a picture of a few large triangles is written row by row: the most spans of a row, of each triangle one for
  * each sample, and of a band of rows. */
-#define TL_FEW_SLOTS 128
-#define TL_FEW_SPANS 4096
+#define TL_SHAPE_SLOTS 128
+#define TL_SHAPE_SPANS 4096
 
-#define TL_BLENDED_ROWS 32  /* of colours that are blended, a band */
-#define TL_BLENDED_RUNS 128 /* of a row of these */
-#define TL_FEW_BLENDED 16   /* triangles */
+#define TL_BLENDED_ROWS 32   /* of colours that are blended, a band */
+#define TL_BLENDED_RUNS 128  /* of a row of these */
+#define TL_SHAPES_BLENDED 16 /* triangles */
 
 /* How many are few, by what is done otherwise: bits are drawn; every triangle is stored over a background; labels are
  * drawn first, or samples averaged. */
-typedef enum { TL_FEW_OF_BITS = 2, TL_FEW_STORED = 4, TL_FEW_LABELLED = 64 } tl_few;
-static inline int tl_are_few(int64_t n, int n_samples, int64_t width, int64_t height, tl_few most)
+typedef enum { TL_SHAPES_OF_BITS = 2, TL_SHAPES_STORED = 4, TL_SHAPES_LABELLED = 64 } tl_shape_limit;
+static inline int tl_is_large_shapes(int64_t n, int n_samples, int64_t width, int64_t height, tl_shape_limit most)
 {
-    const int64_t px_each = most < TL_FEW_LABELLED ? (int64_t)1 << 18 : 4096 * (n_samples > 4 ? n_samples : 4);
-    const int fits = n * n_samples <= TL_FEW_SLOTS && width >= 64 && width < INT32_MAX;
+    const int64_t px_each = most < TL_SHAPES_LABELLED ? (int64_t)1 << 18 : 4096 * (n_samples > 4 ? n_samples : 4);
+    const int fits = n * n_samples <= TL_SHAPE_SLOTS && width >= 64 && width < INT32_MAX;
     return n <= (int64_t)most && fits && n * px_each <= width * height;
 }
 
 /* The same of flat colours that are blended over a background. */
-static inline int tl_few_are_blended(int64_t n, int64_t width, int64_t height)
+static inline int tl_shapes_are_blended(int64_t n, int64_t width, int64_t height)
 {
-    return n <= TL_FEW_BLENDED && width >= 64 && width < (1 << 25) && n << 18 <= width * height;
+    return n <= TL_SHAPES_BLENDED && width >= 64 && width < (1 << 25) && n << 18 <= width * height;
 }
 
 /* Bits of a label where those of a pixel's samples stand in one word.  No label has all of them set. */
-static inline int tl_few_label_bits(int sample_bits) { return sample_bits ? 64 >> sample_bits : 63; }
+static inline int tl_shape_label_bits(int sample_bits) { return sample_bits ? 64 >> sample_bits : 63; }
 
 /* A bit a sample, and a word behind the end. */
 static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 64 + 2; }
@@ -266,19 +266,19 @@ typedef struct {
 } tl_snapped;
 
 /* The part of a mesh that one pass draws.  Several passes may share a mesh: each takes some of the triangles, draws
- * what of them lies in its own window and lists the others for the passes that own the rest of the picture. */
+ * what of them lies in its own window and lists those outside of it for the passes that own the rest of the picture. */
 typedef struct {
     const int32_t *ids; /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
     int64_t first, end;
-    /* or NULL; then `snapped` has no vertices and no triangles, and others lists those that have a TL_SPECIAL corner */
+    /* or NULL; then `snapped` has no vertices and no triangles, and `outside` gets those with a TL_SPECIAL corner */
     struct tl_cluster_pass *clusters;
     /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
-    int32_t *others;
-    int64_t n_others;
-    const tl_window *picture;       /* what all the passes draw; read when there are `others` */
+    int32_t *outside;
+    int64_t n_outside;
+    const tl_window *picture;       /* what all the passes draw; read when there is `outside` */
     int is_first, is_last;          /* of the passes over the window: the first clears it */
     struct tl_exact_counts *counts; /* out: added up, of a mesh whose vertices are not snapped; or NULL */
-} tl_share;
+} tl_slice;
 
 /* The triangles that reach into a window, and the first and last band of rows of each. */
 typedef struct {
@@ -298,8 +298,9 @@ typedef struct {
     int64_t room;
 } tl_split;
 
-/* What 2^sample_bits samples see in the rows [row0, row0 + n_rows) of a picture: the first sample in all columns, and
- * the others, `plane` pixels apart, in the columns [col0, col0 + n_cols), outside of which none sees anything. */
+/* The ids and depths that 2^sample_bits samples see in the rows [row0, row0 + n_rows) of a picture: the first sample in
+ * all columns, and the others, `plane` pixels apart, in the columns [col0, col0 + n_cols), outside of which none sees
+ * anything. */
 typedef struct {
     const int32_t *first_ids, *ids;
     const float *depth;
@@ -307,7 +308,7 @@ typedef struct {
     int sample_bits;
 } tl_seen_samples;
 
-/* What is averaged of the samples' colours: uint8 values become light and back in 65537 steps; alpha, behind the first
+/* How the samples' colours are averaged: uint8 values become light and back in 65537 steps; alpha, behind the first
  * n_channels, does not.  With straight alpha colours count as much as they are opaque. */
 typedef struct {
     const int32_t *decode; /* (256,), 0 to 65536; NULL: the values as they are */
@@ -332,7 +333,7 @@ typedef struct {
 /* Cells a row: 16 before the first pixel, at least 16 behind the last, whole cache lines. */
 static inline int64_t tl_area_stride(int64_t width) { return (width + 47) / 16 * 16; }
 
-/* What a triangle's colour does to a pixel. */
+/* How a triangle's colour changes a pixel. */
 typedef enum {
     TL_BLEND_REPLACE = 0,
     TL_BLEND_OVER = 1,
@@ -349,13 +350,15 @@ typedef struct {
     const void *colors; /* (n_triangles, n_channels), or (n_vertices, n_channels) unless is_flat */
     int n_channels, is_u8, is_flat;
     tl_blend blend;
-    int is_premultiplied;  /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
-    const uint8_t *ground; /* uint8 or is_few: the colour that all pixels get first, or NULL: they stay as they are */
-    int is_few;            /* flat triangles over a ground, at most TL_FEW_BLENDED, are drawn row by row */
-    int is_area;           /* the share of the pixel that the triangle covers counts, not its centre */
-    int64_t band_rows;     /* drawn at once, > 0: with fewer all triangles are set up more often */
-    int32_t *packed;       /* uint8 with other than 4 channels: room for the window; is_few: for TL_BLENDED_ROWS rows */
-    int32_t *cells;        /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
+    int is_premultiplied; /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
+    const uint8_t
+        *ground; /* uint8 or is_large_shapes: the colour that all pixels get first, or NULL: they stay as they are */
+    int is_large_shapes; /* flat triangles over a ground, at most TL_SHAPES_BLENDED, are drawn row by row */
+    int is_area;         /* the share of the pixel that the triangle covers counts, not its centre */
+    int64_t band_rows;   /* drawn at once, > 0: with fewer all triangles are set up more often */
+    int32_t
+        *packed; /* uint8 with other than 4 channels: room for the window; is_large_shapes: for TL_BLENDED_ROWS rows */
+    int32_t *cells; /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
 } tl_canvas;
 
 /* Cells for small triangles, or for strips of the width of a window. */
@@ -390,7 +393,7 @@ typedef struct {
     int64_t n_edges;
 } tl_edges;
 
-/* What listing edges needs besides. */
+/* Scratch and output of listing edges. */
 typedef struct {
     int64_t *starts;   /* (n_vertices + 1,) */
     int32_t *last_low; /* (n_vertices,) */
@@ -460,7 +463,7 @@ typedef struct {
 
 /* ---- points of pixels ---------------------------------------------------------------------------------- */
 
-/* What is told of the point of a pixel. */
+/* The kinds of value of the point of a pixel. */
 typedef enum {
     TL_POINT_ROWS_OF = 0, /* n_rows numbers, 1 or 3 */
     TL_POINT_LENGTH = 1,  /* the length of three */

@@ -172,7 +172,7 @@ def drawing_every_sample(scene: Scene) -> Draw:
         count, mask = memory.empty("count", shape, np.uint8), memory.empty("mask", shape, np.bool_)
         count.fill(0)
         for x, y in sample_positions(n, view.grid_bits).tolist():
-            seen = replace(snapped, mesh=snapped.mesh.seen_from(x, y))
+            seen = replace(snapped, mesh=snapped.mesh.at_sample(x, y))
             draw(memory, seen, one, choices.drawing(one, seen, Sink.MASK), mask)
             np.add(count, mask.view(np.uint8), out=count)
         return (np.multiply(count, np.float32(1 / n), out=memory.empty("share", shape, np.float32)),)
@@ -184,7 +184,7 @@ def of_planes(scene: Scene) -> Ways:
     """Samples of ids in bands of rows, set up once, or a whole picture for each."""
     if scene.verb not in ("rasterize", "fill") or scene.sampling not in MSAA:
         return []
-    return other_than(scene, "can_share", {True: "bands", False: "a picture each"})
+    return other_than(scene, "can_slice", {True: "bands", False: "a picture each"})
 
 
 def of_bands(scene: Scene) -> Ways:
@@ -236,7 +236,7 @@ def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
             cells = np.zeros(height * engine.area_stride(width), np.int64)
             snapped.mesh.draw_area(areas, engine.as_bytes(cells), 0, height, True, True)
         else:
-            sum_areas(memory, snapped.mesh, snapped.n_triangles, areas, 1, is_clamped=True)
+            sum_areas(memory, snapped.mesh, areas, 1, is_clamped=True)
         return (areas,)
 
     return draw_areas
@@ -273,7 +273,7 @@ def of_shares(scene: Scene) -> Ways:
     """Two threads: shares of the triangles or bands of rows."""
     if scene.sampling != "center" or scene.verb == "fill":
         return []
-    return other_than(scene, "is_shared", {True: "shares", False: "bands"}, threads=2)
+    return other_than(scene, "is_sliced", {True: "shares", False: "bands"}, threads=2)
 
 
 def of_array_threads(scene: Scene) -> Ways:

@@ -132,9 +132,9 @@ static tl_snapped scene_of(const mesh *m)
 }
 static void draw(const tl_snapped *s, tl_target g)
 {
-    tl_share share = {.end = s->n_triangles, .is_first = 1, .is_last = 1};
+    tl_slice slice = {.end = s->n_triangles, .is_first = 1, .is_last = 1};
     g.stride_px = W;
-    if (k->draw(s, &WINDOW, &g, &share) >= 0)
+    if (k->draw(s, &WINDOW, &g, &slice) >= 0)
         exit(3);
 }
 static mesh the_mesh;

@@ -66,7 +66,7 @@ class Options:
 
 
 @dataclass
-class Fates:
+class ClusterCounts:
     """What became of clusters, added up over instances and samples."""
 
     n: int = 0
@@ -88,7 +88,7 @@ class CountedEngine:
     """The engine of a mesh in clusters, which adds up what it draws."""
 
     engine: Any
-    fates: Fates
+    counts: ClusterCounts
 
     def __len__(self) -> int:
         return len(self.engine)
@@ -99,25 +99,25 @@ class CountedEngine:
     def draw(self, *arguments: Any) -> tuple[int, int, int]:
         """Draw as the engine does."""
         found = self.engine.draw(*arguments)
-        self.fates.n_drawn += found[2]
+        self.counts.n_drawn += found[2]
         return found
 
 
 @contextmanager
-def counting(fates: Fates) -> Iterator[None]:
+def counting(counts: ClusterCounts) -> Iterator[None]:
     """Count the clusters of what is drawn, while the context lasts."""
 
     class CountedScene(ClusteredMesh):
         def __init__(self, clusters: Clusters, view: Any, first_id: int = 0) -> None:
             super().__init__(clusters, view, first_id)
             self.clusters = copy.copy(clusters)
-            self.clusters.engine = CountedEngine(clusters.engine, fates)
+            self.clusters.engine = CountedEngine(clusters.engine, counts)
 
         def draw_rows(self, *arguments: Any, **options: Any) -> Any:
             n, seen = len(self.clusters), self.survey(len(self.clusters), options.get("sample", (0, 0)))
-            fates.n += n
-            fates.n_in_view += round(n * (1 - seen.outside))
-            fates.n_turned_here += round(n * (seen.back + seen.front))
+            counts.n += n
+            counts.n_in_view += round(n * (1 - seen.outside))
+            counts.n_turned_here += round(n * (seen.back + seen.front))
             return super().draw_rows(*arguments, **options)
 
     rasterize = sys.modules["topleft._core.raster.rasterize"]  # not the verb of the same name
@@ -164,18 +164,18 @@ def measure_scene(scene: StaticScene, options: Options) -> Row:
     AssertionError
         If the ways draw different bits.
     """
-    fates = Fates()
+    counts = ClusterCounts()
     planned, whole = Way("planner", drawing(scene)), Way("whole", drawing(scene), WHOLE)
     first = [cpu_ms(planned.draw), cpu_ms(planned.draw)]
     with whole.in_force():
         whole_first = cpu_ms(whole.draw)
-    with counting(fates):
+    with counting(counts):
         planned.draw()
     ways = [planned, whole]
-    shares = fates.shares()
+    shares = counts.shares()
     if shares is None:
         ways.append(Way("clusters", drawing(scene), FORCED))
-        with ways[2].in_force(), counting(fates):
+        with ways[2].in_force(), counting(counts):
             ways[2].draw()
     is_grown = grow(planned)
     if is_grown:
@@ -202,7 +202,7 @@ def measure_scene(scene: StaticScene, options: Options) -> Row:
         "whole_ms": quartiles(times[1]),
         "faster": quartiles(times[1] / times[0]),
         "rounds": n_rounds,
-        "shares": fates.shares(),
+        "shares": counts.shares(),
     }
     if shares is None:
         row["clusters_faster"] = quartiles(times[1] / times[2])

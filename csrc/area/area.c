@@ -254,11 +254,11 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
     s.snapped = snapped, s.window = window, s.bad_row = -1;
     s.max_extent = max_edge_extent(window->subpixel_bits);
     memset(s.n, 0, sizeof s.n);
-    const tl_share all = {.end = snapped->n_triangles};
+    const tl_slice all = {.end = snapped->n_triangles};
     int32_t corners[3 * TL_LANES];
     for (int64_t i = 0; i < snapped->n_triangles && s.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
-        push_batch(&s, i, share_corners(snapped, &all, i, corners), vm_first(snapped->n_triangles - i));
+        push_batch(&s, i, slice_corners(snapped, &all, i, corners), vm_first(snapped->n_triangles - i));
     }
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);

@@ -24,7 +24,7 @@
 #include "raster/triangles_fixed.c"
 #include "raster/triangles_float.c"
 #include "blend/blend_area.c"
-#include "blend/blend_few.c"
+#include "blend/blend_shapes.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
@@ -174,11 +174,11 @@ TL_INLINE void blend_batches(blend_pass *p, tl_geometry g)
 {
     walk_state *s = &p->walk;
     const tl_snapped *snapped = p->mix.snapped;
-    const tl_share all = {.first = 0, .end = snapped->n_triangles};
+    const tl_slice all = {.first = 0, .end = snapped->n_triangles};
     int32_t corners[3 * TL_LANES];
     for (int64_t i = 0; i < all.end && s->bad_row < 0 && !tl_is_given_up(s->window); i += TL_LANES) {
         tl_count_work(s->window, TL_SETUP_PX * TL_LANES);
-        blend_batch(p, g, share_corners(snapped, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
+        blend_batch(p, g, slice_corners(snapped, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
                     vm_first(all.end - i));
     }
     flush_blend(p, g);
@@ -255,15 +255,15 @@ static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, 
     b->snapped = snapped, b->window = window, b->canvas = canvas;
     b->packed = canvas->is_u8 ? canvas->packed ? canvas->packed : canvas->pixels : NULL;
     b->floats = canvas->is_u8 ? NULL : canvas->pixels;
-    b->stride = canvas->packed || canvas->is_few ? window->width : canvas->stride_px;
+    b->stride = canvas->packed || canvas->is_large_shapes ? window->width : canvas->stride_px;
     b->n_samples = b->stride * (window->height - 1) + window->width;
     b->n_channels = canvas->n_channels, b->is_flat = canvas->is_flat, b->mode = mix_of(canvas);
     b->target = (tl_target){.sink = TL_SINK_BLEND, .pixels = b, .stride_px = b->stride, .n_samples = b->n_samples};
     b->ground = canvas->ground && canvas->is_u8 ? packed_color(canvas->ground, canvas->n_channels) : 0;
     b->n_laid = canvas->ground ? 0 : window->height;
-    b->few = NULL;
-    if (canvas->is_few)
-        return blend_few(b);
+    b->shapes = NULL;
+    if (canvas->is_large_shapes)
+        return blend_large_shapes(b);
     if (snapped->mesh.exact || !canvas->is_area)
         lay_ground(b, window->height);
     for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
@@ -286,7 +286,7 @@ static int64_t blend(const tl_snapped *snapped, const tl_window *window, const t
 {
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
-    const int64_t rows_at_once = canvas->is_few ? window->height : min64(fitting, canvas->band_rows);
+    const int64_t rows_at_once = canvas->is_large_shapes ? window->height : min64(fitting, canvas->band_rows);
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;

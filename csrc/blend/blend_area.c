@@ -178,11 +178,11 @@ static int64_t blend_areas(blend_state *b)
     p.area.plane.stride = TL_ATLAS_COLS; /* what an edge adds right of a row is 0 */
     p.area.snapped = snapped, p.area.window = &atlas, p.area.bad_row = -1;
     memset(p.area.n, 0, sizeof p.area.n);
-    const tl_share all = {.first = 0, .end = snapped->n_triangles};
+    const tl_slice all = {.first = 0, .end = snapped->n_triangles};
     int32_t corners[3 * TL_LANES];
     for (int64_t i = 0; i < all.end && p.area.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
-        blend_area_batch(&p, i, share_corners(snapped, &all, i, corners), vm_first(all.end - i));
+        blend_area_batch(&p, i, slice_corners(snapped, &all, i, corners), vm_first(all.end - i));
     }
     flush_atlas(&p);
     return p.area.bad_row;

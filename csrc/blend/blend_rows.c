@@ -17,7 +17,7 @@
 #include "blend/blend_strip.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
-#include "blend/mix_few.c"
+#include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
 /* Fewer rows or columns are no faster so. */
@@ -136,7 +136,7 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
             put_solid(b->packed + at[1][k], end - at[1][k], b->ground);
     }
     b->n_laid = max64(b->n_laid, row + n);
-    for (int k = 0; b->few && k < n; k++) {
+    for (int k = 0; b->shapes && k < n; k++) {
         take_aside(b, at[0][k], 4 * left->n_quads);
         take_aside(b, at[1][k], 4 * right->n_quads);
     }

@@ -23,7 +23,7 @@
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_f32.c"
-#include "blend/mix_few.c"
+#include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
 /* The pixels [col, col + TL_LANES) of a row that begins at `at`; of them those in m that the areas say. */
@@ -33,7 +33,7 @@ TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, t
     const vm on = vm_and(m, vi_gt(area, vi_set1(0)));
     if (!vm_any(on))
         return;
-    if (b->few) {
+    if (b->shapes) {
         const unsigned bits = vm_bits(on);
         const int first = __builtin_ctz(bits);
         take_aside(b, at + first, 32 - __builtin_clz(bits) - first);
@@ -247,7 +247,7 @@ static int strip_rows(int64_t n_cols)
 /* Columns of a strip up to which looking at all cells takes no longer than to note which are met. */
 #define TL_LOOKED_AT 128
 
-/* What of up to `n` triangles, the pieces of one, lies in rows [row, row + n_rows) of the window. */
+/* The parts of up to `n` triangles, the pieces of one, that lie in rows [row, row + n_rows) of the window. */
 static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, int64_t row, int n_rows)
 {
     const tl_window *window = b->window;

@@ -37,11 +37,11 @@ typedef struct blend_state {
     const tl_snapped *snapped;
     const tl_window *window;
     const tl_canvas *canvas;
-    tl_target target;      /* for the walkers */
-    struct few_state *few; /* of mix_few.c, or NULL */
-    int32_t *packed;       /* uint8: a pixel a lane */
-    float *floats;         /* float32: a channel a lane */
-    int64_t stride;        /* in pixels, of either */
+    tl_target target;           /* for the walkers */
+    struct shape_state *shapes; /* of mix_shapes.c, or NULL */
+    int32_t *packed;            /* uint8: a pixel a lane */
+    float *floats;              /* float32: a channel a lane */
+    int64_t stride;             /* in pixels, of either */
     int64_t n_samples;
     int32_t ground; /* what all pixels get first; uint8 */
     int64_t n_laid; /* rows that have it, the first ones; all, where there is none */

@@ -23,7 +23,7 @@ TL_INLINE vm is_alpha(int64_t i, int n_channels)
     return vm_from_bits(TL_LANES == 1 ? i % n_channels == n_channels - 1 : n_channels == 4 ? 0x8888 : 0xaaaa);
 }
 
-/* What lanes need beyond their own channel. */
+/* Values of a pixel that lanes of all its channels read. */
 typedef struct {
     vf s_alpha, d_alpha;
     vm is_alpha;

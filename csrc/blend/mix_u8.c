@@ -83,7 +83,7 @@ TL_INLINE vi mix_whole_u8(vi d, vi s, vm m, tl_mix mode)
 /* The coverage in 2^-15, ties up. */
 TL_INLINE vi coverage_15(vi area) { return vi_shift_right(vi_add(area, vi_set1(256)), 9); }
 
-/* What alpha makes of a coverage, in 2^-15, to nearest. */
+/* A coverage times alpha, in 2^-15, to nearest. */
 TL_INLINE vi weight_15(vi coverage, vi alpha)
 {
     if (!vm_any(vm_and_not(vm_all(), vi_eq(alpha, vi_set1(255)))))

@@ -3,8 +3,8 @@
  * In: a clustered mesh in object space, a matrix; then a depth buffer.  Out: the clusters that may draw a sample;
  * snapped vertices and triangles, which raster.c draws.
  *
- * What is left out draws nothing, whatever the snap does to it: every test has the errors of the vertex stage and of
- * the snap on its far side.
+ * Clusters that are left out draw nothing, whatever the snap does to them: every test has the errors of the vertex
+ * stage and of the snap on its far side.
  *
  * Based on: U. Assarsson, T. Möller, Optimized View Frustum Culling Algorithms for Bounding Boxes, 2000;
  * N. Greene, M. Kass, G. Miller, Hierarchical Z-Buffer Visibility, 1993 (with one level: clusters are small in the
@@ -335,19 +335,20 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
     return n;
 }
 
-static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, int64_t step, int64_t n_of[TL_N_FATES])
+static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, int64_t step,
+                            int64_t n_of[TL_N_VISIBILITIES])
 {
-    memset(n_of, 0, TL_N_FATES * sizeof *n_of);
+    memset(n_of, 0, TL_N_VISIBILITIES * sizeof *n_of);
     for (int64_t i = 0; i < mesh->n_clusters; i += step) {
         const tl_cluster *c = mesh->clusters + i;
         const seen_box box = place_box(c->low, c->high, v->matrix);
         unsigned within = 0;
         if (is_outside(&box, v, &within) || ((within & TL_IN_DEPTH) == TL_IN_DEPTH && is_between_samples(&box, v)))
-            n_of[TL_FATE_OUTSIDE]++;
+            n_of[TL_VISIBILITY_OUTSIDE]++;
         else if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &box))
-            n_of[TL_FATE_TURNED]++;
+            n_of[TL_VISIBILITY_CULLED]++;
         else
-            n_of[c->cone_cos > 0.0 && shows_back(c, v, &box) ? TL_FATE_BACK : TL_FATE_FRONT]++;
+            n_of[c->cone_cos > 0.0 && shows_back(c, v, &box) ? TL_VISIBILITY_BACK : TL_VISIBILITY_FRONT]++;
     }
 }
 
@@ -397,7 +398,7 @@ typedef struct {
 } cluster_mesh;
 
 /* Lists the triangles that have a special corner, and leaves the others, whose number it returns. */
-static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t n, tl_share *share)
+static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t n, tl_slice *slice)
 {
     int64_t n_left = 0;
     for (int64_t i = 0; i < n; i++) {
@@ -407,7 +408,7 @@ static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t
             is_special |= own->vertices[corners[k]].x_fx == TL_SPECIAL;
         const int32_t name = own->snapped.names[i];
         if (is_special) {
-            share->others[share->n_others++] = name;
+            slice->outside[slice->n_outside++] = name;
             continue;
         }
         memmove(own->corners + 3 * n_left, corners, 3 * sizeof *corners);
@@ -419,7 +420,7 @@ static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t
 
 /* Snaps the vertices of a cluster and unpacks its triangles; returns how many of them there are to draw. */
 static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, const tl_snapped *snapped,
-                            tl_share *share, cluster_mesh *own)
+                            tl_slice *slice, cluster_mesh *own)
 {
     const uint8_t *corners = pass->mesh->corners + 3 * c->first_triangle;
     const size_t row_bytes =
@@ -439,7 +440,7 @@ static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, co
     for (int i = 0; i < 3 * c->n_triangles; i++)
         own->corners[i] = corners[i];
     memset(own->corners + 3 * c->n_triangles, 0, 3 * TL_LANES * sizeof *own->corners);
-    return counts.n_bad || counts.n_wide || counts.n_clipped ? list_special(own, c->n_triangles, share)
+    return counts.n_bad || counts.n_wide || counts.n_clipped ? list_special(own, c->n_triangles, slice)
                                                              : c->n_triangles;
 }
 

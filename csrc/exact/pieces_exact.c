@@ -1,4 +1,4 @@
-/* Pieces: what clip planes leave of triangles whose vertices are not snapped.
+/* Pieces: triangles cut by clip planes, of vertices that are not snapped.
  * In: the caller's vertices, a matrix, points in pixels.  Out: pieces of triangles.
  *
  * The operations are those of clip.c up to the snap, in the same order. */

@@ -21,7 +21,7 @@ typedef struct {
     int n;
 } texel_part;
 
-/* What of a polygon lies where sign * coordinate >= limit; the coordinate is x or, for is_y, y. */
+/* The part of a polygon where sign * coordinate >= limit; the coordinate is x or, for is_y, y. */
 static void cut_part(const texel_part *in, int is_y, double sign, double limit, texel_part *out)
 {
     const double *along = is_y ? in->y : in->x;

@@ -268,7 +268,7 @@ TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
 }
 TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z) { *v = (tl_vertex){x, y, z}; }
 
-/* What shading needs besides. */
+/* For shading. */
 TL_INLINE vf vf_load(const float *p) { return *p; }
 TL_INLINE vf vf_fma(vf a, vf b, vf c) { return fmaf(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return a < b ? a : b; } /* b when one is NaN */

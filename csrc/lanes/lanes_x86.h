@@ -1,4 +1,4 @@
-/* What AVX2 and AVX-512 do alike, written once: TL_MM(add_ps) is the intrinsic of the width at hand.
+/* Lanes that AVX2 and AVX-512 share: TL_MM(add_ps) is the intrinsic of the width at hand.
  * In: lanes_avx2.h or lanes_avx512.h, which include this file.  Out: the names of lanes.h that they do not have. */
 #ifndef TL_LANES_X86_H
 #define TL_LANES_X86_H
@@ -118,7 +118,7 @@ TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
     for (int k = 0; k < 4; k++)
         columns[k] = (vd){low[k], high[k]};
 }
-/* What shading needs besides. */
+/* For shading. */
 TL_INLINE vf vf_load(const float *p) { return TL_MM(loadu_ps)(p); }
 TL_INLINE vf vf_fma(vf a, vf b, vf c) { return TL_MM(fmadd_ps)(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return TL_MM(min_ps)(a, b); }

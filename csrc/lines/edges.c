@@ -105,7 +105,7 @@ static inline line_end snapped_end(tl_vertex v, tl_wide wide)
     return v.x_fx == TL_SPECIAL ? (line_end){wide.x_fx, wide.y_fx, v.z} : (line_end){v.x_fx, v.y_fx, v.z};
 }
 
-/* What the clip planes leave of an edge: the cuts are those of clip_polygon along the same edge.  Only planes that an
+/* An edge cut by the clip planes: the cuts are those of clip_polygon along the same edge.  Only planes that an
  * end is outside of cut it, so the line does not depend on the triangles that share it. */
 static int cut_line(const tl_source *source, const int32_t *edge, const tl_view *view, line_end *ends)
 {

@@ -24,7 +24,7 @@
 #include "base/sort_pairs.h"
 
 #define TL_EAR_LEVELS 11 /* of either tree: 8^11 corners are more than int32 counts */
-#define TL_EAR_STEPS_TO_ASK 16384
+#define TL_EAR_STEPS_TO_POLL 16384
 #define TL_EAR_WIDTH 8 /* children of a box, and corners of a leaf */
 
 /* Of the area of a polygon: corners that turn by less are straight, whatever the rounding says. */
@@ -370,7 +370,7 @@ static int64_t *put_ear(int64_t *triangles, int64_t start, int64_t a, int64_t b,
  * faces are finished: fewer than all when they take more steps than they may, or are given up. */
 static int64_t cut_faces(const tl_faces *faces, int64_t *triangles, int64_t *room)
 {
-    int64_t start = 0, n_asked = 0;
+    int64_t start = 0, n_polled = 0;
     ear_face f = {.n_steps = 0};
     for (int64_t face = 0; face < faces->n_faces; start += faces->n_corners[face++]) {
         const int64_t k = faces->n_corners[face], *corners = faces->corners + start;
@@ -396,10 +396,10 @@ static int64_t cut_faces(const tl_faces *faces, int64_t *triangles, int64_t *roo
             cut_off(&f, ear);
             if (f.n_steps > faces->most_steps)
                 return face;
-            if (f.n_steps - n_asked > TL_EAR_STEPS_TO_ASK && faces->pause) {
-                faces->pause->left_px -= 4 * (f.n_steps - n_asked);
-                n_asked = f.n_steps;
-                if (faces->pause->left_px < 0 && faces->pause->ask(faces->pause))
+            if (f.n_steps - n_polled > TL_EAR_STEPS_TO_POLL && faces->pause) {
+                faces->pause->left_px -= 4 * (f.n_steps - n_polled);
+                n_polled = f.n_steps;
+                if (faces->pause->left_px < 0 && faces->pause->poll(faces->pause))
                     return face;
             }
         }

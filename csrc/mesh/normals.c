@@ -58,7 +58,7 @@ static inline void load_three(const tl_source *source, int64_t i, double *p)
 
 #define TL_DIRECTIONS 64 /* at a time, whole vectors of lanes */
 
-/* What squares of would overflow is made smaller, what is not finite zero. */
+/* Scales down vectors with squares that would overflow; those that are not finite become zero. */
 static void gather_vectors(const tl_source *vectors, int64_t first, int n, double (*v)[TL_DIRECTIONS])
 {
     for (int i = 0; i < n; i++) {

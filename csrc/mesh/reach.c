@@ -33,7 +33,7 @@ typedef struct {
     double corner[TL_PIECE_CORNERS][3];
 } convex;
 
-/* What stays the same for all pieces of a triangle. */
+/* Constants of all pieces of a triangle. */
 typedef struct {
     const tl_surface *surface;
     double across[3]; /* the normal of the triangle, of any length */
@@ -126,7 +126,7 @@ static foot foot_of(reaching *r, const double p[3])
     return best;
 }
 
-/* What a bound may be to be near enough. */
+/* The largest bound that is near enough. */
 static double enough_of(const reaching *r)
 {
     const double more = r->share * r->known;

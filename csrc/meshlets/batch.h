@@ -1,4 +1,4 @@
-/* What the stages of drawing hand on: meshlets of a batch with their vertices snapped, queues, the list of samples.
+/* Data that the stages of drawing share: meshlets of a batch with their vertices snapped, queues, the list of samples.
  *
  * Units: a grid of 2^-8 px, whatever the picture's sub-pixels are, at most 8 bits: those of a coarser grid are
  * multiples.  x runs to the right, y upwards, from the left end of the row below the meshlet's own window of 128 x 128
@@ -55,7 +55,7 @@ typedef struct {
     int32_t sample[TL_LANE_QUEUE], size[TL_LANE_QUEUE], triangle[TL_LANE_QUEUE];
 } lane_queue;
 
-/* What one pass over rows of the window needs; on the stack of draw_meshlets. */
+/* The state of one pass over rows of the window; on the stack of draw_meshlets. */
 typedef struct {
     const tl_meshlet_pass *pass;
     const tl_meshlet *meshlets;

@@ -66,8 +66,8 @@ static __attribute__((noinline)) void draw_fallback(meshlet_batch *s, const tl_m
     const int64_t first = (int64_t)s->row0 * s->stride_px;
     window.y_px += s->row0, window.height = s->row1 - s->row0;
     target.pixels = (int32_t *)target.pixels + first, target.depth += first, target.bounds = NULL;
-    tl_share share = {.end = n};
-    pass->kernels->draw(&snapped, &window, &target, &share);
+    tl_slice slice = {.end = n};
+    pass->kernels->draw(&snapped, &window, &target, &slice);
 }
 
 #endif

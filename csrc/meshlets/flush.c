@@ -155,7 +155,7 @@ TL_INLINE void flush_middle_boxes(meshlet_batch *s, meshlet_slot *slot, int is_f
 }
 TL_DEPTH_COPIES(flush_middle_boxes, (meshlet_batch * s, meshlet_slot *slot), s, slot)
 
-/* What one triangle of a pair needs for its rows, of sixteen triangles. */
+/* Row constants of one triangle of each pair, of sixteen pairs. */
 typedef struct {
     lane_edges edges;
     float start[3][TL_LANES], step[3][TL_LANES], inverse[3][TL_LANES];

@@ -1,4 +1,4 @@
-/* What is known of a meshlet: a ball that holds it, the cone of its normals, how thin its triangles are.
+/* Bounds of a meshlet: a ball that holds it, the cone of its normals, how thin its triangles are.
  * In: a meshlet.  Out: a record of bounds, which list.c looks at. */
 #ifndef TL_MEASURE_C
 #define TL_MEASURE_C

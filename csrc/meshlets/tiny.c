@@ -17,7 +17,7 @@
 
 #if TL_HAS_HALVES
 
-/* What rounds x and y to samples, as pairs and as halves. */
+/* Constants that round x and y to samples, as pairs and as halves. */
 #define TL_ROUND_X 0x7f
 #define TL_ROUND_Y 0x80
 #define TL_ROUND_PAIR (TL_ROUND_X | TL_ROUND_Y << 16)

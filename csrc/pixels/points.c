@@ -24,7 +24,7 @@ typedef struct {
     _Alignas(64) double value[3 * TL_POINT_ROWS][TL_SPAN_ROOM];
 } point_span;
 
-/* What the rows are at the corners of runs. */
+/* The rows at the corners of runs. */
 TL_INLINE void set_values(point_span *r, const tl_points *points)
 {
     const int end = TL_LANES + r->weighed.runs.n_runs;

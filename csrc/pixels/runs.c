@@ -33,13 +33,13 @@
 /* Twice the area of unsnapped triangles, in the units that their edge functions are integers of. */
 #define TL_UNIT_AREA 0x1p24
 
-/* What no step of theirs to the next column exceeds, in units. */
+/* The most that one of their steps to the next column is, in units. */
 #define TL_MOST_STEP 0x1p36
 
 /* |E| below this stay int32, with the step to anywhere else in the box. */
 #define TL_INT32_BOX 0x1p30f
 
-/* What interpolated normals that cancel are shorter than, and rounding could have made. */
+/* Interpolated normals that cancel are shorter: rounding could have made them. */
 #define TL_NO_NORMAL 1e-6f
 
 enum {                                /* coefficients of runs, float32 */
@@ -81,6 +81,7 @@ typedef struct {
     int has_far_texels; /* some are asked for before they are read */
     int is_plain;       /* edge functions and normals of vertices are all that runs need */
     int n_runs, n_special;
+    float most_shortest;    /* of RUN_SHORTEST of the runs that set_plain_runs has set, INFINITY of others */
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
     /* vectors of runs begin with a cache line: one across two takes twice as long */
@@ -165,13 +166,13 @@ TL_INLINE void put_three(shade_runs *s, int first, int slot, const vf *q, vf a0,
     put(s, first + 2, slot, vf_mul(q[2], a2));
 }
 
-/* What TL_LANES runs have in common with their triangles. */
+/* The constants that TL_LANES runs have from their triangles. */
 typedef struct {
     _Alignas(64) int32_t corners[3][TL_MAX_LANES];
     vf q[3], normal[3][3], area, col_step[3], row_step[3];
 } run_setup;
 
-/* What perspective makes of a value along a column or a row: the sum of the steps of the weights times the value. */
+/* The step of a value in perspective along a column or a row: the sum of the steps of the weights times the value. */
 TL_INLINE vf gradient_of(const vf *step, const vf *value)
 {
     return vf_fma(step[0], value[0], vf_fma(step[1], value[1], vf_mul(step[2], value[2])));
@@ -387,7 +388,7 @@ TL_INLINE void set_tangents(shade_runs *s, int slot, const run_setup *r, const f
     put(s, first + 6, slot, vf_mul(hand, turn));
 }
 
-/* What only full materials and holes need. */
+/* For full materials and holes alone. */
 static void set_more_attributes(shade_runs *s, int slot, const run_setup *r)
 {
     const tl_shading *shading = s->shading;
@@ -810,12 +811,23 @@ TL_INLINE vf load_plain_normal(const shade_runs *s, int slot, int k, vf *normal)
     return vf_of_bits(c[3]);
 }
 
+TL_INLINE float largest_lane(vf a)
+{
+    float lanes[TL_MAX_LANES], most;
+    vf_store(lanes, a);
+    most = lanes[0];
+    for (int lane = 1; lane < TL_LANES; lane++)
+        most = most < lanes[lane] ? lanes[lane] : most;
+    return most;
+}
+
 /* The same of runs that need no more than normals of vertices, where none is special: 0 if one is.  Passes of few
  * operations, so that those of several vectors of runs overlap. */
 TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
 {
     const int end = TL_LANES + s->n_runs;
     vm is_special = vm_first(0);
+    vf most = vf_set1(0.0f);
     keep_corners(s, fetches, 1);
     if (fetches)
         fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
@@ -848,7 +860,9 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
         q[1] = load_plain_normal(s, slot, 1, normal[1]);
         q[2] = load_plain_normal(s, slot, 2, normal[2]);
         put_normals(s, slot, vf_from_vi(vi_load(s->ints[RUN_SUM] + slot)), q, (const vf(*)[3])normal);
+        most = vf_max(most, vf_load(s->floats[RUN_SHORTEST] + slot));
     }
+    s->most_shortest = largest_lane(most);
     return 1;
 }
 
@@ -859,6 +873,7 @@ TL_ONCE void set_runs(shade_runs *s, int64_t row)
     const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
     const int is_exact = s->snapped->mesh.exact != NULL;
     s->n_special = 0;
+    s->most_shortest = INFINITY;
     if (!s->n_runs)
         return;
     /* the rest of the last vector: a triangle that is there */
@@ -921,7 +936,7 @@ TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t c
     e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
 }
 
-/* What edge functions of the unsnapped lack. */
+/* Adds the constants of edge functions of vertices that are not snapped. */
 TL_INLINE void find_rests(const shaded_lanes *p, vf *rest)
 {
     const vi in_block = vi_set1((int32_t)(p->s->window->x_px & (TL_RUN_BLOCK - 1))), last = vi_set1(TL_RUN_BLOCK - 1);

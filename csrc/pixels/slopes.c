@@ -11,7 +11,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* What the three weights change by along an axis. */
+/* The derivatives of the three weights along an axis. */
 TL_INLINE void slopes_of_weights(const double *steps, int axis, double w, const float *weights, double *slopes)
 {
     const double sum = steps[axis] + steps[3 + axis] + steps[6 + axis];

@@ -277,7 +277,7 @@ static void barycentric(const tl_snapped *snapped, const tl_window *window, cons
         }
 }
 
-/* What `interpolate` reads. */
+/* The input of `interpolate`. */
 typedef struct {
     const float *rows; /* (n_vertices, n_values), or (n_triangles, 3, n_values) */
     int n_values, per_corner;

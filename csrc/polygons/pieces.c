@@ -142,7 +142,7 @@ static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64
     count_crossings(&w);
 }
 
-/* What takes a row of shares of the columns [left, right). */
+/* Takes a row of shares of the columns [left, right). */
 typedef void (*take_shares)(void *to, int64_t row, int64_t left, int64_t right, const double *shares);
 
 /* Resolves the rows [top, bottom) of a polygon within its box. */

@@ -100,7 +100,7 @@ TL_INLINE int is_polygon_given_up(const tl_polygons *s, int64_t n_px)
     if (!pause)
         return 0;
     pause->left_px -= n_px;
-    return pause->left_px < 0 && pause->ask(pause);
+    return pause->left_px < 0 && pause->poll(pause);
 }
 
 static inline int64_t polygon_x(const tl_polygons *s, int is_wide, int64_t i)

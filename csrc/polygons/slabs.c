@@ -28,7 +28,7 @@
 #define TL_FEW_EDGES 64
 #define TL_EDGES_OF_CROSSING 16
 
-#define TL_CROSSINGS_TO_ASK 256 /* after which it is asked whether to go on; a power of two */
+#define TL_CROSSINGS_TO_POLL 256 /* after which it is asked whether to go on; a power of two */
 
 /* A piece that passes the slab. */
 typedef struct {
@@ -37,7 +37,7 @@ typedef struct {
     int32_t piece, winding; /* left of it */
 } slab_edge;
 
-/* What begins or ends at a height: the piece 8 times over and one of these, or -1 - k for the k-th change. */
+/* An event at a height: the piece 8 times over and one of these, or -1 - k for the k-th change. */
 enum { COMES_LEFT, ENDS_LEFT, ENTERS, ENTERS_FROM_LEFT, LEAVES, LEAVES_TO_LEFT, N_KINDS = 8 };
 
 /* The pieces of one row, from left to right, and what is known of it. */
@@ -193,7 +193,7 @@ static void set_crossing(piece_row *w, int n_leaves, int k, double y, double nex
         tree[k >> 1] = tree[k] < tree[k ^ 1] ? tree[k] : tree[k ^ 1];
 }
 
-/* What an edge adds to the area inside, from where it was added to height y: x where its left side alone is inside,
+/* The area inside that an edge adds, from where it was added to height y: x where its left side alone is inside,
  * -x where its right side is. */
 static inline double area_along(const piece_row *w, int64_t col, slab_edge *e, double y)
 {
@@ -233,9 +233,9 @@ static double resolve_crossings(piece_row *w, int64_t col, double y, double next
         set_crossing(w, n_leaves, k, y, next);
         set_crossing(w, n_leaves, k - 1, y, next);
         set_crossing(w, n_leaves, k + 1, y, next);
-        if ((++w->n_crossings & (TL_CROSSINGS_TO_ASK - 1)) == 0) {
+        if ((++w->n_crossings & (TL_CROSSINGS_TO_POLL - 1)) == 0) {
             count_crossings(w);
-            if (cross_too_often(w->p) || is_polygon_given_up(w->p, 32 * TL_CROSSINGS_TO_ASK)) {
+            if (cross_too_often(w->p) || is_polygon_given_up(w->p, 32 * TL_CROSSINGS_TO_POLL)) {
                 w->is_given_up = 1;
                 return 0.0;
             }
@@ -264,7 +264,7 @@ static double resolve_slab(piece_row *w, int64_t col, double y, double next)
         winding += w->pieces[e->piece].sign;
     }
     w->n_crossings += n > TL_FEW_EDGES ? n / TL_EDGES_OF_CROSSING : 0;
-    if (w->n_crossings > TL_CROSSINGS_TO_ASK)
+    if (w->n_crossings > TL_CROSSINGS_TO_POLL)
         count_crossings(w);
     if (is_polygon_given_up(w->p, 4 * n) || cross_too_often(w->p))
         w->is_given_up = 1;

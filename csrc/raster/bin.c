@@ -122,11 +122,11 @@ static int64_t bin(const tl_snapped *snapped, const tl_window *window, int32_t r
         .right = (int32_t)min64(window->x_px + window->width, farthest),
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
     };
-    const tl_share all = {.end = snapped->n_triangles};
+    const tl_slice all = {.end = snapped->n_triangles};
     int32_t corners[3 * TL_LANES];
     bins->n = 0;
     for (int64_t i = 0; i < snapped->n_triangles; i += TL_LANES)
-        if (!bin_batch(&b, i, share_corners(snapped, &all, i, corners), vm_first(snapped->n_triangles - i), bins))
+        if (!bin_batch(&b, i, slice_corners(snapped, &all, i, corners), vm_first(snapped->n_triangles - i), bins))
             return i;
     return -1;
 }

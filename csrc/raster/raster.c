@@ -59,17 +59,17 @@ TL_INLINE int load_batch(walk_state *s, tl_geometry g, tl_sink sink, const int32
 }
 
 /* Lists the triangles that the passes which draw the rest of the picture are to draw, too. */
-TL_INLINE void list_others(const walk_state *s, const lane_batch *b, vi id)
+TL_INLINE void list_outside(const walk_state *s, const lane_batch *b, vi id)
 {
-    tl_share *share = s->share;
+    tl_slice *slice = s->slice;
     const batch_limits *limits = &s->limits;
     const vi first = vi_max(b->top, vi_set1(limits->picture_top));
     const vi end = vi_min(b->bottom, vi_set1(limits->picture_bottom));
     const vm is_seen = vm_and(b->drawn, vm_and(vi_gt(b->n_cols, vi_set1(0)), vi_gt(end, first)));
     const vm is_beyond = vm_or(vi_gt(b->row, first), vi_gt(end, vi_set1(limits->bottom)));
     const vm m = vm_or(b->single, vm_and(is_seen, is_beyond));
-    vi_compress(share->others + share->n_others, m, id);
-    share->n_others += __builtin_popcount(vm_bits(m));
+    vi_compress(slice->outside + slice->n_outside, m, id);
+    slice->n_outside += __builtin_popcount(vm_bits(m));
 }
 
 /* The lesser side of boxes before the window cut them. */
@@ -194,8 +194,8 @@ TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int3
             return;
         find_fixed_boxes(s, &b);
     }
-    if (s->share->others && !s->share->clusters)
-        list_others(s, &b, id);
+    if (s->slice->outside && !s->slice->clusters)
+        list_outside(s, &b, id);
     if (g == TL_FIXED)
         count_unseen(s->target, sink, vm_and_not(b.drawn, has_box(&b)), shorter_side(s, &b));
     b.drawn = vm_and(b.drawn, has_box(&b));
@@ -210,8 +210,8 @@ TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int3
         draw_boxes(s, g, sink, &b, boxes, id);
 }
 
-/* The triangles of a share, or of a cluster. */
-TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const tl_share *part)
+/* The triangles of a slice, or of a cluster. */
+TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const tl_slice *part)
 {
     const void *vertices = g == TL_FIXED ? (const void *)s->snapped->mesh.vertices : (const void *)s->points->points;
     const size_t n_bytes = g == TL_FIXED ? sizeof(tl_vertex) : (size_t)s->points->stride * sizeof(double);
@@ -227,7 +227,7 @@ TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const 
             fetch_rows(vertices, n_bytes, snapped->triangles + 3 * (i + 4 * TL_LANES));
         if (TL_LANES > 1 && g == TL_FIXED && part->ids && i + 9 * TL_LANES <= part->end)
             fetch_listed(vertices, n_bytes, snapped->triangles, part->ids + i);
-        draw_batch(s, g, sink, share_corners(snapped, part, i, corners), id, live);
+        draw_batch(s, g, sink, slice_corners(snapped, part, i, corners), id, live);
         if (g == TL_FLOAT && __builtin_expect(s->n_slivers > 0, 0))
             draw_slivers(s);
     }
@@ -239,37 +239,37 @@ TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const 
 }
 
 /* As start_fixed, but for squares and several samples, and for the shares of a picture. */
-TL_INLINE void start_share(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
-                           tl_share *share, tl_sink sink)
+TL_INLINE void start_slice(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                           tl_slice *slice, tl_sink sink)
 {
     const int bits = window->subpixel_bits, of_samples = sink_of(target, sink) == TL_SINK_SAMPLES;
     const int32_t reach = of_samples ? sample_reach(target) : 0;
     const extent_rounding round = round_extent(window);
     start_fixed(s, snapped, window, target);
-    set_share(s, share);
+    set_slice(s, slice);
     s->limits.round = (extent_rounding){round.first - reach, round.end + reach};
     if (window->test != TL_TEST_SAMPLE || of_samples)
         s->limits.max_extent = (TL_MAX_BOX_PX - 2) << (bits < 8 ? bits : 8);
-    if (share->clusters)
+    if (slice->clusters)
         s->limits.last_vertex = vi_set1(TL_CLUSTER - 1);
 }
 
-/* Every triangle of a share; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
+/* Every triangle of a slice; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
 TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
-                            tl_share *share, int64_t *bad_row, tl_sink sink)
+                            tl_slice *slice, int64_t *bad_row, tl_sink sink)
 {
     walk_state s;
-    start_share(&s, snapped, window, target, share, sink);
-    tl_cluster_pass *clusters = share->clusters;
+    start_slice(&s, snapped, window, target, slice, sink);
+    tl_cluster_pass *clusters = slice->clusters;
     cluster_mesh cluster;
-    tl_share part = *share;
+    tl_slice part = *slice;
     const int64_t n_parts = clusters ? list_clusters(clusters, window, target) : 1;
     for (int64_t next = 0; next < n_parts && !(next && tl_is_given_up(window)); next++) {
         if (clusters) {
             const tl_cluster *c = clusters->mesh->clusters + clusters->list[next];
             if (clusters->may_be_hidden && is_cluster_hidden(c, clusters->seen, window, target))
                 continue;
-            part.first = 0, part.end = load_cluster(c, clusters, snapped, share, &cluster);
+            part.first = 0, part.end = load_cluster(c, clusters, snapped, slice, &cluster);
             clusters->n_drawn++;
             s.snapped = &cluster.snapped;
         }
@@ -281,12 +281,12 @@ TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, 
 }
 
 TL_INLINE void draw_snapped(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
-                            tl_share *share, int64_t *bad_row, tl_sink sink)
+                            tl_slice *slice, int64_t *bad_row, tl_sink sink)
 {
     const int is_centre = window->test == TL_TEST_SAMPLE && sink_of(target, sink) != TL_SINK_SAMPLES;
     const int fits_lanes = is_centre || window->subpixel_bits <= 8;
     if (snapped->method == TL_METHOD_AUTO && is_near(window) && fits_lanes) {
-        draw_batches(snapped, window, target, share, bad_row, sink);
+        draw_batches(snapped, window, target, slice, bad_row, sink);
         return;
     }
     *bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
@@ -299,23 +299,23 @@ TL_INLINE void draw_snapped(const tl_snapped *snapped, const tl_window *window, 
 }
 
 TL_SINK_COPY(draw_snapped, samples, TL_SINK_SAMPLES,
-             (const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share,
+             (const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice,
               int64_t *bad_row),
-             snapped, window, target, share, bad_row)
+             snapped, window, target, slice, bad_row)
 TL_LIST_COPIES(draw_snapped,
-               (const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share,
+               (const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice,
                 int64_t *bad_row),
-               snapped, window, target, share, bad_row)
+               snapped, window, target, slice, bad_row)
 
 /* Counts the triangles of a mesh by what draw_snapped does with them: in its own code. */
 static int64_t count_classes(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                              tl_census *census)
 {
     tl_target counted = *target;
-    tl_share share = {.end = snapped->n_triangles};
+    tl_slice slice = {.end = snapped->n_triangles};
     int64_t bad_row = -1;
     counted.sink = TL_SINK_CENSUS, counted.census = census;
-    draw_snapped(snapped, window, &counted, &share, &bad_row, TL_SINK_CENSUS);
+    draw_snapped(snapped, window, &counted, &slice, &bad_row, TL_SINK_CENSUS);
     return bad_row;
 }
 
@@ -328,7 +328,7 @@ static void clear_depth(float *depth, int64_t n, float value)
     vf_store_masked(depth + k, vm_first(n - k), vf_set1(value));
 }
 
-/* What every sample of the window starts as. */
+/* Clears every sample of the window. */
 static void clear(const tl_window *window, const tl_target *target)
 {
     const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
@@ -354,12 +354,12 @@ static void clear(const tl_window *window, const tl_target *target)
 }
 
 /* The pieces of listed triangles. */
-static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t n_whole, const tl_share *share)
+static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t n_whole, const tl_slice *slice)
 {
     const tl_exact_pieces *pieces = s->snapped->mesh.exact->pieces;
-    for (int64_t i = share->first; i < share->end; i++) {
-        int64_t k = first_piece(pieces->source, pieces->n_pieces, share->ids[i]);
-        for (; k < pieces->n_pieces && pieces->source[k] == share->ids[i]; k++) {
+    for (int64_t i = slice->first; i < slice->end; i++) {
+        int64_t k = first_piece(pieces->source, pieces->n_pieces, slice->ids[i]);
+        for (; k < pieces->n_pieces && pieces->source[k] == slice->ids[i]; k++) {
             if (s->bad_row >= 0 || tl_is_given_up(s->window))
                 return;
             draw_one_float(s, (int32_t)(n_whole + k));
@@ -367,30 +367,30 @@ static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t 
     }
 }
 
-/* Every triangle of a share whose vertices are not snapped; from n_whole on they are pieces. */
+/* Every triangle of a slice whose vertices are not snapped; from n_whole on they are pieces. */
 TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
-                           tl_share *share, tl_exact_counts *counts, int64_t *bad_row, tl_sink sink)
+                           tl_slice *slice, tl_exact_counts *counts, int64_t *bad_row, tl_sink sink)
 {
     const int counts_pieces = target->sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
     walk_state s;
-    tl_share part = *share;
+    tl_slice part = *slice;
     start_float(&s, mesh, window, target, counts);
-    set_share(&s, share);
-    part.end = counts_pieces ? min64(share->end, n_whole) : share->end;
+    set_slice(&s, slice);
+    part.end = counts_pieces ? min64(slice->end, n_whole) : slice->end;
     draw_triangles(&s, TL_FLOAT, sink, &part);
     draw_slivers(&s);
-    if (share->ids && mesh->mesh.exact->pieces)
-        draw_listed_pieces(&s, n_whole, share);
+    if (slice->ids && mesh->mesh.exact->pieces)
+        draw_listed_pieces(&s, n_whole, slice);
     flush_fragments(target, &s.fragments, s.fragments.n);
     if (counts_pieces && s.bad_row < 0)
-        count_pieces(&s, max64(share->first, n_whole), share->end);
+        count_pieces(&s, max64(slice->first, n_whole), slice->end);
     *bad_row = s.bad_row;
 }
 
 TL_LIST_COPIES(draw_floats,
                (const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
-                tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
-               mesh, n_whole, window, target, share, counts, bad_row)
+                tl_slice *slice, tl_exact_counts *counts, int64_t *bad_row),
+               mesh, n_whole, window, target, slice, counts, bad_row)
 
 /* The mesh with the triangles that are drawn: without those that planes cut, with the pieces behind the others. */
 static tl_snapped drawn_mesh(const tl_snapped *snapped)
@@ -403,45 +403,45 @@ static tl_snapped drawn_mesh(const tl_snapped *snapped)
     return drawn;
 }
 
-static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, const tl_target *part, tl_share *share)
+static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, const tl_target *part, tl_slice *slice)
 {
     const tl_snapped drawn = drawn_mesh(snapped);
-    const int has_all = !share->ids && share->end == snapped->n_triangles;
+    const int has_all = !slice->ids && slice->end == snapped->n_triangles;
     tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
-    tl_share own = *share;
+    tl_slice own = *slice;
     int64_t bad_row = -1;
-    own.end = has_all ? drawn.n_triangles : share->end;
+    own.end = has_all ? drawn.n_triangles : slice->end;
     if (own.first < own.end)
         TL_LIST_CALL(draw_floats, part->sink, &drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row)
-    share->n_others = own.n_others;
-    if (share->counts) {
-        share->counts->n_triangles += counts.n_triangles;
-        share->counts->n_on_grid += counts.n_on_grid;
-        share->counts->n_refined += counts.n_refined;
-        share->counts->n_turns += counts.n_turns;
-        share->counts->n_expansions += counts.n_expansions;
-        share->counts->n_integers += counts.n_integers;
+    slice->n_outside = own.n_outside;
+    if (slice->counts) {
+        slice->counts->n_triangles += counts.n_triangles;
+        slice->counts->n_on_grid += counts.n_on_grid;
+        slice->counts->n_refined += counts.n_refined;
+        slice->counts->n_turns += counts.n_turns;
+        slice->counts->n_expansions += counts.n_expansions;
+        slice->counts->n_integers += counts.n_integers;
     }
     return bad_row;
 }
 
 /* A band of less than 2^31 pixels. */
-static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice)
 {
     int64_t bad_row = -1;
     if (snapped->mesh.exact)
-        return draw_exact(snapped, window, target, share);
-    if (share->first >= share->end && !share->clusters)
+        return draw_exact(snapped, window, target, slice);
+    if (slice->first >= slice->end && !slice->clusters)
         return bad_row;
     if (target->sink == TL_SINK_SAMPLES)
-        draw_snapped_samples(snapped, window, target, share, &bad_row);
+        draw_snapped_samples(snapped, window, target, slice, &bad_row);
     else
-        TL_LIST_CALL(draw_snapped, target->sink, snapped, window, target, share, &bad_row)
+        TL_LIST_CALL(draw_snapped, target->sink, snapped, window, target, slice, &bad_row)
     return bad_row;
 }
 
 /* Clears bands of less than 2^31 pixels, draws and finishes them. */
-static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
@@ -456,14 +456,14 @@ static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl
         part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
         part.n_samples = part.stride_px * (band.height - 1) + band.width;
         part.bounds = target->bounds ? target->bounds + row * tl_segments(target->stride_px) : NULL;
-        if (share->is_first)
+        if (slice->is_first)
             clear(&band, &part);
-        const int64_t bad_row = draw_part(snapped, &band, &part, share);
+        const int64_t bad_row = draw_part(snapped, &band, &part, slice);
         if (bad_row >= 0)
             return bad_row;
-        if (target->sink == TL_SINK_MASK && share->is_last)
+        if (target->sink == TL_SINK_MASK && slice->is_last)
             expand_covered(&band, &part);
-        if (target->sink == TL_SINK_SAMPLES && share->is_last)
+        if (target->sink == TL_SINK_SAMPLES && slice->is_last)
             share_samples(&band, &part);
     }
     return -1;

@@ -20,7 +20,7 @@
 
 #define TL_MAX_WORDS (TL_MIDDLE_BOX * TL_MAX_SAMPLES / 64) /* of a row of a middle box */
 
-/* What a sample adds to the doubled edge functions. */
+/* The offsets of a sample in the doubled edge functions. */
 TL_INLINE vi sample_shift(vi dx, vi dy, const int32_t *sample_fx)
 {
     return vi_sub(vi_mul(dx, vi_set1(2 * sample_fx[1])), vi_mul(dy, vi_set1(2 * sample_fx[0])));

@@ -97,7 +97,7 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
 /* A box at most this wide is walked sample by sample, a wider one by its row ends. */
 #define TL_EDGE_MAX_WIDTH 6
 
-/* What stands in the picture for triangles. */
+/* The ids of triangles in the picture. */
 TL_INLINE vi names_of(const tl_snapped *snapped, vm m, vi id)
 {
     return vi_add(snapped->names ? vi_gather(m, snapped->names, id) : id, vi_set1(snapped->first_id));

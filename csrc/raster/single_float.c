@@ -88,7 +88,7 @@ static void plane_of_points(single_triangle *t, double width, double height)
     t->slope_y = (d2 * x1 - d1 * x2) * inverse;
 }
 
-/* What that takes, in pixels of a plane. */
+/* The work of a depth by weights, in pixels of a plane. */
 #define TL_WEIGHTED_PX 256
 
 /* The depth of a sample by weights: parts of the area, each within 2^-49 of its size. */

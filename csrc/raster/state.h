@@ -35,7 +35,7 @@ typedef struct {
     float xy[TL_QUEUE + TL_MAX_LANES]; /* TL_FLOAT: X * Y of the extent */
 } box_queue;
 
-/* What one pass needs to know of the window and the mesh, in int32. */
+/* Bounds of the window and the mesh in one pass, in int32. */
 typedef struct {
     int32_t left, top, right, bottom;    /* picture pixels */
     int32_t picture_top, picture_bottom; /* rows of the picture that other passes draw */
@@ -52,7 +52,7 @@ typedef struct {
     const tl_snapped *snapped; /* with the triangles that are drawn */
     const tl_window *window;
     const tl_target *target;
-    tl_share *share;
+    tl_slice *slice;
     batch_limits limits;
     int64_t bad_row; /* of triangles, -1: none so far */
     /* TL_FLOAT */
@@ -106,7 +106,7 @@ typedef struct {
     vd x0, y0; /* TL_FLOAT; else 0 */
 } lane_planes;
 
-/* TL_LANES triangles as loaded, and what becomes of them. */
+/* TL_LANES triangles as loaded, their boxes, and how each is drawn. */
 typedef struct {
     vi top, bottom;              /* rows of the extent in the picture */
     vi col, row, n_cols, n_rows; /* the box of samples in the window */
@@ -231,13 +231,13 @@ TL_INLINE int make_room(walk_state *s, int n)
     return 0;
 }
 
-/* ---- triangles of a share -------------------------------------------------------------------------------- */
+/* ---- triangles of a slice -------------------------------------------------------------------------------- */
 
-/* Copies the corners of the triangles [i, i + TL_LANES) of a share, unchecked; behind the end zeros.  What another
+/* Copies the corners of the triangles [i, i + TL_LANES) of a slice, unchecked; behind the end zeros.  What another
  * thread then writes to the indices is not seen any more. */
-TL_INLINE const int32_t *share_corners(const tl_snapped *snapped, const tl_share *share, int64_t i, int32_t *own)
+TL_INLINE const int32_t *slice_corners(const tl_snapped *snapped, const tl_slice *slice, int64_t i, int32_t *own)
 {
-    if (!share->ids && i + TL_LANES <= share->end) {
+    if (!slice->ids && i + TL_LANES <= slice->end) {
         const int32_t *given = snapped->triangles + 3 * i;
         for (int k = 0; k < 3 * TL_LANES; k += 16) /* 5 % of a million-triangle mesh */
             __builtin_prefetch(given + 12 * 48 + k);
@@ -248,7 +248,7 @@ TL_INLINE const int32_t *share_corners(const tl_snapped *snapped, const tl_share
         return own;
     }
     for (int k = 0; k < TL_LANES; k++) {
-        const int64_t id = i + k >= share->end ? -1 : share->ids ? share->ids[i + k] : i + k;
+        const int64_t id = i + k >= slice->end ? -1 : slice->ids ? slice->ids[i + k] : i + k;
         if (id >= 0)
             memcpy(own + 3 * k, snapped->triangles + 3 * id, 3 * sizeof *own);
         else
@@ -288,14 +288,14 @@ TL_INLINE void start_walk(walk_state *s, const tl_snapped *snapped, const tl_win
     s->limits.last_vertex = vi_set1((int32_t)(snapped->mesh.n_vertices - 1));
 }
 
-/* The rows that the passes of a share draw. */
-TL_INLINE void set_share(walk_state *s, tl_share *share)
+/* The rows that the passes of a slice draw. */
+TL_INLINE void set_slice(walk_state *s, tl_slice *slice)
 {
-    s->share = share;
+    s->slice = slice;
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
-    if (share->others && !share->clusters) {
-        s->limits.picture_top = (int32_t)share->picture->y_px;
-        s->limits.picture_bottom = (int32_t)min64(share->picture->y_px + share->picture->height, (int64_t)1 << 30);
+    if (slice->outside && !slice->clusters) {
+        s->limits.picture_top = (int32_t)slice->picture->y_px;
+        s->limits.picture_bottom = (int32_t)min64(slice->picture->y_px + slice->picture->height, (int64_t)1 << 30);
     }
 }
 

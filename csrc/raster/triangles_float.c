@@ -191,7 +191,7 @@ TL_INLINE void set_float_edges(lane_exact *t)
     }
 }
 
-/* What set_box_edges begins with. */
+/* The first step of set_box_edges. */
 TL_INLINE void measure_points(lane_exact *t)
 {
     for (int k = 0; k < 3; k++) {

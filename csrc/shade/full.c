@@ -47,7 +47,7 @@ TL_INLINE void find_uv(const shaded_lanes *p, int first, int gradient, vf *uv, v
     }
 }
 
-/* What only full materials and holes need. */
+/* For full materials and holes alone. */
 static void set_more(shaded_lanes *p)
 {
     if (p->s->needs_uv1)

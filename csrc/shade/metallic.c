@@ -55,7 +55,7 @@ TL_INLINE void set_rough(rough_surface *s, const vf *base, vf metallic, vf rough
     }
 }
 
-/* What one light adds. */
+/* The light that one lamp adds. */
 TL_INLINE void add_rough_light(const rough_surface *s, const tl_light *light, vf *rgb)
 {
     vf to_light[3], half[3], squared_cross = vf_set1(0.0f);
@@ -97,7 +97,7 @@ TL_INLINE void mirrored_share(vf roughness, vf n_dot_v, vf *share)
     share[1] = vf_fma(vf_set1(1.04f), a, vf_fma(vf_set1(0.022f), roughness, vf_set1(-0.04f)));
 }
 
-/* What arrives from all around: ambient light, which is the same from everywhere, and the surroundings. */
+/* Light from all around: ambient light, which is the same from everywhere, and the surroundings. */
 TL_INLINE void add_rough_surroundings(const rough_surface *s, const tl_shading *shading, vf occlusion, vf *rgb)
 {
     vf share[2], mirrored[3], gathered[3], direction[3];

@@ -49,8 +49,13 @@ TL_ONCE void shade_grey(const shade_runs *s, int n, int64_t column, int32_t *pix
             put_shaded(pixels + x, s->visible[i], n - x, grey_word(s, vf_load(light + x)));
 }
 
-TL_INLINE void fill_words(int32_t *pixels, int32_t word, int n)
+/* Fills a span with the background, and asks for the ids and the pixels of the row below it. */
+TL_INLINE void start_span(int32_t *pixels, int32_t word, int n, const int32_t *ids, int64_t to_next)
 {
+    for (int x = 0; to_next && x < n; x += 16) {
+        __builtin_prefetch(ids + to_next + x);
+        __builtin_prefetch(pixels + to_next + x, 1);
+    }
     for (int x = 0; x < n; x += TL_LANES)
         if (n - x >= TL_LANES)
             vi_store(pixels + x, vi_set1(word));
@@ -93,7 +98,7 @@ static void shade(const tl_shaded_scene *scene, const tl_window *window, const i
             const int64_t at = row * window->width + column;
             const int n = (int)min64(TL_SPAN, window->width - column);
             int32_t *own = (int32_t *)pixels + at;
-            fill_words(own, background, n);
+            start_span(own, background, n, ids + at, row + 1 < window->height ? window->width : 0);
             list_instances(&list, ids + at, n);
             for (int k = 0; k < list.n; k++) {
                 const int first = list.parts[k].first, n_own = list.parts[k].end - first;

@@ -109,14 +109,14 @@ TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, in
     return vi_select(vf_lt(vf_set1(0.0f), share), word, vi_set1(background));
 }
 
-/* What the samples of a span of pixels see, a plane a sample. */
+/* The ids and depths of the samples of a span of pixels, a plane a sample. */
 typedef struct {
     int32_t ids[TL_MAX_SAMPLES][TL_SPAN_ROOM];
     float depth[TL_MAX_SAMPLES][TL_SPAN_ROOM];
 } span_samples;
 
-/* Writes what the samples of n pixels see, of which split pixels [at, end) are the first that may lie there; `ids` and
- * `depth` are those of the first sample.  Returns where the split pixels of the next span begin. */
+/* Writes the ids and depths that the samples of n pixels see.  Of split pixels, [at, end) are the first that may lie
+ * there; `ids` and `depth` are those of the first sample.  Returns where the split pixels of the next span begin. */
 static int64_t unpack_span(const tl_split *split, int64_t at, int64_t end, int64_t column, int n, int sample_bits,
                            const int32_t *ids, const float *depth, span_samples *span)
 {

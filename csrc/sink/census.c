@@ -16,7 +16,7 @@ TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink)
     return sink == TL_SINK_CENSUS ? target->census->sink : sink;
 }
 
-/* What follows is empty for all sinks but the census, so that the code that draws reads without it. */
+/* The rest is empty for all sinks but the census, so that the code that draws reads without it. */
 
 /* Triangles without positive area: of none, or turned away. */
 TL_INLINE void count_faceless(const tl_target *target, tl_sink sink, vm m, vi area)

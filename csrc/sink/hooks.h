@@ -9,11 +9,11 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* TL_SINK_BLEND, in blend/mix_few.c: the colours of the pixels [at, at + n). */
+/* TL_SINK_BLEND, in blend/mix_shapes.c: the colours of the pixels [at, at + n). */
 struct blend_state;
 static void mix_run(struct blend_state *b, int64_t at, int64_t n);
 
-/* TL_SINK_SPANS, in few/row_spans.c: the n samples from `at` on are covered. */
+/* TL_SINK_SPANS, in large_shapes/row_spans.c: the n samples from `at` on are covered. */
 struct span_table;
 static void note_span(struct span_table *t, int64_t at, int64_t n);
 

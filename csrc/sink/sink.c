@@ -390,7 +390,7 @@ TL_ONCE void put_weighted(const tl_triangle *t, const tl_window *window, const t
     }
 }
 
-/* What depth needs of a triangle beyond its spans. */
+/* The plane and place of a triangle, for depth. */
 TL_INLINE void setup_sink(tl_triangle *t, const tl_window *window, tl_sink sink)
 {
     if (!sink_has_depth(sink))

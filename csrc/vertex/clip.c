@@ -65,7 +65,7 @@ static int clip_polygon(const clip_corner *in, int n_in, int plane, const tl_vie
     return n;
 }
 
-/* What is left of one triangle; 0 corners when nothing is. */
+/* One triangle, cut; 0 corners when nothing of it is left. */
 static int clip_triangle(const tl_source *source, const int32_t *corners, const tl_view *view, clip_corner *polygon)
 {
     clip_corner other[TL_MAX_CORNERS];
@@ -204,7 +204,7 @@ static void clip(const tl_source *source, const tl_vertex *vertices, const int32
     }
 }
 
-/* What reads the pieces. */
+/* Readers of the pieces. */
 static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 {
     int clipped = 0;
@@ -239,8 +239,8 @@ static int64_t first_piece(const int32_t *source, int64_t n, int64_t id)
     return low;
 }
 
-/* What is drawn of a triangle: itself, or the pieces that clip planes leave of it; n of them, three of `corners`
- * each. */
+/* The parts of a triangle that are drawn: itself, or the pieces that clip planes leave of it; n of them, three of
+ * `corners` each. */
 typedef struct {
     tl_vertex_set set;
     const int32_t *corners;

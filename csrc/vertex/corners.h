@@ -13,8 +13,8 @@ static inline int32_t corner_within(int32_t corner, int64_t n_vertices)
     return (int32_t)((uint32_t)corner < last ? (uint32_t)corner : last);
 }
 
-/* What uses the corners of a triangle more than once reads them once, here: a mesh that changes while it is drawn gives
- * a wrong picture, and nothing is read or written outside of arrays. */
+/* Code that uses the corners of a triangle more than once reads them once, here: a mesh that changes while it is drawn
+ * gives a wrong picture, and nothing is read or written outside of arrays. */
 static inline void read_corners(const tl_snapped *snapped, int64_t i, int32_t *own)
 {
     const int32_t *given = snapped->triangles + 3 * i;

@@ -197,7 +197,7 @@ TL_INLINE vm store_points(double *out, vd x, vd y, vd z)
     return vm_and(vd_ge(farthest, vd_abs(x)), vd_ge(farthest, vd_abs(y)));
 }
 
-/* What begins with `scalar` are constants: a copy for each keeps the matrix in registers. */
+/* Names that begin with `scalar` are constants: a copy for each keeps the matrix in registers. */
 TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
                                 const projected_vertices *out, tl_vertex_counts *counts, tl_scalar scalar,
                                 int has_matrix, int is_affine, int is_snapped)

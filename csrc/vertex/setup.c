@@ -27,7 +27,7 @@ typedef struct {
     double slope_x, slope_y;
 } tl_triangle;
 
-/* What turns an extent [low, high] into pixels: those from (low + first) >> bits on, up to (high + end) >> bits. */
+/* Rounds an extent [low, high] to pixels: those from (low + first) >> bits on, up to (high + end) >> bits. */
 typedef struct {
     int32_t first, end;
 } extent_rounding;

@@ -52,14 +52,15 @@ if TYPE_CHECKING:
     from topleft._apps.batch.visible import VisibleFaces, visible_faces
     from topleft._apps.diagram.pixel_grid import pixel_grid
     from topleft._apps.explore.open import Explorer, explore
-    from topleft._apps.tiles.merge import merge
-    from topleft._apps.tiles.tiles import Tiles, Window, tiles
+    from topleft._apps.tiles.tiles import Tiles, tiles
     from topleft._meshes.grid.bake import Baked, bake
     from topleft._meshes.grid.viewshed import Viewshed, viewshed
     from topleft._meshes.grid.voxels import Voxels, voxelize
+    from topleft._meshes.picture.merge import merge
     from topleft._meshes.picture.object_masks import ObjectMasks, object_masks
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
+    from topleft._meshes.windows.raster import Window
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
@@ -72,10 +73,10 @@ _LATE = {
     "Viewshed": "topleft._meshes.grid.viewshed",
     "VisibleFaces": "topleft._apps.batch.visible",
     "Voxels": "topleft._meshes.grid.voxels",
-    "Window": "topleft._apps.tiles.tiles",
+    "Window": "topleft._meshes.windows.raster",
     "bake": "topleft._meshes.grid.bake",
     "explore": "topleft._apps.explore.open",
-    "merge": "topleft._apps.tiles.merge",
+    "merge": "topleft._meshes.picture.merge",
     "object_masks": "topleft._meshes.picture.object_masks",
     "pixel_grid": "topleft._apps.diagram.pixel_grid",
     "render_batch": "topleft._apps.batch.batch",

@@ -16,10 +16,10 @@ from typing import Any, get_args
 
 import numpy as np
 
+from topleft import rasterize as draw
 from topleft._core.base.arrays import as_checked_triangles, as_pair
 from topleft._core.gradients import tensors
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
-from topleft._core.raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption
 

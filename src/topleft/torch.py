@@ -21,13 +21,13 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft import DepthLayers, peel
+from topleft import rasterize as draw
 from topleft._core.base.arrays import as_pair, check_rows
 from topleft._core.base.threads import parse_threads
 from topleft._core.gradients import tensors
 from topleft._core.gradients.bands import MIN_PX_PER_THREAD
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
-from topleft._core.raster.peel import DepthLayers, peel
-from topleft._core.raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption
 

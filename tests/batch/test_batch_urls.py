@@ -15,7 +15,7 @@ from PIL import Image
 
 import topleft as tl
 from topleft._apps.cli import main
-from topleft._core.base.remote import RemotePath, place_of
+from topleft._core.base.remote import RemotePath, location_of
 
 fsspec = pytest.importorskip("fsspec", reason="the tiles extra is not installed")
 
@@ -87,8 +87,8 @@ def test_layers_go_to_a_store(memory):
 
 
 def test_urls_of_this_machine_are_paths(tmp_path):
-    assert place_of(f"file://{tmp_path}/a b.png") == tmp_path / "a b.png"
-    assert place_of(f"file://{tmp_path}/a%20b.png") == tmp_path / "a b.png"
+    assert location_of(f"file://{tmp_path}/a b.png") == tmp_path / "a b.png"
+    assert location_of(f"file://{tmp_path}/a%20b.png") == tmp_path / "a b.png"
     job = tl.Job(BOX, None, SIZE, {}, f"file://{tmp_path}/new/a.png")
     tl.render_batch([job]).finish()
     assert [path.name for path in (tmp_path / "new").iterdir()] == ["a.png"]

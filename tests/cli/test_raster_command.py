@@ -155,7 +155,7 @@ def test_command_replaces_what_is_there_when_told_to(tmp_path, pair, capsys, nam
         (["-o", "a.zarr", "--size", "9x9", "--nodata", "5"], "--nodata is for --values and .tif"),
         (["-o", "a.zarr", "--size", "9x9", "--labels", "--surface", "upper"], "--surface is for heights"),
         (["-o", "a.dzi", "--size", "9x9", "--uncompressed"], "--uncompressed is for .tif and .zarr"),
-        (["-o", "a.zarr", "--size", "9x9", "--values", "speed"], "--values speed: a .npy file, or what"),
+        (["-o", "a.zarr", "--size", "9x9", "--values", "speed"], "values must be a .npy file or a property of"),
         (["-o", "a.zarr", "--pixel-size", "0"], "pixel_size must be positive"),
         (["-o", "a.zarr", "--size", "9x9", "--window", "0"], "--window"),
         (["-o", "none/a.tif", "--size", "9x9"], "its folder is not there"),

@@ -98,7 +98,7 @@ def test_all_instruction_sets_agree_with_the_scalar_one(isa, force):
 
 @ON_EACH_ISA
 def test_shares_of_triangles_keep_the_bounds_of_their_rows(isa, force):
-    force(is_shared=True)
+    force(is_sliced=True)
     size, rng = (600, 80), np.random.default_rng(3)
     with on(isa):
         for _ in range(10):

@@ -12,7 +12,6 @@ import topleft as tl
 import topleft.typing as words
 from topleft._apps.batch.batch import OnError, Order
 from topleft._apps.tiles import geotiff, zarr_files
-from topleft._apps.tiles.drawing import KINDS
 from topleft._core.base import options
 from topleft._core.polygons.polygons import Rule
 from topleft._core.raster.view import ViewOptions
@@ -23,6 +22,7 @@ from topleft._meshes.model.texture import Encoding, Filter, Wrap
 from topleft._meshes.picture.layers import LAYERS
 from topleft._meshes.picture.shade import Shading
 from topleft._meshes.plan.plan import OUTPUTS
+from topleft._meshes.windows.drawing import KINDS
 from topleft.methods import CLASSICS, METHODS
 
 #: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_read_from_the_types`.

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import topleft as tl
+from topleft._core.base.notes import Notes
 from topleft._meshes.io.foreign import simplified
 from topleft._meshes.io.limits.budget import Budget
-from topleft._meshes.io.notes import Notes
 from topleft.errors import MeshError, MeshWarning
 
 CHEVRON = "0 0 0 4 0 0 4 4 0 2 1 0 0 4 0"

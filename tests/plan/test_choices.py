@@ -129,7 +129,7 @@ def test_shares_and_bands_give_the_same_bits():
     rng = np.random.default_rng(3)
 
     def forced(view, n_triangles, n_parts, sink):
-        return n_parts > 1 and choices.can_share(view)
+        return n_parts > 1 and choices.can_slice(view)
 
     for _ in range(1500):
         vertices, triangles = random_triangles(rng, 3)
@@ -139,7 +139,7 @@ def test_shares_and_bands_give_the_same_bits():
         def draw(arrays=(vertices, triangles), threads=threads):
             return bits_of(tl.rasterize(*arrays, SIZE, threads=threads))
 
-        chosen, shared = both_ways(draw, is_shared=forced)
+        chosen, shared = both_ways(draw, is_sliced=forced)
         assert (chosen == one).all()
         assert (shared == one).all()
 
@@ -248,7 +248,7 @@ def test_samples_in_bands_and_whole_give_the_same_bits(force, n_components):
             frags = tl.rasterize(*arrays, SIZE, **options)
             return np.stack([frags.samples_triangle, frags.samples_depth.view(np.int32)])
 
-        chosen, whole = both_ways(draw, can_share=False)
+        chosen, whole = both_ways(draw, can_slice=False)
         assert (chosen == whole).all()
 
 
@@ -285,7 +285,7 @@ def listed_in_bands(vertices, cull="none"):
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     snapped = snap_mesh(KeptMemory(), vertices, triangles, view, with_depth=False, out=None)
     positions = sampling.sample_positions(4, view.grid_bits)
-    bins = sampling.sort_bands(KeptMemory(), snapped.mesh, len(triangles), positions, (16, 16), 64, 1)
+    bins = sampling.SamplePass(KeptMemory(), snapped.mesh, positions, 1).sort_bands((16, 16), 64)
     assert bins.n_bands == 4
     return bins.n_listed
 

@@ -60,7 +60,7 @@ def draws_by_threads():
 
 def shares():
     view = View.parse((64, 64), {})
-    return [choices.is_shared(view, n, parts, Sink.NEAREST) for n in COUNTS for parts in (1, 2, 4, 16)]
+    return [choices.is_sliced(view, n, parts, Sink.NEAREST) for n in COUNTS for parts in (1, 2, 4, 16)]
 
 
 def clusters():

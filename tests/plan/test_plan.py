@@ -402,17 +402,17 @@ def test_rows_tell_their_units_and_scenes():
         assert row.metadata["unit"] or isinstance(row.default, str)
 
 
-@pytest.mark.parametrize(("n_threads", "is_shared", "ns"), [
+@pytest.mark.parametrize(("n_threads", "is_sliced", "ns"), [
     (1, False, 6 * 100 + 10 + 20 * 0.5), (1, True, 620),
     (2, False, 100 + 520 / 1.5 + 1000), (2, True, 620 / 1.5 + 1000),
     (4, False, 100 + 520 / 2.5 + 3000), (4, True, 620 / 2.5 + 3000),
 ])  # fmt: skip
-def test_draws_are_estimated_by_their_parts(n_threads, is_shared, ns):
+def test_draws_are_estimated_by_their_parts(n_threads, is_sliced, ns):
     """Each thread sets up all triangles unless they are shared; all else is done sooner, but others are woken."""
     own = costs.Costs(draw_count=(1.0, 5.0, *[0.0] * 7, 10.0, 0.5, 0.0), parallel=1.5, wake=1000.0)
     counts = np.array([0, 100, 0, 0, 0, 0, 0, 0, 0, 1, 20, 0.0])
     found = replace(own, draw_count=(1.0, 6.0, *own.draw_count[2:])).draw_ms(
-        "count", counts, n_threads, is_shared=is_shared
+        "count", counts, n_threads, is_sliced=is_sliced
     )
     assert found == pytest.approx(ns / 1e6, rel=1e-12)
 
@@ -431,7 +431,7 @@ def test_stages_are_estimated_by_what_they_do(threads):
     assert ms["input"] == pytest.approx((table.call[3] + table.index * 3000) / 1e6)
     facts, _ = find_facts(vertices, triangles, plan._view, "rasterize", (), DepthTest.LESS)
     counts = costs.draw_features(facts.census, n_pixels)
-    assert ms["method"] == pytest.approx(table.draw_ms("count", counts, threads, is_shared=False))
+    assert ms["method"] == pytest.approx(table.draw_ms("count", counts, threads, is_sliced=False))
     assert plan.estimated_ms == pytest.approx(sum(value for value in ms.values() if value))
     filled = tl.plan(vertices, triangles, SIZE, outputs="color", threads=threads)
     assert stage(filled, "shade").estimated_ms == pytest.approx(table.paint * n_pixels / 1e6)

@@ -82,13 +82,13 @@ static void make_buffers(void)
 static void draw(const tl_snapped *scene, const tl_window *window, tl_target target, const char *name, const char *what,
                  int with_depth)
 {
-    tl_share share = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
+    tl_slice slice = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
     const int is_mask = target.sink == TL_SINK_MASK, is_share = target.sink == TL_SINK_SAMPLES;
     target.pixels = is_mask ? (void *)bytes : is_share ? (void *)floats : (void *)ids;
     target.depth = with_depth ? depth : NULL, target.stride_px = WIDTH;
     target.covered = is_mask || is_share ? covered : NULL;
     char row[64];
-    if (k->draw(scene, window, &target, &share) >= 0)
+    if (k->draw(scene, window, &target, &slice) >= 0)
         exit(3);
     snprintf(row, sizeof row, "%s%s", what, with_depth ? " ids" : "");
     tell(name, row, target.pixels, is_mask ? N_PX : 4 * N_PX);
@@ -122,10 +122,10 @@ static void draw_all(tl_snapped *scene, tl_window *window, const char *name)
 
 static void draw_values(const tl_snapped *scene, const tl_window *window, const char *name)
 {
-    const tl_share whole = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
-    tl_share share = whole;
+    const tl_slice whole = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
+    tl_slice slice = whole;
     k->draw(scene, window, &(tl_target){.sink = TL_SINK_NEAREST, .pixels = ids, .depth = depth, .stride_px = WIDTH},
-            &share);
+            &slice);
     k->barycentric(scene, window, ids, floats);
     tell(name, "barycentric", floats, 12 * N_PX);
 

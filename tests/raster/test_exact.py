@@ -231,8 +231,8 @@ def test_every_instruction_set_and_thread_count_draws_the_same_bits():
     pictures = []
     for isa in tl.build_info()["isa_available"]:
         with on(isa):
-            for threads, is_shared in ((1, False), (2, False), (2, True), (3, True), (8, True)):
-                with sharing(is_shared):
+            for threads, is_sliced in ((1, False), (2, False), (2, True), (3, True), (8, True)):
+                with sharing(is_sliced):
                     frags = tl.rasterize(*scene.arrays, **EXACT, threads=threads)
                     squares = [overdraw(scene, threads=threads, sampling=kind) for kind in SQUARES]
                     counts = overdraw(scene, threads=threads, origin=(7, 11))

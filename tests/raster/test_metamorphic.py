@@ -153,8 +153,8 @@ def test_edge_and_scanline_give_every_buffer_alike(make):
 def test_threads_give_every_buffer_alike(make):
     for scene, _ in scenes_of(make, 3):
         expected = buffers(scene, threads=1)
-        for threads, is_shared in ((2, False), (2, True), (3, True), (8, False), (8, True)):
-            with sharing(is_shared):
+        for threads, is_sliced in ((2, False), (2, True), (3, True), (8, False), (8, True)):
+            with sharing(is_sliced):
                 assert_same_buffers(buffers(scene, threads=threads), expected)
 
 

@@ -213,7 +213,7 @@ def split_ids(vertices, triangles, size, rasterizer=None, **options):
 
 def kept(frags):
     """Pixels that are listed, (H, W), and ids and depths of samples (H, W, S) from the lists; other depths are NaN."""
-    n, split = len(frags._split.positions), frags._split.split
+    n, split = len(frags._split.drawn.positions), frags._split.split
     is_listed = np.zeros(frags.id.shape, bool)
     ids, depth = np.repeat(frags.id[..., None], n, -1), np.full((*frags.id.shape, n), np.nan, np.float32)
     depth[..., 0] = frags.depth

@@ -133,9 +133,9 @@ def cases(make, *arguments):
 
 
 @contextmanager
-def sharing(is_shared):
+def sharing(is_sliced):
     """Threads share the triangles of any scene, or set up all of them in each."""
-    with choices.forced(shared_setups=0 if is_shared else 2**62):
+    with choices.forced(shared_setups=0 if is_sliced else 2**62):
         yield
 
 

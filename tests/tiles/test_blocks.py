@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._apps.tiles import blocks as blocks_file
-from topleft._apps.tiles.blocks import triangles_of
+from topleft._meshes.windows import blocks as blocks_file
+from topleft._meshes.windows.blocks import triangles_of
 
 RNG = np.random.default_rng(5)
 POINTS = RNG.uniform(0, 100, (300, 3)).astype(np.float32)
@@ -20,8 +20,8 @@ WHOLE = tl.rasterize(POINTS, TRIANGLES, 100).triangle
 def small_blocks(monkeypatch):
     """Blocks of 50 triangles instead of 131,072."""
     monkeypatch.setattr(blocks_file, "BLOCK", 50)
-    monkeypatch.setattr("topleft._apps.tiles.spans.BLOCK", 50)
-    monkeypatch.setattr("topleft._apps.tiles.tiles.BLOCK", 50)
+    monkeypatch.setattr("topleft._meshes.windows.spans.BLOCK", 50)
+    monkeypatch.setattr("topleft._meshes.windows.raster.BLOCK", 50)
 
 
 def write_stl(path, corners, n=None, header=b"made by a test"):

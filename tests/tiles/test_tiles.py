@@ -300,7 +300,7 @@ def test_windows_go_on_in_a_forked_child():
 
 
 def test_error_of_a_later_block_comes_in_its_turn(monkeypatch):
-    monkeypatch.setattr("topleft._apps.tiles.spans.BLOCK", 8)
+    monkeypatch.setattr("topleft._meshes.windows.spans.BLOCK", 8)
     points = POINTS.copy()
     points[TRIANGLES[41, 0]] = np.nan
     points[TRIANGLES[20, 0]] = np.nan
@@ -313,3 +313,16 @@ def test_windows_without_number_are_told():
     raster = tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), 2**31 - 1, window=1)
     with pytest.raises(MemoryError, match=r"no memory for 2 arrays of [\d,]+ bytes together"):
         raster[:1, :1]
+
+
+def test_values_by_name_are_those_of_the_file(tmp_path):
+    points, triangles = np.array([[0.0, 0], [6, 0], [0, 6]]), [[0, 1, 2]]
+    np.save(tmp_path / "depth.npy", [1.0, 2.0, 3.0])
+    named = tl.tiles((points, triangles), (6, 6), kind="field", values=tmp_path / "depth.npy", window=4)
+    given = tl.tiles((points, triangles), (6, 6), kind="field", values=[1.0, 2.0, 3.0], window=4)
+    assert np.array_equal(named[:, :], given[:, :], equal_nan=True)
+
+
+def test_values_by_a_name_that_is_not_there_are_refused():
+    with pytest.raises(ValueError, match=r"values must be a \.npy file or a property of .* \(none\), got 'speed'"):
+        tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), (6, 6), kind="field", values="speed")

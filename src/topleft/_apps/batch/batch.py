@@ -220,7 +220,7 @@ def workers_on(executor: object, time_limit: float | None) -> Workers | None:
         raise ValueError(f"time_limit must be positive, got {time_limit}")
     if any(kind.__module__.partition(".")[0] == "distributed" for kind in type(executor).__mro__):
         from topleft._apps.batch.cluster import ClusterWorkers
-        from topleft._core.base.cluster import is_client
+        from topleft._apps.cluster import is_client
 
         if is_client(executor):
             return ClusterWorkers(executor, limit)

@@ -19,12 +19,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from topleft import Level, Levels, Mesh, plan
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
 from topleft._apps.batch.workers import N_SPOOLED, Jobs, Workers, coarser_levels_of, needs_levels
-from topleft._core.base.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
-from topleft._meshes.lod.levels import Level, Levels, keep_levels
-from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.plan.plan import plan
+from topleft._apps.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
+from topleft._meshes.lod.levels import keep_levels
 from topleft.errors import MissingPackageError, TopleftError
 
 MESH_KEY = "topleft-mesh"

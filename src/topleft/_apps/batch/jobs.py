@@ -14,23 +14,16 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_size, shown
-from topleft._core.base.remote import Place, as_place, place_of
-from topleft._core.raster.verbs import Rasterizer
-from topleft._meshes.camera.camera import Camera
-from topleft._meshes.io.images import save_image
+from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent, save_image
+from topleft._core.base.array_types import Array, MeshLike
+from topleft._core.base.arrays import as_scale, as_size, shown
+from topleft._core.base.defaults import DEFAULT_SIZE
+from topleft._core.base.notes import listening, tell
+from topleft._core.base.options import check_layers
+from topleft._core.base.remote import Location, as_location, location_of
 from topleft._meshes.io.layer_files import layer_paths, save_layers
-from topleft._meshes.io.load import as_scale, load
-from topleft._meshes.io.notes import listening, tell
-from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.model.points import Points
-from topleft._meshes.picture.layers import check_layers, draw_layers
-from topleft._meshes.picture.render import DEFAULT_SIZE, render
-from topleft._meshes.picture.transparent import render_transparent
+from topleft._meshes.picture.layers import draw_layers
 from topleft._meshes.picture.view_layers import gbuffer_of
-from topleft._meshes.scene.adapt import MeshLike, as_mesh
-from topleft._meshes.scene.scene import Scene
 from topleft.typing import LayerOption
 
 CameraMaker = Callable[[Any, tuple[int, int]], Camera]
@@ -83,7 +76,7 @@ class Job:
         if isinstance(self.camera, type):
             raise TypeError(f"camera must be a Camera, a function of the mesh and the size or None, got {self.camera}")
         if self.destination is not None:
-            as_place("destination", self.destination)
+            as_location("destination", self.destination)
         if as_scale(self.scale) != 1 and not isinstance(self.scene, str | os.PathLike):
             raise TypeError(f"scale is of a scene that is a path, got {shown(self.scene)}: load(path, scale=) has one")
 
@@ -97,7 +90,7 @@ class Job:
         return f"Job({', '.join(words)})"
 
     @property
-    def files(self) -> tuple[Place, ...]:
+    def files(self) -> tuple[Location, ...]:
         """The files that it writes.
 
         Raises
@@ -109,7 +102,7 @@ class Job:
         """
         if self.destination is None:
             return ()
-        path = place_of(self.destination)
+        path = location_of(self.destination)
         return tuple(dict.fromkeys(layer_paths(path, check_layers(self.layers) or ("color",)).values()))
 
     @property
@@ -241,7 +234,7 @@ class JobRunner:
     def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
         layers = check_layers(job.layers)
-        path = None if job.destination is None else place_of(job.destination)
+        path = None if job.destination is None else location_of(job.destination)
         files = job.files  # before any work: a format that is none
         for file in files:
             if isinstance(file, Path) and not file.parent.is_dir():

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import Mesh, Scene, as_mesh
 from topleft._apps.batch.batch import render_batch
 from topleft._apps.batch.jobs import Job
-from topleft._core.base.array_types import I32
+from topleft._core.base.array_types import I32, MeshLike
 from topleft._core.base.arrays import as_count, shown
+from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._meshes.camera.camera import CameraLike, as_camera
-from topleft._meshes.picture.render import DEFAULT_SIZE
-from topleft._meshes.scene.adapt import MeshLike
-from topleft._meshes.scene.scene import Scene, as_meshes, meshes_of, scene_of
 from topleft.typing import CullOption
 
 
@@ -128,8 +127,8 @@ def visible_faces(
     least = as_count("min_pixels", min_pixels)
     if not isinstance(cameras, Iterable) or isinstance(cameras, str | bytes | np.ndarray):
         raise TypeError(f"cameras must be an iterable of Camera, got {shown(cameras)}")
-    subject = as_meshes(mesh)
-    scene = scene_of(subject)
+    subject: Mesh | Scene = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    scene = subject if isinstance(subject, Scene) else Scene([subject])
     scene.check_counted("a scene whose visible triangles are counted")
     n_faces = scene.n_triangles
     layers = ("triangle",) if len(scene) == 1 else ("triangle", "instance")
@@ -146,6 +145,7 @@ def visible_faces(
     camera = np.repeat(np.arange(len(rows), dtype=np.int32), n_seen)
     none = [np.empty(0, np.int32)]
     face, pixels = (np.concatenate(none + [row[k] for row in rows]) for k in range(2))
-    firsts = np.cumsum([0, *(len(one.vertices) for one in meshes_of(subject))])
-    corners = [one.triangles + np.int32(first) for one, first in zip(meshes_of(subject), firsts.tolist(), strict=False)]
+    meshes = [one.mesh for one in scene]
+    firsts = np.cumsum([0, *(len(one.vertices) for one in meshes)])
+    corners = [one.triangles + np.int32(first) for one, first in zip(meshes, firsts.tolist(), strict=False)]
     return VisibleFaces(camera, face, pixels, (len(rows), n_faces), np.concatenate(corners))

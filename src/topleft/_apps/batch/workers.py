@@ -16,12 +16,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from topleft import Level, Levels, Mesh, Scene
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
 from topleft._core.base.arrays import as_size
-from topleft._meshes.lod.levels import Level, Levels, keep_levels
+from topleft._meshes.lod.levels import keep_levels
 from topleft._meshes.lod.simplify import levels_of
-from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.scene.scene import Scene
 from topleft.errors import MissingPackageError
 
 Jobs = Sequence[tuple[int, Job]]

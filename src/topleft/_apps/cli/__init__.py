@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
+from topleft import build_info
 from topleft._apps.cli.arguments import FAILED, REFUSED, Parser, add_render_arguments
 from topleft._apps.cli.bake import add_bake_command
 from topleft._apps.cli.bop import add_bop_command
@@ -25,8 +26,7 @@ from topleft._apps.cli.mask import add_mask_command
 from topleft._apps.cli.raster import add_raster_command
 from topleft._apps.cli.render import run_render
 from topleft._apps.cli.report import TOLD, complain, complain_of_lacks, one_line
-from topleft._core.engine.isa import build_info
-from topleft._meshes.io.notes import listening
+from topleft._core.base.notes import listening
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

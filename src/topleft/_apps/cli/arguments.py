@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
-from typing import Literal, NoReturn
+from typing import Literal, NoReturn, get_args
 
 from topleft._apps.cli.animation import ANIMATION_SUFFIXES
-from topleft._core.base.arrays import as_point_size
+from topleft._core.base.arrays import as_crease, as_point_size, as_scale, as_seconds
 from topleft._core.base.color import DEFAULT_COLOR
-from topleft._core.base.options import Cull, Sampling
-from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
-from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
-from topleft._meshes.io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._core.base.defaults import (
+    DEFAULT_CREASE,
+    DEFAULT_FOV_Y_DEG,
+    DEFAULT_POINT_SIZE,
+    DEFAULT_SIZE,
+    PICTURE_SUFFIXES,
+    SUFFIXES,
+    THREE_QUARTER_DEG,
+)
+from topleft._core.base.options import LAYER_NAMES, Cull, Sampling, check_layers
 from topleft._meshes.io.limits.budget import LIMITS
-from topleft._meshes.io.load import as_scale, as_seconds
-from topleft._meshes.model.mesh import DEFAULT_CREASE, as_crease
-from topleft._meshes.model.points import DEFAULT_POINT_SIZE
-from topleft._meshes.picture.layers import LAYERS, check_layers
-from topleft._meshes.picture.render import DEFAULT_SIZE
-from topleft._meshes.picture.shade import Shading
 from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
+from topleft.typing import ShadingOption
 
 FAILED, REFUSED = 1, 2
 """Exit status: a part of the work failed; nothing could be done."""
@@ -30,7 +31,7 @@ UP_HELP = "the axis that points up: z for most CAD, print, scan and map files; n
 
 SUBPIXEL_BITS_HELP = "vertices snap to 2^-N pixels, 0 to 16, or stay where they are: exact (default 8)"
 
-LAYERS_OF_ONE_VIEW = tuple(name for name in LAYERS if name != "flow")
+LAYERS_OF_ONE_VIEW = tuple(name for name in LAYER_NAMES if name != "flow")
 """Flow needs a second camera, or a second place."""
 
 RENDER_HELP = f"""\
@@ -176,10 +177,10 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("look").add_argument
     add(
         "--shading",
-        choices=[str(mode) for mode in Shading],
+        choices=get_args(ShadingOption),
         default="smooth",
         metavar="NAME",
-        help=f"{', '.join(Shading)} (default smooth)",
+        help=f"{', '.join(get_args(ShadingOption))} (default smooth)",
     )
     add("--color", type=_rgb, default=DEFAULT_COLOR, metavar="COLOR", help="of a mesh without colours")
     add(

@@ -10,12 +10,10 @@ from typing import Any, get_args
 import numpy as np
 import numpy.typing as npt
 
+from topleft import Baked, Mesh, bake, load, save_image
 from topleft._apps.cli.arguments import UsageError, positive, size
 from topleft._apps.cli.report import complain
-from topleft._meshes.grid.bake import Baked, bake
-from topleft._meshes.io.images import SUFFIXES, save_image
-from topleft._meshes.io.load import load
-from topleft._meshes.model.mesh import Mesh
+from topleft._core.base.defaults import SUFFIXES
 from topleft.errors import MeshError
 from topleft.typing import BakeOption, BakeRuleOption
 

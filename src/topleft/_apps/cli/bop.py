@@ -10,16 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from topleft import Camera, Mesh, ObjectMasks, Scene, load, object_masks, save_image
 from topleft._apps.cli.arguments import UsageError, add_scale, positive, size
 from topleft._core.base.array_types import Array
 from topleft._core.base.whole_file import write_whole
-from topleft._meshes.camera.camera import Camera
-from topleft._meshes.io.images import save_image
-from topleft._meshes.io.load import load
-from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.pose import as_pose
-from topleft._meshes.picture.object_masks import ObjectMasks, object_masks
-from topleft._meshes.scene.scene import Scene
 from topleft.errors import MeshError
 
 BOP_HELP = """\

@@ -11,8 +11,8 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
+from topleft import build_info
 from topleft._core.base.threads import available_threads
-from topleft._core.engine.isa import build_info
 from topleft._core.raster.costs import cache_file, load_costs
 
 #: Extras for those who change the library; their packages are not listed.

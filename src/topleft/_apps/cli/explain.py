@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from topleft import Points, plan
 from topleft._apps.cli.arguments import (
     SUBPIXEL_BITS_HELP,
     UP_HELP,
@@ -15,13 +16,9 @@ from topleft._apps.cli.arguments import (
     tolerance,
 )
 from topleft._apps.cli.targets import MeshSource, Orbit
+from topleft._core.base.defaults import DEFAULT_FOV_Y_DEG, DEFAULT_SIZE, THREE_QUARTER_DEG
 from topleft._core.base.options import Cull, Sampling
 from topleft._core.raster.costs import save_costs
-from topleft._meshes.camera.camera import DEFAULT_FOV_Y_DEG
-from topleft._meshes.camera.matrices import THREE_QUARTER_DEG
-from topleft._meshes.model.points import Points
-from topleft._meshes.picture.render import DEFAULT_SIZE
-from topleft._meshes.plan.plan import plan
 
 
 def run_explain(options: argparse.Namespace) -> int:

@@ -9,23 +9,22 @@ import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft import Grid, polygons, save_image
 from topleft._apps.cli.arguments import FAILED, UsageError, positive, size
 from topleft._apps.cli.report import complain
+from topleft._core.base.defaults import MAX_CROSSINGS, SUFFIXES
 from topleft._core.base.georeference import is_same_crs, transformed
-from topleft._core.base.grid import Grid
 from topleft._core.base.options import Sampling
 from topleft._core.base.whole_file import write_whole
-from topleft._core.polygons.polygons import Rule, polygons
-from topleft._core.polygons.prepared import MAX_CROSSINGS
 from topleft._core.polygons.rle import encode_polygons
 from topleft._core.raster.rle import annotation_of
-from topleft._meshes.io.images import SUFFIXES, save_image
 from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
+from topleft.typing import RuleOption
 
 DEFAULT_SIDE = 1024
 
@@ -233,9 +232,7 @@ def add_mask_command(commands: Any) -> None:
     mask.add_argument("file", metavar="FILE", help="GeoJSON, a vector file, or annotations of COCO")
     mask.add_argument("-o", "--out", required=True, metavar="OUT", help="where the picture goes; see below")
     mask.add_argument("--labels", metavar="NAME", help="write numbers: index, or a property")
-    mask.add_argument(
-        "--rule", choices=[str(rule) for rule in Rule], default="evenodd", help="what is inside (evenodd)"
-    )
+    mask.add_argument("--rule", choices=get_args(RuleOption), default="evenodd", help="what is inside (evenodd)")
     mask.add_argument("--sampling", choices=[str(s) for s in Sampling], default="center", help="how pixels are sampled")
     mask.add_argument("--size", type=size, metavar="WxH", help=f"of the picture (the longer side {DEFAULT_SIDE})")
     mask.add_argument(

@@ -7,22 +7,22 @@ import sys
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
 from topleft._apps.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, positive, size, subpixel_bits
 from topleft._apps.cli.render import client_of
 from topleft._apps.cli.report import complain
-from topleft._apps.tiles.areas import Areas, extent_of_polygons
-from topleft._apps.tiles.blocks import Triangles, mapped_npy, triangles_of
-from topleft._apps.tiles.drawing import KINDS
-from topleft._apps.tiles.tiles import WINDOW, Tiles, extent_of, tiles
+from topleft._apps.tiles.tiles import Tiles, tiles
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import grid_around
-from topleft._core.base.remote import Place, RemotePath, place_of
+from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
 from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, load_polygons
+from topleft._meshes.windows.blocks import triangles_of
+from topleft._meshes.windows.raster import WINDOW, extent_of
+from topleft.typing import RasterKindOption
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.levels import Written
@@ -47,10 +47,13 @@ examples:
 
 SUFFIXES = (".tif", ".tiff", ".zarr", ".dzi")
 
+DIRECT_KINDS = [one for one in get_args(RasterKindOption) if one not in ("field", "fill")]
+"""Kinds that need no values."""
+
 
 def run_raster(options: argparse.Namespace) -> int:
     """Write a raster of a mesh or of polygons, of any size."""
-    path = place_of(options.out)
+    path = location_of(options.out)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
     is_tiff, is_zarr = path.suffix.lower() in (".tif", ".tiff"), path.suffix.lower() == ".zarr"
@@ -79,12 +82,12 @@ def run_raster(options: argparse.Namespace) -> int:
             f"{written.n_kept} kept, {written.n_blank} blank"
         )
     if not (written.n_drawn or written.n_kept):
-        what = "polygon" if isinstance(raster.triangles, Areas) else "triangle"
+        what = "polygon" if raster.is_of_polygons else "triangle"
         complain(f"no {what} of {options.mesh} lies within {options.out}: all of it is blank")
     return 0
 
 
-def write(raster: Tiles, path: Place, options: argparse.Namespace, client: Any) -> Written:
+def write(raster: Tiles, path: Location, options: argparse.Namespace, client: Any) -> Written:
     """Write the raster in the format that the name asks for."""
     progress = True if not options.quiet and sys.stderr.isatty() else None
     how: dict[str, Any] = {
@@ -133,9 +136,8 @@ def raster_of_polygons(options: argparse.Namespace) -> Tiles:
     elif kind == "labels":
         kind, more_options["values"] = "fill", np.arange(len(picture.objects), dtype=np.int32)[picture.owners]
     nodata = -1 if options.nodata is None and options.values is None else options.nodata
-    step = options.pixel_size
-    extent = extent_of_polygons(subject) if options.extent is None else options.extent
-    grid = grid_around(extent, options.size, step if step is None or len(step) > 1 else step[0], "up")
+    step = options.pixel_size if options.pixel_size is None or len(options.pixel_size) > 1 else options.pixel_size[0]
+    grid = grid_around(options.extent or extent_of(subject), options.size, step, "up")
     grid = replace(grid, crs=crs, nodata=None if kind == "coverage" else nodata)
     if kind == "fill" and nodata is not None:
         more_options["background"] = nodata
@@ -155,7 +157,7 @@ def raster_of(options: argparse.Namespace) -> Tiles:
     kind: Any = options.kind or ("labels" if options.labels else "height_map")
     more: dict[str, Any] = {}
     if options.values is not None:
-        kind, values = "field", values_of(options.values, triangles, options.mesh)
+        kind, values = "field", options.values
     if sum((options.labels, options.values is not None, options.kind is not None)) > 1:
         raise UsageError("--labels, --values and --kind each say what is drawn: give one of them")
     if kind == "height_map":
@@ -181,17 +183,6 @@ def raster_of(options: argparse.Namespace) -> Tiles:
     )
 
 
-def values_of(name: str, triangles: Triangles, mesh: str) -> Any:
-    """Return the values of a .npy file, or those that a PLY file has of its vertices or faces."""
-    if name.endswith(".npy"):
-        return mapped_npy(Path(name))
-    named = getattr(triangles, "named", {})
-    if name in named:
-        return named[name]
-    there = ", ".join(one for one, array in named.items() if np.ndim(array) == 1) or "none"
-    raise UsageError(f"--values {name}: a .npy file, or what {mesh} has of its vertices or faces by name ({there})")
-
-
 def add_raster_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
     raster = commands.add_parser(
@@ -214,7 +205,7 @@ def add_raster_command(commands: Any) -> None:
     raster.add_argument("--crs", metavar="CRS", help="what x and y are: EPSG:25832, say")
     raster.add_argument("--labels", action="store_true", help="write which triangle shows, -1 for none")
     raster.add_argument("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
-    raster.add_argument("--kind", choices=[one for one in KINDS if one not in ("field", "fill")], help="what is drawn")
+    raster.add_argument("--kind", choices=DIRECT_KINDS, help="what is drawn")
     raster.add_argument("--surface", choices=("upper", "lower"), help="whose height counts (upper)")
     raster.add_argument("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     raster.add_argument("--nodata", type=float, metavar="N", help="what stands where nothing is, in values and .tif")

@@ -19,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from topleft import save_image
 from topleft._apps.batch.batch import Result, render_batch
 from topleft._apps.batch.jobs import Job
 from topleft._apps.cli.animation import check_animation, save_animation
@@ -27,8 +28,8 @@ from topleft._apps.cli.job_file import read_jobs
 from topleft._apps.cli.report import TOLD, check_report, complain, complain_of_lacks, one_line, write_report
 from topleft._apps.cli.sheet import make_sheet
 from topleft._apps.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
+from topleft._core.base.defaults import PICTURE_SUFFIXES
 from topleft._core.base.remote import is_url
-from topleft._meshes.io.images import PICTURE_SUFFIXES, save_image
 from topleft.errors import MeshWarning, MissingPackageError
 
 MOST_VIEWS_TOGETHER = 16

@@ -15,27 +15,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft import Camera, Environment, Material, Mesh, Points, Texture, load, load_cameras
 from topleft._apps.batch.jobs import Job
 from topleft._apps.cli.arguments import UsageError, meant
 from topleft._core.base.color import DEFAULT_COLOR
+from topleft._core.base.defaults import DEFAULT_CREASE, DEFAULT_POINT_SIZE, SUFFIXES
 from topleft._core.base.options import Sampling
-from topleft._core.base.remote import Place, RemotePath, place_of
+from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.whole_file import remove_stale_parts
-from topleft._meshes.camera.camera import Camera
-from topleft._meshes.camera.file_cameras import load_cameras
-from topleft._meshes.io.images import SUFFIXES
-from topleft._meshes.io.limits.budget import LIMITS, Budget
-from topleft._meshes.io.load import load
-from topleft._meshes.io.references import opened, rgba_of
-from topleft._meshes.model.environment import Environment
-from topleft._meshes.model.material import Material
-from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh
-from topleft._meshes.model.points import DEFAULT_POINT_SIZE, Points
-from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.shade import Shading
-from topleft.errors import ImageError, MeshError, MissingPackageError
+from topleft._meshes.io.limits.budget import LIMITS
+from topleft._meshes.io.references import read_picture
+from topleft.errors import MeshError, MissingPackageError
 from topleft.scenes import SHAPES, shape
 
 SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth", "normals": "camera_normal"}
@@ -82,8 +73,8 @@ class MeshSource:
 
 
 def read_texture(path: str) -> Texture:
-    """The picture of a file; errors as of `read_image`."""
-    return Texture(read_image(path))
+    """The picture of a file; errors as of `read_picture`."""
+    return Texture(read_picture(path))
 
 
 def read_environment(text: str, up: str) -> Environment:
@@ -94,7 +85,7 @@ def read_environment(text: str, up: str) -> Environment:
     UsageError
         If it is neither.
     ImageError, OSError
-        As of `read_image`.
+        As of `read_picture`.
     """
     from PIL import ImageColor
 
@@ -104,37 +95,10 @@ def read_environment(text: str, up: str) -> Environment:
     except ValueError:
         if not Path(text).suffix:
             raise UsageError(f"--environment must be one or two colours or a picture, got {text!r}") from None
-        return Environment(image=read_image(text)[..., :3], up=top)
+        return Environment(image=read_picture(text)[..., :3], up=top)
     if len(colors) > 2:
         raise UsageError(f"--environment must be one or two colours, got {len(colors)}")
     return Environment(colors[0], colors[1] if len(colors) == 2 else None, up=top)  # type: ignore[arg-type]
-
-
-def read_image(path: str) -> npt.NDArray[np.uint8]:
-    """The picture (H, W, 4) of a file.
-
-    Raises
-    ------
-    ImageError
-        If it is none that Pillow reads.
-    OSError
-        If it cannot be read.
-    """
-    if not Path(path).is_file() and Path(path).exists():
-        raise ImageError(f"cannot read {path!r}: it is no file")
-    try:
-        budget = Budget(path)
-        budget.read(Path(path).stat().st_size)
-        with opened(Path(path).read_bytes()) as image:
-            if not budget.has("max_texture_pixels", image.width * image.height):
-                raise MeshError(f"of more than {budget.limit('max_texture_pixels')} pixels")
-            return rgba_of(image)
-    except MeshError as error:
-        raise ImageError(f"cannot read {path!r}: it is {error}") from None
-    except (OSError, ValueError, SyntaxError, EOFError) as error:
-        if isinstance(error, OSError) and error.filename is not None:
-            raise
-        raise ImageError(f"cannot read {path!r}: it is no picture that Pillow knows") from None
 
 
 @dataclass(frozen=True)
@@ -305,13 +269,13 @@ def folders_of(sources: Sequence[str]) -> list[str]:
 
 def default_sampling(options: argparse.Namespace) -> str:
     """Several samples where light is shown, one where numbers are written or pixels stand for ids or distances."""
-    is_light = options.shading not in (Shading.IDS, Shading.DEPTH) and options.opacity is None
+    is_light = options.shading not in ("ids", "depth") and options.opacity is None
     is_picture = not options.layers and Path(options.out).suffix.lower() != ".npz"
     return str(Sampling.MSAA4 if is_light and is_picture else Sampling.CENTER)
 
 
 def _render_options(options: argparse.Namespace) -> dict[str, Any]:
-    if (options.shading == Shading.MATCAP) != (options.matcap is not None):
+    if (options.shading == "matcap") != (options.matcap is not None):
         raise UsageError("--shading matcap and --matcap FILE go together")
     drawing = {
         "shading": options.shading,
@@ -344,7 +308,7 @@ def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
 
 def _pattern(out: str, options: argparse.Namespace) -> str:
     """OUT as a file name with {name}, {view}, {index} and {layer} where several pictures need them."""
-    path = place_of(out)
+    path = location_of(out)
     check_words("OUT", path, ("name", "folder", "view", "index", "layer"))
     is_folder = out.endswith(("/", "\\")) or not path.suffix or (isinstance(path, Path) and path.is_dir())
     if not out or (path.suffix.lower() not in SUFFIXES and not is_folder):
@@ -363,7 +327,7 @@ def _pattern(out: str, options: argparse.Namespace) -> str:
     return str(path.with_name(stem + path.suffix))
 
 
-def check_words(what: str, path: Place, known: Sequence[str]) -> None:
+def check_words(what: str, path: Location, known: Sequence[str]) -> None:
     """Raise a `UsageError` for a word in braces that stands for nothing, unless a folder is called so."""
     folder = Path()
     for part in path.parts if isinstance(path, Path) else (str(path),):
@@ -385,7 +349,7 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
         If two pictures would have the same name, or a picture that of a mesh, or a folder cannot be written to.
     """
     owner_of: dict[str, str] = {}
-    targets: list[tuple[Place, str]] = [
+    targets: list[tuple[Location, str]] = [
         (file, group.source) for group in groups for job in group.jobs for file in job.files
     ]
     targets += [(path, str(path)) for path in others]

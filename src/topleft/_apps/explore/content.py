@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft import failure_scenes, scenes
+from topleft import Mesh, as_mesh, failure_scenes, scenes
 from topleft._apps.explore.session import Content
 from topleft._core.base.arrays import as_checked_triangles, as_size, as_vertices
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.limits.npy import arrays_of
-from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.scene.adapt import as_mesh
 from topleft.errors import MeshError
 
 MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000

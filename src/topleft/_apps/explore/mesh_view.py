@@ -21,13 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from topleft import Camera, Light, Mesh, Rasterizer, choose_detail, load, plan, rasterize_mesh, render, render_layers
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._core.base.array_types import U8
 from topleft._core.base.arrays import as_number
 from topleft._core.base.color import Color, as_color
 from topleft._core.base.options import check_choice
-from topleft._core.raster.verbs import Rasterizer
-from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import (
     FRAMING_MARGIN,
     bounding_sphere,
@@ -38,13 +37,6 @@ from topleft._meshes.camera.matrices import (
     tangent,
 )
 from topleft._meshes.io import png
-from topleft._meshes.io.load import load
-from topleft._meshes.lod.detail import choose_detail
-from topleft._meshes.model.light import Light
-from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.picture.render import rasterize_mesh, render
-from topleft._meshes.picture.view_layers import render_layers
-from topleft._meshes.plan.plan import plan
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
 from topleft.typing import CullOption, SamplesOption, UpOption

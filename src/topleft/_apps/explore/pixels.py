@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft import coverage, fill, overdraw, plan, rasterize, wireframe
 from topleft._apps.explore.content import scene
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._apps.explore.state import PixelState, parse_state
-from topleft._core.raster.verbs import coverage, fill, overdraw, rasterize, wireframe
-from topleft._meshes.plan.plan import plan
 from topleft.methods import CLASSICS, METHODS
 from topleft.methods.reference import area, sampling
 from topleft.methods.reference.integers import ExactPicture

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+from topleft import overdraw
 from topleft._apps.explore.pixels import EXACT, css, triangle_colors
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._apps.explore.state import PixelState, pair, parse_state
-from topleft._core.raster.verbs import overdraw
 from topleft.methods import CLASSICS, reference
 from topleft.methods.reference import Fragment, edge_function, is_top_left, sampling
 

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft import fill, overdraw
 from topleft._apps.explore.session import Reply, Request, Session
-from topleft._core.raster.verbs import fill, overdraw
 from topleft.methods import CLASSICS, find_method
 from topleft.methods.reference.integers import ExactPicture, snapped, turns
 from topleft.scene_families import FAMILIES, Axis, PixelScene

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft._meshes.model.mesh import Mesh
+from topleft import Mesh
 
 Request = dict[str, Any]
 """What a page asks: "do" names it; "parts" are the arrays that came along, as bytes."""

@@ -16,18 +16,15 @@ from typing import Any, get_args
 
 import numpy as np
 
+from topleft import Mesh
 from topleft._apps.explore import mesh_view, pixels
 from topleft._apps.explore.content import MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES, SCENES, scene
 from topleft._apps.explore.handlers import hello
 from topleft._apps.explore.session import Content, Request, Session
 from topleft._apps.explore.state import Look, PixelState, Turn
-from topleft._core.base.color import DEFAULT_COLOR, LIGHT_OF_SRGB
+from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.whole_file import write_whole
-from topleft._meshes.model.light import AMBIENT, TO_HEADLIGHT
-from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh
-from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
-from topleft._meshes.picture.look import Surface, material_row
-from topleft._meshes.picture.shade import plain_material
+from topleft._meshes.picture.shade import plain_numbers
 from topleft.errors import MissingPackageError
 from topleft.methods import CLASSICS
 from topleft.methods.classics.classic_kernels import FORMS
@@ -132,13 +129,10 @@ def first_mesh(content: Content) -> tuple[Mesh, str]:
 def mesh_data(content: Content) -> dict[str, Any]:
     """What the part Mesh knows of its first mesh, whose arrays are a file, and how meshes look."""
     mesh, name = first_mesh(content)
-    color, _, _, specular, shininess, *_ = material_row(
-        plain_material(DEFAULT_COLOR), mesh, Surface((), is_by_triangle=False), -1.0
-    )
     named = {"layer": [(one, one) for one in LAYERS]}
     return {
         "name": name, "is_f64": mesh.vertices.dtype == np.float64, "n_vertices": len(mesh.vertices),
-        "crease": min(DEFAULT_CREASE + EQUAL_ANGLE_DEG, 180.0), "layers": LAYERS, "lit": LIT,
+        "layers": LAYERS, "lit": LIT,
         "view": {one.name: one.default for one in fields(mesh_view.MeshView) if one.default is not MISSING},
         "max_side_px": mesh_view.MAX_SIDE_PX, "max_pixels": mesh_view.MAX_PIXELS,
         "heat": list(zip(mesh_view.HEAT_LABELS, mesh_view.HEAT[1:, :3].tolist(), strict=True)),
@@ -147,8 +141,7 @@ def mesh_data(content: Content) -> dict[str, Any]:
             (title, [(label, key, named.get(key, options)) for label, key, options in rows if key in CHOICES])
             for title, rows in mesh_view.CONTROLS.items()
         ],
-        "light": {"to": TO_HEADLIGHT.tolist(), "color": 1 - AMBIENT, "ambient": AMBIENT},
-        "material": {"color": color[:3], "specular": specular[0], "shininess": shininess},
+        **plain_numbers(mesh),
         "light_of_srgb": LIGHT_OF_SRGB.tolist(),
     }  # fmt: skip
 

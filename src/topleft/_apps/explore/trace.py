@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft import overdraw
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._core.base.arrays import as_size
-from topleft._core.raster.verbs import overdraw
 from topleft.methods import CLASSICS, METHODS, find_method
 
 #: The methods that have a pure twin with steps.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from topleft._core.base.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
+from topleft._apps.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
 from topleft.errors import TopleftError
 
 Block = tuple[int, int, int]

@@ -11,13 +11,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from topleft._apps.tiles.ahead import kept_memory
-from topleft._apps.tiles.blocks import Triangles
-from topleft._apps.tiles.drawing import Painter, Payload, without_values
 from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_aligned
 from topleft._core.base.georeference import xarray_module
 from topleft.errors import MissingPackageError
 
@@ -27,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WindowJob:
-    """A window to be drawn elsewhere: it carries the triangles that touch it, taken out when it is sent."""
+    """A window to be drawn elsewhere: what it needs is taken out of the mesh when it is sent."""
 
     raster: Tiles
     row: int
@@ -38,44 +33,12 @@ class WindowJob:
         return self.raster.draw_window(self.row, self.column, threads=1)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        raster = self.raster
-        (x, y), size = raster.place(self.row, self.column)
-        which = raster.index.of_window(self.row, self.column)
-        if raster.is_mapped:
-            return MappedJob, (raster.triangles, raster.painter, which, (x, y), size)
-        payload = raster.painter.gather(raster.triangles, which)
-        return SentJob, (without_values(raster.painter), payload, (x, y), size)
+        return received, (self.raster.job(self.row, self.column),)
 
 
-@dataclass(frozen=True)
-class SentJob:
-    """A window with all that it needs."""
-
-    painter: Painter
-    payload: Payload
-    origin: tuple[int, int]
-    size: tuple[int, int]
-
-    def __call__(self) -> Array:
-        """Draw it."""
-        return self.painter.window(self.payload, self.origin, self.size, 1, None)
-
-
-@dataclass(frozen=True)
-class MappedJob:
-    """A window of a mesh in files: it carries their names and the indices of its triangles."""
-
-    triangles: Triangles
-    painter: Painter
-    which: npt.NDArray[np.int32]
-    origin: tuple[int, int]
-    size: tuple[int, int]
-
-    def __call__(self) -> Array:
-        """Draw it."""
-        which = as_aligned(self.which)  # bytes that were received lie anywhere
-        payload = self.painter.gather(self.triangles, which, kept_memory())
-        return self.painter.window(payload, self.origin, self.size, 1, None)
+def received(job: Callable[[], Array]) -> Callable[[], Array]:
+    """Return what a `WindowJob` is in another process."""
+    return job
 
 
 def run_job(job: Callable[[], Any]) -> Any:

@@ -21,7 +21,7 @@ from topleft._apps.tiles.store import TileStore, begin, n_levels_to
 from topleft._core.base.array_types import U8, Array
 from topleft._core.base.arrays import as_count, check_progress, shown
 from topleft._core.base.color import id_colors
-from topleft._core.base.remote import as_place
+from topleft._core.base.remote import as_location
 from topleft._meshes.io.png import encode
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def write_deepzoom(
 ) -> Written:
     """`Tiles.to_deepzoom`."""
     check_executor(executor)
-    file = as_place("path", path)
+    file = as_location("path", path)
     if not isinstance(file, Path):
         raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     if file.suffix != ".dzi":
@@ -118,7 +118,7 @@ def fill_blanks(raster: Tiles, store: DeepZoomStore, ground: U8) -> None:
         for block in np.argwhere(~blocks).tolist():
             blank = np.broadcast_to(ground[0, 0], store.shape_of(level, *block))
             for r, c in store.tiles_of(level, *block):
-                tile, name = blank[store.place_of(r, c, *block)], store.name(level, r, c)
+                tile, name = blank[store.location_of(r, c, *block)], store.name(level, r, c)
                 if tile.shape not in contents:
                     contents[tile.shape] = store.encoded(tile)
                 if not store.folder.has(name):

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from topleft._core.base.arrays import shown
-from topleft._core.base.remote import Place, RemotePath, as_place
+from topleft._core.base.remote import Location, RemotePath, as_location
 from topleft._core.base.whole_file import is_whole, write_whole
 
 MANIFEST = "topleft.txt"
@@ -211,14 +211,14 @@ def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = Non
     """Return where chunks of a path or URL are kept."""
     if not (storage is None or isinstance(storage, dict)):
         raise TypeError(f"storage must be a dict or None, got {shown(storage)}")
-    place = as_place("path", path)
+    place = as_location("path", path)
     if isinstance(place, RemotePath):
         return RemoteFolder(replace(place, storage=tuple((storage or {}).items())))
     return DiskFolder(place)
 
 
 @contextmanager
-def only_writer(path: Place) -> Iterator[None]:
+def only_writer(path: Location) -> Iterator[None]:
     """Hold the lock of what is written: a file beside it, locked by the system as long as this process lives.
 
     URLs have none: who writes the same raster there writes the same bytes.

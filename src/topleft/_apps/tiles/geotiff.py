@@ -31,7 +31,7 @@ from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_number, check_progress
 from topleft._core.base.georeference import Tags, geo_tags, nodata_tag
 from topleft._core.base.options import check_choice
-from topleft._core.base.remote import as_place
+from topleft._core.base.remote import as_location
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
@@ -116,7 +116,7 @@ def write_geotiff(
 ) -> Written:
     """`Tiles.to_geotiff`."""
     check_executor(executor)
-    file = as_place("path", path)
+    file = as_location("path", path)
     if not isinstance(file, Path):
         raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     check_choice("compression", compression, COMPRESSIONS)

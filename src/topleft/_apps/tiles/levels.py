@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._apps.cluster import is_client
 from topleft._apps.tiles.folders import DiskFolder
 from topleft._apps.tiles.store import TileStore
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import check_progress, shown
-from topleft._core.base.cluster import is_client
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:

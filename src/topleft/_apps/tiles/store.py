@@ -129,7 +129,7 @@ class TileStore(ABC):
     def write(self, level: int, row: int, column: int, pixels: Array) -> None:
         """Write the tiles of a block."""
         for r, c in self.tiles_of(level, row, column):
-            part = pixels[self.place_of(r, c, row, column)]
+            part = pixels[self.location_of(r, c, row, column)]
             self.folder.put(self.name(level, r, c), self.encoded(self.filled(part)))
 
     def filled(self, part: Array) -> Array:
@@ -152,7 +152,7 @@ class TileStore(ABC):
         """
         pixels = np.empty(self.shape_of(level, row, column), self.dtype)
         for r, c in self.tiles_of(level, row, column):
-            own = pixels[self.place_of(r, c, row, column)]
+            own = pixels[self.location_of(r, c, row, column)]
             height, width = self.tile[::-1] if self.is_filled else own.shape[:2]
             name = self.name(level, r, c)
             content = self.content(name)
@@ -183,7 +183,7 @@ class TileStore(ABC):
         place = self.folder.place(name)
         return FileNotFoundError(f"{place} has gone while the raster was written: resume=True writes it again")
 
-    def place_of(self, r: int, c: int, row: int, column: int) -> tuple[slice, slice]:
+    def location_of(self, r: int, c: int, row: int, column: int) -> tuple[slice, slice]:
         """Where a tile lies in its block."""
         (w, h), (width, height) = self.window, self.tile
         y, x = r * height - row * h, c * width - column * w
@@ -256,7 +256,7 @@ def bytes_of(raster: Tiles, store: TileStore, prepare: Callable[[Array], Array])
     n = int((counts > 0).sum()) * w * h * store.dtype.itemsize * int(np.prod(store.channels, dtype=int))
     if n > LARGE_BYTES:
         row, column = map(int, np.unravel_index(int(np.argmax(counts)), counts.shape))
-        places = [store.place_of(r, c, row, column) for r, c in store.tiles_of(0, row, column)[:MOST_SAMPLES]]
+        places = [store.location_of(r, c, row, column) for r, c in store.tiles_of(0, row, column)[:MOST_SAMPLES]]
         pixels = prepare(raster.draw_window(row, column))
         tiles = [store.filled(pixels[place]) for place in places]
         share = sum(len(store.encoded(tile)) for tile in tiles) / sum(tile.nbytes for tile in tiles)

@@ -23,7 +23,7 @@ from topleft._apps.tiles.store import TileStore, begin, level_size
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_size, check_progress
 from topleft._core.base.options import check_choice
-from topleft._core.base.remote import as_place
+from topleft._core.base.remote import as_location
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def write_zarr(
         encode, decode,
     )  # fmt: skip
     fingerprint = f"{raster.fingerprint} zarr {size} {compression} {n_levels}"
-    with only_writer(as_place("path", path)):
+    with only_writer(as_location("path", path)):
         there: list[tuple[object, str | None]] = [(path, fingerprint_in(folder))] if folder.exists() else []
         begin(raster, store, there, fingerprint, resume=resume, overwrite=overwrite)
         write_metadata(raster, store, codec, fingerprint)

@@ -1,1 +1,1 @@
-"""What every room stands on; it knows no triangle."""
+"""Arrays, options, memory, threads, colours, grids: no triangle, no picture."""

@@ -1,4 +1,4 @@
-"""Names of types of arrays, for annotations."""
+"""Names of types of arrays, and of what becomes a mesh, for annotations."""
 
 from typing import Any, TypeAlias
 
@@ -12,3 +12,6 @@ I32: TypeAlias = npt.NDArray[np.int32]
 I64: TypeAlias = npt.NDArray[np.int64]
 U8: TypeAlias = npt.NDArray[np.uint8]
 U16: TypeAlias = npt.NDArray[np.uint16]
+
+MeshLike: TypeAlias = Any
+"""What `as_mesh` takes."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import os
 from collections.abc import Iterable
+from numbers import Real
 from pathlib import Path
 from typing import Any, cast
 
@@ -26,7 +27,7 @@ DEVICES = {2: "CUDA device", 4: "OpenCL device", 7: "Vulkan device", 8: "Metal d
 
 
 def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
-    """Return what NumPy makes of `values`, aligned for the kernels, without a copy where it can."""
+    """Return `values` as a NumPy array, aligned for the kernels, without a copy where it can."""
     if not isinstance(values, np.ndarray) and (hasattr(values, "__dlpack__") or hasattr(values, "__array__")):
         values = array_of_tensor(name, values)
     try:
@@ -242,6 +243,39 @@ def as_number(name: str, value: object) -> float:
     return float(array)
 
 
+def as_scale(scale: object) -> float:
+    """A scale, if it is one."""
+    factor = as_number("scale", scale)
+    if not 0 < factor < np.inf:
+        raise ValueError(f"scale must be a positive number, got {scale!r}")
+    return factor
+
+
+def as_seconds(time: float) -> float:
+    """A time, if it is one."""
+    seconds = as_number("time", time)
+    if not 0 <= seconds < np.inf:
+        raise ValueError(f"time must be a number of seconds, 0 or more, got {time!r}")
+    return seconds
+
+
+def as_crease(value: float) -> float:
+    """Return a crease angle, degrees.
+
+    Raises
+    ------
+    TypeError
+        If it is no number.
+    ValueError
+        If it is outside of 0 to 180.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(f"crease must be an angle in degrees, got {value!r}")
+    if not 0 <= value <= 180:
+        raise ValueError(f"crease must lie in 0 to 180 degrees, got {value!r}")
+    return float(value)
+
+
 def as_count(name: str, value: object, smallest: int = 1) -> int:
     """Return a whole number that is not below another."""
     try:
@@ -298,7 +332,7 @@ def as_names(name: str, values: object) -> tuple[str, ...]:
 
 
 def shown(value: object) -> str:
-    """What a message says of a wrong value: the value if it is short, else its type, and its shape if it has one."""
+    """Return a wrong value as messages show it: the value if it is short, else its type, and shape."""
     if isinstance(value, str | int | float | bool | tuple | list | None) and len(text := repr(value)) <= 60:
         return text
     shape = getattr(value, "shape", None)

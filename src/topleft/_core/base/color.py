@@ -17,7 +17,7 @@ from topleft._core.base.arrays import as_array, shown
 
 Color = tuple[int, ...]
 ColorLike: TypeAlias = str | Sequence[float] | npt.NDArray[Any]
-"""What `as_color` takes."""
+"""The argument of `as_color`."""
 
 DEFAULT_COLOR = (224, 222, 217)
 """sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""

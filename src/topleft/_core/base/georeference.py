@@ -129,7 +129,7 @@ def geo_tags(crs: str | int | None, transform: Six) -> Tags:
 
 
 def nodata_tag(nodata: float) -> tuple[str, bytes]:
-    """What GDAL's tag of no data holds, 42113."""
+    """The text of GDAL's tag of no data, 42113."""
     whole = float(nodata)
     text = repr(int(whole)) if np.isfinite(whole) and whole == int(whole) else repr(whole)
     return "s", text.encode() + b"\0"

@@ -12,14 +12,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.array_types import F64
+from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_array, as_number, as_real, as_size, shown
 from topleft._core.base.georeference import crs_text, data_array, frame_of_raster
 from topleft._core.base.options import check_choice
 from topleft.typing import YOption
-
-if TYPE_CHECKING:
-    from topleft._meshes.scene.adapt import MeshLike
 
 Extent = tuple[float, float, float, float]
 ExtentLike: TypeAlias = Sequence[float] | npt.NDArray[Any]

@@ -35,7 +35,7 @@ SCRATCH_NAMES = frozenset(
         "bins",
         "covered",
         "labels",
-        "others",
+        "outside",
         "packed",
         "points",
         "records",

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import IntEnum, StrEnum
 from functools import cache, cached_property
-from typing import TypeVar
+from typing import TypeVar, get_args
+
+from topleft._core.base.arrays import as_names
+from topleft.typing import LayerOption
 
 
 class Sampling(StrEnum):
@@ -48,7 +52,7 @@ class ClipDepth(StrEnum):
 
 
 class Per(StrEnum):
-    """What a row of colours belongs to."""
+    """The owner of a row of colours."""
 
     AUTO = "auto"
     TRIANGLE = "triangle"
@@ -56,7 +60,7 @@ class Per(StrEnum):
 
 
 class Blend(StrEnum):
-    """What a triangle's colour does to the colour of a pixel; in the order of `tl_blend` in ``csrc/topleft.h``."""
+    """How a triangle's colour changes that of a pixel; in the order of `tl_blend` in ``csrc/topleft.h``."""
 
     REPLACE = "replace"
     OVER = "over"
@@ -74,21 +78,21 @@ class Alpha(StrEnum):
 
 
 class Resolve(StrEnum):
-    """What of the colours of a pixel's samples is averaged: the values, or the light that sRGB values stand for."""
+    """How a pixel's samples are averaged: their values, or the light that sRGB values stand for."""
 
     VALUES = "values"
     LINEAR = "linear"
 
 
 class PointShape(StrEnum):
-    """What a point covers."""
+    """The shape of a point."""
 
     DISC = "disc"
     SQUARE = "square"
 
 
 class Sink(IntEnum):
-    """What happens to a covered sample; the numbers are `tl_sink` in ``csrc/topleft.h``."""
+    """How a covered sample changes the buffers; the numbers are `tl_sink` in ``csrc/topleft.h``."""
 
     MASK = 0
     COUNT = 1
@@ -128,3 +132,22 @@ def check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
     if not (isinstance(value, str) and value in choices):
         *others, last = (f'"{choice}"' for choice in choices)
         raise ValueError(f"{name} must be {', '.join(others)} or {last}, got {value!r}")
+
+
+LAYER_NAMES: tuple[str, ...] = get_args(LayerOption)
+"""Names of the layers of a view."""
+
+
+def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names of layers, each once.
+
+    Raises
+    ------
+    ValueError
+        If there is no such layer.
+    """
+    checked = tuple(dict.fromkeys(as_names("layers", names)))
+    for name in checked:
+        if name not in LAYER_NAMES:
+            raise ValueError(f"layers must be some of {', '.join(LAYER_NAMES)}, got {name!r}")
+    return checked

@@ -28,7 +28,7 @@ def is_url(value: object) -> bool:
     return isinstance(value, str) and "://" in value
 
 
-def place_of(value: str | os.PathLike[str]) -> Path | RemotePath:
+def location_of(value: str | os.PathLike[str]) -> Path | RemotePath:
     """Return where a file is: a path, or what fsspec reaches by a URL."""
     if isinstance(value, RemotePath):
         return value
@@ -42,11 +42,11 @@ def place_of(value: str | os.PathLike[str]) -> Path | RemotePath:
     return RemotePath(text)
 
 
-def as_place(name: str, value: object) -> Place:
+def as_location(name: str, value: object) -> Location:
     """Return where a file is, of what a caller gave."""
     if not isinstance(value, str | os.PathLike):
         raise TypeError(f"{name} must be a path or a URL, got {shown(value)}")
-    return place_of(value)
+    return location_of(value)
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class RemotePath:
         return self.url
 
     def __fspath__(self) -> str:
-        return self.url  # goes wherever a name goes, and `place_of` makes it out
+        return self.url  # goes wherever a name goes, and `location_of` makes it out
 
     @cached_property
     def _reached(self) -> tuple[Any, str]:
@@ -79,7 +79,7 @@ class RemotePath:
 
     @property
     def name(self) -> str:
-        """What stands behind the last slash."""
+        """The text behind the last slash."""
         return self.url.rstrip("/").rpartition("/")[2]
 
     @property
@@ -142,7 +142,7 @@ class RemotePath:
             fs.rm_file(name)
 
     def read_bytes(self) -> bytes:
-        """Return what the file holds."""
+        """Return the file's bytes."""
         fs, name = self._reached
         return bytes(fs.cat_file(name))
 
@@ -174,5 +174,5 @@ class RemotePath:
             raise
 
 
-Place = Path | RemotePath
+Location = Path | RemotePath
 """Where a file is."""

@@ -22,7 +22,7 @@ from topleft._core.base.options import check_choice
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MOST_KEPT_BYTES = 1 << 27
-"""What the levels of a texture may take and be kept with it; those of 2048 x 2048 texels of four channels take 2/3."""
+"""The most bytes of levels that are kept with a texture; those of 2048 x 2048 texels of four channels take 2/3."""
 
 FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2, "pixelated": 3}  # tl_filter in csrc/shading.h
 WRAP_CODES = {"repeat": 0, "clamp": 1, "mirror": 2}  # tl_wrap
@@ -59,7 +59,7 @@ class ValueLevels(NamedTuple):
 
 
 def as_levels(texture: object, filter: str, wrap: object, encoding: str | None) -> ValueLevels:  # noqa: A002
-    """Return what is looked up.
+    """Return the texels of a lookup.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ def _forget_pool() -> None:
 
 def _hear_signals() -> None:
     """Let kernels answer Ctrl-C in the main thread, which is the one that forked in a child."""
-    engine.hear_signals_in(threading.main_thread().ident or 0, SCRATCH.threads)
+    engine.handle_signals_in(threading.main_thread().ident or 0, SCRATCH.threads)
 
 
 _hear_signals()

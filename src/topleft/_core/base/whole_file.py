@@ -10,13 +10,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-from topleft._core.base.remote import Place, RemotePath
+from topleft._core.base.remote import Location, RemotePath
 
 #: A file that nobody has written to for so long was left by a process that was killed.
 STALE_S = 3600
 
 
-def write_whole(path: Place, write: Callable[[IO[bytes]], object]) -> None:
+def write_whole(path: Location, write: Callable[[IO[bytes]], object]) -> None:
     """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file.
 
     What goes to a URL is sent in one piece.
@@ -43,7 +43,7 @@ def write_whole(path: Place, write: Callable[[IO[bytes]], object]) -> None:
         raise
 
 
-def is_whole(path: Place) -> bool:
+def is_whole(path: Location) -> bool:
     """Tell whether a file is there, and not empty."""
     if isinstance(path, RemotePath):
         return path.size() > 0

@@ -213,7 +213,7 @@ def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles) -> in
 
 
 cdef class Pieces:
-    """What the clip planes leave of the triangles that they cut."""
+    """The pieces of triangles that clip planes cut."""
 
     cdef tl_pieces pieces
     cdef readonly object arrays  #: tuple[Any, ...] | None

@@ -153,8 +153,8 @@ cdef class Clustered:
 
     def survey(self, ClusterView view, int64_t step, int64_t[::1] n_of):
         """Count one cluster of each `step`: those outside, turned away and culled, showing their backs, and the others."""
-        if n_of.shape[0] != TL_N_FATES:
-            raise ValueError("n_of must have a number for each fate")
+        if n_of.shape[0] != TL_N_VISIBILITIES:
+            raise ValueError("n_of must have a number for each `tl_visibility`")
         with nogil:
             K.survey_clusters(&self.mesh, &view.view, step, &n_of[0])
 
@@ -178,13 +178,13 @@ cdef class Clustered:
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = mesh.window(first_row, n_rows, target.width)
-        cdef tl_share share = no_share()
+        cdef tl_slice slice = no_slice()
         cdef tl_cluster_pass clusters
         memset(&clusters, 0, sizeof(clusters))
         clusters.mesh, clusters.seen, clusters.source, clusters.view = &self.mesh, &seen.view, &source.source, &mesh.viewport.view
         clusters.list, clusters.room, clusters.may_be_hidden = &room[0], &room[self.mesh.n_clusters], may_be_hidden
-        share.clusters, share.others, share.is_first, share.is_last = &clusters, &others[0], is_first, is_last
+        slice.clusters, slice.outside, slice.is_first, slice.is_last = &clusters, &others[0], is_first, is_last
         with nogil:
-            K.draw(&mesh.snapped, &window, &rows, &share)
+            K.draw(&mesh.snapped, &window, &rows, &slice)
         raise_if_given_up()
-        return share.n_others, clusters.n_seen, clusters.n_drawn
+        return slice.n_outside, clusters.n_seen, clusters.n_drawn

@@ -2,7 +2,7 @@
 
 
 cdef class ExactPieces:
-    """What clip planes leave of triangles whose vertices are not snapped."""
+    """The pieces of triangles that clip planes cut, of vertices that are not snapped."""
 
     cdef tl_exact_pieces pieces
     cdef readonly object arrays  #: tuple[Array, ...] | None
@@ -88,7 +88,7 @@ cdef class UnsnappedPoints:
         c.n_integers += counts.n_integers
 
     cdef guess_seen(self, int64_t x_px, int64_t y_px, int64_t width, int64_t height):
-        """What `SnappedMesh.guess_seen` returns."""
+        """Return the same as `SnappedMesh.guess_seen`."""
         cdef int64_t n = min(self.points.n_triangles, 128), i, n_seen = 0, last = self.points.n_points - 1
         cdef const int32_t *given
         cdef int32_t t[3]

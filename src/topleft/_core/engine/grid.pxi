@@ -16,7 +16,7 @@ def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, 
     cdef tl_peeled peeled
     cdef tl_target target
     cdef tl_window window = mesh.window(first, end - first, bits.shape[1])
-    cdef tl_share share = no_share()
+    cdef tl_slice slice = no_slice()
     cdef int64_t bad_row
     if end <= first or not bits.shape[1]:
         return -1
@@ -26,9 +26,9 @@ def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, 
     crossings.n_steps, crossings.is_set = n_steps, is_set
     peeled.crossings = &crossings
     target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, bits.shape[1], &peeled
-    share.end = mesh.snapped.n_triangles
+    slice.end = mesh.snapped.n_triangles
     with nogil:
-        bad_row = K.draw(&mesh.snapped, &window, &target, &share)
+        bad_row = K.draw(&mesh.snapped, &window, &target, &slice)
     raise_if_given_up()
     return bad_row
 

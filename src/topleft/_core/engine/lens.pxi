@@ -2,7 +2,7 @@
 
 
 cdef class LensTable:
-    """What kernels know of a lens and the picture behind it: `tl_lens`."""
+    """A lens and the picture behind it, for kernels: `tl_lens`."""
 
     cdef tl_lens lens
 

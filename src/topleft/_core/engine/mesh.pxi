@@ -1,5 +1,5 @@
-# What is computed of a mesh: normals, other arrays that shading needs, distances between surfaces.
-# What reads triangles returns -1, or a row with an index outside the vertices.
+# Kernels on meshes: normals, other arrays that shading needs, distances between surfaces.
+# Functions that read triangles return -1, or a row with an index outside the vertices.
 
 
 def vertex_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end,

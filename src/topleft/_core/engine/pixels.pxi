@@ -2,7 +2,7 @@
 
 
 cdef class Transfer:
-    """What is averaged of colours with several samples a pixel: their light, or as much of them as their alpha tells."""
+    """How the colours of a pixel's samples are averaged: in linear light, or weighted by alpha."""
 
     cdef tl_transfer transfer
     cdef object arrays
@@ -59,7 +59,7 @@ def fill_bands(meshes: Sequence[SnappedMesh], int32_t[:, ::1] labels, uint64_t[:
     cdef SnappedMesh mesh
     cdef tl_target target
     cdef tl_window window
-    cdef tl_share share = no_share()
+    cdef tl_slice slice = no_slice()
     cdef uint8_t[::1] flat = as_bytes(pixels)
     cdef int k, n_samples = len(meshes), sample_bits = int(len(meshes)).bit_length() - 1
     cdef const uint8_t[::1] ground_row = None if ground is None else as_bytes(ground)
@@ -70,20 +70,20 @@ def fill_bands(meshes: Sequence[SnappedMesh], int32_t[:, ::1] labels, uint64_t[:
     memset(&target, 0, sizeof(target))
     target.sink, target.stride_px = <tl_sink>LABEL, width
     target.covered = &covered[0]
-    share.is_first = share.is_last = True
+    slice.is_first = slice.is_last = True
     with nogil:
         for band in range(first_band, end_band):
             first_row = band << bins.band_bits
             n_rows = min(<int64_t>1 << bins.band_bits, height - first_row)
             window = mesh.window(first_row, n_rows, width)
-            share.end = bins.starts[band + 1] - bins.starts[band]
-            share.ids = bins.backwards(band)
+            slice.end = bins.starts[band + 1] - bins.starts[band]
+            slice.ids = bins.backwards(band)
             if ground_row is not None:
                 for row in range(first_row, first_row + n_rows):
                     memcpy(&flat[row * n_row_bytes], &ground_row[0], n_row_bytes)
             for k in range(n_samples):
                 target.pixels = &labels[k, 0]
-                K.draw(&seen[k], &window, &target, &share)
+                K.draw(&seen[k], &window, &target, &slice)
             palette.mean(&labels[0, 0], sample_bits, labels.shape[1], n_rows * width, &flat[0], first_row * width)
     raise_if_given_up()
 
@@ -186,7 +186,7 @@ def halve_rows(const float[:, ::1] level, int64_t width, int64_t height, int64_t
 
 
 cdef class PixelPoints:
-    """What `tl_points` holds: positions of vertices, and what is told of a point."""
+    """`tl_points`: positions of vertices, and the kind of value that is found at a point."""
 
     cdef tl_points points
     cdef object array

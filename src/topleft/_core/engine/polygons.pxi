@@ -72,7 +72,7 @@ cdef class SnappedPolygons:
         return np.asarray(self.boxes)[: self.n_polygons]
 
     cdef tl_polygons asking(self) noexcept:
-        """What kernels read, with the pause of this thread."""
+        """Return `tl_polygons`, with the pause of this thread."""
         cdef tl_polygons set = self.set
         set.pause = pause_of_thread()
         return set
@@ -119,14 +119,14 @@ cdef class SnappedPolygons:
         raise_if_given_up()
 
     def which_are_simple(self) -> NDArray[np.bool_]:
-        """Return of which polygons the rings do not meet, (P,) bool."""
+        """Return (P,) bool: whether the rings of each polygon stay apart."""
         return np.asarray(self.is_simple)[: self.n_polygons].view(np.bool_)
 
     def weights_of_rings(self) -> I8:
-        """Return what the signed area of each ring counts, (R,) int8; it means something where rings do not meet."""
+        """Return the sign with which each ring's area counts, (R,) int8; defined where rings do not meet."""
         return np.asarray(self.weights)[: self.n_rings]
 
-    def seen_from(self, int32_t sample_x_fx, int32_t sample_y_fx):
+    def at_sample(self, int32_t sample_x_fx, int32_t sample_y_fx):
         """Sample pixels at so many sub-pixels from their centre from now on."""
         self.set.sample_x_fx, self.set.sample_y_fx = sample_x_fx, sample_y_fx
 

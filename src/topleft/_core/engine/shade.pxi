@@ -58,7 +58,7 @@ cdef void copy_floats(float *out, values, int n) except *:
 
 
 cdef class ShadingTable:
-    """What `tl_shading` holds; keeps what it points to alive."""
+    """`tl_shading`; keeps the arrays that it points to alive."""
 
     cdef tl_shading shading
     cdef object arrays
@@ -138,7 +138,7 @@ cdef class ShadingTable:
 
     @property
     def camera_rays(self) -> tuple[bool, F64, float]:
-        """What `camera_rays` returns of the camera that sees it."""
+        """Return `camera_rays` of the camera that sees it."""
         return self.rays.has_perspective, np.array([[self.rays.rows[i][k] for k in range(3)] for i in range(9)]), self.rays.scale
 
     def set_headlight(self, to_light: Any, float color, float ambient):
@@ -295,16 +295,16 @@ def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, c
     """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     cdef tl_target target
-    cdef tl_share share = no_share()
+    cdef tl_slice slice = no_slice()
     if n_rows == 0 or ids.shape[1] == 0:
         return
     memset(&target, 0, sizeof(target))
     target.sink, target.stride_px = <tl_sink>4, ids.shape[1]  # nearest
     target.pixels, target.depth = &ids[first_row, 0], &depth[first_row, 0]
-    share.ids, share.end = &opaque[0], opaque.shape[0] - 1  # the last is there to be read
-    share.is_first = share.is_last = True
+    slice.ids, slice.end = &opaque[0], opaque.shape[0] - 1  # the last is there to be read
+    slice.is_first = slice.is_last = True
     with nogil:
-        K.draw(&mesh.snapped, &window, &target, &share)
+        K.draw(&mesh.snapped, &window, &target, &slice)
         K.cut_out(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &triangles[0], triangles.shape[0], &target)
     raise_if_given_up()
 

@@ -1,11 +1,11 @@
 # Snapped triangles, and the passes that draw them: whole, by bands of rows, in layers.
 
 
-cdef inline tl_share no_share() noexcept nogil:
-    """A share of nothing, of no clusters, that lists nothing."""
-    cdef tl_share share
-    memset(&share, 0, sizeof(share))
-    return share
+cdef inline tl_slice no_slice() noexcept nogil:
+    """A slice of nothing, of no clusters, that lists nothing."""
+    cdef tl_slice slice
+    memset(&slice, 0, sizeof(slice))
+    return slice
 
 
 cdef inline tl_exact_counts no_counts() noexcept nogil:
@@ -30,7 +30,7 @@ cdef class SnappedMesh:
     def __init__(self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide or None,
                  const int32_t[:, ::1] triangles, Pieces pieces or None, how: tuple[int, int, int, int, int, int],
                  Viewport viewport or None, const uint8_t[::1] is_used=None, UnsnappedPoints exact=None):
-        """`how`: that of a view, see `topleft._core.raster.view.How`; with `exact` there are no records."""
+        """`how`: that of a view, see `topleft._core.raster.view.RasterState`; with `exact` there are no records."""
         cdef int test
         self.viewport, self.is_used, self.exact = viewport, is_used, exact
         self.arrays = (source, records, wide, triangles, pieces)
@@ -58,7 +58,7 @@ cdef class SnappedMesh:
         """Triangles of the mesh, before any of them is cut."""
         return self.snapped.n_triangles
 
-    def seen_from(self, int32_t x_fx, int32_t y_fx) -> SnappedMesh:
+    def at_sample(self, int32_t x_fx, int32_t y_fx) -> SnappedMesh:
         """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
         cdef SnappedMesh seen = self.copy()
         seen.snapped.mesh.sample_x_fx, seen.snapped.mesh.sample_y_fx = x_fx, y_fx
@@ -230,49 +230,49 @@ cdef class SnappedMesh:
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
-        cdef tl_share share = no_share()
+        cdef tl_slice slice = no_slice()
         cdef tl_exact_counts counts = no_counts()
         cdef int64_t bad_row
-        share.first, share.end, share.is_first, share.is_last = 0, self.snapped.n_triangles, is_first, is_last
-        share.counts = &counts
+        slice.first, slice.end, slice.is_first, slice.is_last = 0, self.snapped.n_triangles, is_first, is_last
+        slice.counts = &counts
         if n_rows == target.height and (n_rows * target.width + 64) * self.snapped.n_triangles < HELD_DRAWN_PX:
-            bad_row = K.draw(&self.snapped, &window, &rows, &share)
+            bad_row = K.draw(&self.snapped, &window, &rows, &slice)
         else:
             with nogil:
-                bad_row = K.draw(&self.snapped, &window, &rows, &share)
+                bad_row = K.draw(&self.snapped, &window, &rows, &slice)
         self.note(&counts)
         raise_if_given_up()
         return bad_row
 
-    def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first,
-                   int32_t[::1] others) -> tuple[int, int]:
-        """Clear rows of a picture and draw there the triangles from `first` on for which `others` has room, 16 numbers left.
+    def draw_slice(self, Target target, int64_t first_row, int64_t n_rows, int64_t first,
+                   int32_t[::1] outside) -> tuple[int, int]:
+        """Clear rows of a picture and draw there the triangles from `first` on for which `outside` has room, 16 numbers left.
 
-        What of them lies in other rows is listed in `others`; returns the first bad row or -1, and how many those are.
+        What of them lies in other rows is listed in `outside`; returns the first bad row or -1, and how many those are.
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
-        cdef tl_share share = no_share()
+        cdef tl_slice slice = no_slice()
         cdef tl_exact_counts counts = no_counts()
         cdef int64_t bad_row
-        share.others, share.picture, share.counts = &others[0], &picture, &counts
-        share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
+        slice.outside, slice.picture, slice.counts = &outside[0], &picture, &counts
+        slice.first, slice.end, slice.is_first, slice.is_last = first, first + outside.shape[0] - 16, True, False
         with nogil:
-            bad_row = K.draw(&self.snapped, &window, &rows, &share)
+            bad_row = K.draw(&self.snapped, &window, &rows, &slice)
         self.note(&counts)
         raise_if_given_up()
-        return bad_row, share.n_others
+        return bad_row, slice.n_outside
 
     def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
         """Draw the triangles listed over what the rows hold."""
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
-        cdef tl_share share = no_share()
+        cdef tl_slice slice = no_slice()
         cdef tl_exact_counts counts = no_counts()
-        share.ids, share.counts = &ids[0] if ids.shape[0] else NULL, &counts
-        share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
+        slice.ids, slice.counts = &ids[0] if ids.shape[0] else NULL, &counts
+        slice.first, slice.end, slice.is_first, slice.is_last = 0, ids.shape[0], False, is_last
         with nogil:
-            K.draw(&self.snapped, &window, &rows, &share)
+            K.draw(&self.snapped, &window, &rows, &slice)
         self.note(&counts)
         raise_if_given_up()
 
@@ -314,10 +314,10 @@ cdef class SnappedMesh:
     def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors,
               int n_channels, bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows,
               const uint8_t[::1] ground or None, int32_t[::1] packed or None, int32_t[::1] cells or None,
-              bint is_few=False) -> int:
+              bint is_large_shapes=False) -> int:
         """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
 
-        `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. `is_few`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows. Returns as `draw` does.
+        `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. `is_large_shapes`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows. Returns as `draw` does.
         """
         cdef tl_canvas canvas
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -330,28 +330,28 @@ cdef class SnappedMesh:
         canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
         canvas.band_rows = band_rows
         canvas.ground = &ground[0] if ground is not None else NULL
-        canvas.is_few = is_few
-        canvas.packed = &packed[0 if is_few else first_row * width] if packed is not None else NULL
+        canvas.is_large_shapes = is_large_shapes
+        canvas.packed = &packed[0 if is_large_shapes else first_row * width] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:
             bad_row = K.blend(&self.snapped, &window, &canvas)
         raise_if_given_up()
         return bad_row
 
-    def is_few(self, int64_t width, int64_t height, int n_samples, int most) -> bool:
+    def is_large_shapes(self, int64_t width, int64_t height, int n_samples, int most) -> bool:
         """Tell whether a picture of the mesh is to be written row by row: large triangles, which are snapped.
 
-        `most`: FEW_OF_BITS, FEW_STORED or FEW_LABELLED, by what is done otherwise.
+        `most`: SHAPES_OF_BITS, SHAPES_STORED or SHAPES_LABELLED, by what is done otherwise.
         """
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
-        return self.snapped.mesh.exact == NULL and tl_are_few(n, n_samples, width, height, <tl_few>most)
+        return self.snapped.mesh.exact == NULL and tl_is_large_shapes(n, n_samples, width, height, <tl_shape_limit>most)
 
-    def blends_few(self, int64_t width, int64_t height) -> bool:
+    def blends_large_shapes(self, int64_t width, int64_t height) -> bool:
         """Tell whether flat colours are to be blended over a background row by row: large triangles, which are snapped."""
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
-        return self.snapped.mesh.exact == NULL and tl_few_are_blended(n, width, height)
+        return self.snapped.mesh.exact == NULL and tl_shapes_are_blended(n, width, height)
 
-    def fill_few(self, pixels: Array, int64_t first_row, int64_t n_rows, colors: Array, Transfer transfer or None,
+    def fill_large_shapes(self, pixels: Array, int64_t first_row, int64_t n_rows, colors: Array, Transfer transfer or None,
                  const uint8_t[::1] ground, const int32_t[:, ::1] samples_fx) -> int:
         """Fill rows of (H, W[, C]) pixels with `ground` and the flat colours of triangles; of samples their mean.
 
@@ -369,7 +369,7 @@ cdef class SnappedMesh:
         canvas.pixels = &flat[first_row * width * canvas.n_channels * (1 if canvas.is_u8 else 4)]
         canvas.stride_px, canvas.colors, canvas.ground, canvas.is_flat = width, data(palette), &ground[0], True
         with nogil:
-            bad_row = K.fill_few(&self.snapped, &window, &canvas, &samples_fx[0, 0], sample_bits, own)
+            bad_row = K.fill_large_shapes(&self.snapped, &window, &canvas, &samples_fx[0, 0], sample_bits, own)
         raise_if_given_up()
         return bad_row
 
@@ -449,19 +449,19 @@ def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], Bins bi
     cdef Target target
     cdef tl_target rows
     cdef tl_window window
-    cdef tl_share share = no_share()
+    cdef tl_slice slice = no_slice()
     cdef int64_t band, first_row
     cdef list pairs = list(zip(meshes, targets, strict=True))
-    share.is_first = share.is_last = True
+    slice.is_first = slice.is_last = True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
-        share.ids = &bins.listed[0] + bins.starts[band]
-        share.end = bins.starts[band + 1] - bins.starts[band]
+        slice.ids = &bins.listed[0] + bins.starts[band]
+        slice.end = bins.starts[band + 1] - bins.starts[band]
         for mesh, target in pairs:
             rows = target.rows(first_row)
             window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
             with nogil:
-                K.draw(&mesh.snapped, &window, &rows, &share)
+                K.draw(&mesh.snapped, &window, &rows, &slice)
             raise_if_given_up()
 
 
@@ -510,7 +510,7 @@ def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1
     cdef tl_target rows, other
     cdef tl_window window
     cdef tl_seen_samples found
-    cdef tl_share share = no_share()
+    cdef tl_slice slice = no_slice()
     cdef int k, n_samples = len(meshes)
     cdef int64_t band, first_row, at = (first_band << bins.band_bits) * first.width + 16 * first_band
     for k in range(n_samples):
@@ -519,24 +519,24 @@ def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1
     memset(&found, 0, sizeof(found))
     found.sample_bits, found.ids, found.depth, found.plane = n_samples.bit_length() - 1, &ids[0, 0], &depth[0, 0], ids.shape[1]
     found.first_stride = first.width
-    share.is_first = share.is_last = True
+    slice.is_first = slice.is_last = True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
         rows = other = first.rows(first_row)
         window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, first.height - first_row), first.width)
-        share.ids = &bins.listed[0] + bins.starts[band]
-        share.end = bins.starts[band + 1] - bins.starts[band]
+        slice.ids = &bins.listed[0] + bins.starts[band]
+        slice.end = bins.starts[band + 1] - bins.starts[band]
         found.first_ids = <int32_t *>rows.pixels
         found.row0, found.n_rows = first_row, window.height
         found.col0, found.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
         found.stride = other.stride_px = (found.n_cols + 15) & ~<int64_t>15
         with nogil:
-            K.draw(&seen[0], &window, &rows, &share)
+            K.draw(&seen[0], &window, &rows, &slice)
             window.x_px += found.col0
             window.width = found.n_cols
             for k in range(1, n_samples if found.n_cols else 0):
                 other.pixels, other.depth = &ids[k - 1, 0], &depth[k - 1, 0]
-                K.draw(&seen[k], &window, &other, &share)
+                K.draw(&seen[k], &window, &other, &slice)
             at = K.split_pixels(&found, &split.split, at)
         raise_if_given_up()
 
@@ -551,7 +551,7 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
     cdef tl_peeled peeled
     cdef tl_target target
     cdef tl_window window
-    cdef tl_share share = no_share()
+    cdef tl_slice slice = no_slice()
     cdef SnappedMesh mesh
     cdef Bins own
     cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
@@ -567,13 +567,13 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
         peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
         for i in range(n):
             mesh, own = pairs[i]
-            share.ids, share.end = NULL, mesh.snapped.n_triangles
+            slice.ids, slice.end = NULL, mesh.snapped.n_triangles
             if own is not None:
-                share.ids, share.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
-            share.is_first, share.is_last = is_first and i == 0, i == n - 1
+                slice.ids, slice.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
+            slice.is_first, slice.is_last = is_first and i == 0, i == n - 1
             window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
             with nogil:
-                bad_row = K.draw(&mesh.snapped, &window, &target, &share)
+                bad_row = K.draw(&mesh.snapped, &window, &target, &slice)
             raise_if_given_up()
             if bad_row >= 0:
                 return bad_row

@@ -1,4 +1,4 @@
-"""What a visibility buffer says of pixels, attributes and textures there, smooth silhouettes; and backward.
+"""Tensors of a visibility buffer: attributes and textures of its pixels, smooth silhouettes; and backward.
 
 Arrays are contiguous, float32 or float64, all of a call the same; shapes are checked by who calls. B pictures; an array
 of vertices, attributes or texels may have one for all of them. A function with `_vjp` returns the products of a
@@ -32,7 +32,7 @@ class TexelFilter(IntEnum):
 
 
 class TexelsBeyond(IntEnum):
-    """What lies beyond the edges of a texture: `tl_texel_edge`."""
+    """The wrap mode of a texture: `tl_texel_edge`."""
 
     WRAP = 0
     CLAMP = 1
@@ -185,7 +185,7 @@ class TexelLook:
         return PixelGrid(np.empty((0, 3), np.int32), b, h, w, self.threads)
 
     def arrays(self, picture: int, *more: Array | None) -> tuple[Array | None, ...]:
-        """Return what the engine takes of a picture."""
+        """Return a picture as the engine takes it."""
         return tuple(None if one is None else one[picture] for one in (self.uv, self.uv_da, self.bias, *more))
 
 

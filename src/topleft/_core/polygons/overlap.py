@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, shown
+from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import numbers_without_data
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
@@ -23,7 +24,7 @@ from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.draw import cells_for
 from topleft._core.polygons.polygons import Rule, frame_of, in_crs_of, warn_if_apart
-from topleft._core.polygons.prepared import MAX_CROSSINGS, Prepared, prepare
+from topleft._core.polygons.prepared import Prepared, prepare
 from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.typing import RuleOption
 
@@ -33,7 +34,7 @@ MAX_ENTRIES_AT_ONCE = 1 << 27
 #: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
 MAX_BLOCK_ENTRIES = 1 << 16
 
-#: What the kernel writes beyond the last entry: a whole vector.
+#: Entries that the kernel may write beyond the last one: a whole vector.
 TAIL = 16
 
 
@@ -217,7 +218,7 @@ class Overlap:
         return picture.reshape(self.size[::-1])
 
     def _check_pixels(self) -> None:
-        """Raise an error for a table made by hand whose pixels are none; a pass over the entries."""
+        """Raise an error for a table made by hand with pixels outside of the grid; a pass over the entries."""
         n = self.shape[1]
         unsigned = self.pixels.view(f"u{self.pixels.dtype.itemsize}")  # below 0 is beyond
         if len(unsigned) and int(unsigned.max()) >= n:
@@ -269,7 +270,7 @@ class Overlap:
     def _reduced(
         self, ufunc: np.ufunc, values: npt.NDArray[np.float64], empty: float = np.nan
     ) -> npt.NDArray[np.float64]:
-        """Return what a function makes of the entries of each polygon; `empty` of none."""
+        """Return a function's value for the entries of each polygon; `empty` without entries."""
         is_full = np.diff(self.starts) > 0
         result = np.full(len(self), empty)
         if is_full.any():

@@ -14,13 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.arrays import apart_from, as_array, as_count, as_size, as_subpixel_bits, as_window
+from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import crs_text, is_same_crs, transformed
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, empty
 from topleft._core.base.options import Sampling, parse
 from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.polygons.draw import add_shares, draw_labels, draw_mask
-from topleft._core.polygons.prepared import MAX_CROSSINGS, Frame, Prepared, prepare
+from topleft._core.polygons.prepared import Frame, Prepared, prepare
 from topleft._core.polygons.rings import RingSet, as_rings
 from topleft._core.raster.rasterize import canvas_of, open_canvas
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, sample_positions
@@ -28,7 +29,7 @@ from topleft.typing import RuleOption, SamplingOption
 
 
 class Rule(StrEnum):
-    """What is inside of rings that wind round a point so many times."""
+    """The fill rule: which winding numbers are inside."""
 
     EVENODD = "evenodd"
     NONZERO = "nonzero"
@@ -36,7 +37,7 @@ class Rule(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """What polygons are painted with: a row of `table` each, and one for where none is."""
+    """The values of polygons: a row of `table` each, and one for pixels of none."""
 
     table: npt.NDArray[Any]  # (P, ...), of the picture's dtype
     background: npt.NDArray[Any]  # a row
@@ -223,7 +224,7 @@ def frame_of(
 
 
 def warn_if_apart(prepared: Prepared, given: RingSet, size: object) -> None:
-    """Warn the caller's caller of polygons of which none meets a pixel of a grid."""
+    """Warn the caller's caller when no polygon meets a pixel of the grid."""
     if not isinstance(size, Grid) or not len(given.points) or 0 in size.size or prepared.frame.origin != (0, 0):
         return
     left, top, right, bottom = prepared.compiled.boxes_px.T
@@ -267,7 +268,7 @@ def mean_of_samples(
     table = None if paint is None else np.concatenate([paint.table, paint.background[None]]).astype(np.float32)
     out.fill(0)
     for at in positions:
-        prepared.compiled.seen_from(*at)
+        prepared.compiled.at_sample(*at)
         if mask is not None:
             draw_binary(prepared, mask, Sampling.CENTER, is_nonzero=is_nonzero, assume_valid=False)
             np.add(out, mask, out=out)
@@ -278,7 +279,7 @@ def mean_of_samples(
 
 
 def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
-    """Return what polygons are painted with."""
+    """Return the values that polygons are painted with."""
     if isinstance(values, str):
         if values != "index":
             raise ValueError(f"values must be 'index', a number or an array, got {values!r}")

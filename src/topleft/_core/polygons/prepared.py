@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.memory import SCRATCH, Memory, times_that_fit
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.polygons.rings import RingSet
@@ -15,10 +16,6 @@ from topleft._core.polygons.rings import RingSet
 #: Points, and pixels, that are worth a thread: below, one is done before the other has begun.
 MIN_POINTS_PER_THREAD = 50_000
 MIN_PIXELS_PER_THREAD = 1 << 20
-
-
-#: How often rings may cross where areas are exact: 4 s of one core.
-MAX_CROSSINGS = 50_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +48,7 @@ class Prepared:
         return threads_for(self.frame, self.n_points)
 
     def certify(self, *, assume_valid: bool) -> None:
-        """Find out of which polygons the rings do not meet, and what the area of each ring counts."""
+        """Find the polygons with rings that do not meet, and the sign of each ring's area."""
         compiled, n = self.compiled, len(self)
         compiled.make_weights(self.frame.max_crossings)
         n_words = 0 if assume_valid else compiled.certify_words()

@@ -1,4 +1,4 @@
-"""What the caller gives as polygons becomes points and offsets.
+"""Converts the caller's polygons to points and offsets.
 
 In: arrays, lists of rings, offset arrays, flat COCO lists, `__geo_interface__`, shapely geometries. Out: `RingSet`.
 """

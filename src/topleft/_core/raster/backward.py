@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 class Given(Protocol):
-    """What a visibility buffer was drawn from: `GivenCorners`."""
+    """The mesh that a visibility buffer was drawn from: `GivenCorners`."""
 
     vertices: Any
     triangles: Any
@@ -39,7 +39,7 @@ class ShownMesh(Protocol):
 
 @dataclass(frozen=True)
 class Backward:
-    """What a picture shows of a mesh: vertices (1, V, 4) as (x w, y w, z, w) in pixels of the picture, and `rast`."""
+    """A mesh in a picture: vertices (1, V, 4) as (x w, y w, z, w) in pixels of the picture, and `rast`."""
 
     given: Given
     vertices: Floats

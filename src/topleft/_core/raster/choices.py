@@ -1,4 +1,4 @@
-"""What is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by the planner.
+"""Choices before anything is drawn: a small function for each, called by the pipeline and by the planner.
 
 None of them changes a bit of a picture; `tests/plan/test_choices.py` draws with each forced on and off. Their numbers
 are rows of `costs.py`; `docs/design/choices.md` has the scenes.
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from topleft._core.raster.clusters import Clusters
     from topleft._core.raster.snap import Snapped
 
-#: What it does not matter to in which order triangles are drawn.
+#: Sinks that give the same picture whatever the order of triangles.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
 
-#: What is drawn row by row where triangles are few, and how few those are.
-FEW_OF = {
-    Sink.MASK: engine.FEW_OF_BITS, Sink.SAMPLES: engine.FEW_OF_BITS, Sink.COUNT: engine.FEW_STORED,
-    Sink.LABEL: engine.FEW_STORED,
+#: Sinks that draw a few large triangles row by row, and how few those are.
+SHAPES_OF = {
+    Sink.MASK: engine.SHAPES_OF_BITS, Sink.SAMPLES: engine.SHAPES_OF_BITS, Sink.COUNT: engine.SHAPES_STORED,
+    Sink.LABEL: engine.SHAPES_STORED,
 }  # fmt: skip
 
 WORK_OF = {Sink.MASK: "bits", Sink.SAMPLES: "bits", Sink.COUNT: "counts", Sink.LABEL: "labels"}
@@ -49,7 +49,7 @@ class ClusterRoute(Enum):
 
 
 class MeshletLimits(NamedTuple):
-    """So many triangles at least, or so large a share outside and so many in view a pixel; and no more hidden."""
+    """Limits from which a mesh is drawn in clusters: `triangles`, or the share outside and those in view a pixel."""
 
     triangles: float
     outside: float
@@ -153,7 +153,7 @@ def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
     return float(costs.work_triangle * snapped.n_triangles + view.sampling.n_samples * drawn_ns)
 
 
-def can_share(view: View) -> bool:
+def can_slice(view: View) -> bool:
     """Tell whether a pass over a scene can draw some of its triangles."""
     fits_lanes = not view.test or view.subpixel_bits <= 8
     return fits_lanes and takes_lanes(view) and not view.is_exact
@@ -166,16 +166,16 @@ def takes_lanes(view: View) -> bool:
     return is_near and view.method == METHODS["auto"].code
 
 
-def is_shared(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
-    """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
+def is_sliced(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
+    """Tell whether each thread is to take a slice of the triangles instead of setting up all of them."""
     pays = n_triangles * n_parts >= cost_table().shared_setups
     fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
-    shares = takes_lanes(view) if view.is_exact else can_share(view)
+    shares = takes_lanes(view) if view.is_exact else can_slice(view)
     return n_parts > 1 and pays and fits_lanes and shares
 
 
 def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
-    """Return what `rasterize` does with a covered sample: the nearer, the farther or the later triangle stays."""
+    """Return the sink of `rasterize`: the nearer, the farther or the later triangle stays."""
     if test is None or not has_depth:
         return Sink.PAINT
     return Sink.FARTHEST if test is DepthTest.GREATER else Sink.NEAREST
@@ -196,7 +196,7 @@ def can_cluster(view: View, sink: Sink) -> bool:
     is_on_grid = view.grid_bits == view.subpixel_bits and (sink is not Sink.SAMPLES or view.grid_bits <= 8)
     if view.single_sided is not None:  # clusters do not know which triangles are
         return False
-    return sink in ORDER_FREE and is_on_grid and 0 not in view.size and can_share(view)
+    return sink in ORDER_FREE and is_on_grid and 0 not in view.size and can_slice(view)
 
 
 def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> bool:
@@ -367,11 +367,11 @@ def is_flat(snapped: Snapped, view: View) -> bool:
 
 
 class Drawing(NamedTuple):
-    """What becomes of a covered sample, and how threads share the work."""
+    """The sink, and how threads share the work."""
 
     sink: Sink
     n_threads: int
-    is_shared: bool  # each thread takes a share of the triangles; otherwise all of them, in its own rows
+    is_sliced: bool  # each thread takes a slice of the triangles; otherwise all of them, in its own rows
     is_bounded: bool  # large triangles leave out what lies behind what has been drawn
     in_bands: bool  # triangles are sorted into bands of rows, and band after band is drawn
 
@@ -379,9 +379,9 @@ class Drawing(NamedTuple):
 def drawing(view: View, snapped: Snapped, sink: Sink) -> Drawing:
     """Return how a mesh is drawn."""
     n_threads = threads_to_draw(view, snapped, sink)
-    shares = is_shared(view, snapped.n_triangles, n_threads, sink)
-    in_bands = pays_to_sort(view, snapped, sink) and not draws_few(snapped, view, sink, n_threads)
-    return Drawing(sink, n_threads, shares and not in_bands, pays_to_bound(view, snapped, sink), in_bands)
+    sliced = is_sliced(view, snapped.n_triangles, n_threads, sink)
+    in_bands = pays_to_sort(view, snapped, sink) and not draws_large_shapes(snapped, view, sink, n_threads)
+    return Drawing(sink, n_threads, sliced and not in_bands, pays_to_bound(view, snapped, sink), in_bands)
 
 
 def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
@@ -389,7 +389,7 @@ def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
     costs, n_pixels, n = cost_table(), view.size[0] * view.size[1], snapped.n_triangles
     has_depth = sink in (Sink.NEAREST, Sink.FARTHEST, Sink.PAINT)
     is_stored = has_depth or sink in (Sink.COUNT, Sink.LABEL)
-    if not is_stored or n_pixels <= costs.near_pixels or view.sampling is not Sampling.CENTER or not can_share(view):
+    if not is_stored or n_pixels <= costs.near_pixels or view.sampling is not Sampling.CENTER or not can_slice(view):
         return False
     n_seen, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
     n_covered = n_layers * n_pixels
@@ -467,7 +467,7 @@ def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: 
 
 def can_split(view: View, n_triangles: int) -> bool:
     """Tell whether what samples see may be kept once for the pixels that show one triangle."""
-    return view.is_split and view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_share(view)
+    return view.is_split and view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_slice(view)
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
@@ -475,30 +475,30 @@ def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
     return test is not None and has_depth
 
 
-def draws_few(snapped: Snapped, view: View, sink: Sink, n_threads: int) -> bool:
+def draws_large_shapes(snapped: Snapped, view: View, sink: Sink, n_threads: int) -> bool:
     """Tell whether `draw` writes a picture row by row: so few triangles for the size of a thread's rows."""
-    is_known = sink in FEW_OF and view.sampling is not Sampling.AREA and not view.test
+    is_known = sink in SHAPES_OF and view.sampling is not Sampling.AREA and not view.test
     n_samples = view.sampling.n_samples if sink is Sink.SAMPLES else 1
     width, height = view.size
-    return is_known and snapped.mesh.is_few(width, height // max(1, n_threads), n_samples, FEW_OF[sink])
+    return is_known and snapped.mesh.is_large_shapes(width, height // max(1, n_threads), n_samples, SHAPES_OF[sink])
 
 
-def fills_few(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+def fills_large_shapes(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
     """Tell whether flat colours over a background are written row by row."""
     n_samples = view.sampling.n_samples
     is_stored = n_samples == 1 and colors.dtype == np.uint8 and colors.shape[1:] == (4,)
-    most = engine.FEW_STORED if is_stored else engine.FEW_LABELLED
-    return is_flat and view.sampling is not Sampling.AREA and snapped.mesh.is_few(*view.size, n_samples, most)
+    most = engine.SHAPES_STORED if is_stored else engine.SHAPES_LABELLED
+    return is_flat and view.sampling is not Sampling.AREA and snapped.mesh.is_large_shapes(*view.size, n_samples, most)
 
 
-def blends_few(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+def blends_large_shapes(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
     """Tell whether flat colours are blended over a background row by row.
 
     By area four bytes a pixel are blended where they are, which is as fast for one triangle and faster for several.
     """
     is_in_place = colors.dtype == np.uint8 and colors.shape[1:] == (4,)
     pays = is_flat and view.sampling.n_samples == 1 and not (view.sampling is Sampling.AREA and is_in_place)
-    return pays and snapped.mesh.blends_few(*view.size)
+    return pays and snapped.mesh.blends_large_shapes(*view.size)
 
 
 def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
@@ -513,6 +513,6 @@ def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bo
     return n_seen * costs.direct_triangle <= view.size[0] * view.size[1] * costs.paint
 
 
-#: What `forced` forces, beside costs.
+#: Choices that `forced` sets, beside costs.
 FORCEABLE = {name for name, one in globals().items() if callable(one) and one.__module__ == __name__ and name.islower()}
 FORCEABLE = FORCEABLE - {"forced", "constantly"} | {"available_threads"}

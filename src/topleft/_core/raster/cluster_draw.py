@@ -64,9 +64,9 @@ class ClusteredMesh:
         self._empty = self._snapped(self._own, NO_RECORDS, clusters.triangles[:0], None)
 
     def survey(self, n_most: int = SURVEYED, sample: tuple[int, int] = (0, 0)) -> Survey:
-        """Return what becomes of the clusters at a sample, by about `n_most` of them, evenly spread over the mesh."""
+        """Return the visibility of the clusters at a sample, by about `n_most` of them, evenly spread over the mesh."""
         n_of: NDArray[np.int64] = np.zeros(4, np.int64)
-        seen = self._seen(Sink.NEAREST, empty=self._empty.seen_from(*sample))
+        seen = self._seen(Sink.NEAREST, empty=self._empty.at_sample(*sample))
         self.clusters.engine.survey(seen, max(1, round(len(self.clusters) / n_most)), n_of)
         n = max(1, int(n_of.sum()))
         return Survey(*(count / n for count in n_of.tolist()))
@@ -128,9 +128,9 @@ class ClusteredMesh:
         and how many clusters have been.
         """
         clusters, sink = self.clusters, target.sink
-        empty = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
+        empty = self._empty if sample == (0, 0) else self._empty.at_sample(*sample)
         room: NDArray[np.int32] = memory.empty("clusters", (3 * len(clusters) + 1,), np.int32)
-        others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
+        others: NDArray[np.int32] = memory.empty("outside", (clusters.n_triangles + 1,), np.int32)
         may_be_hidden = sink in (Sink.NEAREST, Sink.FARTHEST)
         seen, place = self._seen(sink, first, end, empty), (target, first, end - first, room, others)
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
@@ -139,8 +139,8 @@ class ClusteredMesh:
     def seen(
         self, sink: int, sample: tuple[int, int], rows: tuple[int, int] | None = None
     ) -> tuple[engine.ClusterView, engine.SnappedMesh]:
-        """Return what boxes need to know of some rows of the picture, or of all, and how a sample sees this mesh."""
-        empty = self._empty.seen_from(*sample)
+        """Return the view of boxes in some rows of the picture, or all, and the mesh as a sample sees it."""
+        empty = self._empty.at_sample(*sample)
         first, end = rows or (0, self._view.size[1])
         return self._seen(sink, first, end, empty), empty
 
@@ -162,7 +162,7 @@ class ClusteredMesh:
     ) -> bool:
         """Clear a target and draw the mesh from meshlets, as `draw_clustered` does from clusters."""
         height, meshlets = self._view.size[1], self.clusters.meshlets
-        empty = self._empty.seen_from(*sample)
+        empty = self._empty.at_sample(*sample)
         drawn = engine.MeshletPass(meshlets.engine, empty, self._own, self._seen(target.sink), target)
         parts = draw_pass(memory, drawn, len(meshlets), self.clusters.n_triangles, height, n_parts)
         if not any(map(len, parts)):
@@ -184,7 +184,7 @@ class ClusteredMesh:
     def parts_of_samples(
         self, ids: NDArray[np.int32], samples: Sequence[tuple[int, int]]
     ) -> list[Callable[..., engine.SnappedMesh]]:
-        """Return what makes the mesh as each sample sees it, with what (S, H, W) ids show snapped once for all.
+        """Return a maker of the mesh as each sample sees it; those that (S, H, W) ids show are snapped once.
 
         Where other triangles are asked for, too, all are snapped.
         """
@@ -192,7 +192,7 @@ class ClusteredMesh:
         whole = cache(lambda: self.part(np.arange(self.clusters.n_triangles, dtype=np.int32)))
 
         def part_at(x: int, y: int) -> Callable[..., engine.SnappedMesh]:
-            return lambda _, *others: (whole() if others else common()).seen_from(x, y)
+            return lambda _, *others: (whole() if others else common()).at_sample(x, y)
 
         return [part_at(*sample) for sample in samples]
 
@@ -223,7 +223,7 @@ class ClusteredMesh:
     def _seen(
         self, sink: int, first: int = 0, end: int | None = None, empty: engine.SnappedMesh | None = None
     ) -> engine.ClusterView:
-        """Return what clusters need to know of rows [first, end) of the picture, or of all; `empty`: of a sample."""
+        """Return the view of clusters in rows [first, end) of the picture, or all; `empty`: of a sample."""
         width, height = self._view.size
         n_rows, how = (height if end is None else end) - first, (MARGIN_PX, STAGE_ERROR[self.clusters.points.dtype])
         return engine.ClusterView(self._own, empty or self._empty, first, n_rows, width, *how, sink)
@@ -328,7 +328,7 @@ def draw_others(
     part = mesh.try_part([triangles], memory)
     if part is None:
         return False
-    seen = part.seen_from(*sample)
+    seen = part.at_sample(*sample)
 
     def draw_band(i: int, _: int) -> None:
         seen.draw_listed(target, tops[i], tops[i + 1] - tops[i], triangles, True)

@@ -142,7 +142,7 @@ def as_palette(colors: ArrayLike, opacity: float | None) -> NDArray[Any]:
 
 
 def find_owner(palette: NDArray[Any], per: str, layers: DepthLayers) -> str:
-    """Return whose colours these are: "triangle", "vertex" or "pixel"."""
+    """Return the owner of a row of colours: "triangle", "vertex" or "pixel"."""
     n_layers, height, width = layers.planes[0].shape
     rows: dict[str, tuple[int, ...]] = {"triangle": (layers.n_triangles,), "pixel": (height, width, n_layers)}
     if layers.n_vertices is not None:

@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from topleft._core.base.options import Sampling, Sink
 from topleft._core.base.whole_file import write_whole
 
-#: What the time of a draw is made of, in this order: triangles by how they are drawn, samples, pixels of the picture.
+#: The terms of a draw's time, in this order: triangles by how they are drawn, samples, pixels of the picture.
 FEATURES = (
     "hidden", "tiny", "small", "middle", "rows", "long", "64-bit", "128-bit", "point", "span", "pixel", "cold",
 )  # fmt: skip
 CALLS = ("coverage", "overdraw", "fill", "rasterize")
 DTYPES = ("float32", "float64", "int64")
 
-#: What is fitted, or a difference, may be 0: no choice is made from it.
+#: A fitted cost, or a difference, may be 0: no choice is made from it.
 FITTED = ("clip", "beyond", "draw_mask", "draw_count", "draw_depth", "draw_samples", "draw_area")
 
 #: A file may say so many times more or less than what ships: beyond, it is damaged.
@@ -51,7 +51,7 @@ RAPIDS = "1920x1080, Sapphire Rapids"
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """What things take on one machine."""
+    """The costs of one machine."""
 
     machine: str = row("AMD EPYC", "", "where it was measured")
     isa: str = row("avx512", "", "with which instruction set")
@@ -183,14 +183,14 @@ class Costs:
         """Return the time of a vertex: "snap", "affine", "transform" or "project"."""
         return float(getattr(self, kind)[DTYPES.index(dtype)])
 
-    def draw_ms(self, group: str, counts: NDArray[np.float64], n_threads: int, *, is_shared: bool) -> float:
+    def draw_ms(self, group: str, counts: NDArray[np.float64], n_threads: int, *, is_sliced: bool) -> float:
         """Return the time of a draw: each thread has its rows, and sets up all triangles or a share of them."""
         ns: Numbers = getattr(self, f"draw_{group}")
         alone = float((np.array(ns) * counts).sum())
         if n_threads == 1:
             return alone / 1e6
         speedup = 1 + (n_threads - 1) * (self.parallel - 1)
-        setup = 0.0 if is_shared else float(ns[0] * counts[:6].sum())
+        setup = 0.0 if is_sliced else float(ns[0] * counts[:6].sum())
         return (setup + (alone - setup) / speedup + (n_threads - 1) * self.wake) / 1e6
 
 

@@ -7,7 +7,7 @@ colours count as much as they are opaque: the mean of premultiplied colours, mad
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -21,7 +21,7 @@ from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.classic import fill_classic, refuse_classic
 from topleft._core.raster.rasterize import canvas_of, draw, draw_all_samples
-from topleft._core.raster.sampling import SAMPLE_GRID_BITS, draw_means, sample_positions
+from topleft._core.raster.sampling import SAMPLE_GRID_BITS, SamplePass, draw_means, sample_positions
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
@@ -81,6 +81,46 @@ class Blending:
         return self.has_alpha and self.alpha is Alpha.STRAIGHT and self.mode in (Blend.OVER, Blend.REPLACE)
 
 
+@dataclass(slots=True)
+class Painting:
+    """A snapped mesh, its colours, and the contiguous pixels that they are written to."""
+
+    memory: Memory
+    snapped: Snapped
+    view: View
+    colors: NDArray[Any]
+    pixels: NDArray[Any]
+    transfer: engine.Transfer | None  # how samples are averaged; None: the mean of values
+    is_flat: bool  # a row of colours belongs to a triangle, not to a vertex
+    ground: NDArray[Any] | None  # the colour that all pixels get first; None: they stay as they are
+
+    @property
+    def n_channels(self) -> int:
+        """Numbers of a colour."""
+        return 1 if self.colors.ndim == 1 else self.colors.shape[1]
+
+    @property
+    def is_u8(self) -> bool:
+        """Whether colours are uint8; otherwise they are float32."""
+        return bool(self.colors.dtype == np.uint8)
+
+    @property
+    def ground_bytes(self) -> NDArray[np.uint8] | None:
+        """The ground as kernels read it."""
+        return None if self.ground is None else engine.as_bytes(np.full(self.pixels.shape[2:] or 1, self.ground))
+
+    def lay_ground(self) -> None:
+        """Give all pixels the ground: the first row, and the others row by row, which NumPy copies fast."""
+        self.pixels[:1] = self.ground
+        self.pixels[1:] = self.pixels[:1]
+        self.ground = None
+
+    def samples(self, n_threads: int) -> SamplePass:
+        """Return the pass that draws its samples."""
+        positions = sample_positions(self.view.sampling.n_samples, self.view.grid_bits)
+        return SamplePass(self.memory, self.snapped.mesh, positions, n_threads)
+
+
 def draw_fill(
     memory: Memory, vertices: ArrayLike, triangles: ArrayLike, colors: ArrayLike, view: View, style: Style, out: object
 ) -> NDArray[Any]:
@@ -104,29 +144,29 @@ def draw_fill(
     with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
+        painting = Painting(memory, snapped, view, palette, canvas, transfer, is_flat, ground)
         is_drawn = bool(canvas.size and snapped.n_triangles)
         is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
         has_samples = view.sampling.n_samples > 1
-        can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and not has_samples
-        can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_share(view)))
+        can_lay = is_drawn and is_blended and painting.is_u8 and not has_samples
+        can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_slice(view)))
         if blending.is_needed:
-            is_few = is_drawn and choices.blends_few(snapped, view, palette, is_flat=is_flat)
+            is_large_shapes = is_drawn and choices.blends_large_shapes(snapped, view, palette, is_flat=is_flat)
         else:
-            is_few = is_drawn and choices.fills_few(snapped, view, palette, is_flat=is_flat)
-        if ground is not None and not (can_lay or is_few):
-            lay_ground(canvas, ground)
-            ground = None
+            is_large_shapes = is_drawn and choices.fills_large_shapes(snapped, view, palette, is_flat=is_flat)
+        if ground is not None and not (can_lay or is_large_shapes):
+            painting.lay_ground()
+        is_large_shapes = is_large_shapes and painting.ground is not None
         if not is_drawn:
             pass
-        elif is_few and not blending.is_needed and ground is not None:
-            fill_few(snapped, view, palette, canvas, ground, transfer)
+        elif is_large_shapes and not blending.is_needed:
+            fill_large_shapes(painting)
         elif is_blended:
-            options = blending, transfer, is_few and ground is not None
-            blend(memory, snapped, view, palette, canvas, *options, is_flat=is_flat, ground=ground)
+            blend(painting, blending, is_large_shapes=is_large_shapes)
         elif has_samples:
-            paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat, ground=ground)
+            paint_samples(painting)
         else:
-            paint(memory, snapped, view, palette, canvas, is_flat=is_flat, ground=ground)
+            paint(painting)
     view.mark("shade")
     return result
 
@@ -197,159 +237,89 @@ def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
     raise ValueError(f"colors must have {wish}, got {n_colors}")
 
 
-def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
-    """Give all pixels one colour: the first row, and the others row by row, which NumPy copies fast."""
-    pixels[:1] = ground
-    pixels[1:] = pixels[:1]
-
-
-def fill_few(
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    ground: NDArray[Any],
-    transfer: engine.Transfer | None,
-) -> None:
-    """Write every pixel once, row by row: few triangles, of which a row meets fewer."""
-    n_samples = view.sampling.n_samples
-    positions = sample_positions(n_samples, view.grid_bits) if n_samples > 1 else sample_positions(1, SAMPLE_GRID_BITS)
-    under = engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+def fill_large_shapes(p: Painting) -> None:
+    """Write every pixel once, row by row: a few large triangles."""
+    n_samples, under = p.view.sampling.n_samples, cast("NDArray[np.uint8]", p.ground_bytes)
+    grid_bits = p.view.grid_bits if n_samples > 1 else SAMPLE_GRID_BITS
+    positions = sample_positions(n_samples, grid_bits)
 
     def fill_rows(first: int, end: int) -> int:
-        return snapped.mesh.fill_few(pixels, first, end - first, colors, transfer, under, positions)
+        mesh = p.snapped.mesh
+        return mesh.fill_large_shapes(p.pixels, first, end - first, p.colors, p.transfer, under, positions)
 
-    if max(run_parts(fill_rows, view.size[1], choices.threads_to_draw(view, snapped, Sink.LABEL))) >= 0:
-        snapped.refuse()
-    view.mark("draw")
+    if max(run_parts(fill_rows, p.view.size[1], choices.threads_to_draw(p.view, p.snapped, Sink.LABEL))) >= 0:
+        p.snapped.refuse()
+    p.view.mark("draw")
 
 
-def paint(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    *,
-    is_flat: bool,
-    ground: NDArray[Any] | None = None,
-) -> None:
-    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour.
-
-    `ground`, for flat colours: that of pixels where none shows.
-    """
-    width, height = view.size
-    labels = memory.empty("labels", (height, width), np.int32)
-    drawing = choices.drawing(view, snapped, Sink.LABEL)
-    draw(memory, snapped, view, drawing, labels)
-    palette, flat = engine.as_bytes(colors), engine.as_bytes(pixels)
-    n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
-    under = None if ground is None else engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+def paint(p: Painting) -> None:
+    """Draw coloured triangles: first which triangle shows in each pixel, then its colour."""
+    labels = p.memory.empty("labels", p.pixels.shape[:2], np.int32)
+    drawing = choices.drawing(p.view, p.snapped, Sink.LABEL)
+    draw(p.memory, p.snapped, p.view, drawing, labels)
+    palette, flat, under = engine.as_bytes(p.colors), engine.as_bytes(p.pixels), p.ground_bytes
 
     def paint_rows(first: int, end: int) -> None:
-        snapped.mesh.paint(labels, palette, flat, first, end - first, is_flat, is_u8, n_channels, under)
+        p.snapped.mesh.paint(labels, palette, flat, first, end - first, p.is_flat, p.is_u8, p.n_channels, under)
 
-    run_parts(paint_rows, height, drawing.n_threads)
+    run_parts(paint_rows, len(labels), drawing.n_threads)
 
 
-def paint_samples(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    transfer: engine.Transfer | None,
-    *,
-    is_flat: bool,
-    ground: NDArray[Any] | None,
-) -> None:
-    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples.
-
-    `ground`, for flat colours: the colour that all pixels get before.
-    """
-    width, height = view.size
-    positions = sample_positions(view.sampling.n_samples, view.grid_bits)
-    drawing = choices.drawing(view, snapped, Sink.LABEL)
-    n_threads = drawing.n_threads
-    if is_flat and choices.can_share(view):
-        palette = engine.Palette(colors, transfer)
-        if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, ground, n_threads):
-            snapped.refuse()
-        view.mark("draw")
+def paint_samples(p: Painting) -> None:
+    """Draw coloured triangles, each pixel the mean of its samples."""
+    drawing = choices.drawing(p.view, p.snapped, Sink.LABEL)
+    samples = p.samples(drawing.n_threads)
+    if p.is_flat and choices.can_slice(p.view):
+        if draw_means(samples, engine.Palette(p.colors, p.transfer), p.pixels, p.ground):
+            p.snapped.refuse()
+        p.view.mark("draw")
         return
-    labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
-    draw_all_samples(memory, snapped, view, positions, drawing, labels, None)
-    if is_flat:
-        resolve_flat(labels, colors, pixels, transfer, n_threads)
-        return
-    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
-    resolve_gouraud(memory, meshes, labels, colors, pixels, transfer, n_threads)
-
-
-def blend(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    blending: Blending,
-    transfer: engine.Transfer | None,
-    is_few: bool,
-    *,
-    is_flat: bool,
-    ground: NDArray[Any] | None = None,
-) -> None:
-    """Blend coloured triangles into contiguous pixels; with several samples a pixel each is a picture of its own.
-
-    `ground`, for uint8 with one sample a pixel, or `is_few`: the colour that all pixels get before.
-    """
-    n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
-    if view.sampling.n_samples == 1:
-        pictures, meshes = pixels[None], [snapped.mesh]
+    shape = len(samples.positions), *p.pixels.shape[:2]
+    labels: NDArray[np.int32] = p.memory.empty("sample labels", shape, np.int32)
+    draw_all_samples(samples, p.snapped, p.view, drawing.sink, labels, None)
+    if p.is_flat:
+        resolve_flat(p, labels, drawing.n_threads)
     else:
-        positions = sample_positions(view.sampling.n_samples, view.grid_bits).tolist()
-        meshes = [snapped.mesh.seen_from(x, y) for x, y in positions]
-        pictures = memory.empty("sample colors", (len(meshes), *pixels.shape), colors.dtype)
-        pictures[...] = pixels
-    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
-    pixel_bytes = 4 if colors.dtype == np.uint8 else 4 * n_channels
-    row_bytes = pixel_bytes * view.size[0]
-    lays_ground = ground is not None
-    band_rows = 0 if is_few else choices.rows_to_blend(view, snapped, row_bytes, lays_ground=lays_ground)
+        resolve_gouraud(p, samples, labels)
+
+
+def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:
+    """Blend coloured triangles; with several samples a pixel each is a picture of its own.
+
+    A ground is there for uint8 with one sample a pixel, or for `is_large_shapes`.
+    """
+    n_threads, n_samples = choices.threads_to_draw(p.view, p.snapped, Sink.LABEL), p.view.sampling.n_samples
+    if n_samples == 1:
+        pictures, meshes = p.pixels[None], [p.snapped.mesh]
+    else:
+        meshes = p.samples(n_threads).meshes
+        pictures = p.memory.empty("sample colors", (n_samples, *p.pixels.shape), p.colors.dtype)
+        pictures[...] = p.pixels
+    row_bytes = (4 if p.is_u8 else 4 * p.n_channels) * p.view.size[0]
+    lays_ground = p.ground is not None
+    band_rows = 0 if is_large_shapes else choices.rows_to_blend(p.view, p.snapped, row_bytes, lays_ground=lays_ground)
     for mesh, picture in zip(meshes, pictures, strict=True):
-        if blend_colors(memory, mesh, colors, picture, blending, n_threads, band_rows, is_flat=is_flat, ground=ground):
-            snapped.refuse()
-    view.mark("draw")
-    if view.sampling.n_samples > 1:
-        resolve_colors(pictures, pixels, transfer, n_threads)
+        if blend_picture(p, mesh, picture, blending, n_threads, band_rows):
+            p.snapped.refuse()
+    p.view.mark("draw")
+    if n_samples > 1:
+        resolve_colors(p, pictures, n_threads)
 
 
-def blend_colors(
-    memory: Memory,
-    mesh: engine.SnappedMesh,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    blending: Blending,
-    n_threads: int,
-    band_rows: int,
-    *,
-    is_flat: bool,
-    ground: NDArray[Any] | None = None,
+def blend_picture(
+    p: Painting, mesh: engine.SnappedMesh, pixels: NDArray[Any], blending: Blending, n_threads: int, band_rows: int
 ) -> bool:
-    """Blend a mesh into contiguous pixels; returns whether a triangle has an index outside the vertices.
+    """Blend a mesh into a picture of one sample; returns whether a triangle has an index outside the vertices.
 
-    `band_rows`: so many are finished before the next; 0: few triangles, row by row. `ground`, for uint8 or few
-    triangles: the colour that all pixels get before.
+    `band_rows`: so many are finished before the next; 0: a few large triangles, row by row.
     """
     height, width = pixels.shape[:2]
     n_parts = min(height, n_threads)
-    n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
-    flat, palette = engine.as_bytes(pixels), engine.as_bytes(colors)
+    flat, palette, under = engine.as_bytes(pixels), engine.as_bytes(p.colors), p.ground_bytes
     n_packed = width * (n_parts * engine.BLENDED_ROWS if band_rows == 0 else height)
-    packed = memory.empty("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
+    packed = p.memory.empty("packed", (n_packed,), np.int32) if p.is_u8 and p.n_channels != 4 else None
     n_cells = engine.blend_cells(width)
-    cells = memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
-    under = None if ground is None else engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+    cells = p.memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
     code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
 
     def blend_part(i: int, _: int) -> int:
@@ -357,15 +327,15 @@ def blend_colors(
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
         room = packed[engine.BLENDED_ROWS * width * i :] if packed is not None and band_rows == 0 else packed
         return mesh.blend(
-            flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
-            code, is_premultiplied, band_rows, under, room, own, is_few=band_rows == 0,
+            flat, width, first, end - first, palette, p.n_channels, p.is_u8, p.is_flat,
+            code, is_premultiplied, band_rows, under, room, own, is_large_shapes=band_rows == 0,
         )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0
 
 
 def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> engine.Transfer | None:
-    """Return what is averaged; None when it is the values as they are.
+    """Return how samples are averaged; None for the mean of values.
 
     Raises
     ------
@@ -383,53 +353,31 @@ def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_strai
     return engine.Transfer(srgb_tables() if is_linear else None, n_channels - (n_channels in (2, 4)), is_straight)
 
 
-def resolve_flat(
-    labels: NDArray[np.int32],
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    transfer: engine.Transfer | None,
-    n_threads: int,
-) -> None:
-    """Write the mean colour of the triangles that the samples see, labels (S, H, W), over (H, W[, C]) pixels."""
-    palette = engine.Palette(colors, transfer)
+def resolve_flat(p: Painting, labels: NDArray[np.int32], n_threads: int) -> None:
+    """Write the mean colour of the triangles that the samples see, labels (S, H, W)."""
+    palette = engine.Palette(p.colors, p.transfer)
+    run_parts(lambda first, end: palette.mean_flat(labels, p.pixels, first, end - first), labels.shape[1], n_threads)
+
+
+def resolve_gouraud(p: Painting, samples: SamplePass, labels: NDArray[np.int32]) -> None:
+    """Write the mean of the colours at the samples, interpolated at each of them."""
+    painted = p.memory.empty("sample colors", (len(labels), *p.pixels.shape), p.colors.dtype)
+    palette, meshes = engine.as_bytes(p.colors), samples.meshes
 
     def resolve_rows(first: int, end: int) -> None:
-        palette.mean_flat(labels, pixels, first, end - first)
-
-    run_parts(resolve_rows, labels.shape[1], n_threads)
-
-
-def resolve_gouraud(
-    memory: Memory,
-    meshes: list[engine.SnappedMesh],
-    labels: NDArray[np.int32],
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    transfer: engine.Transfer | None,
-    n_threads: int,
-) -> None:
-    """Write the mean of the colours at the samples, interpolated at each of them, over (H, W[, C]) pixels."""
-    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
-    painted = memory.empty("sample colors", (len(labels), *pixels.shape), colors.dtype)
-    palette = engine.as_bytes(colors)
-
-    def resolve_rows(first: int, end: int) -> None:
-        painted[:, first:end] = pixels[first:end]
+        painted[:, first:end] = p.pixels[first:end]
         for mesh, own, picture in zip(meshes, labels, painted, strict=True):
             flat = engine.as_bytes(picture)
-            mesh.paint(own, palette, flat, first, end - first, False, colors.dtype == np.uint8, n_channels)
-        engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
+            mesh.paint(own, palette, flat, first, end - first, False, p.is_u8, p.n_channels)
+        engine.mean_colors(painted, p.pixels, first, end - first, p.n_channels, p.transfer)
 
-    run_parts(resolve_rows, labels.shape[1], n_threads)
+    run_parts(resolve_rows, labels.shape[1], samples.n_threads)
 
 
-def resolve_colors(
-    painted: NDArray[Any], pixels: NDArray[Any], transfer: engine.Transfer | None, n_threads: int
-) -> None:
-    """Write the mean of what the samples hold, (S, H, W[, C]), over (H, W[, C]) pixels."""
-    n_channels = 1 if pixels.ndim == 2 else pixels.shape[2]
+def resolve_colors(p: Painting, painted: NDArray[Any], n_threads: int) -> None:
+    """Write the mean of the colours of the samples, (S, H, W[, C])."""
 
     def resolve_rows(first: int, end: int) -> None:
-        engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
+        engine.mean_colors(painted, p.pixels, first, end - first, p.n_channels, p.transfer)
 
-    run_parts(resolve_rows, len(pixels), n_threads)
+    run_parts(resolve_rows, len(p.pixels), n_threads)

@@ -23,7 +23,7 @@ PartOfMesh = Callable[..., engine.SnappedMesh]
 
 
 class Viewer(Protocol):
-    """What `distance` asks of a camera."""
+    """The part of a camera that `distance` reads."""
 
     @property
     def view(self) -> NDArray[np.float64]:
@@ -31,7 +31,7 @@ class Viewer(Protocol):
 
 
 class GivenCorners(NamedTuple):
-    """What a visibility buffer was drawn from, as it was given: what changes from pixel to pixel is found in it."""
+    """The arrays that a visibility buffer was drawn from, as given; derivatives along the picture come from them."""
 
     vertices: ArrayLike
     triangles: ArrayLike
@@ -68,7 +68,7 @@ class GivenCorners(NamedTuple):
 
 
 class SeenSamples(NamedTuple):
-    """What the samples of a picture see, as kernels read it."""
+    """The ids and depths of the samples of a picture, as kernels read them."""
 
     ids: NDArray[Any]
     """int32, planes (S, H, W), or (1, H, W) of the first with `split`; int64 where int32 does not count triangles."""
@@ -137,9 +137,9 @@ class Fragments:
 
     #: Fragments of each sample when there are several.
     _samples: tuple[Fragments, ...] = ()
-    #: What these see, until somebody asks for their planes.
+    #: Their ids and depths, until the planes are read.
     _split: SplitSamples | None = None
-    #: What it was drawn from; None where that is not kept.
+    #: The mesh that it was drawn from; None where that is not kept.
     corners: GivenCorners | None = None
     #: Ids and depth of these, (S, H, W).
     _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
@@ -168,7 +168,7 @@ class Fragments:
     def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
         """Return the fragments of each of several samples, and their planes (S, H, W), drawn now if they were not."""
         if self._split is not None:
-            self._set_planes(*self._split.planes(), self._split.meshes)
+            self._set_planes(*self._split.planes(), self._split.drawn.meshes)
             self._split = None
         return self._samples, self._planes
 
@@ -196,10 +196,10 @@ class Fragments:
         return mesh
 
     def _seen(self) -> SeenSamples:
-        """Return what the samples see, as it was drawn."""
+        """Return the ids and depths of the samples, as drawn."""
         if self._split is not None:
             found = self._split
-            return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.positions))
+            return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.drawn.positions))
         return SeenSamples.of(*(self._sampled()[1] or (self.id[None], self.depth[None])))
 
     def __repr__(self) -> str:
@@ -264,7 +264,7 @@ class Fragments:
     @classmethod
     def of_split(cls, split: SplitSamples, n_vertices: int, n_triangles: int) -> Fragments:
         """Return the fragments of several samples whose planes are drawn when they are asked for."""
-        frags = cls(split.ids, split.depth, split.meshes[0], n_vertices, n_triangles)
+        frags = cls(split.ids, split.depth, split.drawn.meshes[0], n_vertices, n_triangles)
         frags._split = split
         return frags
 
@@ -504,7 +504,7 @@ class Fragments:
         return Backward.of(self).smooth_vjp(picture, grad, edges)
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
-        """Return what is left when no other pixels than these show a triangle."""
+        """Return the same, with background in all pixels but these."""
         rows, cols = as_places(rows, cols, self.triangle.shape)
         triangle = np.full_like(self.triangle, -1)
         triangle[rows, cols] = self.triangle[rows, cols]
@@ -590,7 +590,7 @@ class Fragments:
         return (found, self._derivatives(checked)) if derivatives else found
 
     def _checked(self, values: Any) -> Any:
-        """What the two following methods take of an attribute."""
+        """Check an attribute and return it as float32."""
         return as_values(values, self._n_vertices, self._n_triangles)
 
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:

@@ -204,10 +204,10 @@ def peel_meshes(
     ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
-    n_pixels = BAND_BYTES // (8 * n_layers) if choices.can_share(view) else min(height * width, 2**31 - 1)
+    n_pixels = BAND_BYTES // (8 * n_layers) if choices.can_slice(view) else min(height * width, 2**31 - 1)
 
     def peel_chunk(meshes: Sequence[engine.SnappedMesh], *, is_first: bool) -> None:
-        meshes = [mesh.seen_from(*at_fx) for mesh in meshes] if any(at_fx) else meshes
+        meshes = [mesh.at_sample(*at_fx) for mesh in meshes] if any(at_fx) else meshes
         n_threads = min(height, count_threads(view.threads, sum(mesh.n_triangles for mesh in meshes)))
         bits = bits_of_bands((height, width), n_pixels, n_threads)
         bins = [bins_of(memory, mesh, view, bits, reach_fx) for mesh in meshes]
@@ -228,7 +228,7 @@ def peel_meshes(
 
 def bins_of(memory: Memory, mesh: engine.SnappedMesh, view: View, band_bits: int, reach_fx: int) -> engine.Bins | None:
     """Return the triangles of each band of rows; None where every band looks at all of them."""
-    if not (mesh.n_triangles and choices.can_share(view)):
+    if not (mesh.n_triangles and choices.can_slice(view)):
         return None
     room = memory.empty("bins", (3, mesh.n_triangles + 16), np.int32)
     bins = engine.Bins(mesh, *view.size[::-1], reach_fx, band_bits, room)

@@ -82,7 +82,7 @@ class PointFragments(Fragments):
         return self.id
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> PointFragments:
-        """Return what is left when no other pixels than these show a point."""
+        """Return the same, with background in all pixels but these."""
         rows, cols = as_places(rows, cols, self.id.shape)
         ids = np.full((1, *self.id.shape), -1, np.int32)
         ids[0, rows, cols] = self.id[rows, cols]
@@ -234,7 +234,7 @@ def rows_of(
     target: engine.Target,
     view: View,
 ) -> Callable[[int, int], None]:
-    """Return what draws rows [first, end) of points, as one sample sees them."""
+    """Return a function that draws rows [first, end) of points, as one sample sees them."""
     is_disc = shape is PointShape.DISC
 
     def draw_rows(first: int, end: int) -> None:

@@ -16,7 +16,7 @@ from topleft._core.base.arrays import as_array, as_checked_triangles, as_out, as
 from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.rasterize import Asked, draw_fragments, refuse_many
+from topleft._core.raster.rasterize import FragmentOptions, draw_fragments, refuse_many
 from topleft._core.raster.view import Planned, View, ViewOptions
 from topleft.typing import DepthTestOption, EncodingOption, FilterOption, WrapOption
 
@@ -216,11 +216,14 @@ def draw_batch(
     """
     view = View.parse(size, options, has_poses=True)
     refuse_many(view, "rasterize")
-    asked = Asked.parse(depth_test, background_depth, out)
+    fragment_options = FragmentOptions.parse(depth_test, background_depth, out)
     (width, height), n_samples = view.size, view.sampling.n_samples
     shape = (n, height, width) if n_samples == 1 else (n, height, width, n_samples)
     outs: list[NDArray[Any] | None] = []
-    for name, array, dtype in (("triangle", asked.ids_out, np.int32), ("depth", asked.depth_out, np.float32)):
+    for name, array, dtype in (
+        ("triangle", fragment_options.ids_out, np.int32),
+        ("depth", fragment_options.depth_out, np.float32),
+    ):
         if array is not None:
             outs.append(as_out(f"out {name}", array, shape, dtype))
         else:  # the planes of samples are each pose's own

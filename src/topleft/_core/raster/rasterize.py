@@ -24,6 +24,7 @@ from topleft._core.raster.classic import draw_classic, refuse_classic
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.sampling import (
+    SamplePass,
     draw_planes,
     draw_sorted,
     draw_split,
@@ -47,7 +48,7 @@ def draw(
     earlier_wins: bool = False,
 ) -> None:
     """Clear contiguous buffers and draw a mesh into them, in bands of rows."""
-    (width, height), (sink, n_parts, is_shared, is_bounded, in_bands) = view.size, drawing
+    (width, height), (sink, n_parts, is_sliced, is_bounded, in_bands) = view.size, drawing
     if 0 in view.size:
         return
     covered: NDArray[np.uint64] | None = None
@@ -64,10 +65,10 @@ def draw(
         return snapped.mesh.draw(target, first, end - first)
 
     if in_bands:
-        mesh, n, shape = snapped.mesh, snapped.n_triangles, (height, width)
-        is_bad = draw_sorted(memory, mesh, n, sample_positions(1, view.grid_bits), [target], shape, n_parts)
-    elif is_shared and snapped.can_share:
-        is_bad = max(draw_shared(memory, snapped, target, height, n_parts)) >= 0
+        own = SamplePass(memory, snapped.mesh, sample_positions(1, view.grid_bits), n_parts)
+        is_bad = draw_sorted(own, [target], (height, width))
+    elif is_sliced and snapped.can_slice:
+        is_bad = max(draw_sliced(memory, snapped, target, height, n_parts)) >= 0
     else:
         is_bad = max(run_parts(draw_rows, height, n_parts)) >= 0
     if is_bad:
@@ -75,21 +76,21 @@ def draw(
     view.mark("draw")
 
 
-def draw_shared(memory: Memory, snapped: Snapped, target: engine.Target, height: int, n_parts: int) -> list[int]:
-    """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
+def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height: int, n_parts: int) -> list[int]:
+    """Draw as `draw` does: each part a slice of the triangles into its rows, then those that others list for it."""
     mesh, n = snapped.mesh, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
-    shares = [n * i // n_parts for i in range(n_parts + 1)]
-    room: NDArray[np.int32] = memory.empty("others", (n + 16 * n_parts,), np.int32)
-    others = [room[shares[i] + 16 * i : shares[i + 1] + 16 * (i + 1)] for i in range(n_parts)]
+    starts = [n * i // n_parts for i in range(n_parts + 1)]
+    room: NDArray[np.int32] = memory.empty("outside", (n + 16 * n_parts,), np.int32)
+    outside = [room[starts[i] + 16 * i : starts[i + 1] + 16 * (i + 1)] for i in range(n_parts)]
 
     def draw_own(i: int, _: int) -> tuple[int, int]:
-        return mesh.draw_share(target, rows[i], rows[i + 1] - rows[i], shares[i], others[i])
+        return mesh.draw_slice(target, rows[i], rows[i + 1] - rows[i], starts[i], outside[i])
 
     def draw_found(i: int, _: int) -> None:
         finders = [k for k in range(n_parts) if k != i]
         for k in finders:
-            mesh.draw_listed(target, rows[i], rows[i + 1] - rows[i], others[k][: counts[k]], k == finders[-1])
+            mesh.draw_listed(target, rows[i], rows[i + 1] - rows[i], outside[k][: counts[k]], k == finders[-1])
 
     bad_rows, counts = zip(*run_parts(draw_own, n_parts, n_parts), strict=True)
     if max(bad_rows) < 0:
@@ -127,7 +128,7 @@ def draw_area(
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
         n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
-        if sum_areas(memory, snapped.mesh, snapped.n_triangles, canvas, n_threads, is_clamped=is_clamped):
+        if sum_areas(memory, snapped.mesh, canvas, n_threads, is_clamped=is_clamped):
             snapped.refuse()
     view.mark("draw")
     return result
@@ -164,7 +165,7 @@ def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: objec
     with canvas_of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
         canvas[...] = 0.0
         for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
-            seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
+            seen = replace(snapped, mesh=snapped.mesh.at_sample(*at))
             draw(memory, seen, view, choices.drawing(view, seen, Sink.MASK), mask)
             np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
     return result
@@ -175,7 +176,7 @@ def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object
     n, (width, height) = view.sampling.n_samples, view.size
     planes = memory.empty("sample counts", (n, height, width), np.int32)
     for plane, at in zip(planes, sample_positions(n, view.grid_bits).tolist(), strict=True):
-        seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
+        seen = replace(snapped, mesh=snapped.mesh.at_sample(*at))
         draw(memory, seen, view, choices.drawing(view, seen, Sink.COUNT), plane)
     counts = np.moveaxis(planes, 0, -1)
     if out is None:
@@ -200,29 +201,23 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
 
 
 def draw_all_samples(
-    memory: Memory,
+    own: SamplePass,
     snapped: Snapped,
     view: View,
-    positions: NDArray[np.int32],
-    drawing: Drawing,
+    sink: Sink,
     pixels: NDArray[np.int32],
     depth: NDArray[np.float32] | None,
 ) -> None:
     """Clear (S, H, W) planes and draw what each sample sees."""
-    width, height = view.size
-    if not (width and height):
+    if 0 in view.size:
         return
-    sink, n_threads, *_ = drawing
-    is_near = snapped.n_triangles > 0 and choices.can_share(view)
-    if draw_planes(
-        memory, snapped.mesh, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
-    ):
+    if draw_planes(own, sink, pixels, depth, is_near=snapped.n_triangles > 0 and choices.can_slice(view)):
         snapped.refuse()
     view.mark("draw")
 
 
-class Asked(NamedTuple):
-    """What `rasterize` is asked for besides the options of all verbs."""
+class FragmentOptions(NamedTuple):
+    """The options of `rasterize` beside those of all verbs."""
 
     test: DepthTest | None
     background: float  # depth where nothing is
@@ -230,7 +225,7 @@ class Asked(NamedTuple):
     depth_out: object
 
     @classmethod
-    def parse(cls, depth_test: str | None, background_depth: float | None, out: object) -> Asked:
+    def parse(cls, depth_test: str | None, background_depth: float | None, out: object) -> FragmentOptions:
         """Check the options of a call."""
         test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
         if background_depth is None:
@@ -256,9 +251,9 @@ def draw_fragments(
     """`rasterize`, on the memory given; with `names` triangle i is called names[i], which ascend."""
     refuse_classic(view, "depth")
     refuse_many(view, "rasterize")
-    asked = Asked.parse(depth_test, background_depth, out)
+    options = FragmentOptions.parse(depth_test, background_depth, out)
     corners = GivenCorners(vertices, triangles, view.transform, view.viewport, view.origin)
-    frags = draw_clusters(memory, vertices, view, asked)
+    frags = draw_clusters(memory, vertices, view, options)
     if frags is not None:
         return frags.drawn_from(corners)
     if view.sampling.n_samples > 1:  # which are drawn from the snapped mesh when they are asked for
@@ -266,29 +261,29 @@ def draw_fragments(
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     if names is not None:
         snapped = replace(snapped, mesh=snapped.mesh.named(names))
-    route, drawing = choices.route(view, snapped, asked.test, wants_depth=asked.depth_out is not None)
-    return ROUTES[route](memory, snapped, view, asked, drawing).drawn_from(corners)
+    route, drawing = choices.route(view, snapped, options.test, wants_depth=options.depth_out is not None)
+    return ROUTES[route](memory, snapped, view, options, drawing).drawn_from(corners)
 
 
 Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
 
 
-def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+def draw_labels(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids of triangles at depth 0, which is written when it is asked for."""
-    with canvas_of(memory, "triangle", asked.ids_out, view.size[::-1], np.int32) as (ids, canvas):
+    with canvas_of(memory, "triangle", options.ids_out, view.size[::-1], np.int32) as (ids, canvas):
         draw(memory, snapped, view, drawing, canvas)
-    return Fragments(ids, asked.background, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+    return Fragments(ids, options.background, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
 
-def draw_flat(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+def draw_flat(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids of triangles that all lie at one depth, and write it where they are."""
-    earlier_wins = choices.earlier_wins(asked.test, has_depth=snapped.has_depth)
+    earlier_wins = choices.earlier_wins(options.test, has_depth=snapped.has_depth)
     flat_depth = choices.first_depth(snapped.given.points, has_depth=snapped.has_depth)
-    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+    with buffers_of(memory, view, options) as ((ids, depth), (ids_canvas, depth_canvas)):
         draw(memory, snapped, view, drawing, ids_canvas, earlier_wins=earlier_wins)
 
         def set_depth(first: int, end: int) -> None:
-            n_rows, background = end - first, asked.background
+            n_rows, background = end - first, options.background
             engine.set_flat_depth(ids_canvas, depth_canvas, first, n_rows, earlier_wins, flat_depth, background)
 
         run_parts(set_depth, len(ids), drawing.n_threads)
@@ -296,34 +291,31 @@ def draw_flat(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawin
     return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
 
-def draw_depth(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+def draw_depth(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids and depth, compared at each sample."""
-    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+    with buffers_of(memory, view, options) as ((ids, depth), (ids_canvas, depth_canvas)):
         draw(memory, snapped, view, drawing, ids_canvas, depth=depth_canvas)
-        lay_background(ids_canvas, depth_canvas, drawing.sink, asked.background)
+        lay_background(ids_canvas, depth_canvas, drawing.sink, options.background)
     return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
 
-def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+def draw_samples(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids and depth of every sample: those of the first, and of pixels that show several; or a plane a sample."""
     (width, height), n = view.size, view.sampling.n_samples
-    positions = sample_positions(n, view.grid_bits)
+    own = SamplePass(memory, snapped.mesh, sample_positions(n, view.grid_bits), drawing.n_threads)
     check_fits((n, height, width), np.int32, np.float32)
     can_split = choices.can_split(view, snapped.n_triangles) and not snapped.mesh.is_named
-    if can_split and asked.ids_out is None and asked.depth_out is None:
-        shape, n_threads = (height, width), drawing.n_threads
-        given = snapped.mesh, snapped.n_triangles, positions, drawing.sink, shape, asked.background
-        split = draw_split(memory, *given, n_threads)
+    if can_split and options.ids_out is None and options.depth_out is None:
+        split = draw_split(own, drawing.sink, (height, width), options.background)
         if split is None:
             snapped.refuse()
         view.mark("draw")
         return Fragments.of_split(split, snapped.n_vertices, snapped.n_triangles)
     ids, depth = planes_of(memory, view)
-    draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
-    lay_background(ids, depth, drawing.sink, asked.background)
-    copy_planes(ids, depth, asked)
-    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
-    return Fragments.of_samples(ids, depth, meshes, snapped.n_vertices, snapped.n_triangles)
+    draw_all_samples(own, snapped, view, drawing.sink, ids, depth)
+    lay_background(ids, depth, drawing.sink, options.background)
+    copy_planes(ids, depth, options)
+    return Fragments.of_samples(ids, depth, own.meshes, snapped.n_vertices, snapped.n_triangles)
 
 
 def planes_of(memory: Memory, view: View) -> Buffers:
@@ -333,9 +325,9 @@ def planes_of(memory: Memory, view: View) -> Buffers:
     return memory.empty("sample ids", shape, np.int32), memory.empty("sample depth", shape, np.float32)
 
 
-def copy_planes(ids: NDArray[np.int32], depth: NDArray[np.float32], asked: Asked) -> None:
+def copy_planes(ids: NDArray[np.int32], depth: NDArray[np.float32], options: FragmentOptions) -> None:
     """Write planes of samples to the arrays that a caller gave, (H, W, S)."""
-    for name, out, planes in (("triangle", asked.ids_out, ids), ("depth", asked.depth_out, depth)):
+    for name, out, planes in (("triangle", options.ids_out, ids), ("depth", options.depth_out, depth)):
         if out is not None:
             n, height, width = planes.shape
             result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
@@ -345,14 +337,14 @@ def copy_planes(ids: NDArray[np.int32], depth: NDArray[np.float32], asked: Asked
 ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
 
 
-def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked) -> Fragments | None:
+def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, options: FragmentOptions) -> Fragments | None:
     """Draw a mesh that the plan has in clusters.
 
     None where there are no clusters, where drawing them does not pay, or where only the mesh can tell what is wrong.
     """
     if view.plan is None or view.transform is None:
         return None
-    sink = choices.fragment_sink(asked.test, has_depth=True)
+    sink = choices.fragment_sink(options.test, has_depth=True)
     clusters = view.plan.find_clusters(vertices) if choices.can_cluster(view, sink) else None
     if clusters is None:
         return None
@@ -364,20 +356,20 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
     if route is choices.ClusterRoute.WHOLE:
         return None
     if view.sampling.n_samples > 1:
-        return draw_cluster_samples(memory, mesh, view, asked, sink, route)
-    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+        return draw_cluster_samples(memory, mesh, view, options, sink, route)
+    with buffers_of(memory, view, options) as ((ids, depth), (ids_canvas, depth_canvas)):
         bounds = memory.empty("bounds", engine.Target.bounds_shape(*ids_canvas.shape), np.float32)
         target = engine.Target(sink, ids_canvas, depth_canvas, None, bounds=bounds)
         if not mesh.draw(memory, target, route):
             return None
         mesh.note_hidden(target)
-        lay_background(ids_canvas, depth_canvas, sink, asked.background)
+        lay_background(ids_canvas, depth_canvas, sink, options.background)
     view.mark("draw")
     return Fragments(ids, depth, mesh.part, len(clusters.points), clusters.n_triangles)
 
 
 def draw_cluster_samples(
-    memory: Memory, mesh: ClusteredMesh, view: View, asked: Asked, sink: Sink, route: choices.ClusterRoute
+    memory: Memory, mesh: ClusteredMesh, view: View, options: FragmentOptions, sink: Sink, route: choices.ClusterRoute
 ) -> Fragments | None:
     """Draw a mesh in clusters into a plane a sample, one after the other; None as `draw_clusters` returns it."""
     (width, height), n = view.size, view.sampling.n_samples
@@ -391,22 +383,22 @@ def draw_cluster_samples(
         if not mesh.draw(memory, target, route, sample):
             return None
     mesh.note_hidden(target)
-    lay_background(ids, depth, sink, asked.background)
+    lay_background(ids, depth, sink, options.background)
     view.mark("draw")
-    copy_planes(ids, depth, asked)
+    copy_planes(ids, depth, options)
     clusters = mesh.clusters
     parts = mesh.parts_of_samples(ids, samples)
     return Fragments.of_samples(ids, depth, parts, len(clusters.points), clusters.n_triangles)
 
 
 @contextmanager
-def buffers_of(memory: Memory, view: View, asked: Asked) -> Iterator[tuple[Buffers, Buffers]]:
+def buffers_of(memory: Memory, view: View, options: FragmentOptions) -> Iterator[tuple[Buffers, Buffers]]:
     """Give ids and depth to return, and contiguous ones to draw into, as `canvas_of` does."""
     shape = view.size[::-1]
-    if asked.ids_out is None and asked.depth_out is None:
+    if options.ids_out is None and options.depth_out is None:
         check_fits(shape, np.int32, np.float32)
-    ids, ids_canvas = open_canvas(memory, "triangle", asked.ids_out, shape, np.int32)
-    depth, depth_canvas = open_canvas(memory, "depth", asked.depth_out, shape, np.float32)
+    ids, ids_canvas = open_canvas(memory, "triangle", options.ids_out, shape, np.int32)
+    depth, depth_canvas = open_canvas(memory, "depth", options.depth_out, shape, np.float32)
     yield (ids, depth), (ids_canvas, depth_canvas)
     for result, canvas in ((ids, ids_canvas), (depth, depth_canvas)):
         if canvas is not result:

@@ -34,7 +34,7 @@ class RunTable:
 
     @property
     def keys(self) -> I64:
-        """What each run is of: the number of its mask, or the id of its pixels."""
+        """The owner of each run: the number of its mask, or the id of its pixels."""
         return self._runs[: self._n, 2]
 
     def add(

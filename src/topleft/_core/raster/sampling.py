@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,17 +39,32 @@ def sample_positions(n_samples: int, grid_bits: int) -> NDArray[np.int32]:
     return np.array(POSITIONS[n_samples], np.int32) << np.int32(grid_bits - SAMPLE_GRID_BITS)
 
 
+class SamplePass(NamedTuple):
+    """A mesh that is drawn as samples see it, in memory that is given, by some threads."""
+
+    memory: Memory
+    mesh: engine.SnappedMesh
+    positions: NDArray[np.int32]
+    n_threads: int
+
+    @property
+    def meshes(self) -> list[engine.SnappedMesh]:
+        """The mesh as each sample sees it."""
+        return [self.mesh.at_sample(x, y) for x, y in self.positions.tolist()]
+
+    def sort_bands(self, shape: tuple[int, int], n_pixels: int, *, with_columns: bool = False) -> engine.Bins:
+        """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
+        height, width = shape
+        band_bits = bits_of_bands(shape, n_pixels, self.n_threads)
+        room = self.memory.empty("bins", (5 if with_columns else 3, self.mesh.n_triangles + 16), np.int32)
+        bins = engine.Bins(self.mesh, height, width, int(np.abs(self.positions).max()), band_bits, room)
+        if bins.bad_row < 0:
+            bins.fill(self.memory.empty("bands", (bins.n_listed + 1,), np.int32))
+        return bins
+
+
 def draw_planes(
-    memory: Memory,
-    mesh: engine.SnappedMesh,
-    n_triangles: int,
-    positions: NDArray[np.int32],
-    sink: Sink,
-    pixels: NDArray[Any],
-    depth: NDArray[np.float32] | None,
-    n_threads: int,
-    *,
-    is_near: bool,
+    own: SamplePass, sink: Sink, pixels: NDArray[Any], depth: NDArray[np.float32] | None, *, is_near: bool
 ) -> bool:
     """Draw each sample into its plane of (S, H, W) arrays; returns whether an index lies outside the vertices.
 
@@ -60,62 +75,45 @@ def draw_planes(
     depths = [None] * n_samples if depth is None else list(depth)
     targets = [engine.Target(sink, plane, z, None) for plane, z in zip(pixels, depths, strict=True)]
     if not is_near:
-        meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
         bad_rows = [
-            max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), height, n_threads))  # type: ignore[misc]
-            for s, t in zip(meshes, targets, strict=True)
+            max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), height, own.n_threads))  # type: ignore[misc]
+            for s, t in zip(own.meshes, targets, strict=True)
         ]
         return max(bad_rows) >= 0
-    return draw_sorted(memory, mesh, n_triangles, positions, targets, (height, width), n_threads)
+    return draw_sorted(own, targets, (height, width))
 
 
-def draw_sorted(
-    memory: Memory,
-    mesh: engine.SnappedMesh,
-    n_triangles: int,
-    positions: NDArray[np.int32],
-    targets: list[engine.Target],
-    shape: tuple[int, int],
-    n_threads: int,
-) -> bool:
+def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int, int]) -> bool:
     """Draw each sample into its target, band after band of rows; returns as `draw_planes` does. The mesh is near."""
-    bins = sort_bands(memory, mesh, n_triangles, positions, shape, int(cost_table().plane_bytes) // 8, n_threads)
+    bins = own.sort_bands(shape, int(cost_table().plane_bytes) // 8)
     if bins.bad_row >= 0:
         return True
-    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
-    run_parts(lambda first, end: engine.draw_bands(meshes, targets, bins, first, end), bins.n_bands, n_threads)
+    meshes = own.meshes
+    run_parts(lambda first, end: engine.draw_bands(meshes, targets, bins, first, end), bins.n_bands, own.n_threads)
     return False
 
 
 @dataclass(frozen=True, eq=False)
 class SplitSamples:
-    """What several samples a pixel see: the first in each pixel, the others in those that show several triangles."""
+    """The ids and depths of several samples a pixel: the first in each, the others in pixels of several triangles."""
 
     ids: NDArray[np.int32]
     depth: NDArray[np.float32]
     split: engine.Split
-    positions: NDArray[np.int32]
-    mesh: engine.SnappedMesh
-    n_triangles: int
+    drawn: SamplePass
     sink: Sink
     background: float
-    n_threads: int
-
-    @property
-    def meshes(self) -> list[engine.SnappedMesh]:
-        """The mesh as each sample sees it."""
-        return [self.mesh.seen_from(x, y) for x, y in self.positions.tolist()]
 
     @cached_property
     def sample_ids(self) -> NDArray[np.int32]:
         """The ids of all samples, (S, H, W)."""
-        ids: NDArray[np.int32] = empty((len(self.positions), *self.ids.shape), np.int32)
+        ids: NDArray[np.int32] = empty((len(self.drawn.positions), *self.ids.shape), np.int32)
 
         def spread_rows(first: int, end: int) -> None:
             ids[0, first:end] = self.ids[first:end]
             self.split.spread_ids(self.ids, ids, first, end - first)
 
-        run_parts(spread_rows, len(self.ids), self.n_threads)
+        run_parts(spread_rows, len(self.ids), self.drawn.n_threads)
         return ids
 
     def planes(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
@@ -126,35 +124,23 @@ class SplitSamples:
         IndexError
             If the triangles have been changed since they were drawn.
         """
-        shape = len(self.positions), *self.ids.shape
+        shape = len(self.drawn.positions), *self.ids.shape
         check_fits(shape, np.int32, np.float32)
         ids, depth = empty(shape, np.int32), empty(shape, np.float32)
-        drawn = self.mesh, self.n_triangles, self.positions, self.sink, ids, depth, self.n_threads
-        if draw_planes(FRESH, *drawn, is_near=True):
+        if draw_planes(self.drawn, self.sink, ids, depth, is_near=True):
             raise IndexError("triangles must stay what they were drawn from until samples are asked for")
         lay_background(ids, depth, self.sink, self.background)
         return ids, depth
 
 
-def draw_split(
-    memory: Memory,
-    mesh: engine.SnappedMesh,
-    n_triangles: int,
-    positions: NDArray[np.int32],
-    sink: Sink,
-    shape: tuple[int, int],
-    background: float,
-    n_threads: int,
-) -> SplitSamples | None:
+def draw_split(own: SamplePass, sink: Sink, shape: tuple[int, int], background: float) -> SplitSamples | None:
     """Draw what the first sample sees, and list the pixels of which others see more; None as `draw_planes` tells.
 
     The mesh is near, neither side of the picture is 0. Planes of the other samples live no longer than a band of rows,
     and only in the columns that its triangles may reach.
     """
-    (height, width), n_others = shape, len(positions) - 1
-    bins = sort_bands(
-        memory, mesh, n_triangles, positions, shape, int(cost_table().split_bytes) // 8, n_threads, with_columns=True
-    )
+    memory, (height, width), n_others = own.memory, shape, len(own.positions) - 1
+    bins = own.sort_bands(shape, int(cost_table().split_bytes) // 8, with_columns=True)
     if bins.bad_row >= 0:
         return None
     ids: NDArray[np.int32] = memory.empty("triangle", shape, np.int32)
@@ -166,11 +152,10 @@ def draw_split(
         memory.empty("split ids", (n_others, room), np.int32),
         memory.empty("split depth", (n_others, room), np.float32),
     )
-    n_parts = max(1, min(n_threads, bins.n_bands))
-    own = n_parts, n_others, (width + 16) << bins.band_bits
-    others = memory.empty("band ids", own, np.int32), memory.empty("band depth", own, np.float32)
-    unused = list(zip(*others, strict=True))
-    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
+    n_parts = max(1, min(own.n_threads, bins.n_bands))
+    of_band = n_parts, n_others, (width + 16) << bins.band_bits
+    others = memory.empty("band ids", of_band, np.int32), memory.empty("band depth", of_band, np.float32)
+    unused, meshes = list(zip(*others, strict=True)), own.meshes
     target = engine.Target(sink, ids, depth, None)
     run_parts(
         lambda first, end: engine.draw_split_bands(meshes, target, *unused.pop(), split, bins, first, end),
@@ -180,7 +165,7 @@ def draw_split(
     lay_background(ids, depth, sink, background)
     for at in split_ranges(split.rows):
         lay_background(split.ids[:, at], split.depth[:, at], sink, background)
-    return SplitSamples(ids, depth, split, positions, mesh, n_triangles, sink, background, n_threads)
+    return SplitSamples(ids, depth, split, own._replace(memory=FRESH), sink, background)
 
 
 def lay_background(ids: NDArray[np.int32], depth: NDArray[np.float32], sink: Sink, background: float) -> None:
@@ -217,30 +202,18 @@ def split_bytes(
     }
 
 
-def draw_means(
-    memory: Memory,
-    mesh: engine.SnappedMesh,
-    n_triangles: int,
-    positions: NDArray[np.int32],
-    palette: engine.Palette,
-    pixels: NDArray[Any],
-    ground: NDArray[Any] | None,
-    n_threads: int,
-) -> bool:
+def draw_means(own: SamplePass, palette: engine.Palette, pixels: NDArray[Any], ground: NDArray[Any] | None) -> bool:
     """Write the mean colour of the samples over (H, W[, C]) pixels, in painter's order; returns as `draw_planes` does.
 
     `ground`: the colour that all pixels get before. The mesh is near. Labels live no longer than a band of rows, which
     is drawn from the last triangle to the first: rows of large ones leave out samples that other large ones cover.
     """
     height, width = pixels.shape[:2]
-    n = len(positions)
-    bins = sort_bands(
-        memory, mesh, n_triangles, positions, (height, width), int(cost_table().label_bytes) // (4 * n), n_threads
-    )
+    memory, meshes, n = own.memory, own.meshes, len(own.positions)
+    bins = own.sort_bands((height, width), int(cost_table().label_bytes) // (4 * n))
     if bins.bad_row >= 0:
         return True
-    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
-    n_parts = max(1, min(n_threads, bins.n_bands))
+    n_parts = max(1, min(own.n_threads, bins.n_bands))
     labels = list(memory.empty("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
     n_words = (width << bins.band_bits) // 64 + 2
     covered = list(memory.empty("covered labels", (n_parts, n_words), np.uint64))
@@ -253,27 +226,6 @@ def draw_means(
     return False
 
 
-def sort_bands(
-    memory: Memory,
-    mesh: engine.SnappedMesh,
-    n_triangles: int,
-    positions: NDArray[np.int32],
-    shape: tuple[int, int],
-    n_pixels: int,
-    n_threads: int,
-    *,
-    with_columns: bool = False,
-) -> engine.Bins:
-    """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
-    height, width = shape
-    band_bits = bits_of_bands(shape, n_pixels, n_threads)
-    room = memory.empty("bins", (5 if with_columns else 3, n_triangles + 16), np.int32)
-    bins = engine.Bins(mesh, height, width, int(np.abs(positions).max()), band_bits, room)
-    if bins.bad_row < 0:
-        bins.fill(memory.empty("bands", (bins.n_listed + 1,), np.int32))
-    return bins
-
-
 def bits_of_bands(shape: tuple[int, int], n_pixels: int, n_threads: int) -> int:
     """Return the binary logarithm of the rows of a band of up to `n_pixels`, two bands a thread at least."""
     height, width = shape
@@ -284,13 +236,7 @@ def bits_of_bands(shape: tuple[int, int], n_pixels: int, n_threads: int) -> int:
 
 
 def sum_areas(
-    memory: Memory,
-    mesh: engine.SnappedMesh,
-    n_triangles: int,
-    pixels: NDArray[np.float32],
-    n_threads: int,
-    *,
-    is_clamped: bool,
+    memory: Memory, mesh: engine.SnappedMesh, pixels: NDArray[np.float32], n_threads: int, *, is_clamped: bool
 ) -> bool:
     """Write the area that triangles cover of each pixel; returns whether a triangle has an index outside the vertices.
 
@@ -302,8 +248,8 @@ def sum_areas(
         return False
     stride = engine.area_stride(width)
     n_parts = max(1, min(n_threads, height))
-    rows_at_once = area_band(n_triangles, height, width, n_parts)
-    cells = memory.constant("cells", area_cells(n_triangles, height, width, n_threads), engine.CELL_CLEAR)
+    rows_at_once = area_band(mesh.n_triangles, height, width, n_parts)
+    cells = memory.constant("cells", area_cells(mesh.n_triangles, height, width, n_threads), engine.CELL_CLEAR)
     unused = list(cells.reshape(n_parts, -1))
 
     def draw_band(own: NDArray[np.uint8], first: int, end: int) -> int:

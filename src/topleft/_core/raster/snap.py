@@ -17,13 +17,13 @@ from topleft._core.base.arrays import apart_from, as_triangles, as_vertices, che
 from topleft._core.base.memory import Memory, empty
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.view import How, View
+from topleft._core.raster.view import RasterState, View
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
 NO_RECORDS = np.empty(0, np.uint8)
 
 
-class Input(NamedTuple):
+class MeshArrays(NamedTuple):
     """Vertices and triangles as kernels take them: contiguous, of known dtypes."""
 
     points: NDArray[Any]
@@ -48,10 +48,10 @@ class Snapped:
     """A mesh after the snap, or without one in `mesh.exact`: ready to be drawn into any buffer of the view's size."""
 
     mesh: engine.SnappedMesh
-    given: Input
+    given: MeshArrays
     records: NDArray[np.uint8]  # `tl_vertex` in csrc
     pieces: engine.Pieces | None
-    can_share: bool = True  # whether threads can each take some of the triangles
+    can_slice: bool = True  # whether threads can each take some of the triangles
 
     @property
     def n_vertices(self) -> int:
@@ -84,7 +84,7 @@ def refuse_changed() -> NoReturn:
     )
 
 
-class Vertices(NamedTuple):
+class SnappedVertices(NamedTuple):
     """Snapped vertices, and how many of them cannot be drawn, or lie outside of a clip plane."""
 
     records: NDArray[np.uint8]
@@ -111,7 +111,7 @@ def snap_mesh(
     given = read(memory, vertices, triangles, view, out)
     view.mark("input")
     if view.is_exact:
-        return take_mesh(memory, given, view, with_depth=with_depth, must_check=out is not None)
+        return read_exact(memory, given, view, with_depth=with_depth, must_check=out is not None)
     return snap_input(memory, given, view, with_depth=with_depth, must_check=out is not None)
 
 
@@ -127,7 +127,7 @@ def snap_to_cover(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     return found or snap_input(memory, given, view, with_depth=False, must_check=must_check)
 
 
-def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> Input:
+def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> MeshArrays:
     """Return arrays as kernels take them, copied where they may share memory with `out`; int64 indices are checked."""
     points = as_vertices(apart_from(out, "vertices", vertices), has_transform=view.transform is not None)
     triangles = apart_from(out, "triangles", triangles)
@@ -142,7 +142,7 @@ def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, 
             narrow_triangles(native, triangles, len(points), room, n_threads)
         indices = room if is_checked else cast("NDArray[np.int32]", native)
     n_threads = choices.threads_to_snap(view.threads, len(points), len(indices))
-    return Input(points, source_of(points, view), indices, triangles, is_checked, n_threads)
+    return MeshArrays(points, source_of(points, view), indices, triangles, is_checked, n_threads)
 
 
 def source_of(points: NDArray[Any], view: View) -> engine.Source:
@@ -150,12 +150,12 @@ def source_of(points: NDArray[Any], view: View) -> engine.Source:
     return engine.Source(points, view.transform, choices.is_affine(view.transform))
 
 
-def n_to_draw(given: Input, view: View) -> int:
+def n_to_draw(given: MeshArrays, view: View) -> int:
     """Return how many vertices are needed: all of them, or none where there is nothing to draw."""
     return len(given.points) if len(given.triangles) and 0 not in view.size else 0
 
 
-def snap_input(memory: Memory, given: Input, view: View, *, with_depth: bool, must_check: bool) -> Snapped:
+def snap_input(memory: Memory, given: MeshArrays, view: View, *, with_depth: bool, must_check: bool) -> Snapped:
     """Take what was read through snap and clip, as `snap_mesh` does."""
     points, source, indices = given.points, given.source, given.triangles
     n = n_to_draw(given, view)
@@ -174,13 +174,13 @@ def snap_input(memory: Memory, given: Input, view: View, *, with_depth: bool, mu
         if is_bad:
             check_used_vertices(points, records, indices, view)
 
-    def made(triangles: NDArray[np.int32], how: How) -> engine.SnappedMesh:
+    def made(triangles: NDArray[np.int32], how: RasterState) -> engine.SnappedMesh:
         return engine.SnappedMesh(source, records, wide, triangles, pieces, how, viewport)
 
     return Snapped(without_sides(made, indices if n else indices[:0], view), given, records, pieces)
 
 
-def snap_for_floats(memory: Memory, given: Input, view: View, *, must_check: bool) -> Snapped | None:
+def snap_for_floats(memory: Memory, given: MeshArrays, view: View, *, must_check: bool) -> Snapped | None:
     """Return pixels rounded to the grid as float64; None for clip space, and where a vertex leaves the range."""
     points, source, indices = given.points, given.source, given.triangles
     if source.is_clip_space or not len(points) or 0 in view.size:
@@ -193,10 +193,10 @@ def snap_for_floats(memory: Memory, given: Input, view: View, *, must_check: boo
     if sum(run_parts(take_part, len(points), given.n_threads)):
         return None
     given.check_first(is_due=must_check)
-    return unsnapped(given, taken, indices, None, view, None)
+    return exact_mesh(given, taken, indices, None, view, None)
 
 
-def take_mesh(memory: Memory, given: Input, view: View, *, with_depth: bool, must_check: bool) -> Snapped:
+def read_exact(memory: Memory, given: MeshArrays, view: View, *, with_depth: bool, must_check: bool) -> Snapped:
     """Take arrays as they are: for ``subpixel_bits="exact"``.
 
     Indices and positions are checked while drawing, or here where an error may not leave a trace in the caller's `out`.
@@ -211,10 +211,10 @@ def take_mesh(memory: Memory, given: Input, view: View, *, with_depth: bool, mus
     given.check_first(is_due=must_check or bool(n == 0 or n_bad))
     if n_bad:
         check_finite(points, indices, with_depth=has_depth)
-    return unsnapped(given, taken, indices if n else indices[:0], None, view, None)
+    return exact_mesh(given, taken, indices if n else indices[:0], None, view, None)
 
 
-def project_mesh(memory: Memory, given: Input, view: View, *, must_check: bool) -> Snapped:
+def project_mesh(memory: Memory, given: MeshArrays, view: View, *, must_check: bool) -> Snapped:
     """Take clip space to pixels, and cut triangles, without a snap."""
     points, source, indices = given.points, given.source, given.triangles
     n, viewport = len(points), view.engine_viewport()
@@ -233,11 +233,11 @@ def project_mesh(memory: Memory, given: Input, view: View, *, must_check: bool) 
     if choices.must_cut(n_clipped):
         pieces = engine.ExactPieces(source, projected, indices, viewport)
     view.mark("clip")
-    return unsnapped(given, projected, indices, pieces, view, viewport)
+    return exact_mesh(given, projected, indices, pieces, view, viewport)
 
 
-def unsnapped(
-    given: Input,
+def exact_mesh(
+    given: MeshArrays,
     points: NDArray[np.float64],
     triangles: NDArray[np.int32],
     pieces: engine.ExactPieces | None,
@@ -246,15 +246,15 @@ def unsnapped(
 ) -> Snapped:
     """Return a mesh of points in pixels, without the sides that are not drawn."""
 
-    def made(triangles: NDArray[np.int32], how: How) -> engine.SnappedMesh:
+    def made(triangles: NDArray[np.int32], how: RasterState) -> engine.SnappedMesh:
         exact = engine.UnsnappedPoints(points, triangles, pieces)
         return engine.SnappedMesh(given.source, NO_RECORDS, None, triangles, None, how, viewport, exact=exact)
 
     mesh = without_sides(made, triangles, view)
-    return Snapped(mesh, given, NO_RECORDS, None, can_share=pieces is None)
+    return Snapped(mesh, given, NO_RECORDS, None, can_slice=pieces is None)
 
 
-def take_points(memory: Memory, given: Input, n: int, *, must_check: bool) -> tuple[NDArray[np.float64], int]:
+def take_points(memory: Memory, given: MeshArrays, n: int, *, must_check: bool) -> tuple[NDArray[np.float64], int]:
     """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was looked at."""
     points, source = given.points, given.source
     is_same = points.dtype == np.float64
@@ -277,11 +277,11 @@ def snap(
     viewport: engine.Viewport | None,
     *,
     with_depth: bool,
-) -> Vertices:
+) -> SnappedVertices:
     """Transform, project and snap the first `n` vertices in one pass; a second one where some are wide."""
     records = memory.empty("records", (n * engine.VERTEX_BYTES,), np.uint8)
     if not n:
-        return Vertices(records, None, 0, 0)
+        return SnappedVertices(records, None, 0, 0)
     wide: NDArray[np.int64] | None = None
 
     def snap_part(first: int, end: int) -> tuple[int, int, int]:
@@ -295,13 +295,13 @@ def snap(
         wide = empty((n, 2), np.int64)
         wide.fill(0)
         snap_part(0, n)
-    return Vertices(records, wide, n_bad, n_clipped)
+    return SnappedVertices(records, wide, n_bad, n_clipped)
 
 
 def without_sides(
-    made: Callable[[NDArray[np.int32], How], engine.SnappedMesh], triangles: NDArray[np.int32], view: View
+    made: Callable[[NDArray[np.int32], RasterState], engine.SnappedMesh], triangles: NDArray[np.int32], view: View
 ) -> engine.SnappedMesh:
-    """Return what is made of triangles, those collapsed of which the view shows the side that is not drawn."""
+    """Return a mesh of the triangles, after those that show the side that is not drawn are collapsed."""
     if view.single_sided is not None and len(triangles):
         is_single, cull = view.single_sided
         seen = made(triangles, view.how._replace(cull=cull))
@@ -378,13 +378,13 @@ def check_finite(points: NDArray[Any], triangles: NDArray[np.int32], *, with_dep
 
 
 def corners_of(triangles: NDArray[np.int32], is_meant: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Return the corners, one after the other, that are vertices of some kind; others may write to the triangles."""
+    """Return the used vertices where `is_meant`; clipped, because another thread may change `triangles`."""
     own = np.clip(triangles, 0, len(is_meant) - 1)
     return own[is_meant[own]]
 
 
 def bad_vertex(points: NDArray[Any], i: int, wish: str) -> ValueError:
-    """Return the error for a vertex that a triangle uses: what it must be, unless it is not even finite."""
+    """Return the error for a vertex that a triangle uses: it must be finite, and fulfil `wish`."""
     row = points[i]
     wish = wish if np.isfinite(row).all() else "be finite where a triangle uses them"
     return ValueError(f"vertices must {wish}, got {row.tolist()} in row {i}")

@@ -382,8 +382,8 @@ def wireframe(
     return draw_wireframe(SCRATCH, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
 
 
-class Turn:
-    """One call at a time: what comes meanwhile is refused."""
+class OneCallAtATime:
+    """Refuses a call while another one runs."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -421,7 +421,7 @@ class Rasterizer:
         self.size = as_size(size)
         self.threads = parse_threads(threads)
         self._memory = KeptMemory()
-        self._turn = Turn()
+        self._turn = OneCallAtATime()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(type(self), threads=self.threads), (self.size,)

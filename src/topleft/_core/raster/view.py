@@ -26,7 +26,7 @@ CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topl
 
 
 class Planned(Protocol):
-    """What a verb asks of the plan that it is given: `topleft.Plan`."""
+    """The part of `topleft.Plan` that verbs use."""
 
     def fitted(self, view: View) -> View:
         """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
@@ -69,7 +69,7 @@ class ViewOptions(WindowOptions, total=False):
 OPTIONS = frozenset(ViewOptions.__annotations__)
 
 
-class How(NamedTuple):
+class RasterState(NamedTuple):
     """How the engine draws triangles: the window's first pixel, its grid, and codes of `csrc/topleft.h`."""
 
     x_px: int
@@ -100,7 +100,7 @@ class View:
     classic: Method | None = None
     plan: Planned | None = None
     single_sided: tuple[NDArray[np.uint8], int] | None = None
-    """1 for each triangle of which one side is not drawn, and the `tl_cull` that names that side."""
+    """1 for each triangle with a side that is not drawn, and the `tl_cull` that names that side."""
     sides_by_material: bool = True
     """Whether materials say which sides are drawn: no `cull` was given."""
     is_split: bool = False
@@ -109,9 +109,9 @@ class View:
     """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 
     @property
-    def how(self) -> How:
+    def how(self) -> RasterState:
         """How the engine draws triangles."""
-        return How(*self.origin, self.grid_bits, self.cull, self.method, self.test)
+        return RasterState(*self.origin, self.grid_bits, self.cull, self.method, self.test)
 
     def engine_viewport(self) -> engine.Viewport:
         """Return how clip space maps to pixels."""

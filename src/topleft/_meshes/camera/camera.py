@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64
+from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import (
     as_array,
     as_number,
@@ -26,11 +26,11 @@ from topleft._core.base.arrays import (
     set_read_only,
     shown,
 )
+from topleft._core.base.defaults import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
 from topleft._core.base.options import check_choice
 from topleft._meshes.camera.calibration import Calibration, of_colmap, of_nerfstudio, of_opengl, of_pytorch3d
 from topleft._meshes.camera.lens import FLIP, Lens, lens_of_opencv
 from topleft._meshes.camera.matrices import (
-    THREE_QUARTER_DEG,
     as_framed,
     box_corners,
     box_matrix,
@@ -49,11 +49,8 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.pose import as_pose
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import FitOption, UpOption
-
-DEFAULT_FOV_Y_DEG = 40.0
 
 
 @dataclass(frozen=True, eq=False)

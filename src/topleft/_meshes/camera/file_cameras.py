@@ -14,11 +14,11 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_path
+from topleft._core.base.arrays import as_path, as_scale
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import box_matrix, frustum_matrix, tangent
 from topleft._meshes.io.limits.budget import Budget
-from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, as_scale, reading
+from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, reading
 from topleft._meshes.io.references import InputFile
 from topleft.errors import MeshError
 

@@ -14,19 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64
+from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_number, as_real, check_regular
+from topleft._core.base.defaults import THREE_QUARTER_DEG
 from topleft._core.base.options import check_choice
 from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
 from topleft._meshes.model.points import Points
-from topleft._meshes.scene.adapt import MeshLike, is_mesh_like
+from topleft._meshes.scene.adapt import is_mesh_like
 from topleft._meshes.scene.scene import Scene, as_subject, world_corners
 from topleft.typing import UpOption
 
 Framed: TypeAlias = Mesh | Points | F64
-
-THREE_QUARTER_DEG = (35.0, 20.0)
-"""Azimuth and elevation of the three-quarter view: front, right side and top all show."""
 
 FRAMING_MARGIN = 1.05
 """What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count
+from topleft._core.base.defaults import THREE_QUARTER_DEG
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.camera.matrices import THREE_QUARTER_DEG, Framed, as_framed, bounding_sphere, ends_to_frame
-from topleft._meshes.scene.adapt import MeshLike
+from topleft._meshes.camera.matrices import Framed, as_framed, bounding_sphere, ends_to_frame
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import FitOption, UpOption
 

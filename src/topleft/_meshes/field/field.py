@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64, I32
+from topleft._core.base.array_types import F64, I32, MeshLike
 from topleft._core.base.arrays import apart_from, as_array, as_checked_triangles, as_number, as_pair
 from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
 from topleft._core.base.memory import SCRATCH
@@ -24,7 +24,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.rasterize import canvas_of, draw
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
-from topleft._meshes.scene.adapt import MeshLike, as_polygons
+from topleft._meshes.scene.adapt import as_polygons
 from topleft._meshes.scene.cells import Polygons
 from topleft.typing import PerOption, SurfaceOption, YOption
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F32, F64, I32, U8
+from topleft._core.base.array_types import F32, F64, I32, U8, MeshLike
 from topleft._core.base.arrays import as_array, as_number, as_size, as_values, shown
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import FRESH, check_fits
@@ -30,7 +30,7 @@ from topleft._meshes.lod.distance import TriangleTree
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import face_normals, unit_or_zero
 from topleft._meshes.picture.render import rasterize_mesh
-from topleft._meshes.scene.adapt import MeshLike, as_mesh
+from topleft._meshes.scene.adapt import as_mesh
 from topleft.errors import MeshError, MeshWarning
 from topleft.typing import BakeOption, BakeRuleOption, TakenOption
 

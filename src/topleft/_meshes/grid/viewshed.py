@@ -16,13 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64
+from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_number, as_real
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._meshes.field.field import extent_of, height_map
-from topleft._meshes.scene.adapt import MeshLike, as_polygons
+from topleft._meshes.scene.adapt import as_polygons
 
 EARTH_RADIUS = 6_370_997.0
 """Metres: that of the sphere that GDAL's curvature coefficient is told for."""

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64, I32, U8
+from topleft._core.base.array_types import F64, I32, U8, MeshLike
 from topleft._core.base.arrays import as_count, as_number, as_real, shown
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits
 from topleft._core.base.options import check_choice
@@ -25,7 +25,6 @@ from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.normals import moved
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, as_meshes, meshes_in_places
 from topleft.errors import MeshWarning
 from topleft.typing import VoxelRuleOption

@@ -28,10 +28,10 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import Array
+from topleft._core.base.notes import Notes
 from topleft._meshes.io.limits.archives import check_zip
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.limits.walks import walks
-from topleft._meshes.io.notes import Notes
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text
 from topleft._meshes.model.from_trimesh import Textures, placed
 from topleft._meshes.model.mesh import Mesh

@@ -14,17 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.arrays import as_array
+from topleft._core.base.defaults import SUFFIXES
 from topleft._core.base.georeference import geo_tags, nodata_tag
 from topleft._core.base.grid import Grid
-from topleft._core.base.remote import Place, as_place
+from topleft._core.base.remote import Location, as_location
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.io import png
 from topleft.errors import ImageError
-
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
-BUFFER_SUFFIXES = (".npy", ".npz")
-SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES
-"""What `save_image` writes, by the end of the name."""
 
 BYTES = ("uint8 (H, W)", "uint8 (H, W, 3)", "uint8 (H, W, 4)")
 HOLDS: Mapping[str, tuple[str, ...]] = {
@@ -98,7 +94,7 @@ def save_image(
     ...     Path(folder, "mask.png").exists()
     True
     """
-    place = as_place("path", path)
+    place = as_location("path", path)
     suffix = place.suffix.lower()
     if suffix not in SUFFIXES:
         raise ImageError(f"cannot write {str(place)!r}: format {place.suffix!r} is none of {' '.join(SUFFIXES)}")
@@ -161,7 +157,7 @@ def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) ->
     return ((mixed + 127) // 255).astype(np.uint8)
 
 
-def _check_holds(path: Place, image: npt.NDArray[Any]) -> None:
+def _check_holds(path: Location, image: npt.NDArray[Any]) -> None:
     """Raise an error for what the format cannot hold."""
     kinds = HOLDS[path.suffix.lower()]
     channels = "".join(f", {n}" for n in image.shape[2:])

@@ -18,8 +18,9 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_number
-from topleft._core.base.remote import Place, as_place, place_of
-from topleft._meshes.io.images import SUFFIXES, save_image
+from topleft._core.base.defaults import SUFFIXES
+from topleft._core.base.remote import Location, as_location, location_of
+from topleft._meshes.io.images import save_image
 from topleft.errors import ImageError
 
 RANGES = {"camera_normal": (-1.0, 1.0), "world_normal": (-1.0, 1.0), "barycentric": (0.0, 1.0)}
@@ -32,7 +33,7 @@ MILLIMETRES = 1000.0
 LARGEST = 65535
 
 
-def layer_paths(destination: Place, names: Sequence[str]) -> dict[str, Place]:
+def layer_paths(destination: Location, names: Sequence[str]) -> dict[str, Location]:
     """Return the file of each layer: `{layer}` in the name stands for the layer; .npz holds all of them.
 
     Raises
@@ -46,7 +47,7 @@ def layer_paths(destination: Place, names: Sequence[str]) -> dict[str, Place]:
         raise ImageError(f"cannot write {text!r}: format {destination.suffix!r} is none of {known}")
     if destination.suffix.lower() != ".npz" and "{layer}" not in text and len(names) > 1:
         raise ImageError(f"{len(names)} layers need {{layer}} in the name, or .npz, got {text!r}")
-    return {name: place_of(text.replace("{layer}", name)) for name in names}
+    return {name: location_of(text.replace("{layer}", name)) for name in names}
 
 
 def save_layers(
@@ -56,7 +57,7 @@ def save_layers(
     scale: float | None = None,
     matrix: npt.NDArray[np.float64] | None = None,
     background: tuple[int, int, int] = (255, 255, 255),
-) -> tuple[Place, ...]:
+) -> tuple[Location, ...]:
     """Write layers, each file whole or not at all; returns the files.
 
     Parameters
@@ -86,7 +87,7 @@ def save_layers(
     OSError
         If a file cannot be written.
     """
-    place = as_place("path", destination)
+    place = as_location("path", destination)
     if scale is not None:
         scale = as_number("scale", scale)
         if not 0 < scale < np.inf:
@@ -102,7 +103,7 @@ def save_layers(
     return tuple(paths.values())
 
 
-def _stored(path: Place, name: str, array: Array, scale: float | None) -> tuple[Array, dict[str, str] | None]:
+def _stored(path: Location, name: str, array: Array, scale: float | None) -> tuple[Array, dict[str, str] | None]:
     """What goes into the file, and the notes that tell what it means."""
     suffix = path.suffix.lower()
     if suffix in (".npy", ".npz") or array.dtype == np.uint8:
@@ -124,7 +125,7 @@ def _stored(path: Place, name: str, array: Array, scale: float | None) -> tuple[
 
 
 def _numbers_of_16_bits(
-    path: Place, name: str, array: Array, scale: float | None
+    path: Location, name: str, array: Array, scale: float | None
 ) -> tuple[npt.NDArray[np.uint16], dict[str, str]]:
     """Numbers in equal steps; 0 where they are not finite, or ids that are -1."""
     if array.dtype == np.int32:
@@ -146,7 +147,7 @@ def _numbers_of_16_bits(
     return values, _notes(name, step, offset)
 
 
-def _check_steps(path: Place, name: str, step: float, steps: npt.NDArray[Any]) -> None:
+def _check_steps(path: Location, name: str, step: float, steps: npt.NDArray[Any]) -> None:
     """Raise an error for what 16 bits do not hold."""
     low, high = steps.min(initial=0), steps.max(initial=0)
     if not (low >= 0 and high <= LARGEST):

@@ -15,12 +15,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from topleft._core.base.arrays import as_number, as_path, shown
+from topleft._core.base.arrays import as_crease, as_path, as_scale, as_seconds, shown
+from topleft._core.base.defaults import DEFAULT_CREASE
+from topleft._core.base.notes import tell
 from topleft._meshes.io.limits.budget import Budget
-from topleft._meshes.io.notes import tell
 from topleft._meshes.io.references import InputFile, Moment
 from topleft._meshes.model.joined import joined
-from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh, as_crease
+from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft.errors import MeshError, MissingPackageError
 
@@ -134,14 +135,6 @@ def load(
     return mesh if scale == 1 else scaled(mesh, scale)
 
 
-def as_scale(scale: object) -> float:
-    """A scale, if it is one."""
-    factor = as_number("scale", scale)
-    if not 0 < factor < np.inf:
-        raise ValueError(f"scale must be a positive number, got {scale!r}")
-    return factor
-
-
 def scaled(mesh: Mesh | Points, scale: float) -> Mesh | Points:
     """What was read with coordinates times a scale, rounded once to their own type."""
     with np.errstate(over="ignore"):
@@ -165,14 +158,6 @@ def as_moment(time: float | None, clip: int | str | None) -> Moment | None:
         except TypeError:
             raise TypeError(f"clip must be an index or a name, got {shown(clip)}") from None
     return Moment(seconds, clip)
-
-
-def as_seconds(time: float) -> float:
-    """A time, if it is one."""
-    seconds = as_number("time", time)
-    if not 0 <= seconds < np.inf:
-        raise ValueError(f"time must be a number of seconds, 0 or more, got {time!r}")
-    return seconds
 
 
 def _mesh(source: InputFile, crease: float) -> Mesh | Points:

@@ -134,7 +134,8 @@ def _bytes_of(rows: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
 
 
 def _chunk(name: bytes, data: bytes) -> bytes:
-    return b"".join((struct.pack(">I", len(data)), name, data, struct.pack(">I", zlib.crc32(data, zlib.crc32(name)))))
+    crc = _crc32()
+    return b"".join((struct.pack(">I", len(data)), name, data, struct.pack(">I", crc(data, crc(name)))))
 
 
 def _text_chunk(keyword: str, text: str) -> bytes:
@@ -145,6 +146,16 @@ def _text_chunk(keyword: str, text: str) -> bytes:
     if not 1 <= len(key) <= 79 or b"\0" in key + value:
         raise ImageError(f"a keyword of a PNG has 1 to 79 characters and no text has a NUL, got {keyword!r}: {text!r}")
     return _chunk(b"tEXt", key + b"\0" + value)
+
+
+@cache
+def _crc32() -> Callable[..., int]:
+    """Return the checksum of `isal`, a sixth of the time of zlib's, where it is installed."""
+    try:
+        from isal import isal_zlib
+    except ImportError:
+        return zlib.crc32
+    return isal_zlib.crc32
 
 
 @cache

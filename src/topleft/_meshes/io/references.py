@@ -18,10 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import U8
+from topleft._core.base.notes import Notes
 from topleft._meshes.io.limits.budget import Budget
-from topleft._meshes.io.notes import Notes
 from topleft._meshes.model.texture import MAX_TEXTURE_SIZE
-from topleft.errors import MeshError
+from topleft.errors import ImageError, MeshError
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -285,3 +285,30 @@ def _known() -> set[str]:
 
     Image.init()
     return set(Image.OPEN)
+
+
+def read_picture(path: str) -> U8:
+    """The picture (H, W, 4) of a file that a caller names.
+
+    Raises
+    ------
+    ImageError
+        If it is none that Pillow reads.
+    OSError
+        If it cannot be read.
+    """
+    if not Path(path).is_file() and Path(path).exists():
+        raise ImageError(f"cannot read {path!r}: it is no file")
+    try:
+        budget = Budget(path)
+        budget.read(Path(path).stat().st_size)
+        with opened(Path(path).read_bytes()) as image:
+            if not budget.has("max_texture_pixels", image.width * image.height):
+                raise MeshError(f"of more than {budget.limit('max_texture_pixels')} pixels")
+            return rgba_of(image)
+    except MeshError as error:
+        raise ImageError(f"cannot read {path!r}: it is {error}") from None
+    except (OSError, ValueError, SyntaxError, EOFError) as error:
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
+        raise ImageError(f"cannot read {path!r}: it is no picture that Pillow knows") from None

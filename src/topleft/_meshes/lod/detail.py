@@ -23,14 +23,14 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64
+from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_number, as_size, shown
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.lod.levels import Level, Levels
 from topleft._meshes.lod.simplify import levels_of
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_holes
-from topleft._meshes.scene.adapt import MeshLike, as_mesh
+from topleft._meshes.scene.adapt import as_mesh
 from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import CullOption
 

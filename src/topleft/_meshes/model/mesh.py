@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from numbers import Real
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
-from topleft._core.base.arrays import as_array, as_checked_triangles, set_read_only, shown
+from topleft._core.base.arrays import as_array, as_checked_triangles, as_crease, set_read_only, shown
 from topleft._core.base.options import check_choice
 from topleft._core.raster.clusters import Clusters, box_of
 from topleft._meshes.model.material import Material
@@ -28,10 +27,6 @@ FloatArray = npt.NDArray[np.floating[Any]]
 
 NO_CREASE = 180.0
 """The crease angle at which no edge is sharp, degrees."""
-
-DEFAULT_CREASE = 30.0
-"""Degrees by which triangles of a mesh without normals bend at an edge before it is sharp: round things of 12 sides and
-more stay round."""
 
 POINTS_AT_ONCE = 1 << 14
 """Points whose distances are computed together: they stay in the second-level cache."""
@@ -293,23 +288,6 @@ def with_normals(mesh: Mesh) -> Mesh:
     colors, uv, uv1 = (None if own is None else own[rows] for own in (mesh.colors, mesh.uv, mesh.uv1))
     split: dict[str, Any] = {"vertices": mesh.vertices[rows], "triangles": corners.of_corner, "normals": corners.rows}
     return replace(mesh, **split, colors=colors, uv=uv, uv1=uv1)
-
-
-def as_crease(value: float) -> float:
-    """Return a crease angle, degrees.
-
-    Raises
-    ------
-    TypeError
-        If it is no number.
-    ValueError
-        If it is outside of 0 to 180.
-    """
-    if not isinstance(value, Real) or isinstance(value, bool):
-        raise TypeError(f"crease must be an angle in degrees, got {value!r}")
-    if not 0 <= value <= NO_CREASE:
-        raise ValueError(f"crease must lie in 0 to 180 degrees, got {value!r}")
-    return float(value)
 
 
 def used_vertices(mesh: Mesh) -> FloatArray:

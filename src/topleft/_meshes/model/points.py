@@ -15,12 +15,10 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import F64, U8
 from topleft._core.base.arrays import INT32_MAX, as_point_size, set_read_only
+from topleft._core.base.defaults import DEFAULT_POINT_SIZE
 from topleft._core.base.options import PointShape, parse
 from topleft._meshes.model.mesh import FloatArray, as_color_array, as_real_array, extreme_points, read_only
 from topleft.typing import PointShapeOption, PointUnitOption
-
-DEFAULT_POINT_SIZE = 2.0
-"""Pixels."""
 
 
 class PointUnit(StrEnum):

@@ -229,7 +229,7 @@ class SceneFragments(InstanceIds, Fragments):
             first, end = first_ids[i : i + 2].tolist()
             part = ids[:, top:bottom, left:right]
             mesh = self.placed.snap_part(i, lambda part=part, first=first, end=end: local_part(part, first, end))
-            found.append((i, mesh.seen_from(*self.positions[0]), first))
+            found.append((i, mesh.at_sample(*self.positions[0]), first))
         return tuple(found)
 
     def _at_sample(self, i: int) -> SceneFragments:
@@ -256,7 +256,7 @@ class SceneFragments(InstanceIds, Fragments):
             box = slice(top, bottom), slice(left, right)
             first, end = self.placed.first_ids[i : i + 2].tolist()
             own = local_part(self.drawn_planes[0][0][box], first, end)
-            scene = self.placed.snap_part(i, lambda own=own: own).seen_from(*self.positions[0]).moved(left, top)
+            scene = self.placed.snap_part(i, lambda own=own: own).at_sample(*self.positions[0]).moved(left, top)
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
             frags.corners = self.placed.corners(i)

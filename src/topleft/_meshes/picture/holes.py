@@ -180,7 +180,7 @@ def draw_holed(
 ) -> None:
     """Draw the triangles with holes over the planes of what one sample sees (1, H, W), or over layers (K, H, W)."""
     for i, mesh, camera, cut in holed:
-        scene = placed.snap(i).seen_from(*at)
+        scene = placed.snap(i).at_sample(*at)
         draw_cut(scene, mesh, camera, cut, ids, depth, is_peeled=is_peeled, threads=threads)
 
 

@@ -120,8 +120,8 @@ class PlacedScene:
         firsts = self._first_vertices[first : end + 1] - self._first_vertices[first]
         found: list[engine.SnappedMesh | None] = [None] * n
         n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
-        is_shared = n_threads <= n  # fewer instances than threads: each is the work of all of them
-        if is_shared and view.plan is None and view.grid_bits == view.subpixel_bits and 0 not in view.size:
+        is_sliced = n_threads <= n  # fewer instances than threads: each is the work of all of them
+        if is_sliced and view.plan is None and view.grid_bits == view.subpixel_bits and 0 not in view.size:
             points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
             shape = int(firsts[-1]) * engine.VERTEX_BYTES
             room = FRESH.empty("records", (shape,), np.uint8) if points is None else points
@@ -311,7 +311,7 @@ class PlacedScene:
         for chunk in self.chunks():
             n_left -= len(chunk)
             for target, at in zip(targets, positions, strict=True):
-                scenes = [mesh.seen_from(*at) for mesh in chunk]
+                scenes = [mesh.at_sample(*at) for mesh in chunk]
                 run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
             is_first = False
 
@@ -578,6 +578,6 @@ def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> N
     for chunk in placed.chunks():
         for mesh in chunk:
             n_threads = count_threads(view.threads, mesh.n_triangles)
-            sum_areas(SCRATCH, mesh, mesh.n_triangles, own, n_threads, is_clamped=True)
+            sum_areas(SCRATCH, mesh, own, n_threads, is_clamped=True)
             canvas += own
     np.minimum(canvas, 1, out=canvas)

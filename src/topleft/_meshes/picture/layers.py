@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, Array
-from topleft._core.base.arrays import as_names
+from topleft._core.base.options import check_layers
 from topleft._meshes.picture.blended import blended_masks
 from topleft._meshes.picture.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._meshes.picture.edges import draw_all_edges
@@ -179,22 +179,7 @@ LAYERS: Mapping[str, Callable[[GBuffer], Array]] = MappingProxyType({
         world_normal, camera_normal, uv, flow,
     )
 })  # fmt: skip
-"""The only list of layers: `render_layers`, batches, files and the command line read it."""
-
-
-def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names of layers, each once.
-
-    Raises
-    ------
-    ValueError
-        If there is no such layer.
-    """
-    checked = tuple(dict.fromkeys(as_names("layers", names)))
-    for name in checked:
-        if name not in LAYERS:
-            raise ValueError(f"layers must be some of {', '.join(LAYERS)}, got {name!r}")
-    return checked
+"""How each layer is made; `LayerOption` of `topleft.typing` has the same names in the same order."""
 
 
 def draw_layers(names: str | Iterable[str], gbuffer: GBuffer | CloudBuffer) -> dict[str, Array]:

@@ -13,8 +13,9 @@ from typing import Any, Literal, cast
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.array_types import F64, I32, I64
+from topleft._core.base.array_types import F64, I32, I64, MeshLike
 from topleft._core.base.arrays import as_array, as_count, as_number, shown
+from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.options import check_choice
 from topleft._core.raster.rle import RunTable, annotation_of, encode_ids
 from topleft._meshes.camera.camera import Camera, CameraLike
@@ -22,9 +23,8 @@ from topleft._meshes.camera.matrices import box_corners
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.holes import without_holes
-from topleft._meshes.picture.render import DEFAULT_SIZE, rasterize_shot
+from topleft._meshes.picture.render import rasterize_shot
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Instance, Scene, scene_of
 from topleft.typing import CullOption
 

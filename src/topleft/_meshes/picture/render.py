@@ -12,8 +12,10 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
+from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_size, shown
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
+from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import Rasterizer, draw_ids
 from topleft._core.raster.view import WindowOptions
@@ -30,11 +32,8 @@ from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import LookOptions, ShadingOptions
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import StaticPlan, seen_through
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
-
-DEFAULT_SIZE = (640, 480)
 
 
 class RasterizeOptions(WindowOptions, total=False):

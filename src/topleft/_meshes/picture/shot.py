@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_size
 from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
 from topleft._meshes.lod.detail import detailed
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, as_meshes, as_subject
 
 

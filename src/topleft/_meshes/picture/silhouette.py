@@ -9,17 +9,17 @@ from typing import Any, Unpack
 
 import numpy.typing as npt
 
+from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_out
+from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.verbs import coverage
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.cloud import draw_share
 from topleft._meshes.picture.instances import draw_scene_coverage
-from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import seen_through
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import CullOption, SamplingOption
 

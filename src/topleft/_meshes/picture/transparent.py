@@ -11,8 +11,10 @@ from typing import Any, Literal, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count
 from topleft._core.base.color import WHITE, ColorLike, as_color
+from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.composite import composite
 from topleft._core.raster.peel import DepthLayers, peel
 from topleft._core.raster.view import WindowOptions
@@ -20,12 +22,10 @@ from topleft._meshes.camera.camera import Camera, CameraLike
 from topleft._meshes.picture.fragments import SceneDepthLayers
 from topleft._meshes.picture.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
 from topleft._meshes.picture.instances import peel_scene
-from topleft._meshes.picture.render import DEFAULT_SIZE
 from topleft._meshes.picture.scene_shade import shade
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import seen_through
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 

@@ -12,10 +12,12 @@ from typing import Any, Literal, Unpack
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.array_types import F64, Array
+from topleft._core.base.array_types import F64, Array, MeshLike
 from topleft._core.base.arrays import as_real, shown
 from topleft._core.base.color import ColorLike
-from topleft._core.base.remote import Place
+from topleft._core.base.defaults import DEFAULT_SIZE
+from topleft._core.base.options import check_layers
+from topleft._core.base.remote import Location
 from topleft._core.polygons.rle import to_rle
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import CameraLike, as_camera
@@ -23,11 +25,9 @@ from topleft._meshes.io.layer_files import save_layers
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.cloud import CloudBuffer
 from topleft._meshes.picture.gbuffer import GBuffer
-from topleft._meshes.picture.layers import LAYERS, check_layers, draw_layers
-from topleft._meshes.picture.render import DEFAULT_SIZE
+from topleft._meshes.picture.layers import LAYERS, draw_layers
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.adapt import MeshLike
 from topleft._meshes.scene.scene import Scene, meshes_of
 from topleft.typing import CullOption, LayerOption, SamplesOption, ShadingOption
 
@@ -66,7 +66,7 @@ class ViewLayers(Mapping[str, Array]):
 
     def save(
         self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None
-    ) -> tuple[Place, ...]:
+    ) -> tuple[Location, ...]:
         """Write the layers, or one of them, and return the files; see `topleft._meshes.io.layer_files.save_layers`.
 
         Raises

@@ -150,7 +150,7 @@ def drawing(memory: KeptMemory, snapped: Snapped, view: View, group: str, sink: 
     shape = view.size[::-1]
     if group == "area":
         areas = memory.empty("pixels", shape, np.float32)
-        return lambda: sum_areas(memory, snapped.mesh, snapped.n_triangles, areas, 1, is_clamped=True)
+        return lambda: sum_areas(memory, snapped.mesh, areas, 1, is_clamped=True)
     dtype = {"mask": np.bool_, "samples": np.float32}.get(group, np.int32)
     pixels = memory.empty("pixels", shape, dtype)
     depth = memory.empty("depth", shape, np.float32) if group == "depth" else None
@@ -217,7 +217,7 @@ def measure_others(n_rounds: int) -> dict[str, float]:
     ids, depth = np.zeros((height, width), np.int32), np.zeros((height, width), np.float32)
     vertices, triangles, _ = random_triangles(10, 300, width, height)
     picture, colors = Rasterizer((width, height), threads=1), np.zeros((10, 4), np.uint8)
-    with choices.forced(is_direct=False, fills_few=False, draws_few=False):
+    with choices.forced(is_direct=False, fills_large_shapes=False, draws_large_shapes=False):
         painted = least_ns(lambda: picture.fill(vertices, triangles, colors), n_rounds)
         counted = least_ns(lambda: picture.overdraw(vertices, triangles), n_rounds)
     fresh = 32 << 20
@@ -302,7 +302,7 @@ TUNED = (
     Tuned("pays_to_bound", ("bound_span",), "rasterize", ((300, 1_000), (1_000, 400), (1_000, 200), (5_000, 100))),
     Tuned("threads_to_draw", ("thread_wakes",), "rasterize",
           ((1, 60), (20, 60), (20, 200), (1_000, 20), (4_000, 20), (50, 400)), (1, 2), threads=None),
-    Tuned("is_shared", ("shared_setups",), "coverage", ((100_000, 2), (300_000, 2), (700_000, 2)), threads=2),
+    Tuned("is_sliced", ("shared_setups",), "coverage", ((100_000, 2), (300_000, 2), (700_000, 2)), threads=2),
     Tuned("pays_to_share", ("shared_item",), "coverage", ((20_000, 2), (50_000, 2), (100_000, 2)), threads=2),
 )  # fmt: skip
 

@@ -100,7 +100,7 @@ class Facts:
     n_pieces: int
     common_depth: float | None  # of all vertices, whatever is made of it
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
-    is_few: bool  # large triangles, whose picture is written row by row
+    is_large_shapes: bool  # large triangles, whose picture is written row by row
     work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
     decided: Decided | None = None  # with vertices that are not snapped
@@ -137,16 +137,16 @@ class Facts:
         return self.clusters is not None and self.clusters.clusters is not None
 
     @property
-    def is_shared(self) -> bool:
+    def is_sliced(self) -> bool:
         """Whether each thread takes a share of the triangles."""
         if self.view.sampling is Sampling.AREA or self.draws_planes or self.is_direct:
             return False
-        return self.drawing.is_shared
+        return self.drawing.is_sliced
 
     @property
     def in_bands(self) -> bool:
         """Whether triangles are sorted into bands of rows, and band after band is drawn."""
-        return self.drawing.in_bands and not (self.is_direct or self.is_few or 0 in self.view.size)
+        return self.drawing.in_bands and not (self.is_direct or self.is_large_shapes or 0 in self.view.size)
 
     @property
     def n_drawn(self) -> int:
@@ -209,7 +209,7 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         common_depth=common,
         is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
-        is_few=writes_rows(snapped, view, verb, drawing),
+        is_large_shapes=writes_rows(snapped, view, verb, drawing),
         work_ms=choices.work_ns(view, snapped, drawing.sink) / 1e6,
         census=tuple(census),
         decided=decided,
@@ -222,9 +222,9 @@ def find_facts(
 def writes_rows(snapped: Snapped, view: View, verb: str, drawing: Drawing) -> bool:
     """Tell whether a picture is written row by row; colours are taken for RGBA, one a triangle."""
     if verb == "fill":
-        return choices.fills_few(snapped, view, np.zeros((snapped.n_triangles, 4), np.uint8), is_flat=True)
+        return choices.fills_large_shapes(snapped, view, np.zeros((snapped.n_triangles, 4), np.uint8), is_flat=True)
     is_one = view.sampling.n_samples == 1 or drawing.sink is Sink.SAMPLES
-    return is_one and choices.draws_few(snapped, view, drawing.sink, drawing.n_threads)
+    return is_one and choices.draws_large_shapes(snapped, view, drawing.sink, drawing.n_threads)
 
 
 def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Decided:
@@ -233,7 +233,7 @@ def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Deci
     mesh = exact.mesh
     if view.sampling.n_samples > 1:
         x, y = sample_positions(view.sampling.n_samples, view.grid_bits)[0].tolist()
-        mesh = mesh.seen_from(x, y)
+        mesh = mesh.at_sample(x, y)
     width, height = view.size
     if width and height:
         covered = empty(engine.Target.covered_shape(height, width, 1), np.uint64)
@@ -317,11 +317,11 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         strips = facts.drawing.n_threads * engine.blend_cells(width)
         of_sums = area_cells(n, height, width, facts.drawing.n_threads) if n_pixels else 0
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
-    elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_few):
+    elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_large_shapes):
         scratch["labels"] = 4 * n_pixels
     elif facts.is_split:
         scratch |= split_bytes(n, (height, width), n_samples, facts.drawing.n_threads)[0]
-    elif facts.draws_bands and not is_empty and n and choices.can_share(view) and not facts.is_few:
+    elif facts.draws_bands and not is_empty and n and choices.can_slice(view) and not facts.is_large_shapes:
         scratch["bins"] = 12 * (n + 16)
         scratch["bands"] = 4 * (n + 1)
     found = facts.clusters
@@ -333,8 +333,8 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
     elif facts.in_bands:
         scratch |= {"bins": 12 * (n + 16), "bands": 4 * (n + 1)}
-    elif facts.is_shared:
-        scratch["others"] = 4 * (n + 16 * facts.drawing.n_threads)
+    elif facts.is_sliced:
+        scratch["outside"] = 4 * (n + 16 * facts.drawing.n_threads)
     if found is not None and found.meshlet_bytes:
         scratch["meshlets"] = found.meshlet_bytes
     return scratch, results

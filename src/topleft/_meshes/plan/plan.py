@@ -14,6 +14,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import DepthTest, Sampling, parse
@@ -29,7 +30,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.plan.facts import CLASSES, find_cluster_facts, find_facts, memory_of
 from topleft._meshes.plan.stages import Stage, find_stages, plan_detail
 from topleft._meshes.plan.table import as_html, as_text
-from topleft._meshes.scene.adapt import MeshLike
 from topleft.methods import METHODS
 from topleft.typing import DepthTestOption, OutputOption
 

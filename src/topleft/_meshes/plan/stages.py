@@ -280,7 +280,7 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
     counts = draw_features(facts.census, n_pixels)
     times *= costs.exact_times if facts.decided is not None else 1.0
-    ms = times * costs.draw_ms(group, counts, facts.drawing.n_threads, is_shared=facts.is_shared) if n_pixels else 0.0
+    ms = times * costs.draw_ms(group, counts, facts.drawing.n_threads, is_sliced=facts.is_sliced) if n_pixels else 0.0
     if view.sampling is Sampling.AREA:
         why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
@@ -292,7 +292,7 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
     if view.method != METHODS["auto"].code:
         rejected = ("method='auto': another one was asked for; the picture is the same",)
-    if facts.is_few and facts.n_drawn:
+    if facts.is_large_shapes and facts.n_drawn:
         parts = [f"{plural(facts.n_drawn, 'triangle')} at once, row by row: every pixel is written once"]
         rejected = ("one after the other: what they cover would be cleared first, and written again",)
     elif facts.is_direct and facts.n_drawn:
@@ -314,7 +314,7 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
         choice = f"{choice}, a picture of each"
         rejected = ("all samples of a band of rows before the next: the whole mesh would be snapped and sorted first",)
     yield Stage("sampling", choice, why, rejected, timed_in="method")
-    if facts.is_direct or (facts.is_few and facts.verb == "fill"):
+    if facts.is_direct or (facts.is_large_shapes and facts.verb == "fill"):
         why = "triangles are few for the picture: their colours go straight to it"
         rejected = ("labels and colours from them: two passes over the picture, which pay for small triangles",)
         yield Stage("shade", "none", why, rejected, timed_in="method")
@@ -378,7 +378,7 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
         return Stage("threads", f"{who}; one band after the other", f"{why}; {sorted_}", rejected)
     if n_threads == 1:
         return Stage("threads", "1, the caller's own", why, (f"more: {wake}",))
-    if facts.is_shared:
+    if facts.is_sliced:
         rejected = (f"bands alone: each of {n_threads} threads would set up all {n:,} triangles",)
         return Stage("threads", f"{n_threads}, each a share of the triangles and its own rows", why, rejected)
     rejected = ("shares of the triangles: threads would have to meet twice",)

@@ -11,18 +11,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
+from topleft._core.base.array_types import MeshLike
+from topleft._core.base.arrays import as_crease
+from topleft._core.base.defaults import DEFAULT_CREASE
 from topleft._meshes.io.load import load
 from topleft._meshes.model.from_trimesh import placed
 from topleft._meshes.model.joined import joined
-from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh, as_crease
+from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.scene.cells import Polygons, of_arrays, of_cells, of_grid, of_padded, of_pair, of_triangulation
-
-MeshLike: TypeAlias = Any
-"""What `as_mesh` takes."""
 
 
 def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64
+from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import INT32_MAX, set_read_only, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.raster.clusters import Backoff
@@ -27,7 +27,7 @@ from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.pose import as_pose
-from topleft._meshes.scene.adapt import MeshLike, as_mesh, is_mesh_like
+from topleft._meshes.scene.adapt import as_mesh, is_mesh_like
 
 
 @dataclass(frozen=True, eq=False)

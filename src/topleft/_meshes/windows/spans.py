@@ -23,11 +23,11 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._apps.tiles.ahead import in_order, kept_memory
-from topleft._apps.tiles.blocks import BLOCK, Triangles
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
 from topleft._core.base.memory import Memory, check_fits
+from topleft._meshes.windows.ahead import in_order, kept_memory
+from topleft._meshes.windows.blocks import BLOCK, Triangles
 
 SPAN_BYTES = 12
 

@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._apps.tiles.drawing import Painter, Size
-from topleft._apps.tiles.spans import Tiling
 from topleft._core.base.array_types import I32, Array
 from topleft._core.base.arrays import set_aligned
 from topleft._core.base.grid import Extent, Grid
@@ -22,6 +20,8 @@ from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.options import Sampling, parse
 from topleft._core.polygons.polygons import as_paint, in_crs_of, polygons
 from topleft._core.polygons.rings import RingSet
+from topleft._meshes.windows.drawing import Painter, Size
+from topleft._meshes.windows.spans import Tiling
 
 MOST_SPANS = 1 << 28
 """Pairs of a polygon and a window that an index lists: 3 GB."""

@@ -1,9 +1,9 @@
 /* Blend of a few large flat triangles over one colour, a row of the picture after the other.
  * In: triangles and their colours, the colour behind them.  Out: every pixel, written once.
  *
- * A band of rows is drawn as runs (mix_few.c) by what draws large triangles into pixels, and then written. */
-#ifndef TL_BLEND_FEW_C
-#define TL_BLEND_FEW_C
+ * A band of rows is drawn as runs (mix_shapes.c) by what draws large triangles into pixels, and then written. */
+#ifndef TL_BLEND_SHAPES_C
+#define TL_BLEND_SHAPES_C
 
 #include <stdint.h>
 
@@ -11,17 +11,17 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
-#include "few/row_runs.c"
+#include "large_shapes/row_runs.c"
 #include "blend/blend_rows.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
-#include "blend/mix_few.c"
+#include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
 /* The rows of a band, from pixel `at` on. */
 TL_INLINE void put_band(blend_state *b, int64_t n_rows, int64_t at, open_run *run, int pixel_bytes)
 {
-    few_state *f = b->few;
+    shape_state *f = b->shapes;
     for (int64_t row = 0; row < n_rows; row++, at += f->canvas->stride_px) {
         const row_runs *r = f->rows + row;
         for (int k = 0; k < r->n; k++) {
@@ -40,7 +40,7 @@ TL_INLINE void put_band(blend_state *b, int64_t n_rows, int64_t at, open_run *ru
 }
 
 /* `b` is ready for the window, but for where it draws. */
-static int64_t blend_few(blend_state *b)
+static int64_t blend_large_shapes(blend_state *b)
 {
     const tl_canvas *canvas = b->canvas;
     const tl_window *window = b->window;
@@ -48,7 +48,7 @@ static int64_t blend_few(blend_state *b)
     const int64_t bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
     if (bad_row >= 0)
         return bad_row;
-    few_state f;
+    shape_state f;
     f.canvas = canvas, f.pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     f.one = *b, f.one.stride = f.one.n_samples = 1;
     for (int k = 0; k < 1 << TL_MIXED_KEYS_BITS; k++)
@@ -58,7 +58,7 @@ static int64_t blend_few(blend_state *b)
     f.is_in_place = !canvas->packed;
     if (f.is_in_place)
         run.n_px = 0; /* nothing is written twice: what stands aside is there */
-    b->few = &f, b->window = &band, b->packed = canvas->packed;
+    b->shapes = &f, b->window = &band, b->packed = canvas->packed;
     b->stride = f.is_in_place ? canvas->stride_px : window->width;
     b->n_laid = INT64_MAX;
     for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row += TL_BLENDED_ROWS) {

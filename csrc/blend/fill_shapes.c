@@ -3,8 +3,8 @@
  *
  * A run of pixels has a key: what each sample of them sees, label by label, 0 where nothing is.  The colour of a key is
  * the mean of resolve.c, and is kept: edges show the same few of them over and over. */
-#ifndef TL_FILL_FEW_C
-#define TL_FILL_FEW_C
+#ifndef TL_FILL_SHAPES_C
+#define TL_FILL_SHAPES_C
 
 #include <stdint.h>
 #include <string.h>
@@ -13,8 +13,8 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
-#include "few/row_runs.c"
-#include "few/row_spans.c"
+#include "large_shapes/row_runs.c"
+#include "large_shapes/row_spans.c"
 #include "pixels/resolve.c"
 
 #define TL_KEPT_COLORS_BITS 6
@@ -27,15 +27,15 @@ typedef struct {
     uint64_t each_label; /* 1 in the label of every sample */
     uint64_t keys[1 << TL_KEPT_COLORS_BITS];
     char colors[1 << TL_KEPT_COLORS_BITS][16];
-} few_colors;
+} shape_colors;
 
-TL_INLINE const char *color_of_label(const few_colors *f, uint64_t label)
+TL_INLINE const char *color_of_label(const shape_colors *f, uint64_t label)
 {
     const char *colors = f->canvas->colors, *ground = (const char *)f->canvas->ground;
     return label ? colors + (int64_t)(label - 1) * f->pixel_bytes : ground;
 }
 
-static __attribute__((noinline)) void mix_color(const few_colors *f, uint64_t key, char *color)
+static __attribute__((noinline)) void mix_color(const shape_colors *f, uint64_t key, char *color)
 {
     const uint64_t label = (1ull << (f->label_bits & 63)) - 1;
     const void *own[TL_MAX_SAMPLES];
@@ -45,7 +45,7 @@ static __attribute__((noinline)) void mix_color(const few_colors *f, uint64_t ke
 }
 
 /* The colour of the pixels of a key. */
-TL_INLINE const char *color_of_key(few_colors *f, uint64_t key)
+TL_INLINE const char *color_of_key(shape_colors *f, uint64_t key)
 {
     if (f->sample_bits == 0)
         return color_of_label(f, key);
@@ -63,7 +63,7 @@ TL_INLINE const char *color_of_key(few_colors *f, uint64_t key)
 }
 
 /* The rows of a band from pixel `at` on, whose spans are listed. */
-TL_INLINE void color_band(few_colors *f, const span_table *t, int64_t n_rows, int64_t at, open_run *run,
+TL_INLINE void color_band(shape_colors *f, const span_table *t, int64_t n_rows, int64_t at, open_run *run,
                           int pixel_bytes)
 {
     const uint64_t label = (1ull << (f->label_bits & 63)) - 1;
@@ -83,8 +83,8 @@ TL_INLINE void color_band(few_colors *f, const span_table *t, int64_t n_rows, in
     }
 }
 
-static void fill_rows_of_few(few_colors *f, const tl_snapped *snapped, const tl_window *window,
-                             const int32_t *samples_fx)
+static void fill_rows_of_shapes(shape_colors *f, const tl_snapped *snapped, const tl_window *window,
+                                const int32_t *samples_fx)
 {
     const int64_t stride = f->canvas->stride_px;
     span_table t;
@@ -103,19 +103,19 @@ static void fill_rows_of_few(few_colors *f, const tl_snapped *snapped, const tl_
     close_run(&run, f->pixel_bytes);
 }
 
-static int64_t fill_few(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
-                        const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer)
+static int64_t fill_large_shapes(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
+                                 const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer)
 {
     const int64_t bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
-    few_colors f = {.canvas = canvas, .transfer = transfer, .sample_bits = sample_bits};
+    shape_colors f = {.canvas = canvas, .transfer = transfer, .sample_bits = sample_bits};
     if (bad_row >= 0)
         return bad_row;
-    f.label_bits = tl_few_label_bits(sample_bits);
+    f.label_bits = tl_shape_label_bits(sample_bits);
     f.pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     for (int s = 0; s < 1 << sample_bits; s++)
         f.each_label |= 1ull << (s * f.label_bits);
     memset(f.keys, 0xff, sizeof f.keys); /* no key: no label has all bits set */
-    fill_rows_of_few(&f, snapped, window, samples_fx);
+    fill_rows_of_shapes(&f, snapped, window, samples_fx);
     return -1;
 }
 

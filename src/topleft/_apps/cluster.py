@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from topleft._core.engine.isa import build_info
+from topleft import build_info
 from topleft.errors import MissingPackageError, TopleftError
 
 MOST_RESTARTS = 5
@@ -63,7 +63,7 @@ def quiet() -> Iterator[None]:
 
 
 def result_of(task: Any) -> tuple[Any, BaseException | None]:
-    """Return what a task has given, or its error; neither of them where it was cancelled or lost with the scheduler."""
+    """Return a task's result, or its error; neither where it was cancelled or lost with the scheduler."""
     try:
         if task.status == "finished":
             return task.result(), None

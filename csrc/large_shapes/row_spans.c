@@ -20,8 +20,8 @@ typedef struct {
 /* The spans of a band: those of a row side by side, in the order of the triangles, of each in the order of the
  * samples. */
 typedef struct span_table {
-    column_span spans[TL_FEW_SPANS];
-    uint16_t triangles[TL_FEW_SLOTS]; /* whose the spans of a row are */
+    column_span spans[TL_SHAPE_SPANS];
+    uint16_t triangles[TL_SHAPE_SLOTS]; /* that the spans of a row belong to */
     int64_t n_in_row, n_slots, n_rows, width;
     column_span *next; /* in the row that begins at sample row_at */
     int64_t row_at;
@@ -77,9 +77,9 @@ static void list_row_spans(const tl_snapped *snapped, const tl_window *band, con
 /* Rows of a band whose spans fit: as many as stay in the first-level cache, or as are worth setting all up anew. */
 static void start_span_table(span_table *t, const tl_snapped *snapped, int n_samples, int64_t width)
 {
-    const int64_t n = max64(spans_in_row(snapped, n_samples), 1), hot = TL_FEW_SPANS / 4 / n;
+    const int64_t n = max64(spans_in_row(snapped, n_samples), 1), hot = TL_SHAPE_SPANS / 4 / n;
     t->n_in_row = n, t->width = width;
-    t->n_rows = hot >= 64 ? hot : min64(64, TL_FEW_SPANS / n);
+    t->n_rows = hot >= 64 ? hot : min64(64, TL_SHAPE_SPANS / n);
 }
 
 #endif

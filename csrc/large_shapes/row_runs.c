@@ -15,11 +15,11 @@
 /* Run k is [col[k], col[k + 1]). */
 typedef struct {
     int n;
-    int32_t col[2 * TL_FEW_SLOTS + 2];
-    uint64_t key[2 * TL_FEW_SLOTS + 2];
+    int32_t col[2 * TL_SHAPE_SLOTS + 2];
+    uint64_t key[2 * TL_SHAPE_SLOTS + 2];
 } row_runs;
 
-/* What a triangle does to the key of what it covers. */
+/* How a triangle changes the key of the pixels that it covers. */
 typedef enum {
     KEY_REPLACE, /* the bits of its sample become its own */
     KEY_COUNT,   /* one more */

@@ -1,18 +1,18 @@
-/* Mix, a few large flat triangles over one colour: rows as runs of pixels, which are not in memory yet.
- * In: what the triangle at hand covers whole or in part.  Out: runs, and pixels that stand aside.
+/* Mix of a few large flat triangles over one colour: rows as runs of pixels, which are not in memory yet.
+ * In: pixels that the current triangle covers whole or in part.  Out: runs, and partly covered pixels.
  *
- * What a triangle covers whole becomes a bit in the key of a run; the colour of a key is blended once and kept.
- * Pixels that a triangle covers in part stand aside: where they belong in the picture, or if a pixel there is no lane
- * in a band of rows beside it.  They are blended one triangle after the other, as in a picture without runs. */
-#ifndef TL_MIX_FEW_C
-#define TL_MIX_FEW_C
+ * A run that a triangle covers whole has its bit in the run's key; the colour of a key is blended once and kept.
+ * Partly covered pixels are blended in place, where a pixel of the picture is a lane of four bytes, or else in a band
+ * of rows beside it: one triangle after the other, as in a picture without runs. */
+#ifndef TL_MIX_SHAPES_C
+#define TL_MIX_SHAPES_C
 
 #include <stdint.h>
 #include <string.h>
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "few/row_runs.c"
+#include "large_shapes/row_runs.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
@@ -30,19 +30,19 @@ typedef struct {
     } canvas;
 } mixed_color;
 
-typedef struct few_state {
+typedef struct shape_state {
     const tl_canvas *canvas; /* the picture; the state of the pass draws aside */
     int pixel_bytes, is_in_place;
     int64_t id; /* of the triangle at hand */
     mixed_color colors[1 << TL_MIXED_KEYS_BITS];
     row_runs rows[TL_BLENDED_ROWS];
     blend_state one; /* a picture of one pixel */
-} few_state;
+} shape_state;
 
 /* ---- colours ----------------------------------------------------------------------------------------------------- */
 
 /* Blends the triangles of a key over the ground, one pixel. */
-static __attribute__((noinline)) void mix_key(few_state *f, uint64_t key, mixed_color *c)
+static __attribute__((noinline)) void mix_key(shape_state *f, uint64_t key, mixed_color *c)
 {
     blend_state *one = &f->one;
     const int n_channels = f->canvas->n_channels, is_u8 = f->canvas->is_u8;
@@ -69,7 +69,7 @@ static __attribute__((noinline)) void mix_key(few_state *f, uint64_t key, mixed_
     }
 }
 
-TL_INLINE const mixed_color *color_of_mix(few_state *f, uint64_t key)
+TL_INLINE const mixed_color *color_of_mix(shape_state *f, uint64_t key)
 {
     mixed_color *c = f->colors + (key * 0x9e3779b97f4a7c15u >> (64 - TL_MIXED_KEYS_BITS));
     if (c->key != key)
@@ -107,7 +107,7 @@ TL_INLINE void join_runs(row_runs *r, int k, int end)
 /* Sees to it that the pixels [first, end) of a row stand aside. */
 static __attribute__((noinline)) void put_aside(blend_state *b, int64_t row, int32_t first, int32_t end)
 {
-    few_state *f = b->few;
+    shape_state *f = b->shapes;
     row_runs *r = f->rows + row;
     if (r->n >= TL_BLENDED_RUNS) /* more cuts than convex shapes make: all of the row */
         first = 0, end = r->col[r->n];
@@ -131,7 +131,7 @@ static void take_aside(blend_state *b, int64_t at, int64_t n)
 {
     const int64_t row = (int64_t)((uint32_t)at / (uint32_t)b->stride);
     const int32_t first = (int32_t)(at - row * b->stride), end = (int32_t)(first + n);
-    const row_runs *r = b->few->rows + row;
+    const row_runs *r = b->shapes->rows + row;
     for (int k = 0; k < r->n && r->col[k] <= first; k++)
         if (r->key[k] == TL_KEY_ASIDE && end <= r->col[k + 1])
             return;
@@ -140,7 +140,7 @@ static void take_aside(blend_state *b, int64_t at, int64_t n)
 
 static void lay_whole(blend_state *b, int64_t at, int64_t n)
 {
-    few_state *f = b->few;
+    shape_state *f = b->shapes;
     const int64_t row = (int64_t)((uint32_t)at / (uint32_t)b->stride), start = row * b->stride;
     const uint64_t bit = 1ull << f->id;
     row_runs *r = f->rows + row;
@@ -159,7 +159,7 @@ static void lay_whole(blend_state *b, int64_t at, int64_t n)
 
 static void mix_run(struct blend_state *b, int64_t at, int64_t n)
 {
-    if (b->few)
+    if (b->shapes)
         lay_whole(b, at, n);
     else
         mix_pixels(b, at, n);

@@ -17,17 +17,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from topleft._apps.tiles.ahead import kept_memory
-from topleft._apps.tiles.blocks import Triangles
 from topleft._core.base.array_types import F64, I32, Array
 from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.options import Per, Sampling, Sink, check_choice, parse
-from topleft._core.raster.rasterize import Asked, draw_fragments
+from topleft._core.raster.rasterize import FragmentOptions, draw_fragments
 from topleft._core.raster.verbs import coverage, fill, overdraw
 from topleft._core.raster.view import View
 from topleft._meshes.field.field import depth_of, dtype_of_field, fill_planes, is_per_face, nodata_of, visible
+from topleft._meshes.windows.ahead import kept_memory
+from topleft._meshes.windows.blocks import Triangles
 
 Size = tuple[int, int]
 
@@ -198,7 +198,9 @@ class FragmentsPainter(Painter):
 
     def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
         """Check options and values against the mesh."""
-        asked = Asked.parse(self.options.get("depth_test", "less"), self.options.get("background_depth"), None)
+        asked = FragmentOptions.parse(
+            self.options.get("depth_test", "less"), self.options.get("background_depth"), None
+        )
         self.asked = asked
         self.depth_test = self.options.get("depth_test", "less")
 

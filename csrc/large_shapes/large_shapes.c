@@ -1,11 +1,11 @@
-/* Few: pictures of a few large triangles without depth, written row by row.
+/* Large shapes: pictures of a few large triangles without depth, written row by row.
  * In: triangles of a snapped mesh.  Out: mask, counts, labels, or shares of covered samples.
  *
  * Where triangles are drawn one after the other, the picture is cleared first, and memory is written twice, or through
  * bits that are expanded at the end.  Here the spans of a row become runs of pixels that hold the same, and each run is
  * written once.  Several samples make more runs, and nothing else: a run is where all of them see the same. */
-#ifndef TL_FEW_C
-#define TL_FEW_C
+#ifndef TL_LARGE_SHAPES_C
+#define TL_LARGE_SHAPES_C
 
 #include <stdint.h>
 #include <string.h>
@@ -16,23 +16,24 @@
 #include "sink/covered.c"
 #include "raster/single_fixed.c"
 #include "raster/raster.c"
-#include "few/row_runs.c"
-#include "few/row_spans.c"
+#include "large_shapes/row_runs.c"
+#include "large_shapes/row_spans.c"
 
 /* Whether all that is drawn is a few triangles of a sink that this file knows. */
-static int draws_few(const tl_snapped *snapped, const tl_window *window, const tl_target *target, const tl_share *share)
+static int draws_large_shapes(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                              const tl_slice *slice)
 {
     const int is_known = target->sink == TL_SINK_MASK || target->sink == TL_SINK_COUNT ||
                          target->sink == TL_SINK_LABEL || target->sink == TL_SINK_SAMPLES;
-    const int is_whole = share->is_first && share->is_last && !share->ids && !share->clusters && !share->others &&
-                         share->first == 0 && share->end == snapped->n_triangles;
+    const int is_whole = slice->is_first && slice->is_last && !slice->ids && !slice->clusters && !slice->outside &&
+                         slice->first == 0 && slice->end == snapped->n_triangles;
     const int n_samples = target->sink == TL_SINK_SAMPLES ? 1 << target->sample_bits : 1;
-    const tl_few most = target->covered ? TL_FEW_OF_BITS : TL_FEW_STORED;
+    const tl_shape_limit most = target->covered ? TL_SHAPES_OF_BITS : TL_SHAPES_STORED;
     return is_known && is_whole && window->test == TL_TEST_SAMPLE && !snapped->mesh.exact &&
-           tl_are_few(spans_in_row(snapped, 1), n_samples, window->width, window->height, most);
+           tl_is_large_shapes(spans_in_row(snapped, 1), n_samples, window->width, window->height, most);
 }
 
-/* What a run holds, as it stands in memory. */
+/* The pixel value of a run, as it stands in memory. */
 TL_INLINE int32_t word_of_key(const tl_target *target, tl_sink sink, uint64_t key)
 {
     if (sink != TL_SINK_SAMPLES)
@@ -68,7 +69,7 @@ TL_INLINE void put_rows(const tl_snapped *snapped, const tl_window *band, const 
     }
 }
 
-TL_INLINE void draw_few_of(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_sink sink)
+TL_INLINE void draw_shapes_of(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_sink sink)
 {
     const int n_samples = sink == TL_SINK_SAMPLES ? 1 << target->sample_bits : 1;
     span_table t;
@@ -84,37 +85,37 @@ TL_INLINE void draw_few_of(const tl_snapped *snapped, const tl_window *window, c
     close_run(&run, sink == TL_SINK_MASK ? 1 : 4);
 }
 
-#define TL_FEW_COPY(name, sink)                                                                                  \
-    TL_SINK_COPY(draw_few_of, name, sink,                                                                        \
+#define TL_LARGE_SHAPES_COPY(name, sink)                                                                         \
+    TL_SINK_COPY(draw_shapes_of, name, sink,                                                                     \
                  (const tl_snapped *snapped, const tl_window *window, const tl_target *target), snapped, window, \
                  target)
-TL_FEW_COPY(mask, TL_SINK_MASK)
-TL_FEW_COPY(count, TL_SINK_COUNT)
-TL_FEW_COPY(label, TL_SINK_LABEL)
-TL_FEW_COPY(samples, TL_SINK_SAMPLES)
+TL_LARGE_SHAPES_COPY(mask, TL_SINK_MASK)
+TL_LARGE_SHAPES_COPY(count, TL_SINK_COUNT)
+TL_LARGE_SHAPES_COPY(label, TL_SINK_LABEL)
+TL_LARGE_SHAPES_COPY(samples, TL_SINK_SAMPLES)
 
 /* Returns as `draw` does. */
-static int64_t draw_few(const tl_snapped *snapped, const tl_window *window, const tl_target *target)
+static int64_t draw_large_shapes(const tl_snapped *snapped, const tl_window *window, const tl_target *target)
 {
     const int64_t bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
     if (bad_row >= 0)
         return bad_row;
     if (target->sink == TL_SINK_MASK)
-        draw_few_of_mask(snapped, window, target);
+        draw_shapes_of_mask(snapped, window, target);
     else if (target->sink == TL_SINK_COUNT)
-        draw_few_of_count(snapped, window, target);
+        draw_shapes_of_count(snapped, window, target);
     else if (target->sink == TL_SINK_LABEL)
-        draw_few_of_label(snapped, window, target);
+        draw_shapes_of_label(snapped, window, target);
     else
-        draw_few_of_samples(snapped, window, target);
+        draw_shapes_of_samples(snapped, window, target);
     return -1;
 }
 
 /* A mesh of either kind. */
-static int64_t draw_mesh(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+static int64_t draw_mesh(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice)
 {
-    return draws_few(snapped, window, target, share) ? draw_few(snapped, window, target)
-                                                     : draw(snapped, window, target, share);
+    return draws_large_shapes(snapped, window, target, slice) ? draw_large_shapes(snapped, window, target)
+                                                              : draw(snapped, window, target, slice);
 }
 
 #endif

@@ -1,0 +1,1 @@
+"""Rasters of any size: which triangles each window needs, and its pixels."""
