@@ -24,6 +24,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import INT32_MAX, shown
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
+from topleft._core.base.defaults import DEFAULT_CREASE
 from topleft._core.base.memory import empty
 from topleft._core.base.options import parse
 from topleft._core.base.threads import count_threads, parse_threads, run_parts, threads_for
@@ -33,7 +34,7 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.environment import Environment
 from topleft._meshes.model.light import AMBIENT, TO_HEADLIGHT, Fog, Light, as_not_negative
 from topleft._meshes.model.material import Material
-from topleft._meshes.model.mesh import DEFAULT_CREASE, Mesh
+from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
 from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture.look import EYE, ShadingInputs, Surface, material_row
