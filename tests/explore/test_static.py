@@ -247,3 +247,13 @@ def test_memory_is_that_of_the_mesh_however_often_it_is_drawn_or_opened(ask, tmp
     round_of_questions = opened_and_drawn("cube.obj", path, views_of(4, np.random.default_rng(1)))
     replies = ask(round_of_questions * 6)
     assert replies[-1]["memory"] == replies[len(round_of_questions)]["memory"]
+
+
+def test_question_without_memory_is_refused_and_the_next_one_is_answered(ask):
+    state, view = {"do": "pixels.draw", "state": SQUARE}, {"do": "mesh.draw", "size": [64, 48]}
+    first, full_state, full_view, last_state, last_view = ask(
+        [view, state | {"is_full": True}, view | {"is_full": True}, state, view]
+    )
+    assert full_state["error"] == full_view["error"] == "not enough memory"
+    assert "error" not in last_state
+    assert last_view["bytes"] == first["bytes"]
