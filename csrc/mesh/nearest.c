@@ -9,6 +9,7 @@
 #ifndef TL_NEAREST_C
 #define TL_NEAREST_C
 
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 
@@ -90,7 +91,7 @@ static void set_foot(const tl_surface *s, const double p[3], int64_t triangle, f
                                        corner_of(s, triangle, 2), out->at);
 }
 
-/* Squared distances of p from the boxes of a node. */
+/* No more than the squared distances of p from the boxes of a node: a sum and its parts are rounded 8 times. */
 TL_INLINE void box_distances(const tl_tree_node *node, const float p[3], float out[TL_TREE_WIDTH])
 {
     for (int k = 0; k < TL_TREE_WIDTH; k++) {
@@ -101,11 +102,12 @@ TL_INLINE void box_distances(const tl_tree_node *node, const float p[3], float o
             const float gap = outside > 0.0f ? outside : 0.0f;
             sum += gap * gap;
         }
-        out[k] = sum;
+        out[k] = sum < FLT_MAX ? sum * (1.0f - 16.0f * FLT_EPSILON) : FLT_MAX;
     }
 }
 
-/* Improves the foot of p to the nearest of all triangles; it must be one already. */
+/* Improves the foot of p to the nearest of all triangles, the first of those equally near; it must be one already.
+ * So it does not depend on where the search begins, which is on the triangle of the point before. */
 static void improve_foot(const tl_surface *s, const double p[3], foot *best)
 {
     struct {
@@ -120,21 +122,21 @@ static void improve_foot(const tl_surface *s, const double p[3], foot *best)
         n--;
         const int64_t node = stack[n].node;
         const int level = stack[n].level;
-        if ((double)stack[n].squared >= best->squared)
+        if ((double)stack[n].squared > best->squared)
             continue;
         float squared[TL_TREE_WIDTH];
         box_distances(s->nodes + s->first_node[level] + node, p32, squared);
         const int64_t first = node * TL_TREE_WIDTH;
         const int base = n;
         for (int k = 0; k < TL_TREE_WIDTH; k++) {
-            if (!((double)squared[k] < best->squared))
+            if (!((double)squared[k] <= best->squared))
                 continue;
             if (level == 0) {
                 const int64_t begin = (first + k) * TL_TREE_LEAF, end = begin + TL_TREE_LEAF;
                 for (int64_t i = begin; i < end && i < s->n_triangles; i++) {
                     foot other;
                     set_foot(s, p, i, &other);
-                    if (other.squared < best->squared)
+                    if (other.squared < best->squared || (other.squared == best->squared && i < best->triangle))
                         *best = other;
                 }
                 continue;

@@ -58,6 +58,24 @@ def test_like_of_an_array_of_xarray_is_its_grid(y):
     assert tl.Grid.like(grid.to_xarray(np.zeros((4, 6)))) == grid
 
 
+@pytest.mark.parametrize("code", ['AUTHORITY["EPSG","25832"]', 'ID["EPSG",25832]'])
+def test_like_takes_the_code_that_well_known_text_ends_with(code):
+    """As rioxarray's `write_crs` and `to_raster` leave it, in both versions of the text."""
+    pytest.importorskip("xarray")
+    grid = tl.Grid((6, 4), (0.0, 6.0, 0.0, 4.0), crs="EPSG:25832")
+    array = grid.to_xarray(np.zeros((4, 6)))
+    array.coords["spatial_ref"].attrs["spatial_ref"] = (
+        f'PROJCS["UTM 32N",GEOGCS["ETRS89",AUTHORITY["EPSG","4258"]],{code}]'
+    )
+    assert tl.Grid.like(array) == grid
+    array.coords["spatial_ref"].attrs["spatial_ref"] = 'PROJCS["own",GEOGCS["ETRS89",AUTHORITY["EPSG","4258"]]]'
+    assert tl.Grid.like(array).crs.startswith('PROJCS["own"')
+
+
+def test_a_number_as_text_is_a_code():
+    assert tl.Grid((6, 4), (0, 6, 0, 4), crs="25832") == tl.Grid((6, 4), (0, 6, 0, 4), crs=25832)
+
+
 def test_like_of_uneven_coordinates_is_refused():
     xr = pytest.importorskip("xarray")
     array = xr.DataArray(np.zeros((3, 3)), coords={"lat": [0, 1, 3], "lon": [0, 1, 2]}, dims=["lat", "lon"])

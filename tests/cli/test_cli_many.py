@@ -334,6 +334,16 @@ def test_sheet_leaves_room_for_what_failed(run, folder):
     assert (reason[:, 62:] == 255).all()
 
 
+def test_sheet_tells_what_failed_in_its_own_row(run, folder):
+    status, _ = run("render", "nope.obj", "cube", "gone.obj", "--sheet", "sheet.png", *SMALL, "--views", "2")
+    assert status == 1
+    sheet = pixels("sheet.png").astype(int)
+    step = 48 + 24  # a picture, the gap and the caption
+    for k in (0, 2):
+        row = sheet[8 + k * step : 56 + k * step]
+        assert (row[..., 0] - row[..., 1] > 60).any()  # red words
+
+
 def test_sheet_wraps_reasons_and_cuts_long_words():
     assert wrapped("no such file 'abcdefghijklm'", 10, len) == ["no such", "file", "'abcdefghi", "jklm'"]
     assert wrapped("", 10, len) == []

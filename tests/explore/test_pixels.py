@@ -105,6 +105,12 @@ def test_production_is_never_wrong_on_the_grid_that_holds_the_vertices():
     assert panels[0]["n_wrong"] == 0 < panels[1]["n_wrong"]
 
 
+@pytest.mark.parametrize("sampling", ["area", "outer", "inner"])
+def test_production_is_never_wrong_where_coverage_alone_is_known(sampling):
+    panels = draw(SQUARE | {"exact": True, "sampling": sampling}).header["panels"]
+    assert panels[0]["n_wrong"] == 0
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_scene_is_drawn(name):
     reply = ask("pixels.scene", name=name)

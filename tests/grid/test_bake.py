@@ -157,6 +157,19 @@ def test_source_gives_the_values_of_its_nearest_points():
     np.testing.assert_allclose(normals[6, 3], np.array([0, -1, 1]) / np.sqrt(2), atol=1e-5)
 
 
+@pytest.mark.parametrize("far", [3.0, 3e7])
+def test_source_of_equally_near_triangles_gives_the_first_with_any_number_of_threads(far):
+    """Above the sides of a cube each point is as near to two triangles, or to six; threads begin elsewhere."""
+    cube = tl.Mesh(*tl.scenes.cube())
+    corners = far * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    square = tl.Mesh(corners, [[0, 1, 2], [0, 2, 3]], uv=[[0, 0], [1, 0], [1, 1], [0, 1]])
+    one, *others = (
+        tl.bake(square, "triangle", 24, source=cube, gutter=0, threads=n).values for n in (1, 2, 3, 5, 7, 24)
+    )
+    for other in others:
+        assert_same(other, one)
+
+
 @ON_EACH_ISA
 def test_pictures_come_back_where_cameras_see_the_mesh(isa):
     """A ball with a texture, taken from eight sides, gets it back; what the sides do not see stays empty."""

@@ -113,6 +113,18 @@ def test_simplify_attributes_are_those_of_the_nearest_point():
     assert np.allclose(level.normals, [0, 0, 1], atol=1e-12)  # unit vectors, rounded
 
 
+def test_simplify_mixes_colours_as_light_where_the_mesh_does():
+    points, triangles = grid(24)
+    srgb = np.where(points <= 0.0031308, 12.92 * points, 1.055 * points.clip(1e-9) ** (1 / 2.4) - 0.055)
+    mesh = tl.Mesh(points, triangles, colors=np.rint(255 * srgb).astype(np.uint8), color_interpolation="linear")
+    level = tl.simplify(mesh)[-1].mesh
+    x = level.vertices.astype(np.float64)
+    expected = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clip(1e-9) ** (1 / 2.4) - 0.055)
+    assert np.abs(level.colors[:, :2] - 255 * expected[:, :2])[x[:, :2].min(axis=1) > 0.1].max() <= 1.5
+    as_numbers = tl.simplify(tl.Mesh(points, triangles, colors=mesh.colors))[-1].mesh
+    assert not np.array_equal(level.colors, as_numbers.colors)
+
+
 def test_simplify_keeps_no_normals_where_there_are_none():
     assert tl.simplify(torus())[1].mesh.normals is None
 

@@ -356,6 +356,23 @@ def test_vector_files_are_read_where_their_packages_are(files, run, suffix):
     assert np.array_equal(picture("m.tif"), expected)
 
 
+@pytest.mark.parametrize("suffix", ["gpkg", "shp"])
+def test_vector_files_are_read_by_fiona_where_pyogrio_is_missing(files, run, monkeypatch, suffix):
+    fiona = pytest.importorskip("fiona")
+    monkeypatch.setitem(sys.modules, "pyogrio", None)
+    driver, other = {"gpkg": "GPKG", "shp": "ESRI Shapefile"}[suffix], [[5, 0], [6, 0], [6, 1], [5, 1], [5, 0]]
+    schema = {"geometry": "Polygon", "properties": {"use": "str"}}
+    with fiona.open(files / f"a.{suffix}", "w", driver=driver, crs="EPSG:25832", schema=schema) as rows:
+        for name, ring in (("b", SQUARE), ("a", other)):
+            geometry = {"type": "Polygon", "coordinates": [ring]}
+            rows.write({"type": "Feature", "geometry": geometry, "properties": {"use": name}})
+    arguments = ["-o", "m.tif", "--labels", "use", "--size", "7x4", "--extent", 0, 7, 0, 4]
+    assert run("mask", f"a.{suffix}", *arguments) == (0, [])
+    grid = tl.Grid((7, 4), (0, 7, 0, 4))
+    assert np.array_equal(picture("m.tif"), tl.polygons([[SQUARE], [other]], grid, values=np.array([2, 1], np.uint8)))
+    assert load_polygons(files / f"a.{suffix}")[0].crs == "EPSG:25832"
+
+
 def test_vector_file_without_its_packages_gives_the_hint(files, run, monkeypatch):
     for name in ("pyogrio", "fiona"):
         monkeypatch.setitem(sys.modules, name, None)

@@ -1,8 +1,10 @@
 """Areas of polygons and the table of overlaps: near fractions, and to the last bit where they must be."""
 
+import sys
 import tracemalloc
 import warnings
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -415,6 +417,31 @@ def test_table_is_a_sparse_matrix():
     assert matrix.shape == (20, 600)
     assert (matrix.toarray().reshape(20, 20, 30) == dense(table)).all()
     assert matrix.has_canonical_format
+
+
+def test_table_is_a_sparse_array_of_pictures(monkeypatch):
+    try:
+        from sparse import COO
+    except ImportError:  # numba comes with it, so the gate has it not: what it is given is what the picture is made of
+        COO = None
+        monkeypatch.setitem(sys.modules, "sparse", SimpleNamespace(COO=lambda *given, **_: given))
+    table = tl.overlap(cells(20, (30, 20)), (30, 20))
+    found = table.to_sparse()
+    if COO is None:
+        places, areas, shape = found
+        pictures = np.zeros(shape, areas.dtype)
+        pictures[tuple(places)] = areas
+    else:
+        assert isinstance(found, COO)
+        pictures = found.todense()
+    assert pictures.dtype == np.float32
+    assert (pictures == dense(table)).all()
+
+
+def test_sparse_array_without_its_package_gives_the_hint(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sparse", None)
+    with pytest.raises(tl.MissingPackageError, match="to_sparse needs the package sparse: pip install sparse"):
+        tl.overlap(cells(2, (3, 2)), (3, 2)).to_sparse()
 
 
 def test_memory_of_a_table_is_used_again():

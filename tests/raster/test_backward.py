@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
@@ -136,6 +137,14 @@ def test_antialias_of_a_long_edge_is_its_exact_area(degrees):
     _, by_points = frags.antialias_vjp(frags.mask, g)
     expected = by_differences(lambda ends: (g * areas([*ends, points[2]], 24)).sum(), points[:2], 1e-4)
     np.testing.assert_allclose(by_points[:2], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_antialias_of_float32_in_either_byte_order_is_float32():
+    frags = tl.rasterize([(1, 1), (7, 2), (2, 6)], [(0, 1, 2)], (8, 8))
+    picture = np.where(frags.mask, np.float32(0.3), np.float32(0.7))
+    swapped = frags.antialias(picture.astype(">f4"))
+    assert swapped.dtype == np.float32
+    assert_same(swapped, frags.antialias(picture))
 
 
 def test_antialias_of_a_crease_of_flat_colours_is_exact():

@@ -149,6 +149,11 @@ def test_view_has_run_lengths_of_every_instance_of_its_scene():
     ("ask", "error", "message"),
     [
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE, beyond=-1), ValueError, "beyond must be a number of pictures"),
+        (
+            lambda: tl.object_masks(strewn(), CAMERA, SIZE, beyond=1e30),
+            ValueError,
+            "beyond must reach at most 1073741824",
+        ),
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE).rle("all"), ValueError, "which must be"),
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE).full(12), IndexError, "there are 12 objects, got 12"),
         (

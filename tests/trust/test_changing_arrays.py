@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from changing_arrays import Changing, between_closed_pages
-from fuzzing import Draw, FromRandom
+from draws import Draw, FromRandom
 
 import topleft as tl
 

@@ -3,7 +3,8 @@
 from importlib.util import find_spec
 
 import pytest
-from fuzzing import KINDS, REFUSALS, FromBytes, FromRandom, check_one
+from draws import REFUSALS, FromBytes, FromRandom
+from fuzzing import KINDS, check_one
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

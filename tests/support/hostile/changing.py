@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from changing_arrays import Changing
-from fuzzing import REFUSALS, SAMPLINGS, Draw, FromRandom, view_of
+from draws import REFUSALS, SAMPLINGS, Draw, FromRandom, view_of
 
 import topleft as tl
 

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from fuzzing import Draw
+from draws import Draw
 
 ODD_NUMBERS = [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-40, -1e-3, 1e-3, 1e6, -1e9, 2.0**31, 2.0**43, 1e30, 3e38]
 ODD_INTEGERS = [-1, 0, 2**15, 10**6, -(10**9), 2**31 - 1, -(2**31), 2**44, 2**63 - 1, -(2**63)]

@@ -16,7 +16,8 @@ import traceback
 import warnings
 from collections import Counter
 
-from fuzzing import KINDS, FromBytes, FromRandom, check_one
+from draws import FromBytes, FromRandom
+from fuzzing import KINDS, check_one
 
 
 def main() -> int:

@@ -193,6 +193,7 @@ def scene(name: str) -> dict[str, Any]:
         vertices = np.where(thin, vertices - low + PRESET_SIZE[1] // 2, vertices / REDUCTION)
         size = PRESET_SIZE
     else:
-        vertices = vertices - low + MARGIN_PX
-        size = tuple((extent + 2 * MARGIN_PX).astype(int).tolist())
+        margin = 1 if name in FANS else MARGIN_PX  # at 1280 screen pixels a fan's pixels are 6 of them wide
+        vertices = vertices - low + margin
+        size = tuple((extent + 2 * margin).astype(int).tolist())
     return {"vertices": vertices.tolist(), "triangles": triangles.tolist(), "size": list(size), "origin": [0, 0]}

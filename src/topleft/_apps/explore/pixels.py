@@ -131,12 +131,16 @@ def draw_reference(state: PixelState) -> MethodPicture:
             raise ValueError(f"the exact picture of {state.sampling!r} takes too long here: make the window smaller")
         verb = {"area": area.area, "outer": sampling.outer, "inner": sampling.inner}[state.sampling]
         bits = 8 if (state.sampling, state.subpixel_bits) == ("area", "exact") else state.subpixel_bits
-        given = (state.vertices, state.triangles, state.size)
-        shares = verb(*given, origin=state.origin, subpixel_bits=bits, cull=state.cull).astype(np.float32)
+        options: dict[str, Any] = {"origin": state.origin, "subpixel_bits": bits, "cull": state.cull}
+        shares = verb(state.vertices, state.triangles, state.size, **options).astype(np.float32)
         seconds = time.perf_counter() - start
         shares = np.minimum(shares, np.float32(1))
         owners = np.where(shares > 0, 0, -1).astype(np.int32)[..., None]
-        return MethodPicture(owners, (shares > 0).astype(np.int32)[..., None], shares, seconds)
+        counts = (shares > 0).astype(np.int32)
+        if state.sampling != "area":  # how many triangles have the pixel
+            each = (verb(state.vertices, row[None], state.size, **options) for row in state.triangles)
+            counts = sum((own.astype(np.int32) for own in each), np.zeros_like(counts))
+        return MethodPicture(owners, counts[..., None], shares, seconds)
     n = int(state.sampling.removeprefix("msaa")) if state.sampling != "center" else 1
     positions = sampling.SAMPLE_POSITIONS[n]
     n_samples = n * int(overdraw(state.vertices, state.triangles, state.size, origin=state.origin).sum())

@@ -5,14 +5,14 @@ Based on: IEC 61966-2-1, "Default RGB colour space - sRGB", 1999.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.array_types import F32, F64, I32, U8
+from topleft._core.base.array_types import F32, F64, I32, U8, Array
 from topleft._core.base.arrays import as_array, shown
 
 Color = tuple[int, ...]
@@ -51,6 +51,15 @@ def srgb_tables() -> tuple[I32, U8]:
     light = LINEAR_ONE * decode_srgb(np.arange(256) / 255)
     values = 255 * encode_srgb(np.arange(LINEAR_ONE + 1) / LINEAR_ONE)
     return np.rint(light).astype(np.int32), np.rint(values).astype(np.uint8)
+
+
+def spread_colors(colors: U8, are_light: bool, spread: Callable[[Array], F64]) -> U8:
+    """Return colours (N, 4) between others, by a function of mixed numbers: mixed as sRGB numbers, or as light."""
+    if not are_light:
+        return np.rint(spread(colors)).astype(np.uint8)
+    light = spread(np.concatenate([LIGHT_OF_SRGB[colors[:, :3]], colors[:, 3:] / 255], axis=1))
+    light[:, :3] = encode_srgb(light[:, :3].clip(0, 1))
+    return np.rint(255 * light).astype(np.uint8)
 
 
 def as_color(name: str, color: ColorLike, n_channels: int) -> Color:

@@ -42,7 +42,7 @@ def crs_text(crs: Any) -> str | None:
         If it is none of these.
     """
     if crs is None or isinstance(crs, str):
-        return crs or None
+        return f"EPSG:{crs}" if crs and crs.isdecimal() else crs or None
     if isinstance(crs, int) and not isinstance(crs, bool):
         return f"EPSG:{crs}"
     for name in ("to_string", "to_wkt"):
@@ -190,7 +190,9 @@ def _crs_of_coordinates(array: Any) -> str | None:
     mapping = {**getattr(array, "attrs", {}), **getattr(array, "encoding", {})}.get("grid_mapping", "spatial_ref")
     said = array.coords[mapping].attrs if mapping in array.coords else {}
     found = next((said[name] for name in ("spatial_ref", "crs_wkt") if said.get(name)), None)
-    return crs_text(found if found is not None else array.attrs.get("crs"))
+    text = crs_text(found if found is not None else array.attrs.get("crs"))
+    code = re.search(r"""(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\]\s*\]$""", text or "")  # WKT ends with its own code
+    return f"EPSG:{code[1]}" if code else text
 
 
 def numbers_without_data(raster: Any) -> list[float]:

@@ -26,6 +26,7 @@ from topleft._core.polygons.draw import cells_for
 from topleft._core.polygons.polygons import Rule, frame_of, in_crs_of, warn_if_apart
 from topleft._core.polygons.prepared import Prepared, prepare
 from topleft._core.polygons.rings import as_points, rings_of_triangles
+from topleft.errors import MissingPackageError
 from topleft.typing import RuleOption
 
 #: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
@@ -110,6 +111,23 @@ class Overlap:
         from scipy.sparse import csr_array
 
         return csr_array((self.areas, self.pixels, self.starts), shape=self.shape)
+
+    def to_sparse(self) -> Any:
+        """Return the table as `sparse.COO` (P, H, W) of pydata/sparse, of float32: no picture is made.
+
+        Raises
+        ------
+        MissingPackageError
+            If sparse is not installed.
+        """
+        try:
+            import sparse
+        except ImportError:
+            raise MissingPackageError("to_sparse needs the package sparse: pip install sparse") from None
+        places = np.stack([self.polygons, *self.rows_columns])
+        return sparse.COO(
+            places, self.areas, (len(self), *self.size[::-1]), has_duplicates=False, sorted=True, fill_value=0
+        )
 
     def sums(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
         """Return the integral (P,) of a raster (H, W) over each polygon; pixels without data count as nothing.

@@ -105,7 +105,7 @@ class Backward:
         out = tensors.smooth(
             self.grid, as_rule(edges), self.pos, self.rast, tensors.halves_across(self.grid.tri), color
         )
-        return out.reshape(given.shape).astype(np.float32 if given.dtype == np.float32 else np.float64, copy=False)
+        return out.reshape(given.shape).astype(np.float32 if given.dtype.type is np.float32 else np.float64, copy=False)
 
     def smooth_vjp(self, picture: ArrayLike, grad: ArrayLike, edges: EdgesOption) -> tuple[Floats, Floats]:
         """Return the gradients of the picture and of the vertices."""

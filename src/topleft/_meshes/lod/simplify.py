@@ -18,6 +18,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
 from topleft._core.base.arrays import shown
+from topleft._core.base.color import spread_colors
 from topleft._meshes.lod.collapse import STUCK, Collapsed, collapse, collapser, wanted_of
 from topleft._meshes.lod.distance import TriangleTree, measure, welded
 from topleft._meshes.lod.levels import Level, Levels, keep_levels, kept_levels
@@ -49,12 +50,15 @@ class Corners(NamedTuple):
     attributes : dict of str to (N, K) array
     material : (N,) int32 or None
         Row of the materials; triangles of two materials have no point in common.
+    mixes_light : bool
+        Whether colours between vertices are mixed as light.
     """
 
     points: F64
     triangles: I32
     attributes: dict[str, npt.NDArray[Any]]
     material: I32 | None
+    mixes_light: bool = False
 
 
 def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
@@ -185,6 +189,7 @@ def corners_of(mesh: Mesh) -> Corners:
         compact.reshape(-1, 3).astype(np.int32),
         {name: array[source] for name, array in given.items()},
         None if rows is None else (used % len(mesh.materials)).astype(np.int32),
+        mesh.color_interpolation == "linear",
     )
 
 
@@ -197,13 +202,15 @@ def next_corners(corners: Corners, collapsed: Collapsed) -> Corners:
     if attributes:
         triangle, weights = nearest_before(corners, collapsed.points, into)
         rows = corners.triangles[triangle]
-        attributes = {name: mixed(name, array, rows, weights) for name, array in attributes.items()}
+        attributes = {
+            name: mixed(name, array, rows, weights, corners.mixes_light) for name, array in attributes.items()
+        }
     if material is not None:
         is_left = into >= 0
         of_next = np.empty(len(collapsed.points), np.int32)
         of_next[into[is_left]] = material[is_left]
         material = of_next
-    return Corners(collapsed.points, collapsed.triangles, attributes, material)
+    return Corners(collapsed.points, collapsed.triangles, attributes, material, corners.mixes_light)
 
 
 def nearest_before(corners: Corners, points: F64, into: I32) -> tuple[npt.NDArray[np.intp], F64]:
@@ -233,12 +240,16 @@ def weights_of(corners: F64, points: F64) -> F64:
     return np.where(total > 0, weights / np.where(total > 0, total, 1), np.eye(3)[nearest])
 
 
-def mixed(name: str, array: npt.NDArray[Any], rows: I32, weights: F64) -> npt.NDArray[Any]:
-    """The attribute of points: that of three vertices, by weight."""
-    values = np.einsum("ij,ijk->ik", weights, array[rows].astype(np.float64))
-    if name == "normals":
-        return unit_or_zero(values).astype(array.dtype)
-    return np.rint(values).astype(np.uint8) if array.dtype == np.uint8 else values.astype(array.dtype)
+def mixed(name: str, array: npt.NDArray[Any], rows: I32, weights: F64, mixes_light: bool) -> npt.NDArray[Any]:
+    """The attribute of points: that of three vertices, by weight; colours as light, or as their numbers."""
+
+    def mix(values: npt.NDArray[Any]) -> F64:
+        mean: F64 = np.einsum("ij,ijk->ik", weights, values[rows].astype(np.float64))
+        return mean
+
+    if name == "colors":
+        return spread_colors(array, mixes_light, mix)
+    return (unit_or_zero(mix(array)) if name == "normals" else mix(array)).astype(array.dtype)
 
 
 def level_mesh(corners: Corners, original: Mesh) -> Mesh:

@@ -13,7 +13,6 @@ the edge alone, and triangles that share an edge share its ends: so they split i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -22,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F32, F64, I32, U8, Array
+from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import set_aligned
-from topleft._core.base.color import LIGHT_OF_SRGB, encode_srgb
+from topleft._core.base.color import spread_colors
 from topleft._core.base.memory import empty
 from topleft._core.base.options import Cull, parse
 from topleft._core.base.threads import run_parts, threads_of_rows
@@ -281,15 +280,6 @@ class LensMap:
         if not self.lens.has_planar_range:  # shares of a chord are not those of its arc
             bends += 0.01 * np.sqrt(sum(((a - b) ** 2).sum(axis=2) for a, b in ends[:2])) / (2 * step)
         return np.asarray(bends.max(axis=1))
-
-
-def spread_colors(colors: U8, are_light: bool, spread: Callable[[Array], F64]) -> U8:
-    """The colours of parts, between those of the corners: mixed as sRGB numbers, or as light."""
-    if not are_light:
-        return np.rint(spread(colors)).astype(np.uint8)
-    light = spread(np.concatenate([LIGHT_OF_SRGB[colors[:, :3]], colors[:, 3:] / 255], axis=1))
-    light[:, :3] = encode_srgb(light[:, :3].clip(0, 1))
-    return np.rint(255 * light).astype(np.uint8)
 
 
 def weighed(weights: F64, corners: npt.NDArray[Any]) -> F64:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from topleft._core.base.array_types import F64, I32, I64, MeshLike
 from topleft._core.base.arrays import as_array, as_count, as_number, shown
 from topleft._core.base.defaults import DEFAULT_SIZE
+from topleft._core.base.memory import check_fits
 from topleft._core.base.options import check_choice
 from topleft._core.raster.rle import RunTable, annotation_of, encode_ids
 from topleft._meshes.camera.camera import Camera, CameraLike
@@ -32,6 +33,7 @@ Window = tuple[int, int, int, int]
 """Left, top, right and bottom, pixels of the picture, which may reach beyond it."""
 
 NO_BOX = (0, 0, 0, 0)
+MOST_BEYOND_PX = 2**30
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +242,10 @@ def object_masks(
     Raises
     ------
     ValueError
-        If there are no triangles and no camera is given, an option is unknown, or `beyond` is negative or not finite.
+        If there are no triangles and no camera is given, an option is unknown, or `beyond` is negative, not finite, or
+        reaches more than ``2**30`` pixels.
+    MemoryError
+        If the mask of an object does not fit.
 
     Notes
     -----
@@ -266,6 +271,8 @@ def object_masks(
     if not 0 <= as_number("beyond", beyond) < np.inf:
         raise ValueError(f"beyond must be a number of pictures, 0 or more, got {beyond}")
     shot = Shot.of(scene, camera, size, takes_points=False)
+    if beyond * max(shot.size) > MOST_BEYOND_PX:
+        raise ValueError(f"beyond must reach at most {MOST_BEYOND_PX} pixels, got {beyond} pictures of {shot.size}")
     whole, (width, height) = scene_of(shot.subject), shot.size
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
     instance, boxes = seen_in(whole, shot.camera, shot.size, options)
@@ -275,7 +282,9 @@ def object_masks(
     windows = []
     for one in whole:
         left, top, right, bottom = window_of(one, shot.camera, shot.size, canvas)
-        mask = np.zeros((max(0, bottom - top), max(0, right - left)), np.bool_)
+        shape = max(0, bottom - top), max(0, right - left)
+        check_fits(shape, np.bool_)
+        mask = np.zeros(shape, np.bool_)
         if mask.size:
             window = options | {"origin": (left, top), "viewport": shot.size}
             mask = seen_in(Scene([one]), shot.camera, mask.shape[::-1], window)[0] >= 0
