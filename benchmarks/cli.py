@@ -29,7 +29,6 @@ from benchmarks.small.batch import STUDY as BATCH
 from benchmarks.small.cluster import STUDY as CLUSTER
 from benchmarks.small.explorer import STUDY as EXPLORER
 from benchmarks.small.gate import STUDY as GATE
-from benchmarks.small.gradients import STUDY as GRADIENTS
 from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.instances import STUDY as INSTANCES
 from benchmarks.small.memset import STUDY as MEMSET
@@ -42,7 +41,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, MEMSET, GROWTH, POLYGONS,
-        REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, INSTANCES, GRADIENTS, *PAIRS,
+        REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, INSTANCES, *PAIRS,
     )
 }  # fmt: skip
 

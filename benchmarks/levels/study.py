@@ -21,7 +21,6 @@ from benchmarks.harness.records import Record, Save
 from benchmarks.levels import page
 from benchmarks.report.study import Study
 from topleft._meshes.lod.detail import pixels_of_bound, window_of
-from topleft._meshes.picture.through_lens import StaticPlan
 
 SIZE = (1920, 1080)
 HEIGHTS_PX = (1000, 300, 100, 30, 10)
@@ -126,17 +125,19 @@ def draw_times(mesh: tl.Mesh, levels: tl.Levels, rounds: int) -> list[dict[str, 
     `turns_ms`: of each level, from arrays; `clustered_ms`: of the mesh as one that is drawn again, in clusters.
     """
     rasterizer = tl.Rasterizer(SIZE, threads=1)
-    arrays: list[tuple[Any, Any, Any]] = [(one.mesh.vertices, one.mesh.triangles, None) for one in levels]
-    arrays.append((mesh.vertices, mesh.triangles, StaticPlan(mesh)))
-    _ = mesh.clusters
+    arrays = [(one.mesh.vertices, one.mesh.triangles) for one in levels]
     found = []
     for height_px in HEIGHTS_PX:
-        matrix = camera_at(mesh, extent_of(mesh), height_px).clip_from_world(SIZE)
-        turns: list[list[float]] = [[] for _ in arrays]
+        camera = camera_at(mesh, extent_of(mesh), height_px)
+        matrix = camera.clip_from_world(SIZE)
+        turns: list[list[float]] = [[] for _ in range(len(levels) + 1)]
         for i in range(rounds + 2):
-            for (vertices, triangles, plan), own in zip(arrays, turns, strict=True):
+            for k, own in enumerate(turns):
                 started = time.perf_counter_ns()
-                rasterizer.rasterize(vertices, triangles, transform=matrix, plan=plan)
+                if k == len(levels):
+                    tl.rasterize_mesh(mesh, camera, SIZE, rasterizer=rasterizer, threads=1)
+                else:
+                    rasterizer.rasterize(*arrays[k], transform=matrix)
                 if i > 1:  # the first one touches the memory, and from the second on there are clusters
                     own.append((time.perf_counter_ns() - started) / 1e6)
         found.append({"turns_ms": turns[:-1], "clustered_ms": turns[-1]})

@@ -58,6 +58,16 @@ class Drawing:
     untimed: str = ""
 
 
+def llvmpipe_context() -> Any:
+    """A context without a display. RuntimeError where OpenGL runs on something else than llvmpipe."""
+    import moderngl
+
+    context = moderngl.create_standalone_context(require=330, backend="egl")
+    if "llvmpipe" not in context.info["GL_RENDERER"]:
+        raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
+    return context
+
+
 def load_peer(name: str) -> ModuleType:
     """The file of a contestant."""
     if name not in (OURS, BROKEN, *PEERS):

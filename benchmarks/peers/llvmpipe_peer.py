@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.peers import Drawing
+from benchmarks.peers import Drawing, llvmpipe_context
 from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "moderngl"
@@ -73,9 +73,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:
         return draw_by_llvmpipe(scene, threads)
     import moderngl
 
-    context = moderngl.create_standalone_context(require=330, backend="egl")
-    if "llvmpipe" not in context.info["GL_RENDERER"]:
-        raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
+    context = llvmpipe_context()
     width, height = scene.size
     vertices, triangles = scene.vertices, scene.triangles
     if scene.task == "smooth-fill":  # corners of its own for every triangle: a colour per vertex is one per triangle

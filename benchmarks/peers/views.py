@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers import Drawing
+from benchmarks.peers import Drawing, llvmpipe_context
 from benchmarks.scenes.cases import Scene
 
 LIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
@@ -93,9 +93,7 @@ def draw_by_llvmpipe(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     """OpenGL: light in the pixel, read back as RGB."""
     import moderngl
 
-    context = moderngl.create_standalone_context(require=330, backend="egl")
-    if "llvmpipe" not in context.info["GL_RENDERER"]:
-        raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
+    context = llvmpipe_context()
     program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
     turned_over = np.diag([1.0, -1.0, 1.0, 1.0]) @ scene.transform  # OpenGL's row 0 is at the bottom
     program["clip_from_eye"].write(turned_over.T.astype("f4").tobytes())

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
+from benchmarks.peers import llvmpipe_context
 from benchmarks.pictures.scenes import SIZE, PictureScene
 from topleft._core.base.color import DEFAULT_COLOR
 from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT
@@ -174,10 +175,8 @@ class OpenGL:
         import moderngl
 
         os.environ.update(ENVIRONMENT)
-        self.context = moderngl.create_standalone_context(require=330, backend="egl")
+        self.context = llvmpipe_context()
         self.renderer = f"{self.context.info['GL_RENDERER']}, OpenGL {self.context.info['GL_VERSION']}"
-        if "llvmpipe" not in self.renderer:
-            raise RuntimeError(f"OpenGL runs on {self.renderer}, not on llvmpipe")
         self.program = self.context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
         targets = [self.context.texture(SIZE, 4), self.context.texture(SIZE, 1, dtype="i4")]
         self.frame = self.context.framebuffer(targets, self.context.depth_texture(SIZE))

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -121,16 +122,10 @@ def timed(work: Callable[[], object]) -> tuple[float, float]:
     return time.perf_counter() - begin, time.process_time() - begin_cpu
 
 
-def topleft_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
+def topleft_labels(vertices: np.ndarray, triangles: np.ndarray, side: int, **options: Any) -> np.ndarray:
     import topleft as tl
 
-    return tl.tiles((vertices, triangles), (side, side), window=WINDOW, depth_test=None)[:]
-
-
-def exact_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
-    import topleft as tl
-
-    return tl.tiles((vertices, triangles), (side, side), window=WINDOW, depth_test=None, subpixel_bits="exact")[:]
+    return tl.tiles((vertices, triangles), (side, side), window=WINDOW, depth_test=None, **options)[:]
 
 
 def rasterio_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
@@ -188,13 +183,10 @@ def datashader_labels(vertices: np.ndarray, triangles: np.ndarray, side: int, n_
     return np.nan_to_num(found.values, nan=-1).astype(np.int32)
 
 
-def datashader_dask_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
-    return datashader_labels(vertices, triangles, side, n_parts=4)
-
-
 DRAWN: dict[str, Callable[[np.ndarray, np.ndarray, int], np.ndarray]] = {
-    "topleft": topleft_labels, "topleft, exact": exact_labels, "rasterio": rasterio_labels,
-    "gdal_rasterize": gdal_labels, "datashader": datashader_labels, "datashader, Dask": datashader_dask_labels,
+    "topleft": topleft_labels, "topleft, exact": partial(topleft_labels, subpixel_bits="exact"),
+    "rasterio": rasterio_labels, "gdal_rasterize": gdal_labels, "datashader": datashader_labels,
+    "datashader, Dask": partial(datashader_labels, n_parts=4),
 }  # fmt: skip
 
 #: What a program took by itself, where making its input is no part of its time.

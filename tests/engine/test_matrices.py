@@ -129,3 +129,22 @@ def test_cube_root_and_length():
         root = Fraction(engine.cube_root(value))
         assert abs(root**3 - Fraction(value)) <= abs(Fraction(value)) * Fraction(1, 10**15)
     assert engine.length([3, 4, 12]) == 13
+
+
+def test_pose_that_is_taken_at_a_glance_is_one():
+    rng = np.random.default_rng(5)
+    n_taken = 0
+    for k in range(400):
+        pose = np.eye(4)
+        pose[:3] = rng.normal(size=(3, 4)) * 10.0 ** rng.integers(-12, 13)
+        pose[2, :3] = pose[0, :3] + pose[2, :3] * 10.0 ** -rng.integers(0, 20)  # the more so, the nearer to singular
+        if k % 5 == 0:
+            pose[rng.integers(4), rng.integers(4)] = rng.choice([np.nan, np.inf, -np.inf, 2.0, 1e200])
+        if engine.is_pose(pose):
+            n_taken += 1
+            assert np.isfinite(pose).all()
+            assert pose[3].tolist() == [0, 0, 0, 1]
+            assert np.linalg.matrix_rank(pose[:3, :3]) == 3
+    assert 50 < n_taken < 350
+    assert engine.is_pose(np.eye(4))
+    assert not engine.is_pose(np.diag([1.0, 1.0, 0.0, 1.0]))

@@ -86,7 +86,7 @@ def test_a_scene_is_its_mesh_and_instances_hide_each_other():
 
 def test_what_is_opaque_is_drawn_as_ever():
     opaque = replace(MESH, materials=[SOLID] * 4)
-    assert blended_masks(opaque, ShadingOptions.parse()) is None
+    assert blended_masks(tl.Scene([opaque]), ShadingOptions.parse()) is None
     alone = replace(MESH, triangles=MESH.triangles[MESH.material_of_triangle == 2], materials=[SOLID],
                     material_of_triangle=None)  # fmt: skip
     clear = [replace(one, opacity=0) if one.alpha_mode == "blend" else one for one in MATERIALS]
@@ -95,10 +95,10 @@ def test_what_is_opaque_is_drawn_as_ever():
 
 def test_full_opacity_is_opaque():
     full = [replace(one, opacity=1) for one in MATERIALS]
-    assert blended_masks(replace(MESH, materials=full), ShadingOptions.parse()) is None
+    assert blended_masks(tl.Scene([replace(MESH, materials=full)]), ShadingOptions.parse()) is None
     nearly = replace(MESH, materials=[replace(one, texture=tl.Texture([[[255, 255, 255, 254]]])) for one in full],
                      uv=np.zeros((len(MESH.vertices), 2)))  # fmt: skip
-    assert blended_masks(nearly, ShadingOptions.parse()) is not None
+    assert blended_masks(tl.Scene([nearly]), ShadingOptions.parse()) is not None
     got, expected = (tl.render(mesh, CAMERA, SIZE).astype(int) for mesh in (nearly, replace(MESH, materials=full)))
     assert np.abs(got - expected).max() <= 12.92 * 255 / 255 + 1  # a 255th of white behind what is black
 

@@ -13,6 +13,7 @@ import topleft as tl
 from topleft._core import engine
 from topleft._core.engine.isa import build_info
 from topleft._meshes.picture.holes import cut_of, cut_out, cuts_of
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.transparent import solid_layers
 
 ORDER = (2, 0, 3, 1)
@@ -247,7 +248,7 @@ def expected_layers(n, bits=8):
 @pytest.mark.parametrize("threads", [1, 3])
 def test_layers_of_glass_are_those_that_are_left(n, threads, bits):
     options = {"layers": n, "threads": threads, "subpixel_bits": bits}
-    found = solid_layers(SCENE, CAMERA, SIZE, cuts_of(SCENE, None), **options)
+    found = solid_layers(Shot.of(SCENE, CAMERA, SIZE), cuts_of(SCENE, None), **options)
     ids, depth = expected_layers(n, bits)
     assert_same(found.planes[0], ids.astype(np.int32))
     assert_same(found.planes[1], depth.astype(np.float32))

@@ -327,7 +327,7 @@ BALLS = [tl.Mesh(vertices.astype(dtype), triangles)
 @ON_EACH_ISA
 @pytest.mark.parametrize("most_ids", [2**31 - 1, 5000, 1500])
 @pytest.mark.parametrize("seed", range(6))
-def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, seed, most_ids, monkeypatch):
+def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, seed, most_ids, monkeypatch, force):
     rng = np.random.default_rng(seed)
     standing, camera = random_scene(rng)
     options = {
@@ -337,10 +337,8 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
     whole = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)
     mask_options = {"threads": 3, "sampling": ["center", "outer", "msaa4"][seed % 3]}
     mask = tl.silhouette(tl.Scene(standing), camera, (60, 40), **mask_options)
-    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: True)
-    monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
+    force(pays_to_cluster=True, pays_to_draw_instances=True, pays_to_share_instances=True)
     monkeypatch.setattr(instances, "FIRST_ROUND", int(rng.choice([1, 4])))
-    monkeypatch.setattr(choices, "pays_to_share_instances", lambda *_: True)
     for module in (placed, instances):
         monkeypatch.setattr(module, "INT32_MAX", most_ids)
     with on(isa):

@@ -11,8 +11,10 @@ from pages import before_a_page, behind_a_page
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, slivers, with_depth
 
 import topleft as tl
+from topleft._core.base.memory import FRESH
+from topleft._core.raster.rasterize import draw_fragments
 from topleft._core.raster.sampling import POSITIONS
-from topleft._core.raster.verbs import draw_ids
+from topleft._core.raster.view import View
 from topleft.methods.reference import sampling as ref
 
 COUNTS = (2, 4, 8, 16)
@@ -206,9 +208,10 @@ def test_index_outside_the_vertices_is_an_error():
 # ---- what is kept of samples for shading ----------------------------------------------------------------------------
 
 
-def split_ids(vertices, triangles, size, rasterizer=None, **options):
+def split_ids(vertices, triangles, size, memory=FRESH, depth_test="less", background_depth=None, out=None, **options):
     """The visibility buffer as pictures have it drawn."""
-    return draw_ids(rasterizer, size, vertices, triangles, is_split=True, **options)
+    view = View.parse(size, options).but(is_split=True)
+    return draw_fragments(memory, vertices, triangles, view, depth_test, background_depth, out)
 
 
 def kept(frags):
@@ -283,7 +286,7 @@ def test_lists_of_every_pixel_stay_in_their_room(isa, guard, width):
     rasterizer = tl.Rasterizer((width, 67), threads=3)
     rasterizer._memory = Guarded(guard)
     with on(isa):
-        frags = split_ids(corners, triangles, (width, 67), rasterizer, sampling="msaa8")
+        frags = split_ids(corners, triangles, (width, 67), rasterizer._memory, sampling="msaa8", threads=3)
         assert kept(frags)[0].all()
         check_kept(frags)
     assert "split columns of samples" in rasterizer._memory.names
@@ -293,7 +296,7 @@ def test_samples_outlive_what_other_verbs_do_with_the_memory():
     scene = mixed(np.random.default_rng(2), 50, (40, 30))
     expected = draw(scene, 4, tl.rasterize)
     rasterizer = tl.Rasterizer(scene.size)
-    for found in (rasterizer.rasterize, partial(draw_ids, rasterizer, scene.size, is_split=True)):
+    for found in (rasterizer.rasterize, partial(split_ids, size=scene.size, memory=rasterizer._memory)):
         frags = found(scene.vertices, scene.triangles, sampling="msaa4")
         for verb in (rasterizer.coverage, rasterizer.overdraw, rasterizer.rasterize):
             verb(scene.vertices[::-1] * 3, scene.triangles[::-1])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._meshes.scene.scene import as_subject, meshes_of, scene_of
+from topleft._meshes.scene.scene import as_subject, scene_of
 
 MESH = tl.Mesh(*tl.scenes.shape("cube"))
 POINTS = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
@@ -40,9 +40,7 @@ def test_file_of_points_where_triangles_are_needed_is_refused(cloud_file, draw):
         draw(cloud_file)
 
 
-def test_meshes_and_scene_of_a_mesh_are_itself_alone():
-    assert meshes_of(MESH) == [MESH]
+def test_scene_of_a_mesh_is_itself_alone():
     assert [instance.mesh for instance in scene_of(MESH)] == [MESH]
     scene = tl.Scene([MESH, MESH])
     assert scene_of(scene) is scene
-    assert meshes_of(scene) == [MESH, MESH]

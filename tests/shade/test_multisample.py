@@ -11,7 +11,6 @@ from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
 from topleft._core.base.color import id_colors, srgb_tables
-from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
 from topleft.methods.reference.sampling import mean
@@ -31,8 +30,8 @@ def test_alpha_is_the_share_of_samples_with_a_triangle(n):
 @ON_EACH_ISA
 @pytest.mark.parametrize("shading", ["smooth", "flat", "normals"])
 @pytest.mark.parametrize("size", [SIZE, (1100, 40)])
-def test_picture_is_the_same_from_planes_of_samples(monkeypatch, isa, shading, size):
-    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: False)  # planes of samples
+def test_picture_is_the_same_from_planes_of_samples(force, isa, shading, size):
+    force(pays_to_cluster=False)  # planes of samples
     square = tl.Camera.orthographic(tl.Camera.framing(KNOT).view, near=0.1, far=30, height=3)
     look = {"shading": shading, "fog": tl.Fog(2.0, 9.0), "background": (10, 200, 30, 100)}
     lights = [tl.Light((1, 2, 3), kind="point")]

@@ -43,7 +43,7 @@ def exact_weights(corners_px, x, y):
 
 def found_weights(frags, mesh, camera, step=1):
     """Of some pixels (row, column) the weights by which the normals of their corners, three axes, are mixed."""
-    shown = [ShownInstance(frags._snapped, mesh)]
+    shown = [ShownInstance(frags._snapped, mesh, np.eye(4))]
     normals = shade_normals(shown, frags.triangle, camera, np.eye(3))  # the camera looks along -z, x to the right
     for y, x in np.argwhere(frags.mask)[::step].tolist():
         mixed = np.abs(normals[y, x].astype(np.float64))

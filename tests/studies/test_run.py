@@ -16,7 +16,7 @@ from benchmarks.peers import PEERS, load_peer, why_not
 from benchmarks.report.tables import number
 from benchmarks.run import scene_tables, smooth_tables, tables
 from benchmarks.scenes.cases import CASES, TASKS, Scene, orbit_camera
-from benchmarks.small import pairs
+from benchmarks.small import others, pairs
 
 import topleft as tl
 
@@ -167,9 +167,9 @@ def test_yardstick_without_a_figure_tells():
 
 
 def test_fields_that_are_timed_are_whole(monkeypatch):
-    monkeypatch.setattr(pairs, "OTHER_FIELDS", {})
-    (_, field), (_, heights) = pairs.field_beside_others()
-    for draw, size in ((field["topleft field"], pairs.HD), (heights["topleft height_map"], (400, 400))):
+    monkeypatch.setattr(others, "OTHER_FIELDS", {})
+    (_, field), (_, heights) = others.field_beside_others()
+    for draw, size in ((field["topleft field"], others.HD), (heights["topleft height_map"], (400, 400))):
         found = draw()
         assert found.shape == size[::-1]
         assert np.isfinite(found).all()
@@ -177,11 +177,11 @@ def test_fields_that_are_timed_are_whole(monkeypatch):
 
 @pytest.mark.parametrize("kind", pairs.PAIRS)
 def test_pairs_draw_the_same_work_and_are_printed(kind):
-    if kind == "rle":
-        pytest.importorskip("pycocotools")
+    needed = {"rle": "pycocotools", "gradients": "torch"}
+    pytest.importorskip(needed.get(kind, "topleft"))
     scene, calls = next(iter(pairs.PAIRS[kind].scenes()))
     assert len(calls) > 1
     rows = [{"scene": scene, "call": name, "ms": [1.0 + k, 2.0]} for k, name in enumerate(calls)]
-    head, _, first, *others = pairs.lines({"rows": rows})
+    head, _, first, *more = pairs.lines({"rows": rows})
     assert head.split()[-2:] == ["ratio", "|"]
-    assert (first.split()[-2], len(others)) == ("1.00", len(calls) - 1)
+    assert (first.split()[-2], len(more)) == ("1.00", len(calls) - 1)

@@ -111,6 +111,24 @@ def determinant(a: ArrayLike) -> float:
     return determinant_of(m)
 
 
+def is_pose(a: Array) -> bool:
+    """Return whether a float64 matrix, (4, 4), is finite, has the last row of a pose, and is certain to be regular.
+
+    The least singular value of three rows is at least 2 |det| / |m|^2, in Frobenius' norm; a matrix of which it is
+    below 1e-9 |m| is left to a closer look.
+    """
+    cdef const double[:, :] m = a
+    cdef Py_ssize_t i, j
+    cdef double squares = 0.0, shift = 0.0
+    if m[3, 0] != 0.0 or m[3, 1] != 0.0 or m[3, 2] != 0.0 or m[3, 3] != 1.0:
+        return False
+    for i in range(3):
+        shift = shift + m[i, 3] - m[i, 3]  # NaN where it is not finite
+        for j in range(3):
+            squares = squares + m[i, j] * m[i, j]
+    return shift == 0.0 and 2.0 * fabs(determinant_of(m)) > 1e-9 * squares * sqrt(squares)
+
+
 cdef struct Rays:
     # How a camera sees a space: rows of eye, four of rays, three to eye space, origin.
     bint has_perspective

@@ -7,7 +7,7 @@ colours count as much as they are opaque: the mean of premultiplied colours, mad
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -81,8 +81,7 @@ class Blending:
         return self.has_alpha and self.alpha is Alpha.STRAIGHT and self.mode in (Blend.OVER, Blend.REPLACE)
 
 
-@dataclass(slots=True)
-class Painting:
+class Painting(NamedTuple):
     """A snapped mesh, its colours, and the contiguous pixels that they are written to."""
 
     memory: Memory
@@ -102,18 +101,18 @@ class Painting:
     @property
     def is_u8(self) -> bool:
         """Whether colours are uint8; otherwise they are float32."""
-        return bool(self.colors.dtype == np.uint8)
+        return self.colors.itemsize == 1
 
     @property
     def ground_bytes(self) -> NDArray[np.uint8] | None:
         """The ground as kernels read it."""
         return None if self.ground is None else engine.as_bytes(np.full(self.pixels.shape[2:] or 1, self.ground))
 
-    def lay_ground(self) -> None:
+    def with_ground_laid(self) -> Painting:
         """Give all pixels the ground: the first row, and the others row by row, which NumPy copies fast."""
         self.pixels[:1] = self.ground
         self.pixels[1:] = self.pixels[:1]
-        self.ground = None
+        return self._replace(ground=None)
 
     def samples(self, n_threads: int) -> SamplePass:
         """Return the pass that draws its samples."""
@@ -155,7 +154,7 @@ def draw_fill(
         else:
             is_large_shapes = is_drawn and choices.fills_large_shapes(snapped, view, palette, is_flat=is_flat)
         if ground is not None and not (can_lay or is_large_shapes):
-            painting.lay_ground()
+            painting = painting.with_ground_laid()
         is_large_shapes = is_large_shapes and painting.ground is not None
         if not is_drawn:
             pass
@@ -314,10 +313,10 @@ def blend_picture(
     `band_rows`: so many are finished before the next; 0: a few large triangles, row by row.
     """
     height, width = pixels.shape[:2]
-    n_parts = min(height, n_threads)
+    n_parts, n_channels, is_u8 = min(height, n_threads), p.n_channels, p.is_u8
     flat, palette, under = engine.as_bytes(pixels), engine.as_bytes(p.colors), p.ground_bytes
     n_packed = width * (n_parts * engine.BLENDED_ROWS if band_rows == 0 else height)
-    packed = p.memory.empty("packed", (n_packed,), np.int32) if p.is_u8 and p.n_channels != 4 else None
+    packed = p.memory.empty("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
     n_cells = engine.blend_cells(width)
     cells = p.memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
     code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
@@ -327,7 +326,7 @@ def blend_picture(
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
         room = packed[engine.BLENDED_ROWS * width * i :] if packed is not None and band_rows == 0 else packed
         return mesh.blend(
-            flat, width, first, end - first, palette, p.n_channels, p.is_u8, p.is_flat,
+            flat, width, first, end - first, palette, n_channels, is_u8, p.is_flat,
             code, is_premultiplied, band_rows, under, room, own, is_large_shapes=band_rows == 0,
         )  # fmt: skip
 

@@ -155,11 +155,17 @@ def peel(
             [ 0, -1],
             [-1, -1]]], dtype=int32)
     """
-    checked = View.parse(size, view)
-    n, is_farthest = check_peel(checked, layers, depth_test)
+    return draw_layers_of(vertices, triangles, View.parse(size, view), layers, depth_test)
+
+
+def draw_layers_of(
+    vertices: ArrayLike, triangles: ArrayLike, view: View, layers: int, depth_test: DepthTestOption
+) -> DepthLayers:
+    """Return the layers of `peel` by checked options."""
+    n, is_farthest = check_peel(view, layers, depth_test)
     # Layers refer to what they were drawn from, so nothing of it can be reused.
-    snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
-    ids, depth = peel_meshes(SCRATCH, [[snapped.mesh]], checked, n, is_farthest=is_farthest, refuse=snapped.refuse)
+    snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=True, out=None)
+    ids, depth = peel_meshes(SCRATCH, [[snapped.mesh]], view, n, is_farthest=is_farthest, refuse=snapped.refuse)
     return DepthLayers(ids, depth, snapped)
 
 

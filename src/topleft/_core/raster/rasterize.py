@@ -338,14 +338,18 @@ ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_de
 
 
 def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, options: FragmentOptions) -> Fragments | None:
-    """Draw a mesh that the plan has in clusters.
+    """Draw a mesh that has clusters, or that the plan has in clusters.
 
     None where there are no clusters, where drawing them does not pay, or where only the mesh can tell what is wrong.
     """
-    if view.plan is None or view.transform is None:
-        return None
     sink = choices.fragment_sink(options.test, has_depth=True)
-    clusters = view.plan.find_clusters(vertices) if choices.can_cluster(view, sink) else None
+    clusters = None
+    if view.transform is None or not choices.can_cluster(view, sink):
+        return None
+    if view.plan is not None:
+        clusters = view.plan.find_clusters(vertices)
+    elif view.static is not None:
+        clusters = view.static.find_clusters()
     if clusters is None:
         return None
     clusters.n_pictures += 1

@@ -133,6 +133,8 @@ def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, 
     triangles = apart_from(out, "triangles", triangles)
     if view.plan is not None:
         is_checked, indices = True, view.plan.triangles_of(triangles, len(points))
+    elif view.static is not None:
+        is_checked, indices = True, view.static.triangles
     else:
         native = as_triangles(triangles)
         is_checked = native.dtype == np.int64

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from threading import Lock
 from typing import Any, Unpack, cast
@@ -286,31 +285,8 @@ def rasterize(
     if n is not None:
         batch = draw_batch(n, vertices, triangles, size, view, depth_test, background_depth, out)
         return cast("Fragments", batch)  # the rare case: whoever passes a batch knows what comes back
-    return draw_ids(None, size, vertices, triangles, depth_test, background_depth, out, **view)
-
-
-def draw_ids(
-    rasterizer: Rasterizer | None,
-    size: int | tuple[int, int],
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    depth_test: DepthTestOption | None = "less",
-    background_depth: float | None = None,
-    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None = None,
-    *,
-    is_split: bool = False,
-    **view: Unpack[ViewOptions],
-) -> Fragments:
-    """Return the visibility buffer, on the memory of a `Rasterizer` or on fresh memory.
-
-    `is_split`: of several samples, what shading reads; without, a plane a sample.
-    """
-    if rasterizer is None:  # fragments refer to what they were drawn from, so nothing of it can be reused
-        checked = replace(View.parse(size, view), is_split=is_split)
-        return draw_fragments(FRESH, vertices, triangles, checked, depth_test, background_depth, out)
-    with rasterizer._turn:
-        checked = replace(rasterizer._view(view), is_split=is_split)
-        return draw_fragments(rasterizer._memory, vertices, triangles, checked, depth_test, background_depth, out)
+    # fragments refer to what they were drawn from, so nothing of it can be reused
+    return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 
 
 def wireframe(
@@ -478,7 +454,9 @@ class Rasterizer:
         **view: Unpack[ViewOptions],
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
-        return draw_ids(self, self.size, vertices, triangles, depth_test, background_depth, out, **view)
+        checked = self._view(view)
+        with self._turn:
+            return draw_fragments(self._memory, vertices, triangles, checked, depth_test, background_depth, out)
 
     def wireframe(
         self,

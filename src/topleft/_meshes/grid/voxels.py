@@ -25,7 +25,7 @@ from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.normals import moved
-from topleft._meshes.scene.scene import Scene, as_meshes, meshes_in_places
+from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
 from topleft.errors import MeshWarning
 from topleft.typing import VoxelRuleOption
 
@@ -172,7 +172,7 @@ def voxelize(
     if samples > 1 and not (solid and rule == "center"):
         raise ValueError(f"samples must be 1 for a surface and for rule 'touched', got {samples}")
     grid = grid_of(subject.bounds if bounds is None else as_bounds(bounds), shape, pitch, samples)
-    bodies = [(in_place(one.mesh.vertices, one.transform), one.mesh.triangles) for one in meshes_in_places(subject)]
+    bodies = [(moved(one.mesh.vertices, one.transform), one.mesh.triangles) for one in scene_of(subject)]
     n_threads = threads_for(threads, sum(len(triangles) for _, triangles in bodies))
     if samples > 1:
         check_fits(grid.shape, np.float32)
@@ -260,11 +260,6 @@ def counts_of(extent: F64, pitch: float) -> list[int]:
     """How many voxels hold an extent; what rounding adds is not worth one."""
     counts = np.ceil(extent / pitch * (1 - 2.0**-40))
     return [int(min(max(count, 1.0), 2.0 * MOST_ALONG)) for count in counts.tolist()]
-
-
-def in_place(vertices: npt.NDArray[Any], transform: F64 | None) -> npt.NDArray[Any]:
-    """The vertices of an instance where it stands."""
-    return vertices if transform is None else moved(vertices, transform)
 
 
 def solid_bits(

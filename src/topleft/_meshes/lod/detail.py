@@ -31,7 +31,7 @@ from topleft._meshes.lod.simplify import levels_of
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.scene.adapt import as_mesh
-from topleft._meshes.scene.scene import Scene, meshes_of
+from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption
 
 
@@ -239,41 +239,20 @@ def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, origina
     return None if scale is None else level.bound * scale
 
 
-def detailed(
-    mesh: Mesh | Scene, camera: Camera, size: tuple[int, int], tolerance: float, **options: Any
-) -> Mesh | Scene:
-    """The mesh or scene as it is drawn within a tolerance; options as for `choose_detail`."""
+def detailed(scene: Scene, camera: Camera, size: tuple[int, int], tolerance: float, **options: Any) -> Scene:
+    """The scene as it is drawn within a tolerance; options as for `choose_detail`."""
     if not isinstance(options.get("material"), Material | None):
         raise TypeError(f"material must be a Material, got {shown(options['material'])}")
     if check_tolerance(tolerance) == 0:
-        return mesh
-    if isinstance(mesh, Mesh):
-        return level_of(mesh, camera, size, tolerance, **options)
+        return scene
+    if camera.lens is not None:
+        return scene  # see `why_whole`
     sight = sight_of(camera, size, options.get("viewport"), options.get("origin", (0, 0)))
-    matrices = mesh.clip_from_objects(sight.clip_from_world)
-    meshes = meshes_of(mesh)
-    for one, material, at in mesh.looks(options.get("material")):
+    matrices = scene.clip_from_objects(sight.clip_from_world)
+    meshes = [instance.mesh for instance in scene]
+    for one, material, at in scene.looks(options.get("material")):
         if not why_whole(one, camera, tolerance, options.get("cull"), material):
             levels = levels_of(one)
             for i, level in zip(at.tolist(), sight.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
                 meshes[i] = levels[level].mesh if level else one
-    return mesh.with_meshes(meshes)
-
-
-def level_of(
-    mesh: Mesh,
-    camera: Camera,
-    size: tuple[int, int],
-    tolerance: float,
-    *,
-    cull: str | None = None,
-    material: Material | None = None,
-    viewport: tuple[int, int] | None = None,
-    origin: tuple[int, int] = (0, 0),
-) -> Mesh:
-    """The mesh of `choose_detail`, of checked arguments, without its words."""
-    if why_whole(mesh, camera, tolerance, cull, material):
-        return mesh
-    levels, sight = levels_of(mesh), sight_of(camera, size, viewport, origin)
-    level = int(sight.coarsest(sight.clip_from_world[None], levels, tolerance)[0][0])
-    return levels[level].mesh if level else mesh
+    return scene.with_meshes(meshes)

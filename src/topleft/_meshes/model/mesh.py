@@ -17,6 +17,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_crease, set_read_only, shown
 from topleft._core.base.options import check_choice
+from topleft._core.raster import choices
 from topleft._core.raster.clusters import Clusters, box_of
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
@@ -238,6 +239,10 @@ class Mesh:
         self.__dict__["_n_drawn"] = n_drawn + 1
         return n_drawn
 
+    def find_clusters(self) -> Clusters | None:
+        """The clusters, from the second picture of a large mesh on; this counts as one."""
+        return self.clusters if choices.pays_to_cluster(len(self.triangles), self.note_drawn()) else None
+
     @property
     def has_clusters(self) -> bool:
         """Whether `clusters` have been made."""
@@ -272,6 +277,13 @@ class Mesh:
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
     __setstate__ = set_read_only
+
+
+def trusted_mesh(vertices: FloatArray, triangles: I32) -> Mesh:
+    """A mesh of arrays that were checked when they were made."""
+    mesh = object.__new__(Mesh)
+    vars(mesh).update(vertices=vertices, triangles=triangles)
+    return mesh
 
 
 def keep_corner_normals(mesh: Mesh, normals: CornerNormals) -> None:

@@ -34,6 +34,9 @@ def as_pose(name: str, pose: Any) -> F64:
     TypeError
         If it is no array.
     """
+    is_matrix = type(pose) is np.ndarray and pose.shape == (4, 4) and pose.dtype == np.float64 and pose.flags.aligned
+    if is_matrix and engine.is_pose(pose):
+        return pose.copy()
     if isinstance(pose, Mapping):
         keys = next((keys for keys in BOP_POSES if all(key in pose for key in keys)), None)
         if keys is None:

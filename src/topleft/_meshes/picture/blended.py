@@ -26,7 +26,6 @@ from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.fragments import SeenSamples
 from topleft._core.raster.peel import peel_meshes
-from topleft._core.raster.rasterize import refuse_many
 from topleft._core.raster.view import View
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import AlphaMode, Material
@@ -35,7 +34,7 @@ from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place
 from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.scene import Scene, collapsed, meshes_in_places, scene_of
+from topleft._meshes.scene.scene import Scene, collapsed
 
 Mask = npt.NDArray[np.bool_]
 
@@ -71,23 +70,23 @@ def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
     return material.opacity == 1 and not (texture is not None and texture.has_alpha)
 
 
-def blended_masks(subject: Mesh | Scene, options: ShadingOptions) -> list[Mask | None] | None:
+def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | None:
     """The blended triangles of each instance; None where there are none, or a picture does not tell them apart."""
     if options.mode not in BLENDING:
         return None
-    masks = [blended_triangles(one.mesh, one.material) for one in meshes_in_places(subject, options.material)]
+    masks = [
+        blended_triangles(one.mesh, one.material if options.material is None else options.material) for one in scene
+    ]
     return None if all(mask is None for mask in masks) else masks
 
 
 def glass_of(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) -> Glass | None:
     """What a picture composites; None where all of it is opaque."""
-    masks = blended_masks(shot.subject, options)
+    masks = blended_masks(shot.scene, options)
     if masks is None:
         return None
-    scene = scene_of(shot.subject)
-    scene.check_counted("a scene that something shows through")
-    placed, view = place(scene, shot.camera, shot.size, view_options, material=options.material)
-    refuse_many(view, "rasterize")
+    shot.scene.check_counted("a scene that something shows through")
+    placed, view = place(shot.scene, shot.camera, shot.size, view_options, material=options.material)
     if placed.bent is not None:  # the parts that a lens makes of the triangles
         masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
     return Glass(placed, view, masks, shot.camera, options)
@@ -132,7 +131,7 @@ class Glass:
         for i, one in zip(some, self.snapped, strict=True):
             mesh = self.scene[i].mesh if bent is None else bent[i].mesh_of(self.scene[i].mesh)
             own = self.scene[i]
-            shown.append(ShownInstance(one, mesh, int(first_ids[i]), own.transform, own.material))
+            shown.append(ShownInstance(one, mesh, own.transform, int(first_ids[i]), own.material))
         return Lit(shown, self.camera, self.view.size, self.options)
 
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:

@@ -190,6 +190,7 @@ class CloudBuffer:
     look: dict[str, Any] = field(default_factory=dict)
     camera_to: Camera | None = None
     transforms_to: F64 | None = None
+    n_instances: int = 1
 
     @cached_property
     def frags(self) -> PointFragments:

@@ -14,10 +14,9 @@ import numpy.typing as npt
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import wireframe
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.shade import ShadingOptions
 from topleft._meshes.picture.through_lens import seen_through
-from topleft._meshes.scene.scene import Instance, Scene, scene_of
+from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import CullOption
 
 EDGE_COLOR = (24, 28, 40)
@@ -27,7 +26,7 @@ TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
 def draw_all_edges(
     picture: npt.NDArray[np.uint8],
     frags: Fragments,
-    subject: Mesh | Scene,
+    scene: Scene,
     camera: Camera,
     options: ShadingOptions,
     *,
@@ -35,7 +34,7 @@ def draw_all_edges(
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
     behind = depth_behind(frags.depth)
-    for instance in scene_of(subject):
+    for instance in scene:
         own_camera = camera.placed(instance.transform)
         vertices, triangles = instance.mesh.vertices, instance.mesh.triangles
         is_single = None if cull is not None else instance.mesh.single_sided(options.material or instance.material)

@@ -24,7 +24,7 @@ from topleft._core.raster.peel import DepthLayers
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.shade import ShownInstance
-from topleft._meshes.scene.scene import Scene, counted_ranges, meshes_in_places, meshes_of
+from topleft._meshes.scene.scene import Scene, counted_ranges
 
 if TYPE_CHECKING:
     from topleft._meshes.picture.instances import PlacedScene
@@ -52,40 +52,31 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class VisiblePart(Part):
-    """A part, and the instance that shows there; without one the mesh stands where its vertices are."""
+    """A part, the mesh of the instance that shows there, and world from object, (4, 4)."""
 
     mesh: Mesh
-    transform: F64 | None = None
+    place: F64
 
     @cached_property
     def shown(self) -> ShownInstance:
         """The mesh as it was drawn, for kernels."""
         ((i, snapped, first),) = self.frags._drawn()
-        return ShownInstance(snapped, self.frags._parts_of(i, self.mesh), first)
-
-    @property
-    def place(self) -> npt.NDArray[np.float64]:
-        """World from object, (4, 4)."""
-        return np.eye(4) if self.transform is None else self.transform
+        return ShownInstance(snapped, self.frags._parts_of(i, self.mesh), self.place, first)
 
 
 PartT = TypeVar("PartT", bound=Part)
 
 
-def parts_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[VisiblePart]:
-    """What each instance shows that shows anything, of the mesh or scene that was drawn; a mesh shows one part."""
+def parts_of(frags: Fragments, scene: Scene) -> Sequence[VisiblePart]:
+    """What each instance shows that shows anything, of the scene that was drawn; a mesh shows one part."""
     parts: Sequence[Part] = getattr(frags, "parts", [Part(0, WHOLE, frags)])
-    placed = meshes_in_places(subject)
-    return [VisiblePart(part.i, part.box, part.frags, *placed[part.i][:2]) for part in parts]
+    return [VisiblePart(one.i, one.box, one.frags, scene[one.i].mesh, scene[one.i].transform) for one in parts]
 
 
-def shown_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[ShownInstance]:
-    """The instances that some sample sees, as they are shaded, of the mesh or scene that was drawn."""
-    placed = meshes_in_places(subject)
-    return [
-        ShownInstance(snapped, frags._parts_of(i, placed[i].mesh), first, *placed[i][1:])
-        for i, snapped, first in frags._drawn()
-    ]
+def shown_of(frags: Fragments, scene: Scene) -> Sequence[ShownInstance]:
+    """The instances that some sample sees, as they are shaded, of the scene that was drawn."""
+    drawn = [(scene[i], frags._parts_of(i, scene[i].mesh), snapped, first) for i, snapped, first in frags._drawn()]
+    return [ShownInstance(snapped, mesh, one.transform, first, one.material) for one, mesh, snapped, first in drawn]
 
 
 def join(
@@ -271,7 +262,7 @@ class SceneFragments(InstanceIds, Fragments):
         """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
         view = view_of(camera)
         rows = [engine.product(view[2], instance.transform) for instance in self.whole]
-        meshes = meshes_of(self.whole)
+        meshes = [instance.mesh for instance in self.whole]
         values = [-(engine.product(mesh.vertices, row[:3]) + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
         return self.interpolate(values, background=np.inf)
 

@@ -21,11 +21,10 @@ from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import VisiblePart, join, parts_of
 from topleft._meshes.picture.holes import cuts_of, without_holes
-from topleft._meshes.picture.render import rasterize_shot
+from topleft._meshes.picture.instances import rasterize_shot
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene
 
@@ -104,9 +103,14 @@ class GBuffer:
     rasterizer: Rasterizer | None = None
 
     @property
-    def subject(self) -> Mesh | Scene:
+    def scene(self) -> Scene:
         """What is drawn."""
-        return self.shot.subject
+        return self.shot.scene
+
+    @property
+    def n_instances(self) -> int:
+        """How many meshes stand in it."""
+        return len(self.scene)
 
     @property
     def camera(self) -> Camera:
@@ -131,15 +135,15 @@ class GBuffer:
     @cached_property
     def has_holes(self) -> bool:
         """Whether materials cut something out."""
-        return any(cuts_of(self.subject, self.look.get("material")))
+        return any(cuts_of(self.scene, self.look.get("material")))
 
     def _cut(self, frags: Fragments) -> Fragments:
-        return without_holes(frags, self.subject, self.camera, self.look.get("material"))
+        return without_holes(frags, self.scene, self.camera, self.look.get("material"))
 
     @cached_property
     def parts(self) -> Sequence[VisiblePart]:
         """The visible pixels of each instance that shows any."""
-        return parts_of(self.frags, self.subject)
+        return parts_of(self.frags, self.scene)
 
     def join(
         self, channels: tuple[int, ...], background: float, make: Callable[[VisiblePart], npt.NDArray[Any]]

@@ -28,7 +28,7 @@ from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.fragments import BentFragments, SceneFragments
 from topleft._meshes.picture.instances import PlacedScene
 from topleft._meshes.picture.look import ShadingInputs, Surface
-from topleft._meshes.scene.scene import Scene, collapsed, meshes_in_places, scene_of
+from topleft._meshes.scene.scene import Scene, collapsed
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,23 +69,23 @@ def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
     return Cut(materials, rows, np.full(len(mesh.triangles), True) if rows is None else with_holes[rows])
 
 
-def cuts_of(subject: Mesh | Scene, material: Material | None) -> list[Cut | None]:
+def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
     """What materials, or this one, cut out of the mesh of each instance."""
-    return [cut_of(one.mesh, one.material) for one in meshes_in_places(subject, material)]
+    return [cut_of(one.mesh, one.material if material is None else material) for one in scene]
 
 
 def without_holes(
-    frags: Fragments, subject: Mesh | Scene, camera: Camera, material: Material | None, *, threads: int | None = None
+    frags: Fragments, scene: Scene, camera: Camera, material: Material | None, *, threads: int | None = None
 ) -> Fragments:
     """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
-    cuts = cuts_of(subject, material)
+    cuts = cuts_of(scene, material)
     if 0 in frags.id.shape or not any(cuts):
         return frags
     bent: Sequence[BentMesh] | None = [frags.bent] if isinstance(frags, BentFragments) else None
     if isinstance(frags, SceneFragments):
         frags.whole.check_counted("a scene with holes in its materials")
         bent = frags.placed.bent
-    holed = holed_instances(scene_of(subject), cuts, camera, bent)
+    holed = holed_instances(scene, cuts, camera, bent)
     if isinstance(frags, SceneFragments):
         return cut_scene(frags, holed, threads)
     drawn = frags.drawn if isinstance(frags, BentFragments) else frags

@@ -6,7 +6,7 @@ In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragment
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, cast
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import INT32_MAX, set_aligned
+from topleft._core.base.arrays import INT32_MAX, set_aligned, shown
 from topleft._core.base.memory import FRESH, SCRATCH, KeptMemory, Memory, check_fits, empty
 from topleft._core.base.options import Cull, DepthTest, Sampling, Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
@@ -22,17 +22,19 @@ from topleft._core.raster import choices
 from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.cluster_draw import ClusteredMesh, Survey, draw_clustered, equal_bands
 from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.fragments import GivenCorners
-from topleft._core.raster.peel import check_peel, peel_meshes
-from topleft._core.raster.rasterize import canvas_of, refuse_many
+from topleft._core.raster.fragments import Fragments, GivenCorners
+from topleft._core.raster.peel import DepthLayers, check_peel, draw_layers_of, peel_meshes
+from topleft._core.raster.rasterize import canvas_of, draw_coverage, draw_fragments, refuse_many
 from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
-from topleft._meshes.picture.fragments import Ids, SceneDepthLayers, SceneFragments
+from topleft._meshes.picture.fragments import BentFragments, Ids, SceneDepthLayers, SceneFragments
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import DrawnScene, scene_through
-from topleft._meshes.scene.scene import Scene
+from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import DepthTestOption
 
 #: Snapped vertices that are held at a time: 16 bytes each.
@@ -81,20 +83,30 @@ class PlacedScene:
         first_id: int = 0,
     ) -> None:
         self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
-        self.first_ids, self.whole_first_ids = drawn.scene.first_ids, drawn.whole.first_ids
         self._view, self._first_id = view, first_id
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
         self._kept: dict[int, engine.SnappedMesh] = {}
         self._n_kept = 0  # vertices of these
+        self._sides_of_looks: dict[tuple[int, int], tuple[int, NDArray[np.uint8] | None]] = {}
         self._last: tuple[int, View] | None = None  # the instance that was last asked for: often thrice in turn
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: views of instances are made there."""
-        return vars(self) | {"_last": None, "_kept": {}, "_n_kept": 0}
+        return vars(self) | {"_last": None, "_kept": {}, "_n_kept": 0, "_sides_of_looks": {}}
 
     __setstate__ = set_aligned
+
+    @property
+    def first_ids(self) -> NDArray[np.int64]:
+        """Where the ids of what is drawn of each instance begin."""
+        return self.scene.first_ids
+
+    @property
+    def whole_first_ids(self) -> NDArray[np.int64]:
+        """Where the ids of each instance begin."""
+        return self.whole.first_ids
 
     def of(self, scene: Scene) -> PlacedScene:
         """Return another scene to draw, made for this picture alone, seen in the same way."""
@@ -144,7 +156,7 @@ class PlacedScene:
     def _snap_alone(self, i: int) -> engine.SnappedMesh:
         mesh = self.scene[i].mesh
         snapped = snap_mesh(
-            FRESH, mesh.vertices, mesh.triangles, self._view_of(i), with_depth=self._with_depth, out=None
+            FRESH, mesh.vertices, mesh.triangles, self.view_of(i), with_depth=self._with_depth, out=None
         )
         return snapped.mesh.numbered_from(int(self._numbers[i]))
 
@@ -165,18 +177,29 @@ class PlacedScene:
         is_mirrored = np.array([one.is_mirrored for one in self.scene.instances], np.bool_)
         culls = np.where(is_mirrored, MIRRORED[self._view.cull], self._view.cull).astype(np.int32)
         is_mixed = np.zeros(len(culls), np.bool_)
-        for mesh, material, at in self.whole.looks(self._material) if self._view.sides_by_material else ():
-            is_single = mesh.single_sided(material)
-            if is_single is None:
-                continue
-            is_mixed[at] = not is_single.all()
-            if not is_mixed[at[0]]:
-                culls[at] = np.where(is_mirrored[at], CULL_CODES[Cull.FRONT], CULL_CODES[Cull.BACK])
+        for _, _, at in self.whole.looks(self._material) if self._view.sides_by_material else ():
+            cull, is_single = self._sides_of(self.whole[at[0]])
+            if cull != self._view.cull:
+                culls[at] = np.where(is_mirrored[at], MIRRORED[cull], cull)
+            if is_single is not None:
+                is_mixed[at] = True
         return culls, is_mixed
+
+    def _sides_of(self, whole: Instance) -> tuple[int, NDArray[np.uint8] | None]:
+        """The `tl_cull` of an instance that is no mirror; 1 for each triangle with one side, where others have two."""
+        key = id(whole.mesh), id(whole.material)
+        found = self._sides_of_looks.get(key)
+        if found is None:
+            material = whole.material if self._material is None else self._material
+            is_single = whole.mesh.single_sided(material) if self._view.sides_by_material else None
+            is_all = is_single is not None and bool(is_single.all())
+            found = CULL_CODES[Cull.BACK] if is_all else self._view.cull, None if is_all else is_single
+            self._sides_of_looks[key] = found
+        return found
 
     def corners(self, i: int) -> GivenCorners:
         """Return what an instance is drawn from."""
-        mesh, view = self.scene[i].mesh, self._view_of(i)
+        mesh, view = self.scene[i].mesh, self.view_of(i)
         return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport, view.origin)
 
     def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
@@ -185,21 +208,22 @@ class PlacedScene:
             return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i)
 
-    def _view_of(self, i: int) -> View:
+    def view_of(self, i: int) -> View:
+        """How an instance is seen."""
         last = self._last
         if last is None or last[0] != i:
             self._last = last = i, self._make_view(i)
         return last[1]
 
     def _make_view(self, i: int) -> View:
-        culls, is_mixed = self._sides
-        own = replace(self._view, transform=self._clip_from_objects[i], cull=int(culls[i]))
-        if not is_mixed[i]:
-            return own
-        whole = self.whole[i]
-        is_single = whole.mesh.single_sided(whole.material if self._material is None else self._material)
-        is_single = is_single if is_single is None or self.bent is None else is_single[self.bent[i].source]
-        return own.without_backs(is_single, is_mirrored=self.scene[i].is_mirrored)
+        one, (cull, is_single) = self.scene[i], self._sides_of(self.whole[i])
+        is_mirrored, single_sided = one.is_mirrored, None
+        if is_single is not None:
+            back = CULL_CODES[Cull.FRONT if is_mirrored else Cull.BACK]
+            single_sided = is_single if self.bent is None else is_single[self.bent[i].source], back
+        cull = MIRRORED[cull] if is_mirrored else cull
+        transform, static = self._clip_from_objects[i], one.mesh if self._may_cluster else None
+        return self._view.but(transform=transform, cull=cull, single_sided=single_sided, static=static)
 
     def _can_cluster(self, sink: Sink) -> bool:
         """Whether clusters may be drawn, which do not know that some triangles are single-sided and others are not."""
@@ -207,7 +231,7 @@ class PlacedScene:
 
     def clustered(self, i: int) -> tuple[Clusters, View, int]:
         """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
-        return self.scene[i].mesh.clusters, self._view_of(i), int(self._numbers[i])
+        return self.scene[i].mesh.clusters, self.view_of(i), int(self._numbers[i])
 
     def groups(self) -> Iterator[tuple[int, PlacedScene]]:
         """Yield parts of the scene whose triangles int32 counts from 1 on, each with where its own ids begin."""
@@ -453,46 +477,91 @@ def place(
 ) -> tuple[PlacedScene, View]:
     """Return the scene as the camera sees it, and the checked options of a verb; `material`: whose backs are culled."""
     view = View.parse(size, cast(ViewOptions, options))
-    refuse_classic(view, "depth" if with_depth else "a scene")
+    if with_depth:
+        refuse_classic(view, "depth")
+        refuse_many(view, "rasterize")
     drawn = scene_through(scene, camera, view.viewport, near_clip=view.near_clip)
     return PlacedScene(drawn, view, with_depth=with_depth, material=material), view
 
 
-def draw_scene(
-    scene: Scene,
-    camera: Camera,
-    size: tuple[int, int],
+def rasterize_shot(
+    shot: Shot,
+    rasterizer: Rasterizer | None = None,
+    material: Material | None = None,
     *,
     depth_test: DepthTestOption | None = "less",
     background_depth: float | None = None,
-    material: Material | None = None,
+    is_split: bool = True,
     **options: Any,
+) -> Fragments:
+    """Return the visibility buffer of what is drawn; options as those of `rasterize`, without `transform`.
+
+    `material`: whose backs are culled, instead of those that the meshes have. `rasterizer` and `out`: for a mesh alone,
+    as `is_split` of `View`.
+    """
+    if not shot.is_mesh:
+        placed, view = place(shot.scene, shot.camera, shot.size, options, material=material)
+        return draw_nearest(placed, view, depth_test, background_depth)
+    out = options.pop("out", None)
+    with lent(rasterizer, shot.size) as memory:
+        placed, _ = place(shot.scene, shot.camera, shot.size, options, material=material)
+        drawn = draw_one(memory, placed, depth_test, background_depth, out, is_split=is_split)
+    return drawn if placed.bent is None else BentFragments(drawn, placed.bent[0], shot.scene[0].mesh)
+
+
+@contextmanager
+def lent(rasterizer: Rasterizer | None, size: tuple[int, int]) -> Iterator[Memory]:
+    """Give the memory of a `Rasterizer` of this size, which draws nothing else meanwhile, or fresh memory."""
+    if rasterizer is None:  # fragments refer to what they were drawn from, so nothing of it can be reused
+        yield FRESH
+        return
+    if not isinstance(rasterizer, Rasterizer):
+        raise TypeError(f"rasterizer must be a Rasterizer or None, got {shown(rasterizer)}")
+    if rasterizer.size != size:
+        raise ValueError(f"rasterizer must have the size {size}, got {rasterizer.size}")
+    with rasterizer._turn:
+        yield rasterizer._memory
+
+
+def draw_one(
+    memory: Memory,
+    placed: PlacedScene,
+    depth_test: DepthTestOption | None,
+    background_depth: float | None,
+    out: Any = None,
+    *,
+    is_split: bool = False,
+) -> Fragments:
+    """Return the visibility buffer of the one instance that there is; `is_split` as in `View`."""
+    mesh, view = placed.scene[0].mesh, placed.view_of(0)
+    view = view.but(is_split=True) if is_split and view.sampling.n_samples > 1 else view
+    return draw_fragments(memory, mesh.vertices, mesh.triangles, view, depth_test, background_depth, out)
+
+
+def draw_nearest(
+    placed: PlacedScene, view: View, depth_test: DepthTestOption | None = "less", background_depth: float | None = None
 ) -> SceneFragments:
-    """Return the visibility buffer of a scene; options as those of `rasterize`, without `out` and `transform`."""
-    placed, view = place(scene, camera, size, options, material=material)
-    refuse_many(view, "rasterize")
-    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
-    frags = draw_nearest(placed, view, test)
-    if background_depth is not None:
-        ids, depth = frags.drawn_planes
-        depth[ids < 0] = background_depth
-    return frags
-
-
-def draw_nearest(placed: PlacedScene, view: View, test: DepthTest | None = DepthTest.LESS) -> SceneFragments:
     """Return the visibility buffer of what `place` returned."""
-    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     (width, height), n = view.size, view.sampling.n_samples
     positions: list[tuple[int, int]] = list(map(tuple, sample_positions(n, view.grid_bits).tolist()))
+    if len(placed.scene) == 1:
+        frags = draw_one(FRESH, placed, depth_test, background_depth)
+        return SceneFragments(*(frags._sampled()[1] or (frags.id[None], frags.depth[None])), placed, positions)
+    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     check_fits((n, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
     targets = [engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True) if width and height]
     if placed.scene.n_triangles > INT32_MAX:
-        return SceneFragments(draw_groups(placed, targets, positions, ids), depth, placed, positions)
-    if targets:
-        placed.draw(targets, positions, height)
-    return SceneFragments(ids, depth, placed, positions)
+        frags = SceneFragments(draw_groups(placed, targets, positions, ids), depth, placed, positions)
+    else:
+        if targets:
+            placed.draw(targets, positions, height)
+        frags = SceneFragments(ids, depth, placed, positions)
+    if background_depth is not None:
+        depth[frags.drawn_planes[0] < 0] = background_depth
+    return frags
 
 
 def draw_groups(
@@ -513,34 +582,31 @@ def draw_groups(
     return counted
 
 
-def peel_scene(
-    scene: Scene,
-    camera: Camera,
-    size: tuple[int, int],
+def peel_shot(
+    shot: Shot,
     *,
     layers: int = 4,
     depth_test: DepthTestOption = "less",
     material: Material | None = None,
     **options: Any,
-) -> SceneDepthLayers:
-    """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
-    scene.check_counted("a scene that is peeled")
-    placed, view = place(scene, camera, size, options, material=material)
+) -> DepthLayers:
+    """Return the nearest layers of what is drawn; options as those of `peel`, without `transform`."""
+    shot.scene.check_counted("a scene that is peeled")
+    placed, view = place(shot.scene, shot.camera, shot.size, options, material=material)
+    if shot.is_mesh:
+        mesh = shot.scene[0].mesh
+        return draw_layers_of(mesh.vertices, mesh.triangles, placed.view_of(0), layers, depth_test)
     n, is_farthest = check_peel(view, layers, depth_test)
     return SceneDepthLayers(*peel_meshes(SCRATCH, placed.chunks(), view, n, is_farthest=is_farthest), placed)
 
 
-def draw_scene_coverage(
-    scene: Scene,
-    camera: Camera,
-    size: tuple[int, int],
-    out: object,
-    *,
-    material: Material | None = None,
-    **options: Any,
-) -> NDArray[Any]:
-    """Return the mask of a scene, as `coverage` gives that of a mesh; options as there."""
-    placed, view = place(scene, camera, size, options, with_depth=False, material=material)
+def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
+    """Return the mask of what is drawn; options as those of `coverage`, without `transform`."""
+    placed, view = place(shot.scene, shot.camera, shot.size, options, with_depth=False)
+    if len(placed.scene) == 1:
+        mesh = placed.scene[0].mesh
+        return draw_coverage(SCRATCH, mesh.vertices, mesh.triangles, placed.view_of(0), out)
+    refuse_classic(view, "a scene")
     width, height = view.size
     n = view.sampling.n_samples
     is_share = n > 1 or view.sampling is Sampling.AREA

@@ -25,7 +25,6 @@ from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import ShadingOptions, shade_normals
 from topleft._meshes.picture.silhouette import silhouette as draw_silhouette
 from topleft._meshes.picture.transparent import render_transparent
-from topleft._meshes.scene.scene import meshes_of
 
 NOT_OF_LIGHT = ("cull", "edges", "sampling", "subpixel_bits")
 """Options of `render` that say which triangle is seen where, not how it is lit."""
@@ -33,16 +32,16 @@ NOT_OF_LIGHT = ("cull", "edges", "sampling", "subpixel_bits")
 
 def color(gbuffer: GBuffer) -> Array:
     """The picture (H, W, 4) uint8 of `render`, or of `render_transparent` if the look has an `opacity`."""
-    subject, camera, options = gbuffer.subject, gbuffer.camera, {**gbuffer.options, **gbuffer.look}
+    scene, camera, options = gbuffer.scene, gbuffer.camera, {**gbuffer.options, **gbuffer.look}
     if "opacity" in options:
-        return render_transparent(subject, camera, gbuffer.size, **options)
+        return render_transparent(scene, camera, gbuffer.size, **options)
     look = {name: value for name, value in options.items() if name not in NOT_OF_LIGHT}
     checked = ShadingOptions.parse(**look)
-    if options.get("sampling", "center") != "center" or blended_masks(subject, checked) is not None:
-        return render(subject, camera, gbuffer.size, rasterizer=gbuffer.rasterizer, **options)
-    picture = shade_by(gbuffer.frags, subject, camera, checked)
+    if options.get("sampling", "center") != "center" or blended_masks(scene, checked) is not None:
+        return render(gbuffer.shot.subject, camera, gbuffer.size, rasterizer=gbuffer.rasterizer, **options)
+    picture = shade_by(gbuffer.frags, scene, camera, checked)
     if options.get("edges"):
-        draw_all_edges(picture, gbuffer.frags, subject, camera, checked, cull=options["cull"])
+        draw_all_edges(picture, gbuffer.frags, scene, camera, checked, cull=options["cull"])
     return picture
 
 
@@ -66,7 +65,7 @@ def silhouette(gbuffer: GBuffer) -> Array:
         return gbuffer.frags.mask
     if gbuffer.has_holes:
         return (gbuffer.sampled(sampling).samples_triangle >= 0).mean(axis=-1, dtype=np.float32)
-    return draw_silhouette(gbuffer.subject, gbuffer.camera, gbuffer.size, sampling=sampling, **gbuffer.options)
+    return draw_silhouette(gbuffer.scene, gbuffer.camera, gbuffer.size, sampling=sampling, **gbuffer.options)
 
 
 def depth(gbuffer: GBuffer) -> Array:
@@ -124,13 +123,13 @@ def world_normal(gbuffer: GBuffer) -> Array:
 def normals_of(gbuffer: GBuffer, turn: F64) -> npt.NDArray[np.float32]:
     """Unit normals (H, W, 3), from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
     frags = gbuffer.frags
-    seen, shown = frags._seen(), shown_of(frags, gbuffer.subject)
+    seen, shown = frags._seen(), shown_of(frags, gbuffer.scene)
     return shade_normals(shown, seen.ids[0], gbuffer.camera, turn, threads=gbuffer.options.get("threads"))
 
 
 def uv(gbuffer: GBuffer) -> Array:
     """Texture coordinates, (H, W, 2) float32, NaN where nothing is or a mesh has none."""
-    if all(mesh.uv is None for mesh in meshes_of(gbuffer.subject)):
+    if all(one.mesh.uv is None for one in gbuffer.scene):
         raise ValueError("layer 'uv' needs a mesh that has texture coordinates")
 
     def make(part: VisiblePart) -> Array:

@@ -280,18 +280,15 @@ class ShadingInputs:
         """Have the opacity of the surface in the alpha of the picture; all materials are full."""
         self.shading.set_wants_opacity()
 
-    def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64 | None = None) -> None:
-        """Take the lights, in shading space.
-
-        `world_from_mesh`: (4, 4) for a mesh that stands in the world by a matrix.
-        """
+    def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64) -> None:
+        """Take the lights, in shading space; `world_from_mesh`: (4, 4), where the mesh stands."""
         if lights is None:
             self.shading.set_headlight(TO_HEADLIGHT, max(0.0, 1 - ambient), ambient)
             return
-        placed = lights if world_from_mesh is None else self._lights_by(lights, world_from_mesh)
+        placed = self._lights_by(lights, world_from_mesh)
         self.shading.set_lights([self._light(light) for light in placed], (ambient,) * 3)
 
-    def set_environment(self, environment: Environment | None, world_from_mesh: F64 | None = None) -> None:
+    def set_environment(self, environment: Environment | None, world_from_mesh: F64) -> None:
         """Take the environment, or what metallic surfaces mirror without one.
 
         `world_from_mesh`: as for `set_lights`.
@@ -300,7 +297,7 @@ class ShadingInputs:
         rows = self.rays.eye_from
         if own.space is LightSpace.WORLD:
             rows = engine.product(engine.inverse(self.view[:3, :3]), rows)
-            rows = rows if world_from_mesh is None else engine.product(world_from_mesh[:3, :3], rows)
+            rows = engine.product(world_from_mesh[:3, :3], rows)
         rows = engine.product(own.axes, rows / engine.cube_root(abs(engine.determinant(rows))))
         texels, table = own.levels or (None, None)
         diffuse = 0.0 if environment is None else 1.0

@@ -24,9 +24,9 @@ from topleft._meshes.camera.matrices import box_corners
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.holes import without_holes
-from topleft._meshes.picture.render import rasterize_shot
+from topleft._meshes.picture.instances import rasterize_shot
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.scene import Instance, Scene, scene_of
+from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import CullOption
 
 Window = tuple[int, int, int, int]
@@ -273,7 +273,7 @@ def object_masks(
     shot = Shot.of(scene, camera, size, takes_points=False)
     if beyond * max(shot.size) > MOST_BEYOND_PX:
         raise ValueError(f"beyond must reach at most {MOST_BEYOND_PX} pixels, got {beyond} pictures of {shot.size}")
-    whole, (width, height) = scene_of(shot.subject), shot.size
+    whole, (width, height) = shot.scene, shot.size
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
     instance, boxes = seen_in(whole, shot.camera, shot.size, options)
     n_visible = np.bincount(instance.reshape(-1) + 1, minlength=len(whole) + 1)[1:].astype(np.int64)

@@ -13,26 +13,24 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._core.base.array_types import MeshLike
-from topleft._core.base.arrays import as_size, shown
+from topleft._core.base.arrays import as_size
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.verbs import Rasterizer, draw_ids
+from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
-from topleft._meshes.model.material import Material
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.blended import glass_of
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
 from topleft._meshes.picture.edges import draw_all_edges
-from topleft._meshes.picture.fragments import BentFragments, SceneFragments
+from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.holes import without_holes
-from topleft._meshes.picture.instances import draw_scene
+from topleft._meshes.picture.instances import rasterize_shot
 from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import LookOptions, ShadingOptions
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.picture.through_lens import StaticPlan, seen_through
-from topleft._meshes.scene.scene import Scene, scene_of
+from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
 
 
@@ -133,16 +131,16 @@ def render(
     shot = shot.within(tolerance, cull=cull, material=options.material)
     glass = glass_of(shot, options, view)
     if glass is None:
-        subject, frags = shot.subject, rasterize_shot(shot, rasterizer, options.material, **view)
+        frags = rasterize_shot(shot, rasterizer, options.material, **view)
     else:
-        subject, frags = glass.scene, glass.draw_opaque()
-    camera = shot.camera
-    frags = without_holes(frags, subject, camera, options.material, threads=threads)
-    picture = shade_by(frags, subject, camera, options)
+        frags = glass.draw_opaque()
+    scene, camera = shot.scene, shot.camera
+    frags = without_holes(frags, scene, camera, options.material, threads=threads)
+    picture = shade_by(frags, scene, camera, options)
     if glass is not None:
         glass.lay_over(picture, cast(SceneFragments, frags))
     if edges:
-        draw_all_edges(picture, frags, subject, camera, options, cull=cull)
+        draw_all_edges(picture, frags, scene, camera, options, cull=cull)
     return picture
 
 
@@ -198,28 +196,4 @@ def rasterize_mesh(
         return draw_cloud(shot.cloud, shot.camera, shot.size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     shot = shot.within(tolerance, cull=cull, **window)
-    return rasterize_shot(shot, rasterizer, cull=cull, threads=threads, **view)
-
-
-def rasterize_shot(
-    shot: Shot, rasterizer: Rasterizer | None = None, material: Material | None = None, **view: Any
-) -> Fragments:
-    """The visibility buffer of meshes; options as for `rasterize_mesh`.
-
-    `material`: whose backs are culled, instead of those that the meshes have.
-    """
-    subject, camera, size = shot.mesh, shot.camera, shot.size
-    if subject is None:
-        return draw_scene(scene_of(shot.subject), camera, size, material=material, **view)
-    frame, near_clip = view.get("viewport") or size, view.get("near_clip", True)
-    drawn = seen_through(subject.vertices, subject.triangles, camera, frame, near_clip=near_clip)
-    view["transform"] = drawn.transform
-    if not isinstance(rasterizer, Rasterizer | None):
-        raise TypeError(f"rasterizer must be a Rasterizer or None, got {shown(rasterizer)}")
-    if rasterizer is not None and rasterizer.size != tuple(size):
-        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
-    if drawn.bent is None:
-        view.setdefault("plan", StaticPlan(subject))
-    view["plan"] = drawn.sided(view.get("plan"), subject.single_sided(material))
-    frags = draw_ids(rasterizer, size, drawn.vertices, drawn.triangles, is_split=True, **view)
-    return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)
+    return rasterize_shot(shot, rasterizer, is_split=False, cull=cull, threads=threads, **view)

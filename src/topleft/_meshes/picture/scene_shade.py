@@ -22,7 +22,7 @@ from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture.cloud import shade_cloud
 from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.shade import Shading, ShadingOptions, shade_instances, shade_numbers
-from topleft._meshes.scene.scene import Scene, meshes_of
+from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import ShadingOption
 
 
@@ -110,14 +110,14 @@ def shade(
         if not (isinstance(frags, PointFragments) and frags._n_vertices == len(mesh)):
             raise ValueError(f"frags must be those of the {len(mesh)} points, got {frags!r}")
         return shade_cloud(frags, mesh, camera, options)
-    return shade_by(frags, mesh, camera, options)
+    return shade_by(frags, scene_of(mesh), camera, options)
 
 
-def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: ShadingOptions) -> U8:
+def shade_by(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOptions) -> U8:
     """The picture of a visibility buffer by checked options."""
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
-    return shade_instances(shown_of(frags, mesh), frags._seen(), camera, options)
+    return shade_instances(shown_of(frags, scene), frags._seen(), camera, options)
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
@@ -128,7 +128,7 @@ def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
     kind = Mesh if whole is None else Scene
     if not isinstance(mesh, kind):
         raise TypeError(f"mesh must be a {kind.__name__}, got {type(mesh).__name__}")
-    given = counts_of(mesh)
+    given = counts_of(scene_of(mesh))
     drawn = [(frags._n_vertices, frags._n_triangles)] if whole is None else counts_of(whole)
     if len(drawn) != len(given):
         raise ValueError(f"mesh must be the scene that was drawn, of {len(drawn)} instances, got one of {len(given)}")
@@ -141,6 +141,6 @@ def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
             )
 
 
-def counts_of(subject: Mesh | Scene) -> list[tuple[int, int]]:
+def counts_of(scene: Scene) -> list[tuple[int, int]]:
     """Vertices and triangles of the mesh of each instance."""
-    return [(len(mesh.vertices), len(mesh.triangles)) for mesh in meshes_of(subject)]
+    return [(len(one.mesh.vertices), len(one.mesh.triangles)) for one in scene]

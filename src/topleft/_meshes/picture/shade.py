@@ -37,7 +37,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import EYE, ShadingInputs, Surface, material_row
+from topleft._meshes.picture.look import ShadingInputs, Surface, material_row
 from topleft.typing import ShadingOption
 
 MIN_PX_PER_THREAD = 1 << 14
@@ -155,19 +155,17 @@ class ShownInstance(NamedTuple):
     snapped: engine.SnappedMesh
     mesh: Mesh
     """The mesh as it was drawn, which kernels read triangle by triangle: of a lens its parts."""
+    place: F64
+    """World from object, (4, 4)."""
     first_id: int = 0
     """What its triangle 0 is called in the ids."""
-    place: F64 | None = None
-    """World from object, (4, 4); None: the world is the space of the mesh."""
     material: Material | None = None
     """What goes before the materials of the mesh."""
 
 
 def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
     """Eye from object of each instance, (4, 4), as a camera without a lens sees it."""
-    if all(one.place is None for one in shown):
-        return [camera.view] * len(shown)
-    places = np.concatenate([EYE if one.place is None else one.place for one in shown], axis=1)
+    places = np.concatenate([one.place for one in shown], axis=1)
     return list(np.ascontiguousarray(engine.product(camera.view, places).reshape(4, -1, 4).transpose(1, 0, 2)))
 
 

@@ -14,17 +14,21 @@ from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
 from topleft._meshes.lod.detail import detailed
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
-from topleft._meshes.scene.scene import Scene, as_meshes, as_subject
+from topleft._meshes.scene.scene import IN_PLACE, Scene, as_meshes, as_subject, scene_of
+
+NOTHING = Scene([IN_PLACE])
+"""The scene of a cloud, which has points alone."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """What is drawn, and who looks at it: `cloud` of points, or else the `subject`, of which `mesh` is one alone."""
+    """What is drawn, and who looks at it: a `cloud` of points, or else a `scene`; a mesh alone is a scene of one."""
 
-    subject: Mesh | Scene
+    scene: Scene
     cloud: Points | None
     camera: Camera
     size: tuple[int, int]
+    is_mesh: bool = False
 
     @classmethod
     def of(
@@ -32,16 +36,18 @@ class Shot:
     ) -> Shot:
         """Return a shot of what is given; without a camera the three-quarter view."""
         checked = as_size(size)
-        subject: Any = as_subject(given) if takes_points else as_meshes(given)
-        return cls(
-            subject, subject if isinstance(subject, Points) else None, camera_for(subject, camera, checked), checked
-        )
+        subject = as_subject(given) if takes_points else as_meshes(given)
+        seen_by = camera_for(subject, camera, checked)
+        if isinstance(subject, Points):
+            return cls(NOTHING, subject, seen_by, checked)
+        return cls(scene_of(subject), None, seen_by, checked, is_mesh=isinstance(subject, Mesh))
 
     @property
-    def mesh(self) -> Mesh | None:
-        """The mesh that is drawn, unless a scene is."""
-        return self.subject if isinstance(self.subject, Mesh) else None
+    def subject(self) -> Mesh | Scene:
+        """The mesh or scene, as `shade` takes it."""
+        return self.scene[0].mesh if self.is_mesh else self.scene
 
     def within(self, tolerance: float, **options: Any) -> Shot:
         """Return the shot of the levels of detail that a tolerance in pixels allows; options as for `choose_detail`."""
-        return replace(self, subject=detailed(self.subject, self.camera, self.size, tolerance, **options))
+        scene = detailed(self.scene, self.camera, self.size, tolerance, **options)
+        return self if scene is self.scene else replace(self, scene=scene)

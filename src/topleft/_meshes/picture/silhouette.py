@@ -12,15 +12,13 @@ import numpy.typing as npt
 from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_out
 from topleft._core.base.defaults import DEFAULT_SIZE
-from topleft._core.raster.verbs import coverage
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.cloud import draw_share
-from topleft._meshes.picture.instances import draw_scene_coverage
+from topleft._meshes.picture.instances import cover_shot
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.picture.through_lens import seen_through
-from topleft._meshes.scene.scene import Scene, scene_of
+from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption, SamplingOption
 
 
@@ -97,11 +95,4 @@ def silhouette(
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     shot = shot.within(tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
-    subject = shot.mesh
-    if subject is None:
-        return draw_scene_coverage(scene_of(shot.subject), shot.camera, shot.size, out, **options)
-    frame, near_clip = view.get("viewport") or shot.size, view.get("near_clip", True)
-    drawn = seen_through(subject.vertices, subject.triangles, shot.camera, frame, near_clip=near_clip)
-    options |= {"transform": drawn.transform, "plan": drawn.sided(view.get("plan"), subject.single_sided())}
-    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, shot.size, out=out, **options)
-    return mask
+    return cover_shot(shot, out, **options)

@@ -9,14 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.typing import ArrayLike, NDArray
 
 from topleft._core.base.array_types import Array
-from topleft._core.raster import choices
-from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.view import Planned, View
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.mesh import trusted_mesh
 from topleft._meshes.picture.bend import BentMesh, bend
 from topleft._meshes.scene.scene import Instance, Scene
 
@@ -31,24 +27,6 @@ class DrawnMesh(NamedTuple):
     transform: npt.NDArray[np.float64]
     bent: BentMesh | None
 
-    def sided(self, plan: Planned | None, is_single: npt.NDArray[np.uint8] | None) -> Planned | SidedPlan | None:
-        """The plan, without the backs of the triangles of the mesh that are single-sided."""
-        if is_single is None:
-            return plan
-        return SidedPlan(plan, is_single if self.bent is None else is_single[self.bent.source])
-
-
-class SidedPlan:
-    """A plan for triangles some of which show no back."""
-
-    def __init__(self, plan: Planned | None, is_single: npt.NDArray[np.uint8]) -> None:
-        self._plan, self._is_single = plan, is_single
-
-    def fitted(self, view: View) -> View:
-        """Return the view with the plan, and without these backs."""
-        own = view if self._plan is None else self._plan.fitted(view)
-        return own.without_backs(self._is_single)
-
 
 def seen_through(
     vertices: Array, triangles: Array, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True
@@ -58,22 +36,6 @@ def seen_through(
         return DrawnMesh(vertices, triangles, camera.clip_from_world(frame), None)
     bent = bend(vertices, triangles, camera, camera.lens, frame, near_clip=near_clip)
     return DrawnMesh(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
-
-
-class StaticPlan(Planned):
-    """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-
-    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
-        """Return the triangles of the mesh, which has checked them."""
-        return self._mesh.triangles
-
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
-        """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
-        mesh = self._mesh
-        return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
 
 
 class DrawnScene(NamedTuple):
@@ -101,5 +63,5 @@ def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_
         place = MIRROR if instance.is_mirrored else np.eye(4)
         points = bent.points_eye * np.diag(MIRROR)[:3] if instance.is_mirrored else bent.points_eye
         many.append(bent)
-        instances.append(Instance(Mesh(points, bent.triangles), place))
+        instances.append(Instance(trusted_mesh(points, bent.triangles), place))
     return DrawnScene(Scene(instances), scene, camera.clip_from_eye(frame), tuple(many))

@@ -6,7 +6,8 @@ Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, Unpack
+from dataclasses import replace
+from typing import Any, Literal, Unpack, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,17 +17,16 @@ from topleft._core.base.arrays import as_count
 from topleft._core.base.color import WHITE, ColorLike, as_color
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.composite import composite
-from topleft._core.raster.peel import DepthLayers, peel
+from topleft._core.raster.peel import DepthLayers
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import Camera, CameraLike
 from topleft._meshes.picture.fragments import SceneDepthLayers
 from topleft._meshes.picture.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
-from topleft._meshes.picture.instances import peel_scene
+from topleft._meshes.picture.instances import peel_shot
 from topleft._meshes.picture.scene_shade import shade
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.picture.through_lens import seen_through
-from topleft._meshes.scene.scene import Scene, scene_of
+from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
 CLEAR = (0, 0, 0, 0)
@@ -98,42 +98,35 @@ def render_transparent(
     """
     layers, material = as_count("layers", layers), look.get("material")
     shot = Shot.of(mesh, camera, size, takes_points=False).within(tolerance, cull=cull, material=material)
-    subject, camera, size = shot.subject, shot.camera, shot.size
+    camera, size = shot.camera, shot.size
     ground = as_color("background", background, 4)
     view: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
-    cuts = cuts_of(subject, material)
+    check_straight(camera)
+    cuts = cuts_of(shot.scene, material)
     if any(cuts):
-        subject = scene_of(subject)  # which is the same picture
-        found: DepthLayers = solid_layers(subject, camera, size, cuts, layers=layers, **view)
+        shot = replace(shot, is_mesh=False)  # which is the same picture
+        found: DepthLayers = solid_layers(shot, cuts, layers=layers, **view)
     else:
-        found = visible_layers(subject, camera, size, layers=layers, **view)
+        found = peel_shot(shot, layers=layers, **view)
     pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
     for k in range(layers):
         frags = found.layer(k)
         if not frags.mask.any():
             break
-        own = shade(frags, subject, camera, shading=shading, background=CLEAR, **look)
+        own = shade(frags, shot.subject, camera, shading=shading, background=CLEAR, **look)
         pictures[:, :, k] = own[..., :3]
     picture: npt.NDArray[np.uint8] = composite(found, pictures, opacity=opacity, background=ground, threads=threads)
     return picture
 
 
-def solid_layers(
-    scene: Scene,
-    camera: Camera,
-    size: tuple[int, int],
-    cuts: Sequence[Cut | None],
-    *,
-    threads: int | None,
-    **options: Any,
-) -> SceneDepthLayers:
+def solid_layers(shot: Shot, cuts: Sequence[Cut | None], *, threads: int | None, **options: Any) -> SceneDepthLayers:
     """The nearest layers of a scene without what is cut out of its meshes."""
-    check_straight(camera)
-    holed = holed_instances(scene, cuts, camera)
-    found = peel_scene(solid_scene(scene, holed), camera, size, threads=threads, **options)
-    if 0 in size:
+    holed = holed_instances(shot.scene, cuts, shot.camera)
+    solid = replace(shot, scene=solid_scene(shot.scene, holed))
+    found = cast("SceneDepthLayers", peel_shot(solid, threads=threads, **options))
+    if 0 in shot.size:
         return found
-    whole = SceneDepthLayers(*found.planes, found.placed.of(scene))
+    whole = SceneDepthLayers(*found.planes, found.placed.of(shot.scene))
     draw_holed(whole.placed, holed, *whole.planes, is_peeled=True, threads=threads)
     return whole
 
@@ -178,10 +171,5 @@ def visible_layers(
     2
     """
     shot = Shot.of(mesh, camera, size, takes_points=False)
-    subject, camera, size = shot.mesh, shot.camera, shot.size
-    check_straight(camera)
-    if subject is None:
-        return peel_scene(scene_of(shot.subject), camera, size, **options)
-    drawn = seen_through(subject.vertices, subject.triangles, camera, options.get("viewport") or size)
-    options["plan"] = drawn.sided(options.get("plan"), subject.single_sided())
-    return peel(subject.vertices, subject.triangles, size, transform=drawn.transform, **options)
+    check_straight(shot.camera)
+    return peel_shot(shot, **options)

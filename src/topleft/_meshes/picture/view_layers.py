@@ -28,7 +28,7 @@ from topleft._meshes.picture.gbuffer import GBuffer
 from topleft._meshes.picture.layers import LAYERS, draw_layers
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.scene import Scene, meshes_of
+from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption, LayerOption, SamplesOption, ShadingOption
 
 LOOKS = frozenset({"shading", "color", "background", "edges", "sampling", *LookOptions.__annotations__})
@@ -242,7 +242,7 @@ def render_layers(
         if name in LAYERS:
             raise ValueError(f"attributes must not have the name of a layer, got {name!r}")
         found[name] = gbuffer.frags.interpolate(values, background=np.nan)
-    return ViewLayers(found, 1 if isinstance(gbuffer, CloudBuffer) else len(meshes_of(gbuffer.subject)))
+    return ViewLayers(found, gbuffer.n_instances)
 
 
 def gbuffer_of(
@@ -274,7 +274,7 @@ def gbuffer_of(
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
     if shot.cloud is None:
         shot = shot.within(tolerance, cull=cull, material=look.get("material"))
-    n = 1 if shot.cloud is not None else len(meshes_of(shot.subject))
+    n = len(shot.scene)
     flow = (
         None if camera_to is None else as_camera(camera_to, "camera_to"),
         None if transforms_to is None else as_transforms(transforms_to, n),

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.pose import as_pose
 from topleft._meshes.scene.adapt import as_mesh, is_mesh_like
+
+EYE = np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,7 @@ class Instance:
     """
 
     mesh: Mesh
-    transform: F64 = field(default_factory=lambda: np.eye(4))
+    transform: F64 = field(default_factory=lambda: EYE)
     name: str | None = None
     material: Material | None = None
     color: InitVar[ColorLike | None] = None
@@ -89,9 +91,9 @@ class Instance:
     def __post_init__(self, color: ColorLike | None) -> None:
         if not isinstance(self.mesh, Mesh):
             raise TypeError(f"mesh must be a Mesh, got {shown(self.mesh)}: topleft.as_mesh makes one of others")
-        if not isinstance(self.name, str | None):
+        if not (self.name is None or isinstance(self.name, str)):
             raise TypeError(f"name must be a str or None, got {shown(self.name)}")
-        if not isinstance(self.material, Material | None):
+        if not (self.material is None or isinstance(self.material, Material)):
             raise TypeError(f"material must be a Material or None, got {shown(self.material)}")
         if color is not None:
             if self.material is not None:
@@ -117,6 +119,11 @@ class Instance:
     def is_mirrored(self) -> bool:
         """Whether the matrix turns the winding of triangles over."""
         return engine.determinant(self.transform[:3, :3]) < 0
+
+
+IN_PLACE = Instance(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)))
+"""Nothing, where its vertices are."""
+vars(IN_PLACE)["is_mirrored"] = False  # as copies know
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -212,6 +219,9 @@ class Scene:
 
     def clip_from_objects(self, clip_from_world: F64) -> F64:
         """Clip from object of each instance, (N, 4, 4): the product of each, to the bit."""
+        if len(self) == 1:
+            own = self.instances[0].transform
+            return (clip_from_world if own is IN_PLACE.transform else engine.product(clip_from_world, own))[None]
         columns = np.ascontiguousarray(self.transforms.transpose(1, 0, 2)).reshape(4, -1)
         products = engine.product(clip_from_world, columns).reshape(4, -1, 4)
         return np.ascontiguousarray(products.transpose(1, 0, 2))
@@ -247,8 +257,7 @@ class Scene:
         """The scene in parts whose triangles int32 can count from 1 on, each with the index of its first instance."""
         groups = []
         for first, end in counted_ranges(self.first_ids):
-            part = object.__new__(Scene)
-            vars(part).update(instances=self.instances[first:end], transforms=self.transforms[first:end])
+            part = unchecked_scene(self.instances[first:end], transforms=self.transforms[first:end])
             groups.append((first, part))
         return tuple(groups)
 
@@ -265,10 +274,8 @@ class Scene:
 
     def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
         """Return the scene with other meshes, which stand where these do."""
-        scene = object.__new__(Scene)
-        instances = tuple(one.with_mesh(mesh) for one, mesh in zip(self.instances, meshes, strict=True))
-        vars(scene).update(instances=instances, transforms=self.transforms)
-        return scene
+        instances = [one.with_mesh(mesh) for one, mesh in zip(self.instances, meshes, strict=True)]
+        return unchecked_scene(instances, transforms=self.transforms)
 
     @property
     def bounds(self) -> F64:
@@ -356,31 +363,16 @@ def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
     return given if isinstance(given, Scene) else as_mesh(given)
 
 
-class Placed(NamedTuple):
-    """A mesh of a subject, as it is shaded."""
-
-    mesh: Mesh
-    transform: F64 | None
-    """World from object; None for a mesh alone, which stands where its vertices are."""
-    material: Material | None
-    """What goes before the materials of the mesh."""
-
-
-def meshes_in_places(subject: Mesh | Scene, material: Material | None = None) -> list[Placed]:
-    """The mesh of each instance; `material` goes before those of instances."""
-    if isinstance(subject, Mesh):
-        return [Placed(subject, None, material)]
-    return [Placed(one.mesh, one.transform, one.material if material is None else material) for one in subject]
-
-
-def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
-    """The mesh of each instance."""
-    return [subject] if isinstance(subject, Mesh) else [instance.mesh for instance in subject]
-
-
 def scene_of(subject: Mesh | Scene) -> Scene:
     """The scene, or that of a mesh alone."""
-    return subject if isinstance(subject, Scene) else Scene([subject])
+    return subject if isinstance(subject, Scene) else unchecked_scene([IN_PLACE.with_mesh(subject)])
+
+
+def unchecked_scene(instances: Sequence[Instance], **known: object) -> Scene:
+    """A scene of instances, and what is known of it."""
+    scene = object.__new__(Scene)
+    vars(scene).update(instances=tuple(instances), **known)
+    return scene
 
 
 def collapsed(scene: Scene, masks: Sequence[npt.NDArray[np.bool_] | None], *, keeps_others: bool = True) -> Scene:
