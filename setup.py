@@ -59,7 +59,7 @@ FLAGS_CYTHON = [
     "-O1", "-g0", "-ffp-contract=off", "-fno-fast-math", "-fvisibility=hidden", "-fno-lto",
     "-Wno-unused-function", "-Wno-unused-parameter", "-Wno-missing-field-initializers", "-Wno-cast-function-type",
 ]  # fmt: skip
-# The classics do their arithmetic in Cython.
+# The classics do their arithmetic in the unit that Cython makes, from their headers.
 FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-fno-math-errno"]
 # For findings of a sanitizer: where they are, and integers whose overflow the language does not define.
 FLAGS_SANITIZED = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"]
@@ -338,11 +338,14 @@ class BuildTopleft(build_ext):
 
     def compile_unit(self, source: Path | Extension, flags: list[str], macros: list[tuple[str, str]]) -> Path:
         """Return the object of one source, compiled again when the source, a header or a flag changed."""
+        own_headers: list[Path] = []
         if isinstance(source, Extension):
+            own_headers = files_in(str(Path(source.sources[0]).parent), ".h")
             source = self.cython(source)
         target = self.temp / (source.stem + ".o")
         is_ours = source.is_relative_to(ROOT / "csrc")  # what Cython made includes the headers of the contract alone
-        sources = [source, *(files_in("csrc", ".c", ".h") if is_ours else sorted((ROOT / "csrc").glob("*.h")))]
+        headers = files_in("csrc", ".c", ".h") if is_ours else [*sorted((ROOT / "csrc").glob("*.h")), *own_headers]
+        sources = [source, *headers]
 
         def make() -> None:
             with tempfile.TemporaryDirectory(dir=self.temp) as folder:
@@ -350,7 +353,7 @@ class BuildTopleft(build_ext):
                     [os.path.relpath(source)],
                     output_dir=folder,
                     macros=macros,
-                    include_dirs=[str(ROOT / "csrc"), *self.include_dirs],
+                    include_dirs=[str(ROOT / "csrc"), *{str(path.parent) for path in own_headers}, *self.include_dirs],
                     debug=self.debug,
                     extra_postargs=[*flags, "-g"] if self.debug else flags,
                 )

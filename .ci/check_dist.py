@@ -33,7 +33,9 @@ def main(folder: Path) -> None:
         in_sdist = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
 
     package = {name.removeprefix("src/") for name in files_below("src/topleft")}
-    modules = {name for name in package if name.endswith((".py", ".pyi", "py.typed", ".json", ".html", ".css", ".js"))}
+    modules = {
+        name for name in package if name.endswith((".py", ".pyi", "py.typed", ".json", ".html", ".css", ".js", ".wasm"))
+    }
     units = {name.removesuffix(".pyx") for name in package if name.endswith(".pyx")}
     extensions = {name for name in in_wheel if name.endswith((".so", ".pyd"))}
     metadata = {name for name in in_wheel if ".dist-info/" in name}
@@ -43,7 +45,15 @@ def main(folder: Path) -> None:
         sys.exit(f"{wheel.name} must hold the license and these, compiled: {', '.join(sorted(units))}; got {found}")
     check(wheel.name, in_wheel, modules, in_wheel - modules - extensions - metadata)
 
-    top = {"LICENSE", "MANIFEST.in", "README.md", "packaging/bindings.py", "pyproject.toml", "setup.py"}
+    top = {
+        "LICENSE",
+        "MANIFEST.in",
+        "README.md",
+        "packaging/bindings.py",
+        "packaging/wasm.py",
+        "pyproject.toml",
+        "setup.py",
+    }
     made = {"src/topleft/_core/engine/kernels.c", "src/topleft/_core/engine/kernels.pyi"}
     built = {name for name in in_sdist if name.endswith((".so", ".o", ".pyc"))} | made
     check(sdist.name, in_sdist, top | files_below("csrc", "src", "tests") - made, built)

@@ -7,7 +7,7 @@ sys.path.insert(0, str(Path(__file__).parent / "site"))
 
 project = "topleft"
 author = "the topleft authors"
-extensions = ["myst_parser", "gallery", "links", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "gallery", "links", "live", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 autodoc_typehints = "none"  # docstrings have shapes, dtypes and units
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False

@@ -132,3 +132,12 @@ def test_indices_are_read_in_few_places():
     first_looks = r"(first_bad_row|fetch_rows|fetch_listed)\([^;]*;"  # checks of all, and mere prefetches
     named = r"(snapped|mesh|fans|\bs|\bc)(->|\.)triangles\b(?!\s*=)"
     assert {name for name in FILES if re.search(named, re.sub(first_looks, "", code_of(name)))} == READERS_OF_INDICES
+
+
+def test_unit_of_webassembly_compiles_with_what_the_headers_declare():
+    if not compiler():
+        pytest.skip("no C compiler: $CC, cc, gcc or clang")
+    unit = CSRC.parent / "src/topleft/_apps/explore/wasm/web.c"
+    builtins = ("-D__builtin_wasm_memory_size(i)=0", "-D__builtin_wasm_memory_grow(i,n)=0")  # compilers here have none
+    result = check_syntax(unit, ("-Wno-attributes", *builtins))
+    assert result.returncode == 0, result.stderr

@@ -15,7 +15,7 @@ FRONT = sorted(ROOT.glob("*.md"))
 CHECKED = [*FRONT, *PAGES, *sorted(ROOT.glob("benchmarks/**/*.md")), *sorted(ROOT.glob("csrc/**/*.md"))]
 
 ROOMS = ("src", "csrc", "tests", "benchmarks", "examples", "docs")
-BUILD = [ROOT / "setup.py", ROOT / "packaging" / "bindings.py"]
+BUILD = [ROOT / "setup.py", *(ROOT / "packaging").glob("*.py")]
 SOURCES = [path.as_posix() for path in [*BUILD, *(p for name in ROOMS for p in (ROOT / name).rglob("*.*"))]]
 NAMED = re.compile(r"(?<![\w./])[\w./]*[a-z0-9_]\.(?:c|h|py|pyi|pyx|pxi)\b(?!\()")
 LINK = re.compile(r"\]\(([^()\s]+)\)")

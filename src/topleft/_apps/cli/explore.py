@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from topleft._apps.cli.arguments import Parser, UsageError, size
@@ -14,11 +15,13 @@ WHAT is a mesh file, an .npz file with arrays `vertices`, `triangles` and maybe 
 triangles.
 
 The page is served to this machine alone, under an address with a token, until it has been closed for half a minute.
+--export writes it as a folder instead, for any web server: its kernels run in the browser, without Python.
 
 examples:
   topleft explore two-triangles
   topleft explore bunny.ply
   topleft explore arrays.npz --no-browser
+  topleft explore --export site && python -m http.server -d site
 """
 
 
@@ -32,6 +35,12 @@ def run_explore(options: argparse.Namespace) -> int:
     if not options.idle > 0:
         raise UsageError(f"--idle must be more than 0 seconds, got {options.idle}")
     content = content_of_name(options.what or "shared-edge", options.size)
+    if options.export is not None:
+        from topleft._apps.explore.static import write_static
+
+        written = write_static(Path(options.export), content)
+        print(f"{options.export}: {len(written)} files, {sum(path.stat().st_size for path in written):,} bytes")
+        return 0
     host, port, idle, browser = options.host, options.port, options.idle, not options.no_browser
     with suppress(KeyboardInterrupt), open_page(content, host=host, port=port, idle=idle, browser=browser) as explorer:
         explorer.wait()
@@ -49,6 +58,7 @@ def add_explore_command(commands: argparse._SubParsersAction[Parser]) -> None:
     command.add_argument("what", nargs="?", metavar="WHAT", help="what is shown")
     command.add_argument("--size", type=size, metavar="WxH", help="of the magnified picture, for an .npz file")
     command.add_argument("--no-browser", action="store_true", help="print the address alone")
+    command.add_argument("--export", metavar="DIR", help="write the page there, as files that need no Python")
     command.add_argument("--port", type=int, default=0, help="a free one unless given")
     command.add_argument(
         "--host", help="let other machines see the page, too, at this address of this machine; traffic is not encrypted"

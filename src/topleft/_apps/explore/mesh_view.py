@@ -27,7 +27,15 @@ from topleft._core.base.array_types import U8
 from topleft._core.base.arrays import as_number
 from topleft._core.base.color import Color, as_color
 from topleft._core.base.options import check_choice
-from topleft._meshes.camera.matrices import FRAMING_MARGIN, bounding_sphere, box_corners, ends_to_frame, orbit_view
+from topleft._meshes.camera.matrices import (
+    FRAMING_MARGIN,
+    bounding_sphere,
+    box_corners,
+    ends_to_frame,
+    orbit_view,
+    sine_of_tangent,
+    tangent,
+)
 from topleft._meshes.io import png
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
@@ -83,6 +91,7 @@ HEAT = np.array([
 ], np.uint8)  # fmt: skip
 """Colours of counts 0, 1, 2, 3-4, 5-8, ... and more: light to dark, which all eyes see. ColorBrewer's YlGnBu."""
 
+HEAT_STARTS = (1, 2, 3, 5, 9, 17, 33, 65)
 HEAT_LABELS = ("1", "2", "3-4", "5-8", "9-16", "17-32", "33-64", "65 and more")
 
 
@@ -168,13 +177,13 @@ class MeshView:
         """Return the camera of the view."""
         center, radius = bounding_sphere(ends_to_frame(mesh))
         aspect = self.size[0] / self.size[1]
-        half_angle = math.radians(self.fov or 40.0) / 2
-        distance = radius * FRAMING_MARGIN / math.sin(math.atan(math.tan(half_angle) * min(1.0, aspect))) / self.zoom
+        tan_y = tangent((self.fov or 40.0) / 2)
+        distance = radius * FRAMING_MARGIN / sine_of_tangent(tan_y * min(1.0, aspect)) / self.zoom
         height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect) / self.zoom
         if not self.fov:
             distance = 4 * radius
         matrix = orbit_view(center, distance, self.azimuth, self.elevation, up=self.up)  # type: ignore[arg-type]
-        half_px = height / 2 if not self.fov else distance * math.tan(half_angle)
+        half_px = height / 2 if not self.fov else distance * tan_y
         matrix[:2, 3] += np.array(self.pan) * half_px
         reach = 1.01 * radius
         near, far = max(distance - reach, 1e-3 * distance, 1e-4 * radius), distance + reach
@@ -267,10 +276,9 @@ def draw(shown: Shown, view: MeshView, background: Color = (0, 0, 0, 0)) -> U8:
             transform=camera.clip_from_world(size),
             cull=view.cull,  # type: ignore[arg-type]
         )
-        classes = np.searchsorted([1, 2, 3, 5, 9, 17, 33, 65], np.arange(66), side="right").astype(np.uint8)
         heat = HEAT.copy()
         heat[0] = background
-        return heat[classes[np.minimum(counts, 65)]]
+        return heat[heat_classes()[np.minimum(counts, HEAT_STARTS[-1])]]
     if view.layer == "uv":
         layers = render_layers(mesh, camera, size, layers="uv", rasterizer=memory, **view.drawn_options())
         return uv_colors(layers["uv"], background)
@@ -278,6 +286,11 @@ def draw(shown: Shown, view: MeshView, background: Color = (0, 0, 0, 0)) -> U8:
     table = table_of(shown, view, len(mesh.triangles))
     table[-1] = np.array(background, np.uint8).view(np.uint32)[0]
     return table.take(ids, mode="wrap").view(np.uint8).reshape(*ids.shape, 4)
+
+
+def heat_classes() -> U8:
+    """The colour of each count, the last one of all that are larger."""
+    return np.searchsorted(HEAT_STARTS, np.arange(HEAT_STARTS[-1] + 1), side="right").astype(np.uint8)
 
 
 def table_of(shown: Shown, view: MeshView, n: int) -> NDArray[np.uint32]:
@@ -370,6 +383,7 @@ def answer_draw(session: Session, request: Request) -> Reply:
     header = {
         "box": (x, y, width, height), "size": view.size, "draw_ms": 1e3 * (drawn - start),
         "encode_ms": 1e3 * (encoded - drawn), "n_triangles": len(shown.mesh.triangles),
+        "is_jpeg": background is not None,
     }  # fmt: skip
     if view.tolerance:
         found = choose_detail(shown.mesh, camera, view.size, tolerance=view.tolerance, cull=view.cull)  # type: ignore[arg-type]

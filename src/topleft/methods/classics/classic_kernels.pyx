@@ -1,74 +1,95 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
 # cython: freethreading_compatible=True
 # cython: auto_pickle=False, emit_code_comments=False
-"""The classics as one compiled module: arrays in, a loop over triangles, and the fill of the method that is named.
-
-A method is a file beside this one.  It has its variants in FORMS, in the order of its own constants, and a function
-`fill_NAME` that draws one triangle.  All are one module since a module by itself takes longer to compile than a method.
-"""
+"""The classics as one compiled module: arrays in, the methods of classics.h over their triangles."""
 
 import numpy as np
 
-FORMS: dict[str, tuple[str, ...]] = {}
+from cpython.buffer cimport PyBUF_C_CONTIGUOUS, PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
+from libc.stdint cimport int32_t, int64_t
 
-include "_target.pxi"
-include "_edges.pxi"
-include "bresenham_scanline.pxi"
-include "edge_increment.pxi"
-include "float_barycentric.pxi"
-include "lerp_scanline.pxi"
-include "point_in_triangle.pxi"
-include "row_crossing.pxi"
-include "zigzag.pxi"
+cdef extern from "classics.h":
+    enum: CLASSIC_N, CLASSIC_MOST_FORMS
+    ctypedef int classic_sink
+    ctypedef struct classic_target:
+        void *pixels
+        classic_sink sink
+        int64_t x0, y0, x1, y1
+    ctypedef struct classic_point:
+        int64_t x, y
+    ctypedef struct classic_line:
+        int64_t x, y, n_left
+    ctypedef struct classic:
+        const char *name
+        const char *forms[CLASSIC_MOST_FORMS]
+    const classic CLASSICS[CLASSIC_N]
+    void draw_classic(int method, int form, int subpixel_bits, const double *vertices, int64_t stride, const int32_t *triangles,
+                      int64_t n, classic_target *t) noexcept nogil
+    classic_line start_line(classic_point a, classic_point b) noexcept nogil
+    void step_line(classic_line *l) noexcept nogil
 
-ctypedef void (*filler)(target *, const double *, const double *, const double *, int, int) noexcept nogil
+#: The variants of each method, in the order of their numbers; methods in the order of theirs.
+FORMS: dict[str, tuple[str, ...]] = {
+    CLASSICS[i].name.decode(): tuple([
+        CLASSICS[i].forms[k].decode() for k in range(CLASSIC_MOST_FORMS) if CLASSICS[i].forms[k] != NULL
+    ])
+    for i in range(CLASSIC_N)
+}
 
-cdef filler find_filler(str method) except NULL:
-    if method == "bresenham_scanline":
-        return fill_bresenham_scanline
-    if method == "edge_increment":
-        return fill_edge_increment
-    if method == "float_barycentric":
-        return fill_float_barycentric
-    if method == "lerp_scanline":
-        return fill_lerp_scanline
-    if method == "point_in_triangle":
-        return fill_point_in_triangle
-    if method == "row_crossing":
-        return fill_row_crossing
-    if method == "zigzag":
-        return fill_zigzag
-    raise ValueError(f"method must be one of {', '.join(map(repr, FORMS))}, got {method!r}")
+
+cdef void *lend(object array, Py_buffer *view, Py_ssize_t item_size, int n_columns, int flags) except? NULL:
+    """Return the memory of a contiguous array of rows of at least `n_columns` items (0: one dimension).
+
+    Typed memoryviews would do the same, and be most of the module.
+    """
+    PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | flags)
+    if view.itemsize != item_size or view.ndim != (2 if n_columns else 1) or (n_columns and view.shape[1] < n_columns):
+        PyBuffer_Release(view)
+        raise ValueError(f"a buffer must have items of {item_size} bytes in rows of {n_columns or 'one'}")
+    return view.buf
 
 
 def draw(str method, vertices, triangles, pixels, tuple window, int sink, str variant="", int subpixel_bits=8):
     """Draw triangles in order over a cleared window (x, y, width, height) of the picture."""
-    cdef filler fill_triangle = find_filler(method)
-    cdef int form = FORMS[method].index(variant)
-    cdef Py_ssize_t i, n, step
+    cdef int form, number
     cdef Py_buffer points, corners, bytes_drawn
     cdef const double *xy
     cdef const int32_t *corner
-    cdef target t
+    cdef classic_target t
+    if method not in FORMS:
+        raise ValueError(f"method must be one of {', '.join(map(repr, FORMS))}, got {method!r}")
+    number, form = list(FORMS).index(method), FORMS[method].index(variant)
     t.x0, t.y0 = window[:2]
     t.x1, t.y1 = t.x0 + window[2], t.y0 + window[3]
-    t.sink = sink
+    t.sink = <classic_sink>sink
     xy = <const double *>lend(vertices, &points, sizeof(double), 2, 0)
     try:
         corner = <const int32_t *>lend(triangles, &corners, sizeof(int32_t), 3, 0)
         try:
             t.pixels = lend(pixels, &bytes_drawn, 1, 0, PyBUF_WRITABLE)
-            n = corners.shape[0] if bytes_drawn.len else 0
-            step = points.shape[1]
-            with nogil:
-                for i in range(n):
-                    t.label = <int32_t>i
-                    fill_triangle(
-                        &t, xy + step * corner[0], xy + step * corner[1], xy + step * corner[2], form, subpixel_bits
-                    )
-                    corner += corners.shape[1]
+            if bytes_drawn.len:
+                with nogil:
+                    draw_classic(number, form, subpixel_bits, xy, points.shape[1], corner, corners.shape[0], &t)
             PyBuffer_Release(&bytes_drawn)
         finally:
             PyBuffer_Release(&corners)
     finally:
         PyBuffer_Release(&points)
+
+
+def line_pixels(int64_t x0, int64_t y0, int64_t x1, int64_t y1):
+    """Return the (N, 2) pixels of a line, from its upper end down."""
+    cdef classic_line l
+    cdef classic_point a, b
+    cdef Py_ssize_t i
+    cdef Py_buffer view
+    cdef int64_t *pixels
+    a.x, a.y, b.x, b.y = x0, y0, x1, y1
+    l = start_line(a, b)
+    made = np.empty((l.n_left, 2), np.int64)
+    pixels = <int64_t *>lend(made, &view, sizeof(int64_t), 2, PyBUF_WRITABLE)
+    for i in range(view.shape[0]):
+        pixels[2 * i], pixels[2 * i + 1] = l.x, l.y
+        step_line(&l)
+    PyBuffer_Release(&view)
+    return made

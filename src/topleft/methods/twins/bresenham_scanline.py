@@ -1,6 +1,6 @@
 """Bresenham scanline in Python, where the generator of the line really is one.
 
-In: vertices, truncated to pixels.  Out: counts.  Source: see bresenham_scanline.pxi.
+In: vertices, truncated to pixels.  Out: counts.  Source: see bresenham_scanline.h.
 """
 
 from __future__ import annotations

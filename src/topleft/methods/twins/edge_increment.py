@@ -1,6 +1,6 @@
 """Edge increment in Python: edge functions of whole numbers, set up once a triangle, then stepped by additions.
 
-In: vertices.  Out: counts.  Source: see edge_increment.pxi.
+In: vertices.  Out: counts.  Source: see edge_increment.h.
 """
 
 from __future__ import annotations

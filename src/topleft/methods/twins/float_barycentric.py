@@ -1,6 +1,6 @@
 """Float barycentric in NumPy: the three weights of the whole bounding box, in the float type of the variant.
 
-In: vertices as they are.  Out: counts.  Source: see float_barycentric.pxi.
+In: vertices as they are.  Out: counts.  Source: see float_barycentric.h.
 """
 
 from __future__ import annotations

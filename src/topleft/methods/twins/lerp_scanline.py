@@ -1,6 +1,6 @@
 """Lerp scanline in Python, with float32 where the lesson has it.
 
-In: vertices, truncated to pixels.  Out: counts.  Source: see lerp_scanline.pxi.
+In: vertices, truncated to pixels.  Out: counts.  Source: see lerp_scanline.h.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Point in triangle in NumPy: the whole bounding box is three expressions, which is why Python programs like it.
 
-In: vertices, truncated to pixels.  Out: counts.  Source: see point_in_triangle.pxi.
+In: vertices, truncated to pixels.  Out: counts.  Source: see point_in_triangle.h.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Row crossing in NumPy: all rows of a triangle ask an edge at once.
 
-In: vertices, truncated to pixels.  Out: counts.  Source: see row_crossing.pxi.
+In: vertices, truncated to pixels.  Out: counts.  Source: see row_crossing.h.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Zigzag in Python: stepped edge functions, and a walk that turns round at the sides of the triangle.
 
-In: vertices.  Out: counts.  Source: see zigzag.pxi.
+In: vertices.  Out: counts.  Source: see zigzag.h.
 """
 
 from __future__ import annotations

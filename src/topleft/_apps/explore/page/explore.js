@@ -1,5 +1,6 @@
-// The page of the explorer. It asks Python for everything that is drawn, and draws no triangle by itself: pictures are
-// arrays of pixels that come from the library; lines and handles are laid over them.
+// The page of the explorer. It asks for everything that is drawn, and draws no triangle by itself: pictures are arrays of
+// pixels that come from the library, by Python or, in a page that was written with --export, by a worker with the same
+// kernels; lines and handles are laid over them.
 
 // ---- questions and answers -------------------------------------------------------------------------------------
 
@@ -67,8 +68,8 @@ class Line {
     if (header.error) (reject ?? console.error)(new Error(header.error));
     else resolve?.(header);
   }
-  lose() {
-    for (const {reject} of this.waiting.values()) reject(new Error("the connection is closed"));
+  lose(why = "the connection is closed") {
+    for (const {reject} of this.waiting.values()) reject(new Error(why));
     this.waiting.clear();
     this.onLost?.();
   }
@@ -87,6 +88,15 @@ function socketLine(onLost) {
         + "Python stops it. Open the address without them.")),
       () => reject(new Error("the explorer has ended: start it again")));
   });
+}
+
+// A page without Python: a worker answers.
+async function workerLine(onLost, root) {
+  const worker = new Worker(new URL(root.dataset.worker, document.baseURI), {type: "module"});
+  const line = new Line((header, parts) => worker.postMessage([header, parts], parts.map((part) => part.buffer)), onLost);
+  worker.onmessage = ({data: [header, parts]}) => line.hear(withArrays(header, parts));
+  worker.onerror = (event) => (event.preventDefault?.(), line.lose(event.message));
+  return line;
 }
 
 function notebookLine(model) {
@@ -209,6 +219,7 @@ function pixelsPart(app, panel) {
       told(error);
     }
     part.drawn = asked;
+    if (app.root.classList.contains("figure")) parent.postMessage("topleft is drawn", "*");
     part.onDrawn?.();
   });
   const explain = newest(async () => {
@@ -706,7 +717,7 @@ function meshPart(app, panel) {
   });
   async function decode(frame) {
     const [, , width, height] = frame.box, {pixels} = frame.arrays, start = performance.now();
-    if (pixels.length) frame.image = frame.isAtRest ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
+    if (pixels.length) frame.image = !frame.is_jpeg ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
     frame.decode = performance.now() - start;
     if (frame.number < frames.newest) return;
     frames.newest = frame.number;
@@ -809,7 +820,7 @@ function meshPart(app, panel) {
       ...mesh.controls.map(([title, rows]) => group(title, ...rows.map(control))), legend,
       make("div.buttons", {}, button("Reset the camera", () => change(home()), "0")),
       group("Picked", make("p.hint", {}, "A click tells which triangle shows."), found),
-      group("Keep", make("div.buttons", {}, ...saves, button("Copy link", () => app.copyLink())), planBox));
+      group("Keep", make("div.buttons", {}, ...app.hello.saves ? [] : saves, button("Copy link", () => app.copyLink())), ...app.hello.has_plan === false ? [] : [planBox]));
   }
   panel.append(make("div.layout", {}, stage, side));
   new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);
@@ -954,7 +965,7 @@ export async function start(root, connect, hasAddress = true) {
   };
   app.restore = (fragment) => {
     const [tab, text = ""] = fragment.replace(/^#/, "").split("=");
-    if (!(tab in PARTS) || !text) return false;
+    if (!(app.hello.tabs ?? Object.keys(PARTS)).includes(tab) || !text) return false;
     app.show(tab);
     try {
       app.parts[tab].restore?.(JSON.parse(decodeURIComponent(text)));
@@ -965,11 +976,15 @@ export async function start(root, connect, hasAddress = true) {
   };
 
   try {
-    app.line = await connect(() => app.say("The explorer has ended. Start it again to go on.", true));
+    app.line = await connect(() => app.say("The explorer has ended. Start it again to go on.", true), root);
     app.hello = await app.line.ask("hello");
   } catch (error) {
     return void app.say(error.message, true);
   }
+  const {tabs: shown = Object.keys(PARTS), saves, has_plan: hasPlan = true} = app.hello;
+  for (const tab of tabs) tab.hidden = !shown.includes(tab.dataset.tab);
+  for (const plan of root.querySelectorAll(".plan")) plan.hidden = !hasPlan;
+  for (const one of root.querySelectorAll("[data-save]")) one.hidden = saves && !saves.includes(one.dataset.save);
   for (const [name, part] of Object.entries(PARTS)) {
     app.parts[name] = part(app, root.querySelector(`[data-panel=${name}]`));
   }
@@ -994,4 +1009,7 @@ async function render({model, el}) {
 export default {render};
 
 const page = document.querySelector("body > .explorer");
-if (page) start(page, socketLine);
+if (page) {
+  page.classList.toggle("figure", new URLSearchParams(location.search).has("figure"));
+  start(page, page.dataset.worker ? workerLine : socketLine);
+}

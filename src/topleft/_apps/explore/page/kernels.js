@@ -1,0 +1,173 @@
+// The kernels of topleft in WebAssembly: arrays in, pictures out. `wasm/web.c` says what its functions do; nothing is
+// drawn here. Runs in a worker of a page and in node.
+
+export const SINK = {mask: 0, count: 1, label: 2, nearest: 4, farthest: 5};
+export const TEST = {outer: 1, inner: 2};
+export const CULL = {none: 0, back: 1, front: 2};
+export const METHOD = {auto: 0, edge: 1, scanline: 2};
+const FULL = -2, MOST_STEPS = 2 ** 30;
+
+// What this machine has no memory for: the sentence that Python has.
+export class OutOfMemory extends Error {
+  constructor() {
+    super("not enough memory");
+  }
+}
+
+// A module with one vector instruction: a browser that takes it has SIMD128.
+const PROBE = new Uint8Array([0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11]);
+export const setOf = () => WebAssembly.validate(PROBE) ? "simd128" : "scalar";
+
+export class Kernels {
+  // `module`: a WebAssembly.Module, or the bytes of one.
+  static async of(module) {
+    const made = await WebAssembly.instantiate(module, {});
+    return new Kernels((made.instance ?? made).exports);
+  }
+
+  constructor(exports) {
+    this.exports = exports;
+    this.start = exports.web_used();
+  }
+
+  // Calls `work`, and frees what it has taken of memory, whatever it ends with.
+  within(work) {
+    const before = this.exports.web_used();
+    try {
+      return work();
+    } finally {
+      this.exports.web_release(before);
+    }
+  }
+
+  // The address of so many bytes.
+  room(bytes) {
+    const at = this.exports.web_room(bytes) >>> 0;
+    if (!at) throw new OutOfMemory();
+    return at;
+  }
+
+  // The address of a copy of a typed array.
+  put(array) {
+    const at = this.room(array.byteLength);
+    new array.constructor(this.exports.memory.buffer, at, array.length).set(array);
+    return at;
+  }
+
+  // A copy of what stands there: `kind` is that of a typed array. A page that is short of memory lives on.
+  get(kind, at, n) {
+    try {
+      return new kind(this.exports.memory.buffer, at, n).slice();
+    } catch (error) {
+      throw error instanceof RangeError ? new OutOfMemory() : error;
+    }
+  }
+
+  check(status) {
+    if (status === FULL) throw new OutOfMemory();
+    return status;
+  }
+
+  // Takes a scene in pixels, {points, n_components, triangles, bits, n_samples, cull, method}: bits are sub-pixel bits, or
+  // "exact". Returns -1, or the lowest vertex that a triangle uses and that cannot be drawn.
+  takePixels({points, n_components, triangles, bits, n_samples = 1, cull = "none", method = "auto"}) {
+    const own = bits === "exact" ? 8 : bits, grid = n_samples > 1 ? Math.max(4, own) : own;
+    return this.check(this.exports.web_take_pixels(
+      this.put(points), n_components, points.length / n_components, this.put(triangles), triangles.length / 3,
+      bits === "exact" ? -1 : bits, grid, CULL[cull], METHOD[method]));
+  }
+
+  window([x, y], [width, height], test = 0) {
+    this.size = [width, height];
+    this.exports.web_window(x, y, width, height, test);
+  }
+
+  // A mask (Uint8Array), or counts, or ids (Int32Array), as one sample sees them: `at`, in sixteenths of a pixel.
+  draw(sink, at = [0, 0]) {
+    return this.within(() => {
+      const n = this.size[0] * this.size[1], kind = sink === SINK.mask ? Uint8Array : Int32Array;
+      const pixels = this.room(n * kind.BYTES_PER_ELEMENT), depth = sink >= SINK.nearest ? this.room(4 * n) : 0;
+      this.check(this.exports.web_draw(sink, ...at, pixels, depth));
+      return this.get(kind, pixels, n);
+    });
+  }
+
+  // How much of each pixel triangles cover, their sum or at most 1 of it: Float32Array.
+  area(isClamped) {
+    return this.within(() => {
+      const n = this.size[0] * this.size[1], pixels = this.room(4 * n);
+      this.check(this.exports.web_area(pixels, Number(isClamped)));
+      return this.get(Float32Array, pixels, n);
+    });
+  }
+
+  // The counts, or labels, that a classic draws: {number, form} of it.
+  classic({number, form}, {points, n_components, triangles}, bits, sink, [x, y], [width, height]) {
+    return this.within(() => {
+      const n = width * height, pixels = this.room(4 * n);
+      this.exports.web_classic(number, form, bits, this.put(points), n_components, this.put(triangles), triangles.length / 3,
+        sink, x, y, width, height, pixels);
+      return this.get(Int32Array, pixels, n);
+    });
+  }
+
+  wireframe() {
+    return this.within(() => {
+      const n = this.size[0] * this.size[1], pixels = this.room(n);
+      this.check(this.exports.web_wireframe(pixels));
+      return this.get(Uint8Array, pixels, n);
+    });
+  }
+
+  // Triangles of polygons, lists of vertices: Int32Array (3 t).
+  cut(polygons, vertices) {
+    if (polygons.every((face) => face.length === 3)) return Int32Array.from(polygons.flat());
+    return this.within(() => {
+      const corners = polygons.flat(), n = polygons.reduce((sum, face) => sum + Math.max(0, face.length - 2), 0);
+      const most = polygons.reduce((high, face) => Math.max(high, face.length), 0), out = this.room(24 * n);
+      const done = this.check(this.exports.web_cut(
+        this.put(Float64Array.from(vertices)), this.put(BigInt64Array.from(corners, BigInt)),
+        this.put(BigInt64Array.from(polygons, ({length}) => BigInt(length))), polygons.length, most, MOST_STEPS, out));
+      if (done < polygons.length) throw new Error("its polygons take too many comparisons to be cut into triangles");
+      return Int32Array.from(this.get(BigInt64Array, out, 3 * n), (row) => corners[Number(row)]);
+    });
+  }
+
+  // Takes a mesh: what was there before is gone. Returns its box, {ends}, the middle of that, {center}, as a number of the
+  // vertices {origin}, and how far it reaches from there, {radius}.
+  takeMesh(vertices, triangles, leastCosine) {
+    this.exports.web_release(this.start);
+    this.isF64 = vertices instanceof Float64Array;
+    const box = this.room(48), points = this.put(vertices), corners = this.put(triangles);
+    const n = this.check(this.exports.web_take_mesh(points, Number(this.isF64), vertices.length / 3, corners, triangles.length / 3, leastCosine, box));
+    this.counts = {n_vertices: n, n_triangles: triangles.length / 3};
+    this.mesh = this.exports.web_used();
+    const ends = this.get(Float64Array, box, 6), center = [0, 1, 2].map((k) => ends[k] / 2 + ends[3 + k] / 2);
+    let most = 0;
+    for (const i of triangles) {
+      const [x, y, z] = [0, 1, 2].map((k) => (vertices[3 * i + k] - center[k]) ** 2);
+      most = Math.max(most, x + y + z);
+    }
+    const round = this.isF64 ? (x) => x : Math.fround, origin = [0, 1, 2].map((k) => round(round(ends[k] / 2) + round(ends[3 + k] / 2)));
+    return {center, origin, radius: Math.sqrt(most) || 1, ends};
+  }
+
+  // Brings the mesh into view by a matrix, clip from object space (4 rows), and calls `work`.
+  viewing(matrix, [width, height], cull, work) {
+    return this.within(() => {
+      const own = this.put((this.isF64 ? Float64Array : Float32Array).from(matrix.flat()));
+      const isAffine = matrix[3].every((value, k) => value === (k === 3 ? 1 : 0));
+      this.check(this.exports.web_view_mesh(own, Number(isAffine), width, height, CULL[cull]));
+      this.size = [width, height];
+      return work();
+    });
+  }
+
+  // Shades what is in view: RGBA. `look` as web_look of web.c has it, `samples` in sixteenths of a pixel.
+  render(look, samples) {
+    const [width, height] = this.size, pixels = this.room(4 * width * height);
+    const at = this.put(Int32Array.from(samples.flat(), (value) => value * 16)), given = this.put(look);
+    this.check(this.exports.web_render(given, Math.log2(samples.length), at, pixels));
+    return this.get(Uint8ClampedArray, pixels, 4 * width * height);
+  }
+}

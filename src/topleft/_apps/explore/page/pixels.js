@@ -1,0 +1,325 @@
+// The part Pixels without Python: what pixels.py, state.py and probe.py answer, by the kernels in WebAssembly and exact
+// fractions. Tables and words come from Python (`data`, written by static.py); a test asks both sides the same questions.
+
+import {SINK, TEST} from "./kernels.js";
+
+const MAX_COORDINATE = 2 ** 52;
+
+// Python's words for a mistake: what a page gets is the sentence.
+export class Refusal extends Error {}
+export const refuse = (text) => {
+  throw new Refusal(text);
+};
+const shown = (value) => Array.isArray(value) ? `[${value.map(repr).join(", ")}]` : typeof value === "boolean" ? (value ? "True" : "False") : value === null ? "None" : Number.isInteger(value) ? `${BigInt(value)}` : String(value);
+const repr = (value) => typeof value === "string" ? `'${value}'` : shown(value);
+const quoted = (words) => words.map((word) => `'${word}'`).join(", ");
+
+// A float64 as Python writes it.
+export function asFloat(x) {
+  const [digits, power] = x.toExponential().split("e"), exponent = Number(power);
+  if (exponent < -4 || exponent >= 16) return `${digits}e${exponent < 0 ? "-" : "+"}${String(Math.abs(exponent)).padStart(2, "0")}`;
+  return Number.isInteger(x) ? x.toFixed(1) : exponent < 0 ? x.toFixed(digits.replace(/[-.]/g, "").length - 1 - exponent) : String(x);
+}
+
+// ---- a state, checked as state.py checks it ---------------------------------------------------------------------
+
+function pairOf(name, value, least, greatest) {
+  if (!Array.isArray(value) || value.length !== 2 || !value.every(Number.isInteger)) {
+    refuse(`${name} must be two whole numbers, got ${shown(value).slice(0, 40)}`);
+  }
+  if (!value.every((number) => least <= number && number <= greatest)) {
+    refuse(`${name} must be from ${least} to ${greatest}, got ${value.map(shown).join(", ")}`);
+  }
+  return value;
+}
+
+function chosen(name, value, words) {
+  const marked = words.map((word) => `"${word}"`);
+  if (!words.includes(value)) refuse(`${name} must be ${marked.slice(0, -1).join(", ")} or ${marked.at(-1)}, got ${repr(value)}`);
+}
+
+// A method is one of the kernels' or of the literature.
+function checkMethod(name, {hello: {methods}}) {
+  const names = (isClassic) => methods.filter((one) => one.is_classic === isClassic).map((one) => one.name);
+  if (methods.some((one) => one.name === name)) return;
+  refuse(`method must be one of ${quoted(names(false))}, got ${repr(name)}; methods to compare with are ${quoted(names(true))}`);
+}
+
+export function parseState(given, data) {
+  const {max_side_px, max_triangles, max_vertices, words} = data.limits;
+  if (given === null || typeof given !== "object" || Array.isArray(given)) {
+    refuse(`a state must be an object, got ${Array.isArray(given) ? "list" : typeof given}`);
+  }
+  const known = ["vertices", "triangles", "size", "scene", ...Object.keys(data.defaults)];
+  const unknown = Object.keys(given).filter((name) => !known.includes(name)).sort();
+  if (unknown.length) refuse(`a state has no ${unknown.join(", ").slice(0, 80)}`);
+  const missing = ["vertices", "triangles", "size"].filter((name) => !(name in given));
+  if (missing.length) refuse(`a state must have ${missing.join(" and ")}`);
+  const state = {...data.defaults, ...given};
+  pairOf("size", state.size, 1, max_side_px);
+  pairOf("origin", state.origin, -MAX_COORDINATE, MAX_COORDINATE);
+  const {vertices, triangles, subpixel_bits: bits} = state;
+  if (!Array.isArray(vertices)) refuse("vertices must be a list of rows");
+  if (vertices.length > max_vertices) refuse(`at most ${max_vertices} vertices are drawn magnified, got ${vertices.length}`);
+  const n = vertices[0]?.length ?? 2;
+  if ((n !== 2 && n !== 3) || !vertices.every(Array.isArray) || !vertices.every((row) => row.length === n && row.every((value) => typeof value === "number"))) {
+    refuse("vertices must be rows of two or three numbers each, all of one length");
+  }
+  if (!vertices.every(([x, y, z = 0]) => Math.abs(x) <= MAX_COORDINATE && Math.abs(y) <= MAX_COORDINATE && Math.abs(z) < 1e38)) {
+    refuse(`vertices must lie within ${MAX_COORDINATE} pixels of 0`);
+  }
+  if (bits !== "exact" && !(Number.isInteger(bits) && 0 <= bits && bits <= 16)) {
+    refuse(`subpixel_bits must be from 0 to 16, or 'exact', got '${shown(bits).slice(0, 40)}'`);
+  }
+  if (typeof state.exact !== "boolean") refuse("exact must be true or false");
+  for (const name of [state.method, state.other]) if (name) checkMethod(name, data);
+  for (const [name, options] of Object.entries(words)) chosen(name, state[name], options);
+  if (triangles.length > max_triangles) refuse(`at most ${max_triangles} triangles are drawn magnified, got ${triangles.length}`);
+  for (const [i, row] of triangles.entries()) {
+    if (!row.every((index) => 0 <= index && index < vertices.length)) {
+      refuse(`triangles must hold indices in [0, ${vertices.length}), the number of vertices; row ${i} is ${shown(row)}`);
+    }
+  }
+  const areaOf = ([a, b, c]) => (vertices[b][0] - vertices[a][0]) * (vertices[c][1] - vertices[a][1])
+    - (vertices[b][1] - vertices[a][1]) * (vertices[c][0] - vertices[a][0]);
+  const isWrong = {clockwise: (area) => area < 0, "counter-clockwise": (area) => area > 0}[state.winding] ?? (() => false);
+  state.triangles = triangles.map((row) => isWrong(areaOf(row)) ? [row[0], row[2], row[1]] : row);
+  state.has_depth = n === 3;
+  state.n_samples = state.sampling.startsWith("msaa") ? Number(state.sampling.slice(4)) : 1;
+  return state;
+}
+
+const isCoverage = (state) => ["area", "outer", "inner"].includes(state.sampling);
+
+// ---- what is drawn ---------------------------------------------------------------------------------------------
+
+// A pair of floats rounded as NumPy rounds: halves to even.
+function rint(x) {
+  const low = Math.floor(x), rest = x - low;
+  return rest > 0.5 || (rest === 0.5 && low % 2 !== 0) ? low + 1 : low;
+}
+
+// The sub-pixel bits that a method draws with.
+export function bitsOf(state, method, data) {
+  const classic = data.classics[method];
+  if (classic) return classic.has_bits && state.subpixel_bits !== "exact" ? state.subpixel_bits : 8;
+  return state.sampling === "area" && state.subpixel_bits === "exact" ? 8 : state.subpixel_bits;
+}
+
+// What was asked for that a method does not have, in words.
+function lacks(state, method, data) {
+  const classic = data.classics[method], notes = [];
+  if (bitsOf(state, method, data) !== state.subpixel_bits) notes.push(classic ? "its own grid" : "8 sub-pixel bits");
+  else if (classic?.is_integer) notes.push("whole pixels");
+  if (!classic) return notes;
+  if (state.sampling !== "center") notes.push("at centres");
+  if (state.cull !== "none") notes.push("nothing culled");
+  if (state.has_depth) notes.push("no depth");
+  return notes;
+}
+
+// Refuses vertices beyond the range of a classic.
+export function checkReach(state, method, bits, data) {
+  const {limit, has_bits: hasBits} = data.classics[method], most = hasBits ? limit / 2 ** Math.max(1, bits) : limit ?? Infinity;
+  const bad = new Set(state.triangles.flat().filter((i) => !state.vertices[i].slice(0, 2).every((x) => Math.abs(x) < most)));
+  if (!bad.size) return;
+  const i = Math.min(...bad);
+  refuse(`vertices must lie within ${most} pixels of 0 for method '${method}', got [${state.vertices[i].map(asFloat).join(", ")}] in row ${i}`);
+}
+
+// What a method draws: owners and counts of each sample, (H W S), shares of pixels, and seconds.
+function drawn(kernels, state, method, data) {
+  const {size, origin, n_samples, look} = state, isExact = method === "exact";
+  const n = size[0] * size[1], classic = data.classics[method], notes = isExact ? [] : lacks(state, method, data);
+  if (isExact && isCoverage(state)) refuse(`the exact picture of '${state.sampling}' is drawn by Python alone: topleft explore`);
+  const bits = isExact ? "exact" : bitsOf(state, method, data);
+  const points = Float64Array.from(state.vertices.flat()), n_components = state.has_depth ? 3 : 2;
+  const scene = {points, n_components, triangles: Int32Array.from(state.triangles.flat()), cull: state.cull,
+    method: isExact ? "auto" : method};
+  const take = (more) => {
+    const bad = kernels.takePixels({...scene, points: points.slice(), bits, n_samples, ...more}), grid = n_samples > 1 ? Math.max(4, bits) : bits;
+    if (bad >= 0) {
+      refuse(`vertices must lie within 2**${62 - grid} pixels of 0 with ${grid} sub-pixel bits, got `
+        + `[${state.vertices[bad].map(asFloat).join(", ")}] in row ${bad}`);
+    }
+    kernels.window(origin, size, TEST[state.sampling] ?? 0);
+  };
+  return kernels.within(() => {
+    const start = performance.now(), seconds = () => (performance.now() - start) / 1000;
+    if (look === "wireframe") {
+      take({bits: 8, n_samples: 1, cull: "none", method: "auto"});
+      kernels.window(origin, size);
+      const lines = kernels.wireframe();
+      return {owners: Int32Array.from(lines, (value) => value ? 0 : -1), counts: Int32Array.from(lines), shares: Float32Array.from(lines), n_samples: 1, seconds: seconds(), notes};
+    }
+    if (classic) {
+      checkReach(state, method, bits, data);
+      const owners = kernels.classic(classic, scene, bits, SINK.label, origin, size), took = seconds();
+      const counts = kernels.classic(classic, scene, bits, SINK.count, origin, size);
+      return {owners, counts, shares: Float32Array.from(owners, (owner) => owner >= 0 ? 1 : 0), n_samples: 1, seconds: took, notes};
+    }
+    take();
+    if (isCoverage(state)) {
+      const shares = state.sampling === "area" ? kernels.area(true) : Float32Array.from(kernels.draw(SINK.mask)), took = seconds();
+      const counts = state.sampling === "area" ? kernels.area(false) : kernels.draw(SINK.count);
+      return {owners: Int32Array.from(shares, (value) => value > 0 ? 0 : -1), counts, shares, n_samples: 1, seconds: took, notes};
+    }
+    const sink = !state.has_depth ? SINK.label : state.depth_test === "less" ? SINK.nearest : SINK.farthest;
+    const positions = data.samples[n_samples], planes = positions.map((at) => kernels.draw(sink, at)), took = seconds();
+    const counted = positions.map((at) => kernels.draw(SINK.count, at));
+    const mixed = (arrays) => Int32Array.from({length: n * n_samples}, (_, i) => arrays[i % n_samples][Math.floor(i / n_samples)]);
+    const owners = mixed(planes), shares = new Float32Array(n);
+    for (let i = 0; i < n * n_samples; i++) shares[Math.floor(i / n_samples)] += (owners[i] >= 0) / n_samples;
+    return {owners, counts: mixed(counted), shares, n_samples, seconds: took, notes};
+  });
+}
+
+const most = ({counts, n_samples}, i) => {
+  let found = 0;
+  for (let k = 0; k < n_samples; k++) found = Math.max(found, Math.ceil(counts[i * n_samples + k]));
+  return found;
+};
+
+// The colour of a triangle: seven, then the same paler, then darker.
+function colorOf(i, data) {
+  const color = data.colors[i % 7], turn = Math.floor(i / 7) % 3;
+  return turn === 0 ? color : color.map((c) => turn === 1 ? (c + 255) >> 1 : Math.floor(c * 2 / 3));
+}
+const css = (color) => `#${color.slice(0, color.length).map((c) => c.toString(16).padStart(2, "0")).join("")}`;
+
+function picture(state, drawing, data) {
+  const n = state.size[0] * state.size[1], {owners, shares, n_samples} = drawing, pixels = new Uint8ClampedArray(4 * n);
+  const colors = Array.from({length: Math.max(1, state.triangles.length)}, (_, i) => colorOf(i, data));
+  for (let i = 0; i < n; i++) {
+    if (state.look === "overdraw") pixels.set(data.heat[Math.min(most(drawing, i), data.heat.length - 1)], 4 * i);
+    else if (state.look === "wireframe" || isCoverage(state)) {
+      pixels.set(state.look === "wireframe" ? data.ink : data.colors[0], 4 * i);
+      pixels[4 * i + 3] = rint(Math.fround(255 * Math.min(1, Math.max(0, shares[i]))));
+    } else {
+      const sum = [0, 0, 0];
+      let count = 0;
+      for (let k = 0; k < n_samples; k++) {
+        const owner = owners[i * n_samples + k];
+        if (owner >= 0) count++, colors[owner].forEach((c, channel) => (sum[channel] += c));
+      }
+      pixels.set(sum.map((total) => rint(Math.fround(total / Math.max(1, count)))), 4 * i);
+      pixels[4 * i + 3] = rint(255 * count / n_samples);
+    }
+  }
+  return pixels;
+}
+
+// Where two drawings differ: rows of `data.differences`.
+function difference(one, two, n, data) {
+  const samples = Math.max(one.n_samples, two.n_samples), kinds = new Uint8Array(n);
+  const at = (drawing, i, k) => drawing.owners[i * drawing.n_samples + (drawing.n_samples > 1 ? k : 0)];
+  for (let i = 0; i < n; i++) {
+    let isSame = true;
+    for (let k = 0; k < samples; k++) isSame &&= at(one, i, k) === at(two, i, k);
+    const [a, b] = [one.shares[i], two.shares[i]];
+    if (a > Math.fround(b + data.area_error)) kinds[i] = 2;
+    else if (Math.fround(a + data.area_error) < b) kinds[i] = 3;
+    else if (!isSame) kinds[i] = 4;
+    else if (a === 0) kinds[i] = 0;
+    else kinds[i] = most(one, i) === most(two, i) ? 1 : 5;
+  }
+  return kinds;
+}
+
+const grouped = (n) => n.toLocaleString("en-US");
+function told(kinds, n) {
+  const counts = new Array(n).fill(0);
+  for (const kind of kinds) counts[kind]++;
+  return counts;
+}
+const panelOf = (key, title) => ({key, title, notes: "", facts: [], legend: [], refused: ""});
+
+function described(drawing, state, data) {
+  const ms = 1e3 * drawing.seconds;
+  let n = 0, twice = 0;
+  drawing.shares.forEach((share, i) => ((n += share > 0), (twice += most(drawing, i) > 1)));
+  const facts = [[`${grouped(n)} px`, "n", "pixels that are drawn at least once"],
+    [ms >= 1 ? `${ms.toFixed(1)} ms` : `${(1e3 * ms).toFixed(0)} µs`, "n", "of the call that draws it"]];
+  if (twice) facts.push([`${grouped(twice)} of them more than once`, "n", "drawn for several triangles"]);
+  const legend = state.look === "overdraw" ? ["once", "twice", "3 times", "4 or more"].map((word, i) => [css(data.heat[i + 1]), word]) : [];
+  return {n, n_twice: twice, notes: drawing.notes.join(", "), facts, legend};
+}
+
+function compared(kinds, [a, b], data) {
+  const counts = told(kinds, data.differences.length), n = counts.slice(2).reduce((x, y) => x + y);
+  const words = ["", "same", `${a} alone`, `${b} alone`, "another owner", "drawn more often"];
+  return {
+    kinds: counts,
+    facts: [[`${grouped(n)} of ${grouped(n + counts[1])} pixels differ`, n ? "bad" : "good", "of those that either of them draws"]],
+    legend: counts.flatMap((count, k) => k && count ? [[css(data.differences[k]), `${grouped(count)} ${words[k]}`]] : []),
+  };
+}
+
+export function drawAll(kernels, data, {state: given}) {
+  const state = parseState(given, data), n = state.size[0] * state.size[1], shape = [state.size[1], state.size[0]];
+  const names = {a: state.method}, arrays = {}, panels = {}, drawings = {};
+  if (state.look !== "wireframe") {
+    if (state.other) names.b = state.other;
+    if (state.exact) names.exact = "exact";
+  }
+  for (const [key, method] of Object.entries(names)) {
+    panels[key] = panelOf(key, state.look === "wireframe" ? "wireframe" : method);
+    try {
+      drawings[key] = drawn(kernels, state, method, data);
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      panels[key].refused = error.message;
+      continue;
+    }
+    const drawing = drawings[key], {n_samples} = drawing;
+    Object.assign(panels[key], described(drawing, state, data));
+    arrays[key] = [picture(state, drawing, data), [...shape, 4]];
+    arrays[`${key}_owners`] = [drawing.owners.filter((_, i) => i % n_samples === 0), shape];
+    arrays[`${key}_counts`] = [Int32Array.from({length: n}, (_, i) => most(drawing, i)), shape];
+    if (key !== "exact") continue;
+    for (const other of Object.keys(drawings).filter((one) => one !== "exact")) {
+      const counts = told(difference(drawings[other], drawing, n, data), data.differences.length), wrong = counts.slice(2).reduce((x, y) => x + y);
+      panels[other].n_wrong = wrong;
+      const kinds = ["too many", "missing", "of another triangle", "drawn too often"].flatMap((word, i) => counts[i + 2] ? [`${grouped(counts[i + 2])} ${word}`] : []);
+      panels[other].facts.push(wrong ? [`${grouped(wrong)} wrong: ${kinds.join(", ")}`, "bad", data.wrong] : ["all exact", "good", data.wrong]);
+    }
+  }
+  const pair = Object.keys(drawings).slice(0, 2);
+  if (pair.length === 2) {
+    const kinds = difference(drawings[pair[0]], drawings[pair[1]], n, data), pixels = new Uint8ClampedArray(4 * n);
+    kinds.forEach((kind, i) => pixels.set(data.differences[kind], 4 * i));
+    arrays.difference = [pixels, [...shape, 4]];
+    panels.difference = {...panelOf("difference", "difference"), ...compared(kinds, pair.map((key) => names[key]), data)};
+  }
+  const samples = isCoverage(state) ? [] : data.samples[state.n_samples].map((at) => at.map((x) => 0.5 + x / 16));
+  return {header: {panels: Object.values(panels), samples}, arrays};
+}
+
+// ---- edits -----------------------------------------------------------------------------------------------------
+
+export function edit(kernels, data, {state: given, what, triangle}) {
+  parseState(given, data);
+  let vertices = [...given.vertices], triangles = [...given.triangles], at = triangle;
+  if (what === "add") {
+    const [x, y] = given.size.map((n, k) => (given.origin?.[k] ?? 0) + (n >> 1)), r = Math.max(2, Math.min(...given.size) >> 2);
+    const depth = vertices[0]?.slice(2) ?? [], n = vertices.length;
+    at = triangles.length;
+    triangles.push([n, n + 1, n + 2]);
+    vertices.push([x - r, y + r, ...depth], [x, y - r, ...depth], [x + r, y + r, ...depth]);
+  } else if (!Number.isInteger(at) || !(0 <= at && at < triangles.length)) {
+    refuse(`triangle must be from 0 to ${triangles.length - 1}, got ${shown(at)}`);
+  } else if (what === "remove") {
+    triangles.splice(at, 1);
+    const used = [...new Set(triangles.flat())].sort((a, b) => a - b);
+    triangles = triangles.map((row) => row.map((i) => used.indexOf(i)));
+    vertices = used.map((i) => vertices[i]);
+  } else {
+    const [a, b, c] = triangles[at], n = vertices.length;
+    if (what === "flip") triangles[at] = [a, c, b];
+    else {
+      triangles.splice(at, 1, [a, b, n], [b, c, n], [c, a, n]);
+      vertices.push(vertices[a].map((value, k) => rint((value + vertices[b][k] + vertices[c][k]) / 3 * 256) / 256));
+    }
+  }
+  return {header: {state: {vertices, triangles}, triangle: Math.max(0, Math.min(at, triangles.length - 1))}};
+}

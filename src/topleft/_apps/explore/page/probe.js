@@ -1,0 +1,160 @@
+// Why a pixel is whose, without Python: what probe.py answers, in whole numbers of any length.
+
+import {SINK} from "./kernels.js";
+import {bitsOf, checkReach, parseState, refuse, Refusal} from "./pixels.js";
+
+const MAX_ROWS = 6, MAX_DRAWN = 64;
+const abs = (n) => n < 0n ? -n : n;
+const gcd = (a, b) => b ? gcd(b, a % b) : abs(a);
+
+// A float64 as (whole number, power of two below it): exact.
+function dyadic(x) {
+  let k = 0;
+  while (!Number.isInteger(x)) (x *= 2), k++;
+  return [BigInt(x), k];
+}
+
+// The float64 nearest to n / d, d > 0: 64 bits of the quotient, the last of them telling whether something is left.
+function quotient(n, d) {
+  const shift = 66 - (abs(n).toString(2).length - d.toString(2).length), by = BigInt(Math.abs(shift));
+  const [a, b] = shift > 0 ? [abs(n) << by, d] : [abs(n), d << by];
+  const whole = a / b, bits = whole * b === a ? whole : whole | 1n;
+  return (n < 0n ? -1 : 1) * Number(bits) * 2 ** -shift;
+}
+
+// Python's "{:.6g}": a number in the middle between two is rounded to the even one, where JavaScript's go away from 0.
+export function sixDigits(x) {
+  if (x === 0) return "0";
+  const [exact, power] = Math.abs(x).toExponential(60).split("e"), digits = exact.replace(".", "");
+  let head = Number(digits.slice(0, 6)), exponent = Number(power);
+  if (digits[6] > "5" || (digits[6] === "5" && (head % 2 || /[1-9]/.test(digits.slice(7))))) head++;
+  if (head === 1e6) (head = 1e5), exponent++;
+  const sign = x < 0 ? "-" : "", text = String(head);
+  if (exponent >= -4 && exponent < 6) return sign + String(Number(`${text}e${exponent - 5}`));
+  return `${sign}${Number(`${text[0]}.${text.slice(1)}`)}e${exponent < 0 ? "-" : "+"}${String(Math.abs(exponent)).padStart(2, "0")}`;
+}
+const number = (n, d) => n === 0n ? "0" : sixDigits(quotient(n, d));
+function fraction(n, d) {
+  const g = gcd(n, d);
+  return d / g === 1n ? `${n / g}` : `${n / g}/${d / g}`;
+}
+
+const cross = (a, b, p) => (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+const isTopLeft = (a, b) => (a[1] === b[1] && b[0] > a[0]) || b[1] < a[1];
+const side = (a, b) => a[1] === b[1] ? (isTopLeft(a, b) ? "top" : "bottom") : isTopLeft(a, b) ? "left" : "right";
+
+function rintEven(x) {
+  const low = Math.floor(x), rest = x - low;
+  return rest > 0.5 || (rest === 0.5 && low % 2 !== 0) ? low + 1 : low;
+}
+
+// Each triangle with an area at a sample: edges with twice their areas in units of 4^-k px, and what that makes of it.
+function verdicts(state, pixel, sample, bits) {
+  const own = state.vertices.map(([x, y]) => [x, y].map((value) => bits === "exact" ? dyadic(value) : [BigInt(rintEven(value * 2 ** bits)), bits]));
+  const k = Math.max(4, ...own.flat().map(([, power]) => power)), unit = 4 ** k;
+  const points = own.map((row) => row.map(([n, power]) => n << BigInt(k - power)));
+  const at = [0, 1].map((i) => BigInt(16 * (pixel[i] + state.origin[i]) + 8 + sample[i]) << BigInt(k - 4));
+  const found = [];
+  for (const [triangle, numbers] of state.triangles.entries()) {
+    const corners = numbers.map((i) => points[i]), area = cross(...corners);
+    if (!area || state.cull === (area > 0n ? "back" : "front")) continue;
+    const edges = [0, 1, 2].map((i) => {
+      const [p, q] = area > 0n ? [(i + 1) % 3, (i + 2) % 3] : [(i + 2) % 3, (i + 1) % 3];
+      return {ends: [numbers[p], numbers[q]], kind: side(corners[p], corners[q]), value: cross(corners[p], corners[q], at)};
+    });
+    const isTouched = edges.every(({value}) => value >= 0n);
+    const isCovered = edges.every(({value, kind}) => value > 0n || (value === 0n && (kind === "top" || kind === "left")));
+    const least = edges.reduce((low, {value}) => value < low ? value : low, edges[0].value);
+    found.push({triangle, numbers, edges, area: abs(area), d: BigInt(unit), isTouched, isCovered, least, depth: depthOf(state, numbers, edges, abs(area))});
+  }
+  return found.sort((a, b) => b.isCovered - a.isCovered || b.isTouched - a.isTouched || (a.least < b.least ? 1 : a.least > b.least ? -1 : 0));
+}
+
+// The depth of the plane at the sample, as a fraction.
+function depthOf(state, numbers, edges, area) {
+  if (!state.has_depth) return null;
+  const z = numbers.map((i) => dyadic(state.vertices[i][2])), k = Math.max(...z.map(([, power]) => power));
+  const sum = edges.reduce((total, {value}, i) => total + value * (z[i][0] << BigInt(k - z[i][1])), 0n);
+  return [sum, area << BigInt(k)];
+}
+
+// The triangle that shows: the nearest depth as float32 has it, else the one that is drawn last.
+function winner(covered, state) {
+  const inOrder = [...covered].sort((a, b) => a.triangle - b.triangle);
+  if (!state.has_depth) return inOrder.at(-1) ?? null;
+  const near = (one) => (state.depth_test === "less" ? -1 : 1) * Math.fround(quotient(...one.depth));
+  return inOrder.reduce((best, one) => best === null || near(one) > near(best) ? one : best, null);
+}
+
+const named = ({ends}) => `${Math.min(...ends)}\u2013${Math.max(...ends)}`;
+
+function edgeStory(one) {
+  const through = one.edges.filter(({value}) => value === 0n), ends = through.map(named).join(" and "), kinds = through.map(({kind}) => kind).join(" and a ");
+  const story = through.length === 1 ? `Edge ${ends} is a ${kinds} edge` : `Edges ${ends} are a ${kinds} edge`;
+  return `${story} of triangle ${one.triangle}, so the pixel ${one.isCovered ? "belongs" : "does not belong"} to it.`;
+}
+
+function sentences(state, found, owner, [x, y], k) {
+  const what = `The ${state.n_samples > 1 ? `sample ${k}` : "centre"} of pixel (${x}, ${y})`, told = [];
+  const onEdge = found.filter((one) => one.isTouched && one.edges.some(({value}) => value === 0n)), covered = found.filter((one) => one.isCovered);
+  if (onEdge.length) told.push(`${what} lies on an edge. ${onEdge.slice(0, 4).map(edgeStory).join(" ")}`);
+  else if (owner) told.push(`${what} lies inside triangle ${owner.triangle}: all three edge values are positive.`);
+  else told.push(`${what} lies in no triangle: each has an edge value below zero.`);
+  if (covered.length > 1 && owner) {
+    const others = covered.filter((one) => one !== owner).map((one) => one.triangle);
+    const listed = `${others.length === 1 ? "triangle" : "triangles"} ${others.slice(0, 4).join(", ")}${others.length > 4 ? " and others" : ""}`;
+    told.push(`Triangle ${owner.triangle} shows because ${state.has_depth ? "it is nearer" : "it is drawn last"}; ${listed} ${covered.length === 2 ? "is" : "are"} hidden.`);
+  }
+  return told;
+}
+
+// How often a classic draws a pixel for each triangle, [triangle, times]; null when that cannot be told.
+function drawnBy(kernels, data, state, place, method) {
+  if (state.triangles.length > MAX_DRAWN) return null;
+  const points = Float64Array.from(state.vertices.flat()), bits = bitsOf(state, method, data), found = [];
+  for (const [i, row] of state.triangles.entries()) {
+    const scene = {points, n_components: state.has_depth ? 3 : 2, triangles: Int32Array.from(row)};
+    try {
+      checkReach({...state, triangles: [row]}, method, bits, data);
+    } catch (error) {
+      if (error instanceof Refusal) return null;
+      throw error;
+    }
+    const [times] = kernels.classic(data.classics[method], scene, bits, SINK.count, place, [1, 1]);
+    if (times) found.push([i, times]);
+  }
+  return found;
+}
+
+// What a classic makes of the pixel, beside the exact rule.
+function classicStory(method, times, owner) {
+  if (!times) return "";
+  const n = times.reduce((sum, [, k]) => sum + k, 0);
+  const rule = owner ? `by the exact rule it is triangle ${owner.triangle}'s` : "no triangle should have it";
+  if (!n) return `${method} leaves it out${owner ? `; ${rule}: a gap.` : ", as it should."}`;
+  if (owner && times.length === 1 && times[0][0] === owner.triangle && n === 1) {
+    return `${method} draws it once, for triangle ${owner.triangle}, as it should.`;
+  }
+  const drawn = times.map(([i, k]) => `triangle ${i}${k > 1 ? ` (${k} times)` : ""}`).join(" and ");
+  return `${method} draws it ${n === 1 ? "once" : `${n} times`}, for ${drawn}; ${rule}.`;
+}
+
+export function probe(kernels, data, {state: given, pixel, sample = 0, method: asked}) {
+  const state = parseState(given, data), method = asked ?? state.method, bits = method === "exact" ? "exact" : bitsOf(state, method, data);
+  if (!pixel.every((at, k) => at >= 0 && at < state.size[k])) {
+    refuse(`pixel must lie in the window of (${state.size.join(", ")}), got ${pixel.join(", ")}`);
+  }
+  const found = verdicts(state, pixel, data.samples[state.n_samples][sample], bits);
+  const place = pixel.map((at, k) => at + state.origin[k]), owner = winner(found.filter((one) => one.isCovered), state);
+  const rows = found.slice(0, MAX_ROWS).map((one) => ({
+    triangle: one.triangle,
+    color: data.triangle_colors[one.triangle % data.triangle_colors.length],
+    verdict: one === owner ? "owner" : one.isCovered ? "hidden" : one.isTouched ? "on its edge" : "outside",
+    edges: one.edges.map((edge) => ({ends: named(edge), kind: edge.kind, value: number(edge.value, one.d), exact: fraction(edge.value, one.d)})),
+    depth: one.depth && number(...one.depth),
+    weights: one.edges.map(({value}) => number(value, one.area)).join(", "),
+  }));
+  const classics = [...new Set([method, state.method, state.other])].filter((name) => name in data.classics);
+  const stories = classics.map((name) => classicStory(name, drawnBy(kernels, data, state, place, name), owner)).filter(Boolean);
+  return {header: {pixel: place, sentences: [...sentences(state, found, owner, place, sample), ...stories], owner: owner?.triangle ?? -1, rows, n_more: Math.max(0, found.length - MAX_ROWS)}};
+}

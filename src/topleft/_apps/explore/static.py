@@ -1,0 +1,160 @@
+"""Writes the explorer as files that need no Python: the page, the kernels in WebAssembly, tables and scenes.
+
+The page's worker answers what needs no more than the kernels; words, colours and scenes are those of the Python side,
+written to `data.json`, so that both say the same.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import MISSING, fields
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from topleft import Mesh
+from topleft._apps.explore import mesh_view, pixels
+from topleft._apps.explore.content import MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES, SCENES, scene
+from topleft._apps.explore.handlers import hello
+from topleft._apps.explore.session import Content, Request, Session
+from topleft._apps.explore.state import Look, PixelState, Turn
+from topleft._core.base.color import LIGHT_OF_SRGB
+from topleft._core.base.whole_file import write_whole
+from topleft._meshes.picture.shade import plain_numbers
+from topleft.errors import MissingPackageError
+from topleft.methods import CLASSICS
+from topleft.methods.classics.classic_kernels import FORMS
+from topleft.methods.reference import sampling
+from topleft.scenes import shape
+from topleft.typing import CullOption, DepthTestOption, SamplingOption
+
+SETS = ("simd128", "scalar")
+"""The instruction sets of the kernels; a page fetches one."""
+
+TABS = ("pixels", "mesh")
+"""Parts of the page that work without Python."""
+
+SCRIPTS = (
+    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "mesh.js", "camera.js", "files.js",
+)  # fmt: skip
+
+LIT = ("smooth", "flat", "unlit", "normals")
+LAYERS = (*LIT, "triangle", "overdraw")
+"""What a frame of a mesh shows without Python."""
+
+CHOICES = ("layer", "sampling", "cull", "fov", "up", "spin")
+"""What a page without Python lets choose of a mesh."""
+
+
+def write_static(folder: Path, content: Content) -> list[Path]:
+    """Write the page into a folder, which is made, and return what was written.
+
+    Raises
+    ------
+    MissingPackageError
+        If this installation has no kernels for WebAssembly.
+    OSError
+        If the folder cannot be written.
+    """
+    page = files("topleft._apps.explore").joinpath("page")
+    modules = {name: page.joinpath(name) for name in (f"topleft-{one}.wasm" for one in SETS)}
+    if missing := [name for name, module in modules.items() if not module.is_file()]:
+        raise MissingPackageError(
+            f"this installation has no {' and no '.join(missing)}: wheels of a release have them, and in a clone "
+            "python packaging/wasm.py makes them (apt-get install clang lld wasi-libc libclang-rt-dev-wasm32)"
+        )
+    made = {name: page.joinpath(name).read_bytes() for name in ("explore.css", *SCRIPTS)}
+    made |= {name: module.read_bytes() for name, module in modules.items()}
+    made["index.html"] = static_html(page).encode()
+    made["data.json"] = json.dumps(data_of(content), allow_nan=False, separators=(",", ":")).encode()
+    mesh, _ = first_mesh(content)
+    made["mesh.bin"] = mesh.vertices.tobytes() + mesh.triangles.tobytes()
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, text in made.items():
+        written.append(folder / name)
+        write_whole(written[-1], lambda file, text=text: file.write(text))  # type: ignore[misc]
+    return written
+
+
+def static_html(page: Traversable) -> str:
+    """The page, marked as one whose questions a worker answers."""
+    text = page.joinpath("index.html").read_text(encoding="utf-8")
+    return text.replace('<div class="explorer">', '<div class="explorer" data-worker="worker.js">')
+
+
+def data_of(content: Content) -> dict[str, Any]:
+    """What the worker knows besides the kernels."""
+    greeting: Request = dict(hello(Session(content), {}).header)
+    defaults = {one.name: one.default for one in fields(PixelState) if one.default is not MISSING}
+    words = {
+        "sampling": SamplingOption,
+        "cull": CullOption,
+        "depth_test": DepthTestOption,
+        "winding": Turn,
+        "look": Look,
+    }
+    return {
+        "hello": {**greeting, "tabs": TABS, "saves": (), "has_plan": False},
+        "states": {name: scene(name) for name in SCENES},
+        "defaults": defaults,
+        "limits": {
+            "max_side_px": MAX_SIDE_PX, "max_triangles": MAX_TRIANGLES, "max_vertices": MAX_VERTICES,
+            "words": {name: get_args(kind) for name, kind in words.items()},
+        },
+        "mesh": mesh_data(content),
+        "classics": classics(),
+        "samples": sampling.SAMPLE_POSITIONS,
+        "colors": pixels.COLORS.tolist(),
+        "triangle_colors": [pixels.css(color) for color in pixels.triangle_colors(21)],
+        "heat": pixels.HEAT.tolist(),
+        "differences": pixels.DIFFERENCES.tolist(),
+        "ink": pixels.INK,
+        "area_error": float(pixels.AREA_ERROR),
+        "wrong": pixels.WRONG,
+    }  # fmt: skip
+
+
+def first_mesh(content: Content) -> tuple[Mesh, str]:
+    """The mesh that the part Mesh begins with, and its name."""
+    if content.mesh is not None:
+        return content.mesh, content.name
+    return Mesh(*shape(mesh_view.FIRST_SHAPE)), mesh_view.FIRST_SHAPE
+
+
+def mesh_data(content: Content) -> dict[str, Any]:
+    """What the part Mesh knows of its first mesh, whose arrays are a file, and how meshes look."""
+    mesh, name = first_mesh(content)
+    named = {"layer": [(one, one) for one in LAYERS]}
+    return {
+        "name": name, "is_f64": mesh.vertices.dtype == np.float64, "n_vertices": len(mesh.vertices),
+        "layers": LAYERS, "lit": LIT,
+        "view": {one.name: one.default for one in fields(mesh_view.MeshView) if one.default is not MISSING},
+        "max_side_px": mesh_view.MAX_SIDE_PX, "max_pixels": mesh_view.MAX_PIXELS,
+        "heat": list(zip(mesh_view.HEAT_LABELS, mesh_view.HEAT[1:, :3].tolist(), strict=True)),
+        "heat_table": mesh_view.HEAT.tolist(), "heat_classes": mesh_view.heat_classes().tolist(),
+        "controls": [
+            (title, [(label, key, named.get(key, options)) for label, key, options in rows if key in CHOICES])
+            for title, rows in mesh_view.CONTROLS.items()
+        ],
+        **plain_numbers(mesh),
+        "light_of_srgb": LIGHT_OF_SRGB.tolist(),
+    }  # fmt: skip
+
+
+def classics() -> dict[str, dict[str, Any]]:
+    """The classics by name: the numbers of a method and its variant in classics.h, and what it takes."""
+    return {
+        name: {
+            "number": list(FORMS).index(name.partition("/")[0]),
+            "form": FORMS[name.partition("/")[0]].index(name.partition("/")[2]),
+            "limit": one.limit if math.isfinite(one.limit) else None,
+            "has_bits": one.has_subpixel_bits,
+            "is_integer": one.claims.integer_vertices,
+        }
+        for name, one in CLASSICS.items()
+    }

@@ -1,0 +1,259 @@
+"""The page that needs no Python: each of its answers is the one that Python gives, to the bit."""
+
+import base64
+import json
+import shutil
+import subprocess
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from topleft._apps.explore.content import SCENES, scene
+from topleft._apps.explore.handlers import answer
+from topleft._apps.explore.messages import split
+from topleft._apps.explore.session import Content, Session
+from topleft._apps.explore.static import LAYERS, SETS, write_static
+from topleft.methods import CLASSICS
+
+NODE = shutil.which("node")
+PAGE = files("topleft._apps.explore").joinpath("page")
+HAS_KERNELS = all(PAGE.joinpath(f"topleft-{name}.wasm").is_file() for name in SETS)
+pytestmark = [
+    pytest.mark.skipif(not HAS_KERNELS, reason="no kernels for WebAssembly: python packaging/wasm.py"),
+    pytest.mark.skipif(NODE is None, reason="node is not installed"),
+]
+
+#: Two triangles that share an edge through pixel centres, with a depth and without one.
+SQUARE = {
+    "vertices": [[1.5, 1.5], [9.5, 1.5], [1.5, 9.5], [9.5, 9.5]],
+    "triangles": [[0, 1, 2], [1, 3, 2]],
+    "size": [11, 12],
+}
+DEEP = SQUARE | {
+    "vertices": [[1, 1, 0.5], [9, 1, 0.5], [1, 9, 0.5], [9, 9, 0.0], [0, 9, 0.9]],
+    "triangles": [[0, 3, 2], [1, 3, 4]],
+}
+FAR = SQUARE | {"vertices": [[-3e9, 2.0], [7.1, 1e10], [11.9, -5.5], [9.5, 9.5]]}
+SAMPLINGS = ("center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner")
+
+
+@pytest.fixture(scope="module", params=SETS)
+def ask(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("static")
+    write_static(folder, Content())
+
+    def asked(questions):
+        command = [NODE, str(Path(__file__).with_name("ask_static.mjs")), str(folder), request.param]
+        done = subprocess.run(command, input=json.dumps(questions), capture_output=True, text=True, check=True)
+        return json.loads(done.stdout)
+
+    return asked
+
+
+def random_states():
+    """States of all samplings, bits, sides and orders; triangles are small, large, cut by the window, and far."""
+    rng, found = np.random.default_rng(3), []
+    for i, sampling in enumerate(SAMPLINGS * 6):
+        n, extent, columns = int(rng.integers(1, 30)), (3, 30, 3e4)[i % 3], 2 + i % 2
+        vertices = rng.uniform(-extent, 40 + extent, (3 * n, columns))
+        if i % 4 == 0:
+            vertices[:, :2] = np.round(vertices[:, :2] * 2) / 2  # edges and vertices on centres
+        found.append({
+            "vertices": vertices.tolist(), "triangles": rng.integers(0, 3 * n, (n, 3)).tolist(),
+            "size": [int(rng.integers(1, 70)), int(rng.integers(1, 50))], "origin": rng.integers(-9, 9, 2).tolist(),
+            "sampling": sampling, "subpixel_bits": (0, 2, 4, 8, 12, 16, "exact")[i % 7],
+            "cull": ("none", "back", "front")[i % 3], "depth_test": ("less", "greater")[i % 2],
+            "method": ("auto", "edge", "scanline")[i % 3],
+            "winding": ("as given", "clockwise", "counter-clockwise")[i % 3],
+            "other": (*CLASSICS, "")[i % (len(CLASSICS) + 1)],
+            "look": ("owners", "overdraw", "owners", "wireframe")[i % 4], "exact": i % 3 == 0,
+        })  # fmt: skip
+    return found
+
+
+def without_times(header):
+    """A header without what differs from call to call, and from page to page."""
+    text = json.loads(json.dumps(header))
+    for panel in text.get("panels", ()):
+        panel["facts"] = [fact for fact in panel["facts"] if fact[2] != "of the call that draws it"]
+    return text
+
+
+def check(ask, questions):
+    """Ask both sides, and compare headers and bytes."""
+    replies = ask(questions)
+    for question, reply in zip(questions, replies, strict=True):
+        header, parts = split(answer(Session(Content()), {"id": 1, "parts": [], **question}))
+        bytes_drawn = [base64.b64decode(part) for part in reply.pop("bytes")]
+        reply.pop("memory")
+        reply = {"arrays": {}, **reply}
+        assert without_times(reply) == without_times(header), question
+        assert bytes_drawn == [bytes(part) for part in parts], question
+    assert len(replies) == len(questions)
+
+
+def test_pixels_of_random_states_are_those_of_python(ask):
+    questions = [{"do": "pixels.draw", "state": state} for state in random_states()]
+    drawable = [one for one in questions if not (one["state"]["exact"] and one["state"]["sampling"] in SAMPLINGS[5:])]
+    assert len(drawable) > 40
+    check(ask, drawable)
+
+
+def test_pixels_of_each_scene_are_those_of_python(ask):
+    states = [scene(name) for name in SCENES]
+    check(ask, [{"do": "pixels.draw", "state": state} for state in states])
+    check(ask, [{"do": "pixels.scene", "name": "single-point"}, {"do": "pixels.draw", "state": FAR}])
+
+
+def test_reasons_of_pixels_are_those_of_python(ask):
+    rng, questions = np.random.default_rng(5), []
+    for state in [SQUARE, DEEP, FAR, *random_states()]:
+        if state.get("look") == "wireframe":
+            continue
+        n = int(state["sampling"][4:]) if state.get("sampling", "").startswith("msaa") else 1
+        for _ in range(4):
+            pixel = [int(rng.integers(0, side)) for side in state["size"]]
+            question = {"do": "pixels.probe", "state": state, "pixel": pixel, "sample": int(rng.integers(0, n))}
+            questions += [question, question | {"method": "exact"}]
+    check(ask, questions)
+
+
+def test_edits_are_those_of_python(ask):
+    words = [("add", 0), ("split", 0), ("flip", 1), ("remove", 0), ("remove", 1), ("split", 7), ("flip", None)]
+    check(
+        ask, [{"do": "pixels.edit", "state": one, "what": w, "triangle": i} for w, i in words for one in (SQUARE, DEEP)]
+    )
+
+
+BAD_STATES = [
+    {"size": [300, 2]}, {"size": [1.5, 2]}, {"size": 3}, {"origin": [2**60, 0]},
+    {"vertices": [[1, 2], [3, 4, 5], [0, 0]]},
+    {"vertices": [[1, 2], [3, 1e300], [0, 0], [1, 1]]}, {"vertices": 7}, {"vertices": [["a", 1]] * 4},
+    {"subpixel_bits": 17}, {"subpixel_bits": "all"}, {"sampling": "msaa3"}, {"cull": "both"}, {"depth_test": "equal"},
+    {"winding": "left"}, {"look": "nice"}, {"triangles": [[0, 1, 4]]}, {"triangles": [[0, 1, 2]] * 1001},
+    {"vertices": [[0, 0]] * 3001}, {"method": "best"}, {"color": 3}, {"exact": 1},
+    {"subpixel_bits": 16, "vertices": [[2**51 + 0.5, 0], [3, 1], [0, 0], [1, 1]]},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("i", range(0, len(BAD_STATES), 6))
+def test_sentences_of_bad_states_are_those_of_python(ask, i):
+    questions = [{"do": "pixels.draw", "state": SQUARE | bad} for bad in BAD_STATES[i : i + 6]]
+    check(ask, [*questions, {"do": "pixels.draw", "state": {"size": [1, 1]}}, {"do": "pixels.draw", "state": []}])
+
+
+def test_memory_stays_as_it_is_however_often_a_scene_is_drawn(ask):
+    replies = ask([{"do": "pixels.draw", "state": random_states()[4]}] * 40)
+    assert replies[-1]["memory"] == replies[1]["memory"]
+
+
+def files_of_meshes():
+    """Names and bytes: quads with sharp edges, a concave face, numbers of 32 and of 64 bits, nodes that are placed."""
+    rng = np.random.default_rng(2)
+    cube = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1.5) for z in (0, 2.25))
+    quads = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf -7 -3 -1 -5\n"
+    arrow = "v 0 0 0\nv 4 0 0\nv 1 1 0\nv 0 4 0\nf 1 2 3 4\n"
+    points = (rng.integers(0, 40, (40, 3)) / 7).astype(np.float32)
+    corners = rng.integers(0, 40, (60, 3)).astype("<i4")
+    header = "ply\nformat {} 1.0\nelement vertex 40\nproperty {t} x\nproperty {t} y\nproperty {t} z\nelement face 60\n"
+    header += "property list uchar int vertex_indices\nend_header\n"
+    rows = "".join(" ".join(map(repr, row)) + "\n" for row in points.astype(float).tolist())
+    rows += "".join("3 " + " ".join(map(str, row)) + "\n" for row in corners.tolist())
+    packed = points.tobytes() + b"".join(b"\3" + row.tobytes() for row in corners)
+    triangles = points[corners]
+    stl = bytes(80) + np.uint32(60).tobytes() + b"".join(bytes(12) + one.tobytes() + bytes(2) for one in triangles)
+    text = "solid a\n" + "".join(
+        "facet normal 0 0 1\nouter loop\n"
+        + "".join("vertex " + " ".join(map(repr, row)) + "\n" for row in one)
+        + "endloop\nendfacet\n"
+        for one in triangles.astype(float).tolist()
+    )
+    return {
+        "cube.obj": (cube + quads).encode(), "arrow.obj": arrow.encode(), "text.stl": text.encode(), "binary.stl": stl,
+        "text.ply": (header.format("ascii", t="double") + rows).encode(),
+        "binary.ply": header.format("binary_little_endian", t="float").encode() + packed,
+    }  # fmt: skip
+
+
+BROKEN = {
+    "short.stl": bytes(80) + b"\7\0\0\0" + bytes(60), "numbers.stl": b"solid a\nvertex 1 2 3\nvertex 1 2\n",
+    "head.ply": b"plx", "end.ply": b"ply\nformat ascii 1.0\n", "format.ply": b"ply\nelement vertex 1\nend_header\n1",
+    "said.ply": b"ply\nformat ascii 1.0\nelement vertex many\nend_header\n",
+    "rows.ply": b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    b"element face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n",
+    "two.obj": b"v 1 2\nf 1 1 1\n", "beyond.obj": b"v 1 2 3\nf 1 2 9\n", "zero.obj": b"v 1 2 3\nf 0 1 1\n",
+    "words.obj": b"v 1 2 3\nf a b c\n", "back.obj": b"v 1 2 3\nf -1 -2 -3\n", "nul.obj": b"v 1 2 3\0",
+    "points.obj": b"v 1 2 3\nv 2 3 4\n", "none.obj": b"# nothing\n", "nameless": b"",
+}  # fmt: skip
+
+
+def opened_and_drawn(name, path, views):
+    """Questions of a file and of views of it."""
+    return [{"do": "mesh.open", "name": name, "file": str(path)}, *({"do": "mesh.draw", **view} for view in views)]
+
+
+def views_of(n, rng):
+    """Views from near and far, with and without perspective, of every layer that needs no Python."""
+    return [
+        {
+            "size": [int(rng.integers(20, 200)), int(rng.integers(20, 150))], "azimuth": float(rng.uniform(-200, 400)),
+            "elevation": float(rng.choice([-90, 90, rng.uniform(-89, 89)])), "zoom": float(rng.choice([0.4, 1, 3, 40])),
+            "pan": rng.uniform(-0.5, 0.5, 2).tolist(), "fov": [40, 0, 70, 20][i % 4], "up": "yz"[i % 2],
+            "layer": LAYERS[i % len(LAYERS)], "sampling": ["center", "msaa4", "msaa2"][i % 3],
+            "cull": ["none", "back", "front"][i % 3],
+        }
+        for i in range(n)
+    ]  # fmt: skip
+
+
+def check_meshes(ask, questions):
+    """Ask both sides in one session, and compare names, counts, boxes and pixels."""
+    session = Session(Content())
+    for question, reply in zip(questions, ask(questions), strict=True):
+        parts = [Path(question["file"]).read_bytes()] if "file" in question else []
+        header, own = split(answer(session, {"id": 1, **question, "parts": parts}))
+        assert "error" not in reply, reply
+        for name in ("name", "n_vertices", "n_triangles", "box", "size"):
+            assert reply.get(name) == (list(header[name]) if isinstance(header.get(name), tuple) else header.get(name))
+        assert [base64.b64decode(part) for part in reply["bytes"]] == [bytes(part) for part in own], question
+
+
+def test_views_of_the_first_mesh_are_those_of_python(ask):
+    check_meshes(ask, [{"do": "mesh.draw", **view} for view in views_of(24, np.random.default_rng(1))])
+
+
+@pytest.mark.parametrize("name", files_of_meshes())
+def test_views_of_a_file_are_those_of_python(ask, tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(files_of_meshes()[name])
+    check_meshes(ask, opened_and_drawn(name, path, views_of(12, np.random.default_rng(4))))
+
+
+def test_sentences_of_broken_files_are_those_of_python(ask, tmp_path):
+    questions, wanted = [], []
+    for name, content in BROKEN.items():
+        path = tmp_path / name
+        path.write_bytes(content)
+        questions.append({"do": "mesh.open", "name": name, "file": str(path)})
+        wanted.append(answer(Session(Content()), {"id": 1, **questions[-1], "parts": [content]}).header["error"])
+    assert [reply.get("error") for reply in ask(questions)] == wanted
+
+
+def test_memory_is_that_of_the_mesh_however_often_it_is_drawn_or_opened(ask, tmp_path):
+    path = tmp_path / "cube.obj"
+    path.write_bytes(files_of_meshes()["cube.obj"])
+    round_of_questions = opened_and_drawn("cube.obj", path, views_of(4, np.random.default_rng(1)))
+    replies = ask(round_of_questions * 6)
+    assert replies[-1]["memory"] == replies[len(round_of_questions)]["memory"]
+
+
+def test_question_without_memory_is_refused_and_the_next_one_is_answered(ask):
+    state, view = {"do": "pixels.draw", "state": SQUARE}, {"do": "mesh.draw", "size": [64, 48]}
+    first, full_state, full_view, last_state, last_view = ask(
+        [view, state | {"is_full": True}, view | {"is_full": True}, state, view]
+    )
+    assert full_state["error"] == full_view["error"] == "not enough memory"
+    assert "error" not in last_state
+    assert last_view["bytes"] == first["bytes"]
