@@ -32,7 +32,8 @@ typedef struct {
     int64_t n, n_columns;
 } tl_grad_sums;
 
-/* The numbers that a triangle sums up: X0, Y0; gradients of a_k, three times, and of z/w: times X, times Y, and alone. */
+/* The numbers that a triangle sums up: X0, Y0; gradients of a_k, three times, and of z/w: times X, times Y, and alone.
+ * */
 enum { TL_SUMS_OF_FACE = 14 };
 
 /* Gradients of where pixels lie in triangles.  g_db may be NULL. */
@@ -69,8 +70,8 @@ typedef struct {
 /* Pairs of neighbours across silhouettes. */
 typedef struct {
     const void *rast;
-    /* (n_triangles, 3), of the edge opposite to a corner: 3 * the other triangle + its corner, -1 for none; -2 less that
-     * where the two are wound differently or there are more */
+    /* (n_triangles, 3), of the edge opposite to a corner: 3 * the other triangle + its corner, -1 for none; -2 less
+     * that where the two are wound differently or there are more */
     const int32_t *across;
     const double *places;   /* (n_vertices, 2): pixels */
     const int32_t *outline; /* (n_triangles): see grad_outline */

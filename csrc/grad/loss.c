@@ -1,6 +1,6 @@
 /* The mean squared difference of a picture from another one, and its gradients: points, attributes, edges and all of
  * them backwards, a few rows at a time, which stay in the cache.
- * In: ids of a picture, a mesh with attributes, the other picture.  Out: a sum of squares, sums by vertex and attribute.
+ * In: ids of a picture, a mesh with attributes, the other picture.  Out: a sum of squares; sums by vertex, attribute.
  *
  * Rows go through the kernels of this room, so sums have the bits that these give one after the other.  What backward
  * takes of a row depends on the one above it, that on the colours of the next: rows are drawn two ahead, compared one

@@ -1,5 +1,5 @@
-/* What edges need to know of a mesh in a view: where its vertices are, which side of a triangle is seen, and which of its
- * edges are silhouettes.
+/* A mesh in a view, as its edges need it: where vertices are, which side of a triangle is seen, and which of its edges
+ * are silhouettes.
  * In: vertices, triangles, which one lies across each edge.  Out: places in pixels, a number by triangle. */
 #ifndef TL_GRAD_OUTLINE_C
 #define TL_GRAD_OUTLINE_C

@@ -1,5 +1,5 @@
-/* Parts of rows in lanes: runs of pixels that show one triangle, and numbers of runs, which reach their pixels by a load
- * and a permutation.
+/* Parts of rows in lanes: runs of pixels that show one triangle, and numbers of runs, which reach their pixels by a
+ * load and a permutation.
  * In: ids of pixels, triangles.  Out: runs, the corners of their triangles.
  *
  * Numbers are float32.  A run ends with its span, and spans begin at multiples of TL_GRAD_SPAN: nothing depends on how

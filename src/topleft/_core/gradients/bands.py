@@ -7,6 +7,7 @@ the size of a picture alone, so every number of threads gives the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import chain
 from typing import Any, NamedTuple, TypeVar
 
@@ -26,6 +27,7 @@ WAITING_BANDS = 4
 
 Array = NDArray[Any]
 Found = TypeVar("Found")
+Done = TypeVar("Done")
 
 
 class Band(NamedTuple):
@@ -77,12 +79,17 @@ class Bands:
         at_a_time = self.threads * WAITING_BANDS if self.threads > 1 else 1
         for start in range(0, len(self.all), at_a_time):
             some = self.all[start : start + at_a_time]
-            parts = run_parts(lambda first, end, some=some: [work(b) for b in some[first:end]], len(some), self.threads)
+            parts = run_parts(partial(work_on, work, some), len(some), self.threads)
             for band, (sums, found) in zip(some, chain.from_iterable(parts), strict=True):
                 for own, out in zip(sums, outs, strict=True):
                     own.add_to(out[band.picture if len(out) > 1 else 0])
                 results.append(found)
         return results
+
+
+def work_on(work: Callable[[Band], Done], bands: Sequence[Band], first: int, end: int) -> list[Done]:
+    """Return what `work` makes of bands [first, end)."""
+    return [work(band) for band in bands[first:end]]
 
 
 def sums_of(n_rows: int, n_columns: int, band: Band, width: int, name: str = "rows") -> engine.GradientSums:

@@ -240,11 +240,12 @@ class Outline:
 def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outline:
     """Return which edges of triangles are silhouettes, and where vertices are; `across` is that of `halves_across`."""
     places, edges = empty((*pos.shape[:2], 2), np.float64), empty((len(pos), len(grid.tri)), np.int32)
-    run_parts(
-        lambda first, end: [grid.view(pos[i]).outline(across, places[i], edges[i]) for i in range(first, end)],
-        len(pos),
-        grid.bands.threads,
-    )
+
+    def write(first: int, end: int) -> None:
+        for i in range(first, end):
+            grid.view(pos[i]).outline(across, places[i], edges[i])
+
+    run_parts(write, len(pos), grid.bands.threads)
     return Outline(across, places, edges)
 
 
