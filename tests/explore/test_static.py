@@ -3,6 +3,7 @@
 import base64
 import json
 import shutil
+import struct
 import subprocess
 from importlib.resources import files
 from pathlib import Path
@@ -163,6 +164,7 @@ def files_of_meshes():
     rows += "".join("3 " + " ".join(map(str, row)) + "\n" for row in corners.tolist())
     packed = points.tobytes() + b"".join(b"\3" + row.tobytes() for row in corners)
     triangles = points[corners]
+    apart = rng.permuted(np.tile(np.arange(40, dtype="<u2"), (60, 1)), axis=1)[:, :3].copy()  # none has a corner twice
     stl = bytes(80) + np.uint32(60).tobytes() + b"".join(bytes(12) + one.tobytes() + bytes(2) for one in triangles)
     text = "solid a\n" + "".join(
         "facet normal 0 0 1\nouter loop\n"
@@ -174,7 +176,42 @@ def files_of_meshes():
         "cube.obj": (cube + quads).encode(), "arrow.obj": arrow.encode(), "text.stl": text.encode(), "binary.stl": stl,
         "text.ply": (header.format("ascii", t="double") + rows).encode(),
         "binary.ply": header.format("binary_little_endian", t="float").encode() + packed,
+        "big.ply": header.format("binary_big_endian", t="float").encode() + points.astype(">f4").tobytes()
+        + b"".join(b"\3" + row.astype(">i4").tobytes() for row in corners),
+        "nodes.glb": glb_of(points, apart, MOVED), "still.glb": glb_of(points, apart, [{"mesh": 0}]),
     }  # fmt: skip
+
+
+#: Nodes that show a mesh twice: moved by a chain of nodes, and by a matrix.
+MOVED = [
+    {"mesh": 0, "matrix": [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0.5, 0, 4, -3, 1, 1]},
+    {"children": [2], "translation": [1, 2, 3], "rotation": [0.5, 0.5, 0.5, 0.5]}, {"mesh": 0, "scale": [1, 2, 1]},
+]  # fmt: skip
+
+
+def glb_of(points, corners, nodes):
+    """A GLB of positions and triangles."""
+    data = points.tobytes() + corners.tobytes()
+    scene = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [*range(min(2, len(nodes)))]}], "nodes": nodes,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(points), "type": "VEC3",
+             "min": points.min(0).tolist(), "max": points.max(0).tolist()},
+            {"bufferView": 1, "componentType": 5123, "count": corners.size, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": points.nbytes},
+            {"buffer": 0, "byteOffset": points.nbytes, "byteLength": corners.nbytes},
+        ],
+        "buffers": [{"byteLength": len(data)}],
+    }  # fmt: skip
+    text = json.dumps(scene).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = b"".join(
+        struct.pack("<II", len(body), kind) + body for body, kind in ((text, 0x4E4F534A), (data, 0x004E4942))
+    )
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 
 BROKEN = {

@@ -1,7 +1,7 @@
 // Reads meshes without Python: OBJ, PLY, STL and GLB, triangles and polygons, without colours, textures and normals, which
 // a note tells. A broken file gets the sentence that Python's readers have.
-// In: bytes and a name. Out: {vertices: Float32Array or Float64Array (3 n), polygons or triangles, lacks: [text]}; triangles
-// are an Int32Array (3 t), polygons lists of vertices.
+// In: bytes and a name. Out: {vertices: Float32Array or Float64Array (3 n), polygons or triangles, isSplit, lacks: [text]};
+// triangles are an Int32Array (3 t), polygons lists of vertices; isSplit: equal vertices are apart where an edge is sharp.
 
 const NOT_HERE = "colours, textures, materials and normals of files are drawn by Python alone";
 
@@ -172,23 +172,30 @@ function readGlb(bytes) {
     }
     return values;
   };
-  const vertices = [], triangles = [];
-  const place = (primitive, matrix) => {
-    if ((primitive.mode ?? 4) !== 4) return;
-    const points = accessor(primitive.attributes.POSITION), first = vertices.length / 3;
-    const indices = primitive.indices === undefined ? Float64Array.from({length: points.length / 3}, (_, i) => i) : accessor(primitive.indices);
-    for (let i = 0; i < points.length; i += 3) {
+  const vertices = [], triangles = [], seen = new Set();
+  let hasNormals = false, isMoved = false;
+  const place = ({attributes, indices: names, mode = 4}, matrix) => {
+    if (mode !== 4) return;
+    const points = accessor(attributes.POSITION), n = points.length / 3, first = vertices.length / 3, isFlat = attributes.NORMAL === undefined;
+    const indices = names === undefined ? Float64Array.from({length: n}, (_, i) => i) : accessor(names);
+    const put = (i) => {
       for (let k = 0; k < 3; k++) vertices.push(matrix ? matrix[k] * points[i] + matrix[4 + k] * points[i + 1] + matrix[8 + k] * points[i + 2] + matrix[12 + k] : points[i + k]);
-    }
-    for (const index of indices) triangles.push(first + index);
+    };
+    hasNormals ||= !isFlat, isMoved ||= matrix !== null;
+    for (const index of indices) if (index >= n) broken(`a face names vertex ${index} of ${n}`);
+    if (isFlat) indices.forEach((index) => put(3 * index)); // triangles without normals are flat: each has its own corners
+    else for (let i = 0; i < points.length; i += 3) put(i);
+    indices.forEach((index, i) => triangles.push(first + (isFlat ? i : index)));
   };
   const walk = (i, matrix) => {
+    if (seen.has(i)) broken(`nodes[${i}] is below itself, or shown twice`);
+    seen.add(i);
     const node = gltf.nodes[i], own = times(matrix, matrixOf(node));
     if (node.mesh !== undefined) for (const primitive of gltf.meshes[node.mesh].primitives) place(primitive, own);
     for (const child of node.children ?? []) walk(child, own);
   };
   for (const root of gltf.scenes?.[gltf.scene ?? 0]?.nodes ?? gltf.nodes?.map((_, i) => i) ?? []) walk(root, null);
-  return {vertices: Float32Array.from(vertices), triangles: Int32Array.from(triangles), lacks: gltf.materials || gltf.animations ? [NOT_HERE] : []};
+  return {vertices: (isMoved ? Float64Array : Float32Array).from(vertices), triangles: Int32Array.from(triangles), isSplit: true, lacks: hasNormals || gltf.materials || gltf.animations ? [NOT_HERE] : []};
 }
 
 // The matrix of a node, by columns; null where it moves nothing.

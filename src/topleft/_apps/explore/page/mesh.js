@@ -7,12 +7,12 @@ import {refuse} from "./pixels.js";
 
 let shown = null;  // {name, lacks, bounds, center, table, counts}
 
-function take(kernels, data, {vertices, triangles, polygons, lacks}, name) {
+function take(kernels, data, {vertices, triangles, polygons, isSplit, lacks}, name) {
   const before = shown;
   shown = null;
   const corners = triangles ?? kernels.cut(polygons, vertices);
   try {
-    const [cosine] = cosineAndSine(data.mesh.crease), bounds = kernels.takeMesh(vertices, corners, cosine);
+    const cosine = isSplit ? -2 : cosineAndSine(data.mesh.crease)[0], bounds = kernels.takeMesh(vertices, corners, cosine);
     shown = {name, lacks, bounds, counts: kernels.counts};
   } catch (error) {
     if (before) kernels.exports.web_release(kernels.start);  // neither mesh is there: the page opens its own again
@@ -75,7 +75,7 @@ function tableOf(n) {
   return table;
 }
 
-// A colour for each number, in the numbers' own memory. (`from` of typed arrays takes ten times as long.)
+// A colour for each number, in the numbers' own memory.
 function colored(numbers, colorOf) {
   const colors = new Uint32Array(numbers.buffer);
   for (let i = 0; i < numbers.length; i++) colors[i] = colorOf(numbers[i]);

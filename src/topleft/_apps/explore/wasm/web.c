@@ -254,6 +254,7 @@ static int crease_normals(double least_cosine)
 }
 
 /* Takes float32 or float64 vertices (n, 3) and triangles whose indices were checked; both are changed where vertices are equal.
+ * With a cosine below -1 equal vertices stay apart, and all edges between triangles that share vertices are smooth.
  * Writes the box round the triangles, low and high.  Returns how many vertices are left, or WEB_FULL. */
 WEB_EXPORT(web_take_mesh)
 int web_take_mesh(void *vertices, int is_f64, int n, int32_t *triangles, int n_triangles, double least_cosine,
@@ -266,7 +267,7 @@ int web_take_mesh(void *vertices, int is_f64, int n, int32_t *triangles, int n_t
     const uintptr_t before = used;
     if (!mesh.normals || !mesh.normal_of_corner || !mesh.face_normals || !mesh.is_turned)
         return WEB_FULL;
-    const int left = merge_vertices(vertices, is_f64, n, triangles, n_triangles);
+    const int left = least_cosine < -1.0 ? n : merge_vertices(vertices, is_f64, n, triangles, n_triangles);
     used = before;
     if (left < 0)
         return left;
