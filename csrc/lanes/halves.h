@@ -19,8 +19,6 @@ typedef __mmask32 vhm;
 
 TL_INLINE vi vi_load_aligned(const void *p) { return _mm512_load_si512(p); }
 TL_INLINE void vi_store_aligned(void *p, vi a) { _mm512_store_si512(p, a); }
-TL_INLINE vi vi_negate(vi a) { return _mm512_sub_epi32(_mm512_setzero_si512(), a); }
-TL_INLINE vi vi_abs(vi a) { return _mm512_abs_epi32(a); }
 TL_INLINE vi vi_shift_right_unsigned(vi a, int n) { return _mm512_srli_epi32(a, (unsigned)n); }
 TL_INLINE vi vi_or_three(vi a, vi b, vi c) { return _mm512_ternarylogic_epi32(a, b, c, 0xfe); }
 TL_INLINE vi vi_bytes_at(const uint8_t *p) { return _mm512_cvtepu8_epi32(_mm_loadu_si128((const __m128i *)p)); }
@@ -81,7 +79,6 @@ TL_INLINE void vh_part(vi a, vi b, vi *low, vi *high)
     *low = _mm512_permutex2var_epi16(a, even, b);
     *high = _mm512_permutex2var_epi16(a, _mm512_add_epi16(even, _mm512_set1_epi16(1)), b);
 }
-TL_INLINE unsigned vhm_bits(vhm m) { return m; }
 
 TL_INLINE vb vb_count_from(int first)
 {

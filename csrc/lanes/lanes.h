@@ -9,8 +9,8 @@
  *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
- * v?_load_some(m, p, has_room) the lanes in m; with room for a whole vector the others are read, too, or are anything
- * v?_store_some(p, m, a, has_room) the lanes in m; with room for a whole vector the others may be written as they are
+ *   v?_load_some(m, p, has_room)    the lanes in m; with room for a vector the others are read, too, or are anything
+ *   v?_store_some(p, m, a, has_room)    the lanes in m; with room for a vector the others may be written as they are
  *   vi_gather(m, p, i)      p[i] in the lanes of m
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
@@ -37,7 +37,8 @@
  *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8; the sign of 0 may be either
  *   vd_or(a, b)             the bits of both: 0 where both are
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
- * vi_load_records(base, scale, i, c), vf_load_pairs 16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
+ *   vi_load_records(base, scale, i, c)    16 bytes at base + scale * i[k], as columns
+ *   vf_load_pairs(base, i, c)    8 bytes at base + 8 * i[k], as columns
  *   vi_load_rows(base, i, c)    16 bytes at base + 8 * i[k], as columns; i are unsigned
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
@@ -46,10 +47,9 @@
  *   vi_upper_bytes          the upper byte of each half, as its value
  *   vi_add_bytes, vi_max_bytes, vi_min_bytes    unsigned bytes; a sum is at most 255
  *   vf_last_of(a, n)        the last of every n = 2 or 4 lanes, in all of them (scalar: a)
- * vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_nearest(vf), vi_round(vd) conversions; INT32_MIN
- * when
- *                           out of range; the last two to nearest, ties to even
- * / */
+ *   vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd    conversions
+ *   vi_floor(vf), vi_nearest(vf), vi_round(vd)    to integers, INT32_MIN when out of range; the last two to nearest,
+ *                           ties to even */
 #ifndef TL_LANES_H
 #define TL_LANES_H
 
