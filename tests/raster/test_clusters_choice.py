@@ -10,7 +10,8 @@ from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
 from topleft._core.raster.clusters import Backoff, Clusters
 from topleft._core.raster.view import View
 from topleft._meshes.picture import instances
-from topleft._meshes.picture.instances import PlacedScene, count_layers, survey_instances
+from topleft._meshes.picture.instances import PlacedScene, count_layers, rasterize_shot, survey_instances
+from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import scene_through
 
 SIZE = (160, 120)
@@ -82,7 +83,7 @@ def test_mesh_of_several_samples_is_drawn_from_clusters_where_they_pay():
     mesh = tl.Mesh(*FINE)
     mesh.note_drawn()
     for cull, in_planes in (("none", True), ("back", False)):
-        frags = tl.rasterize_mesh(mesh, CAMERA, SIZE, sampling="msaa4", cull=cull)
+        frags = rasterize_shot(Shot.of(mesh, CAMERA, SIZE), sampling="msaa4", cull=cull)
         assert (frags._split is None) == in_planes
         expected = tl.rasterize(*FINE, SIZE, transform=MATRIX, sampling="msaa4", cull=cull)
         assert (frags.samples_triangle == expected.samples_triangle).all()

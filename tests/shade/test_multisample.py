@@ -12,7 +12,9 @@ from engine_cases import ON_EACH_ISA, on
 import topleft as tl
 from topleft._core.base.color import id_colors, srgb_tables
 from topleft._core.raster.cluster_draw import ClusteredMesh
+from topleft._meshes.picture.instances import rasterize_shot
 from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
+from topleft._meshes.picture.shot import Shot
 from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
@@ -38,7 +40,7 @@ def test_picture_is_the_same_from_planes_of_samples(force, isa, shading, size):
     with on(isa):
         for camera, n in ((None, 4), (square, 2), (square, 16)):
             camera = camera or tl.Camera.framing(KNOT)
-            frags = tl.rasterize_mesh(KNOT, camera, size, sampling=f"msaa{n}", threads=3)
+            frags = rasterize_shot(Shot.of(KNOT, camera, size), sampling=f"msaa{n}", threads=3)
             from_lists = tl.shade(frags, KNOT, camera, lights=lights, **look)
             assert frags._split is not None
             assert frags.samples_depth.shape[-1] == n
