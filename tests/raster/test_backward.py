@@ -8,6 +8,7 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
+from topleft._core.gradients import tensors
 from topleft._core.raster.backward import in_pixels
 
 RNG = np.random.default_rng(7)
@@ -283,3 +284,13 @@ def test_layers_have_no_gradients():
     layers = tl.peel([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]], (4, 4))
     with pytest.raises(ValueError, match="gradients are those of rasterize and rasterize_mesh, not of layers"):
         layers.layer(0).antialias(np.ones((4, 4)))
+
+
+def test_more_numbers_than_int32_counts_are_refused_before_they_are_read():
+    many = np.broadcast_to(np.int32(0), (2**31 // 3 + 1, 3))
+    with pytest.raises(ValueError, match=r"tri must have at most 2147483647 numbers a picture, got shape \(7158"):
+        tensors.PixelGrid(many, 1, 2, 2)
+    grid = tensors.PixelGrid(np.zeros((1, 3), np.int32), 1, 2, 2)
+    attr, rast = np.broadcast_to(np.float32(0), (1, 2**29, 4)), np.zeros((1, 2, 2, 4), np.float32)
+    with pytest.raises(ValueError, match="attr must have at most 2147483647 numbers a picture"):
+        tensors.values(grid, attr, rast)

@@ -10,6 +10,7 @@ High-Performance Differentiable Rendering", ACM Transactions on Graphics, 2020.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
+from topleft._core.base.arrays import INT32_MAX
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts
 from topleft._core.gradients.bands import Array, Band, Bands, sums_of
@@ -61,6 +63,9 @@ class PixelGrid:
     in_pixels: bool = False
     """Whether x/w and y/w count pixels; otherwise they run from -1 to 1 across the picture, as z/w does."""
 
+    def __post_init__(self) -> None:
+        check_counted("tri", self.tri.shape)
+
     @property
     def bands(self) -> Bands:
         """The bands of all pictures."""
@@ -80,6 +85,12 @@ class PixelGrid:
         """Raise an error for the number of a triangle that does not exist."""
         if bad >= 0:
             raise IndexError(f"rast must hold ids of the {len(self.tri)} triangles of tri plus 1, got {bad + 1}")
+
+
+def check_counted(name: str, shape: tuple[int, ...]) -> None:
+    """Raise an error unless int32 counts the numbers of an array, as lanes do to find them."""
+    if math.prod(shape) > INT32_MAX:
+        raise ValueError(f"{name} must have at most {INT32_MAX} numbers a picture, got shape {shape}")
 
 
 def of(arrays: Array, picture: int) -> Array:
@@ -124,6 +135,7 @@ def values(
     grid: PixelGrid, attr: Array, rast: Array, rast_db: Array | None = None, wanted: Sequence[int] = ()
 ) -> tuple[Array, Array]:
     """Return attributes (B or 1, V, K) at pixels (B, H, W, K), and what those `wanted` change by, (B, H, W, 2 N)."""
+    check_counted("attr", attr.shape[1:])
     out = empty(grid.shape(attr.shape[2]), attr.dtype)
     out_da = empty(grid.shape(2 * len(wanted)), attr.dtype)
     view, columns = grid.view(attr[0, :0]), np.asarray(wanted, np.int32)
@@ -148,6 +160,7 @@ def values_vjp(
     wanted: Sequence[int] = (),
 ) -> tuple[Array, Array, Array | None]:
     """Return the gradients of `attr`, `rast` and `rast_db`, the last None without `g_da`."""
+    check_counted("attr", attr.shape[1:])
     g_attr, g_rast = np.zeros(attr.shape, attr.dtype), empty(rast.shape, attr.dtype)
     g_db = None if g_da is None else empty(rast.shape, attr.dtype)
     view, columns = grid.view(attr[0, :0]), np.asarray(wanted if g_da is not None else (), np.int32)
