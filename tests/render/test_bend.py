@@ -221,9 +221,9 @@ def test_bend_splits_a_triangle_alike_from_each_of_its_corners():
 
 
 def test_second_derivative_of_a_tangential_lens_is_that_of_its_formula():
-    tangential = LensMap(OpenCVLens(p1=0.01), np.array([[100.0, 0, 0], [0, 100, 0]]), (80.0, 60.0))
+    tangential = LensMap(OpenCVLens(p1=0.02), np.array([[100.0, 0, 0], [0, 100, 0]]), (80.0, 60.0))
     # x: 2 p1 x y, y: p1 (x^2 + 3 y^2): all second derivatives, squared, sum to (2^2 + 2^2) + (2^2 + 6^2), times p1^2.
-    assert tangential._bends(np.array([1.0, 0.9, 0.7]), 2**-8) == pytest.approx(100 * 0.01 * 48**0.5, rel=1e-9)
+    assert tangential._bends(np.array([1.0, 0.9, 0.7]), 2**-8) == pytest.approx(100 * 0.02 * 48**0.5, rel=1e-9)
 
 
 @ON_EACH_LENS
