@@ -16,6 +16,7 @@ import topleft as tl
 from topleft._core import engine
 from topleft._core.base import memory
 from topleft._core.polygons import overlap
+from topleft._core.polygons.draw import cells_for
 from topleft._core.polygons.polygons import frame_of
 from topleft._core.polygons.prepared import Prepared, prepare
 from topleft._core.polygons.rings import as_rings
@@ -194,7 +195,7 @@ def test_table_of_a_range_leaves_the_polygons_behind_it():
     prepared = prepare(memory.FRESH, found, frame, is_nonzero=False)
     prepared.certify(assume_valid=False)
     starts, pixels, areas = np.full(7, -1), np.empty(200, np.int32), np.empty(200, np.float32)
-    cells_of_rows = np.full(overlap.cells_for(prepared, 9), engine.CELL_CLEAR, np.int32)
+    cells_of_rows = np.full(cells_for(prepared, 9), engine.CELL_CLEAR, np.int32)
     starts[0] = 0
     prepared.compiled.list_shares(0, 4, starts, pixels, areas, cells_of_rows, prepared.piece_scratch())
     assert starts.tolist() == [0, 1, 2, 3, 4, -1, -1]
