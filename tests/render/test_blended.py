@@ -12,8 +12,8 @@ from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.peel import peel_meshes
 from topleft._meshes.picture.blended import blended_masks
 from topleft._meshes.picture.instances import draw_nearest, place
-from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.shade import ShadingOptions
+from topleft._meshes.picture.shot import Shot
 
 SIZE = (120, 90)
 CAMERA = tl.Camera.look_at((0.3, 0.2, 4))

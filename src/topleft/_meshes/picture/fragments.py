@@ -180,7 +180,7 @@ class SceneFragments(InstanceIds, Fragments):
         return self._given if self._one is None else (self._one._sampled()[1] or self._given)
 
     @cached_property
-    def _planes(self) -> Any:
+    def _planes(self) -> Any:  # type: ignore[override]
         """The same in terms of the whole scene."""
         ids, depth = self.drawn_planes
         return self.placed.whole_ids(ids), depth
