@@ -458,10 +458,17 @@ def test_counts_add_up(page):
     assert sum(legend[1:]) == int(n)
 
 
-def test_page_without_its_socket_says_so(chromium, explorer):
+@pytest.mark.parametrize("blocked", ["setTimeout(() => this.onerror?.(), 0)", ""], ids=["refused", "held up"])
+def test_page_without_its_socket_asks_by_post(chromium, explorer, blocked):
     context = chromium.new_context()
-    context.add_init_script("WebSocket = class { constructor() { setTimeout(() => this.onerror(), 0); } }")
+    context.add_init_script(f"WebSocket = class {{ constructor() {{ {blocked} }} close() {{}} }}")
     page = context.new_page()
     page.goto(explorer.url.split("#")[0])
     page.wait_for_function("() => document.querySelector('.status').textContent.includes('WebSocket is blocked')")
+    pixels_of(page).locator("[data-name=scene]").select_option("two-triangles")
+    page.wait_for_function(f"() => {STATE}.scene === 'two-triangles'")
+    check_pictures(page)
+    explorer.close()
+    pixels_of(page).locator("[data-name=scene]").select_option("wide")
+    page.wait_for_function("() => document.querySelector('.status').textContent.includes('Failed to fetch')")
     context.close()

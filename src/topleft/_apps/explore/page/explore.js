@@ -75,19 +75,45 @@ class Line {
   }
 }
 
+// A WebSocket; where none is let through, POST.
 function socketLine(onLost) {
   const socket = new WebSocket(new URL("socket", document.baseURI).href.replace(/^http/, "ws").replace(/#.*/, ""));
   socket.binaryType = "arraybuffer";
   const line = new Line((header, parts) => socket.send(pack(header, parts)), onLost);
   socket.onmessage = ({data}) => line.hear(unpack(data));
-  socket.onclose = () => line.lose();
   return new Promise((resolve, reject) => {
-    socket.onopen = () => resolve(line);
-    socket.onerror = () => fetch(document.baseURI).then(
-      () => reject(new Error("the page is there, but its WebSocket is blocked: a proxy or an extension between the browser and "
-        + "Python stops it. Open the address without them.")),
-      () => reject(new Error("the explorer has ended: start it again")));
+    const fallBack = () => {
+      clearTimeout(late);
+      socket.onopen = socket.onerror = null;
+      socket.close();
+      fetch(document.baseURI).then(() => resolve(postLine(onLost)), () => reject(new Error("the explorer has ended: start it again")));
+    };
+    const late = setTimeout(fallBack, 4000);
+    socket.onerror = fallBack;
+    socket.onopen = () => {
+      clearTimeout(late);
+      socket.onclose = () => line.lose();
+      resolve(line);
+    };
   });
+}
+
+// The same frames, a POST each, one after the other. It asks every 20 s, or it would be taken for closed.
+function postLine(onLost) {
+  const page = crypto.getRandomValues(new Uint32Array(4)).join("-"), url = new URL(`ask/${page}`, document.baseURI);
+  let last = Promise.resolve();
+  const post = async (frame) => {
+    const answer = await fetch(url, {method: "POST", body: frame});
+    if (!answer.ok) throw new Error((await answer.text()).trim());
+    line.hear(unpack(await answer.arrayBuffer()));
+  };
+  const line = new Line((header, parts) => {
+    const frame = pack(header, parts);
+    last = last.then(() => post(frame)).catch(({message}) => (clearInterval(alive), line.lose(message)));
+  }, onLost);
+  const alive = setInterval(() => line.ask("hello").catch(() => {}), 20000);
+  line.note = "WebSocket is blocked by a proxy or an extension: the page asks by HTTP, which takes longer.";
+  return line;
 }
 
 // A page without Python: a worker answers.
@@ -998,6 +1024,7 @@ export async function start(root, connect, hasAddress = true) {
   root.app = app;
   if (hasAddress) addEventListener("hashchange", () => location.hash !== noted && app.restore(location.hash));
   if (!app.restore(hasAddress && location.hash ? location.hash : app.hello.fragment)) app.show(app.hello.tab);
+  if (app.line.note) app.say(app.line.note);
   return app;
 }
 
