@@ -10,7 +10,7 @@ import pytest
 from gltf_files import QUAD, TRIANGLE, GltfFile, glb_of
 
 import topleft as tl
-from topleft._meshes.io.gltf.draco import _DracoBytes, declared_by_draco
+from topleft._meshes.io.gltf.draco import DracoBytes, declared_by_draco
 from topleft.errors import MeshError, MeshWarning
 
 QUAD_STRIP = [0, 1, 3, 2]
@@ -658,7 +658,7 @@ def test_draco_symbols_with_tags_are_skipped_with_their_bits(n):
         len(packed).to_bytes(1, "little") if len(packed) < 128 else bytes([len(packed) & 127 | 128, len(packed) >> 7])
     )
     values = b"\xff" * ((sum(tags) + 7) // 8)
-    rest = _DracoBytes(b"\0" + table + size + packed + values + b"\x4d", 0)
+    rest = DracoBytes(b"\0" + table + size + packed + values + b"\x4d", 0)
     rest.skip_symbols(n)
     assert rest.byte() == 0x4D
 

@@ -38,7 +38,7 @@ class DracoSize(NamedTuple):
     """Of all attributes of a vertex, while they are unpacked."""
 
 
-class _DracoBytes:
+class DracoBytes:
     """Bytes that are read one after the other; those beyond the end are an IndexError."""
 
     def __init__(self, content: bytes, at: int) -> None:
@@ -133,7 +133,7 @@ def _tags(packed: bytes, chances: list[int], n: int) -> list[int]:
     return tags
 
 
-def _skip_indices(rest: _DracoBytes, n_triangles: int, n_vertices: int) -> None:
+def _skip_indices(rest: DracoBytes, n_triangles: int, n_vertices: int) -> None:
     """Skip the corners of triangles that follow each other as they are."""
     if rest.byte() == COMPRESSED:
         rest.skip_symbols(3 * n_triangles)
@@ -143,7 +143,7 @@ def _skip_indices(rest: _DracoBytes, n_triangles: int, n_vertices: int) -> None:
         rest.skip(3 * n_triangles * (1 if n_vertices < 1 << 8 else 2 if n_vertices < 1 << 16 else 4))
 
 
-def _skip_walk(rest: _DracoBytes, traversal: int) -> bool:
+def _skip_walk(rest: DracoBytes, traversal: int) -> bool:
     """Skip the walk from triangle to triangle (Edgebreaker); returns whether there may be seams."""
     if traversal not in (STANDARD, VALENCE):
         raise MeshError(f"what is compressed is no mesh of Draco 2.2 (traversal {traversal})")
@@ -161,7 +161,7 @@ def _skip_walk(rest: _DracoBytes, traversal: int) -> bool:
     return n_with_seams > 0
 
 
-def _row_bytes(rest: _DracoBytes, bytes_of_decoder: int) -> int:
+def _row_bytes(rest: DracoBytes, bytes_of_decoder: int) -> int:
     """The bytes that all attributes have for a vertex, while they are unpacked."""
     n_decoders, total = rest.byte(), 0
     rest.skip(bytes_of_decoder * n_decoders)
@@ -187,7 +187,7 @@ def declared_by_draco(content: bytes) -> DracoSize:
     head = content[:11]
     if head[:5] != b"DRACO" or head[5:7] != b"\2\2" or len(head) < 11 or head[7] != 1:
         raise MeshError("what is compressed is no mesh of Draco 2.2")
-    rest = _DracoBytes(content, 11)
+    rest = DracoBytes(content, 11)
     try:
         if int.from_bytes(head[9:11], "little") & HAS_METADATA:
             for _ in range(rest.number()):  # of attributes, by their number, then of the mesh
