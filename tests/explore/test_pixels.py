@@ -13,6 +13,7 @@ from topleft._apps.explore.state import parse_state
 from topleft.errors import MeshError
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS, METHODS
+from topleft.scenes import TUTORIAL_SCENES
 
 #: Two triangles whose shared edge passes through pixel centres; the second is the nearer one where they have depth.
 SQUARE = {
@@ -116,6 +117,12 @@ def test_scene_is_drawn(name):
     reply = ask("pixels.scene", name=name)
     panels = draw(reply.header["state"] | {"exact": True}).header["panels"]
     assert not any(panel["refused"] for panel in panels)
+
+
+def test_page_lists_each_scene_once_in_the_order_of_its_keys():
+    listed = [name for _, rows in ask("hello").header["groups"] for name, _ in rows]
+    assert listed == list(SCENES)
+    assert sorted(listed) == sorted(["shared-edge", *TUTORIAL_SCENES, *FAILURE_SCENES])
 
 
 @pytest.mark.parametrize("name", FAILURE_SCENES)
