@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
-pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
 
 import topleft as tl  # noqa: E402
 from topleft._apps.explore.content import content_of  # noqa: E402
+from topleft._apps.explore.content import scene as scene_of  # noqa: E402
 from topleft._apps.explore.handlers import answer  # noqa: E402
 from topleft._apps.explore.messages import split  # noqa: E402
 from topleft._apps.explore.notebook import markup  # noqa: E402
@@ -443,6 +444,23 @@ def test_edges_are_switched_off(page):
     assert page.locator('[data-key="a"] .edges').get_attribute("d") == ""
     page.locator("[data-panel=pixels] .edged").check()
     assert page.locator('[data-key="a"] .edges').get_attribute("d") != ""
+
+
+APART = """[...document.querySelectorAll(".panel")].every((panel) => {
+  const words = [...panel.querySelectorAll("figcaption *, .legend *")].map((one) => one.getBoundingClientRect().right);
+  return words.length > 2 && Math.max(...words) <= panel.getBoundingClientRect().right + 1;
+})"""
+
+
+@pytest.mark.parametrize("scene", ["tight-fan", "tight-fan-sideways"])
+@pytest.mark.parametrize("width", [1280, 1920])
+def test_fans_have_six_screen_pixels_a_pixel_and_words_keep_apart(chromium, explorer, width, scene):
+    state = json.dumps(scene_of(scene) | {"other": "bresenham_scanline"})
+    with opened(chromium, explorer, f"#pixels={state}", viewport={"width": width, "height": 800}) as page:
+        assert page.locator("figcaption").count() == 3
+        assert page.evaluate("document.querySelector('.explorer').app.parts.pixels.cell") >= 6
+        assert page.evaluate(APART)
+        assert page.evaluate("document.documentElement.scrollWidth") == width
 
 
 def test_counts_add_up(page):

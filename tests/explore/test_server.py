@@ -15,8 +15,8 @@ import pytest
 from topleft._apps.explore.messages import pack, read_header, split, unpack
 from topleft._apps.explore.session import Content, Reply
 
-pytest.importorskip("starlette", reason="the explorer needs its extra: pip install 'topleft[explore]'")
-pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+pytest.importorskip("starlette", reason="the explorer needs its extra: pip install '.[explore]'")
+pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
 sockets = pytest.importorskip("websockets.sync.client", reason="the explorer needs its extra")
 
 from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402

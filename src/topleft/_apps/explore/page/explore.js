@@ -426,16 +426,24 @@ function pixelsPart(app, panel) {
     for (const [name, value] of Object.entries({x, y, width, height: 1})) rect?.setAttribute(name, value);
   }
 
-  // The largest whole number of screen pixels a pixel that lets all pictures fit, in the columns that allow most.
+  // The largest whole number of screen pixels a pixel that lets all pictures fit, in the columns that allow most; below
+  // LEAST_CELL they may be higher than the window, which then scrolls.
+  const LEAST_CELL = 6;
   function fit() {
     const n = part.views.size, [width, height] = state.size, isNarrow = stage.clientWidth < 480;
-    const room = isNarrow ? Infinity : Math.max(420, innerHeight - 120);
-    let best = [0, 1];
-    for (let columns = 1; columns <= (isNarrow ? 1 : n); columns++) {
+    const room = Math.max(420, innerHeight - 120), most = isNarrow ? 1 : n;
+    const cellOf = (columns, room) => {
       const wide = ((stage.clientWidth + 24) / columns - 24) / (width + 2);
-      const high = (room / Math.ceil(n / columns) - 84) / (height + 2);
-      const cell = Math.max(1, Math.floor(Math.min(wide, high, 44)));
+      return Math.max(1, Math.floor(Math.min(wide, (room / Math.ceil(n / columns) - 84) / (height + 2), 44)));
+    };
+    let best = [0, 1];
+    for (let columns = 1; columns <= most; columns++) {
+      const cell = cellOf(columns, isNarrow ? Infinity : room);
       if (cell > best[0]) best = [cell, columns];
+    }
+    for (let columns = 1; columns <= most && best[0] < LEAST_CELL; columns++) {
+      const cell = Math.min(LEAST_CELL, cellOf(most + 1 - columns, Infinity));
+      if (cell > best[0]) best = [cell, most + 1 - columns];
     }
     const [cell, columns] = best, px = (n) => `${cell * n}px`;
     part.cell = cell;
@@ -674,6 +682,7 @@ function stepsPart(app, panel) {
       const scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : drawn;
       const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view, [width, height] = size;
       const asked = JSON.stringify([view.scene, method, subpixel_bits]);
+      if (!trace) told.textContent = "The steps are being recorded.";
       trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
       if (asked !== JSON.stringify([view.scene, view.method, view.subpixel_bits])) return;  // a link has come in between
       methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
