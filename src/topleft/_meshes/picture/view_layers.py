@@ -110,7 +110,7 @@ class ViewLayers(Mapping[str, Array]):
         return to_rle(found, labels=labels, compressed=compressed)
 
     def _named(self, layer: str) -> Array:
-        if layer not in tuple(self):
+        if not (isinstance(layer, str) and layer in self):
             raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
         return self[layer]
 
