@@ -113,7 +113,7 @@ def test_production_is_never_wrong_where_coverage_alone_is_known(sampling):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_scene_is_drawn(name):
+def test_scene_by_its_name_is_drawn_by_every_panel(name):
     reply = ask("pixels.scene", name=name)
     panels = draw(reply.header["state"] | {"exact": True}).header["panels"]
     assert not any(panel["refused"] for panel in panels)
@@ -341,7 +341,7 @@ def test_mesh_or_arrays_without_a_size_in_space_are_a_mesh(folder):
     ]
 
 
-def test_link_is_taken():
+def test_address_of_a_page_gives_its_fragment():
     assert content_of_name("http://127.0.0.1:4000/token/#pixels={}").fragment == "pixels={}"
 
 
