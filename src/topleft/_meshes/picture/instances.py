@@ -462,10 +462,11 @@ def draw_nearest(
     background_depth: float | None = None,
     *,
     is_split: bool = False,
+    memory: Memory = FRESH,
 ) -> SceneFragments:
-    """Return the visibility buffer of what `place` returned; `is_split` as in `View`, of one instance."""
+    """Return the visibility buffer of what `place` returned; `is_split` as in `View`, and `memory`: of one instance."""
     if len(placed.scene) == 1:
-        return placed.fragments_of(draw_one(FRESH, placed, depth_test, background_depth, is_split=is_split), view)
+        return placed.fragments_of(draw_one(memory, placed, depth_test, background_depth, is_split=is_split), view)
     (width, height), positions = view.size, placed.positions(view)
     n = len(positions)
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
