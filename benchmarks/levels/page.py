@@ -23,7 +23,7 @@ tl.Levels.load("mesh-levels.npz", mesh)
 print(tl.plan(mesh, camera, (1920, 1080), tolerance=0.5).explain())
 ```
 
-`pip install 'topleft[simplify]'` gets [fast-simplification](https://pypi.org/project/fast-simplification/), which
+`pip install fast-simplification` gets [fast-simplification](https://pypi.org/project/fast-simplification/), which
 collapses edges. It promises nothing about the result; the bound does: each level is measured against the mesh, and no
 point of either surface is farther from the other than `level.bound`. What that is in pixels depends on the view, and
 `tl.choose_detail` tells it: for each level the most that any point that shows can be off.

@@ -1,7 +1,7 @@
 """Arrays of JAX on the CPU, with gradients, in the conventions of `topleft.torch`: `import topleft.jax as dr`.
 
 Each function is one call of the engine through `jax.pure_callback`, so `jax.jit`, `jax.grad` and `jax.vmap` take it;
-gradients are first derivatives, with the same bits in every run. Needs JAX: ``pip install 'topleft[jax]'``.
+gradients are first derivatives, with the same bits in every run. Needs JAX: ``pip install jax``.
 
 Row 0 is the bottom row, resolutions are (height, width), ids are 1 more and stand in a channel of floats, depth is z/w
 in -1..1, and row 0 of a texture is v = 0. Shapes are those of `topleft.torch`, with a batch of B pictures; a wrong one
@@ -27,7 +27,7 @@ try:
     import jax
     import jax.numpy as jnp
 except ImportError:
-    raise MissingPackageError("topleft.jax needs JAX: pip install 'topleft[jax]'") from None
+    raise MissingPackageError("topleft.jax needs JAX: pip install jax") from None
 
 __all__ = ["antialias", "interpolate", "rasterize", "texture"]
 

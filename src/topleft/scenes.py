@@ -132,6 +132,17 @@ def square_of_four() -> Shape:
     return vertices, np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], dtype=np.int32)
 
 
+def composite_triangle(*, major: str = "right") -> Shape:
+    """A triangle cut at its middle vertex into a flat bottom and a flat top, which share the edge in row 70.
+
+    Scanline fillers call it composite, and draw it as these two; its long edge, the major one, is on the right or on
+    the left.
+    """
+    x = np.array([70.0, 50, 80, 100])  # the top, the middle vertex, the cut of the long edge, the bottom
+    vertices = np.stack([x if major == "right" else 150 - x, [50.0, 70, 70, 110]], axis=-1)
+    return vertices, np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32)
+
+
 def tight_fan(n: int = 16, *, sideways: bool = False) -> Shape:
     """A fan of `n` triangles from (50, 50), downwards or to the right: 100 pixels long, 3 wide at the far end."""
     rim = np.stack([50.0 + 3 * np.arange(n + 1), np.full(n + 1, 150.0)], axis=-1)
@@ -145,6 +156,8 @@ TUTORIAL_SCENES: Mapping[str, Callable[[], Shape]] = MappingProxyType(
     | {
         "two-triangles": two_triangles,
         "square-of-four": square_of_four,
+        "composite-major-right": composite_triangle,
+        "composite-major-left": partial(composite_triangle, major="left"),
         "tight-fan": tight_fan,
         "tight-fan-sideways": partial(tight_fan, sideways=True),
     }

@@ -3,7 +3,7 @@
 In and out: tensors of float32 (or float64) on the CPU, read without a copy. Each function is one call of the engine,
 which also computes its gradients, with the same bits for every number of threads. They are custom operators
 of PyTorch (``torch.ops.topleft``), so `torch.compile` and `torch.vmap` take them. Needs PyTorch 2.5:
-``pip install 'topleft[torch]'``.
+``pip install torch``.
 
 What differs from the rest of `topleft`: row 0 is the bottom row, resolutions are (height, width), ids are 1 more and
 stand in a channel of floats, depth is z/w in -1..1, and row 0 of a texture is v = 0.

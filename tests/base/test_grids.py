@@ -162,6 +162,16 @@ def test_tif_of_a_grid_says_where_it_lies(tmp_path):
         tl.save_image(tmp_path / "a.png", np.zeros((4, 6), np.uint8), grid=GRID)
 
 
+def test_tif_of_a_height_map_keeps_its_floats_of_64_bits(tmp_path):
+    rasterio = pytest.importorskip("rasterio")
+    heights = tl.height_map(tl.Mesh([(0, 0, 0.1), (6, 0, 1 / 3), (0, 4, 7)], [(0, 1, 2)]), GRID)
+    tl.save_image(tmp_path / "a.tif", heights, grid=GRID)
+    assert heights.max() > 0
+    with rasterio.open(tmp_path / "a.tif") as found:
+        assert (found.dtypes, tl.Grid.like(found)) == (("float64",), GRID)
+        assert found.read(1).tobytes() == heights.tobytes()
+
+
 def test_geotiff_of_tiles_takes_the_crs_of_the_grid(tmp_path):
     rasterio = pytest.importorskip("rasterio")
     pytest.importorskip("pyproj")

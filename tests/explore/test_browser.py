@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
-pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
 
 import topleft as tl  # noqa: E402
 from topleft._apps.explore.content import content_of  # noqa: E402
+from topleft._apps.explore.content import scene as scene_of  # noqa: E402
 from topleft._apps.explore.handlers import answer  # noqa: E402
 from topleft._apps.explore.messages import split  # noqa: E402
 from topleft._apps.explore.notebook import markup  # noqa: E402
@@ -445,6 +446,23 @@ def test_edges_are_switched_off(page):
     assert page.locator('[data-key="a"] .edges').get_attribute("d") != ""
 
 
+APART = """[...document.querySelectorAll(".panel")].every((panel) => {
+  const words = [...panel.querySelectorAll("figcaption *, .legend *")].map((one) => one.getBoundingClientRect().right);
+  return words.length > 2 && Math.max(...words) <= panel.getBoundingClientRect().right + 1;
+})"""
+
+
+@pytest.mark.parametrize("scene", ["tight-fan", "tight-fan-sideways"])
+@pytest.mark.parametrize("width", [1280, 1920])
+def test_fans_have_six_screen_pixels_a_pixel_and_words_keep_apart(chromium, explorer, width, scene):
+    state = json.dumps(scene_of(scene) | {"other": "bresenham_scanline"})
+    with opened(chromium, explorer, f"#pixels={state}", viewport={"width": width, "height": 800}) as page:
+        assert page.locator("figcaption").count() == 3
+        assert page.evaluate("document.querySelector('.explorer').app.parts.pixels.cell") >= 6
+        assert page.evaluate(APART)
+        assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
 def test_counts_add_up(page):
     """The kinds of wrong pixels are all that are wrong; those of the difference all that either draws."""
     told = page.inner_text('[data-key="b"] figcaption')
@@ -458,10 +476,17 @@ def test_counts_add_up(page):
     assert sum(legend[1:]) == int(n)
 
 
-def test_page_without_its_socket_says_so(chromium, explorer):
+@pytest.mark.parametrize("blocked", ["setTimeout(() => this.onerror?.(), 0)", ""], ids=["refused", "held up"])
+def test_page_without_its_socket_asks_by_post(chromium, explorer, blocked):
     context = chromium.new_context()
-    context.add_init_script("WebSocket = class { constructor() { setTimeout(() => this.onerror(), 0); } }")
+    context.add_init_script(f"WebSocket = class {{ constructor() {{ {blocked} }} close() {{}} }}")
     page = context.new_page()
     page.goto(explorer.url.split("#")[0])
     page.wait_for_function("() => document.querySelector('.status').textContent.includes('WebSocket is blocked')")
+    pixels_of(page).locator("[data-name=scene]").select_option("two-triangles")
+    page.wait_for_function(f"() => {STATE}.scene === 'two-triangles'")
+    check_pictures(page)
+    explorer.close()
+    pixels_of(page).locator("[data-name=scene]").select_option("wide")
+    page.wait_for_function("() => document.querySelector('.status').textContent.includes('Failed to fetch')")
     context.close()

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
-pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
 
 import topleft as tl  # noqa: E402
 from topleft._apps.explore.mesh_view import HANDLERS, MeshView  # noqa: E402

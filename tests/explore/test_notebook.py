@@ -23,7 +23,7 @@ def shell(monkeypatch):
 
 
 def test_widget_answers_and_returns_the_vertices_that_were_moved():
-    pytest.importorskip("anywidget", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+    pytest.importorskip("anywidget", reason="the explorer needs its extra: pip install '.[explore]'")
     widget, sent = notebook.widget_of(content_of(VERTICES, TRIANGLES, 8)), []
     widget.send = lambda header, parts: sent.append((header, parts))
     assert widget.vertices.tolist() == VERTICES
@@ -38,7 +38,7 @@ def test_widget_answers_and_returns_the_vertices_that_were_moved():
 
 
 def test_explore_in_a_notebook_is_a_widget_with_the_page(shell):
-    anywidget = pytest.importorskip("anywidget", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+    anywidget = pytest.importorskip("anywidget", reason="the explorer needs its extra: pip install '.[explore]'")
     widget = tl.explore(VERTICES, TRIANGLES, 8)
     assert isinstance(widget, anywidget.AnyWidget)
     assert widget.markup.startswith('<div class="explorer">')

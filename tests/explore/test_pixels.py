@@ -13,6 +13,7 @@ from topleft._apps.explore.state import parse_state
 from topleft.errors import MeshError
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS, METHODS
+from topleft.scenes import TUTORIAL_SCENES
 
 #: Two triangles whose shared edge passes through pixel centres; the second is the nearer one where they have depth.
 SQUARE = {
@@ -112,10 +113,16 @@ def test_production_is_never_wrong_where_coverage_alone_is_known(sampling):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_scene_is_drawn(name):
+def test_scene_by_its_name_is_drawn_by_every_panel(name):
     reply = ask("pixels.scene", name=name)
     panels = draw(reply.header["state"] | {"exact": True}).header["panels"]
     assert not any(panel["refused"] for panel in panels)
+
+
+def test_page_lists_each_scene_once_in_the_order_of_its_keys():
+    listed = [name for _, rows in ask("hello").header["groups"] for name, _ in rows]
+    assert listed == list(SCENES)
+    assert sorted(listed) == sorted(["shared-edge", *TUTORIAL_SCENES, *FAILURE_SCENES])
 
 
 @pytest.mark.parametrize("name", FAILURE_SCENES)
@@ -334,7 +341,7 @@ def test_mesh_or_arrays_without_a_size_in_space_are_a_mesh(folder):
     ]
 
 
-def test_link_is_taken():
+def test_address_of_a_page_gives_its_fragment():
     assert content_of_name("http://127.0.0.1:4000/token/#pixels={}").fragment == "pixels={}"
 
 

@@ -15,8 +15,8 @@ import pytest
 from topleft._apps.explore.messages import pack, read_header, split, unpack
 from topleft._apps.explore.session import Content, Reply
 
-pytest.importorskip("starlette", reason="the explorer needs its extra: pip install 'topleft[explore]'")
-pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+pytest.importorskip("starlette", reason="the explorer needs its extra: pip install '.[explore]'")
+pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
 sockets = pytest.importorskip("websockets.sync.client", reason="the explorer needs its extra")
 
 from websockets.exceptions import ConnectionClosed, InvalidStatus  # noqa: E402
@@ -119,9 +119,9 @@ def test_second_user_without_the_token_is_refused(server):
         assert refusal(server, token=token) == (403, "The address must hold the token that the terminal shows.")
 
 
-def test_other_methods_than_get_are_refused(server):
+def test_other_methods_are_refused(server):
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
-    connection.request("POST", f"/{server.token}/")
+    connection.request("PUT", f"/{server.token}/")
     assert connection.getresponse().status == 405
 
 
@@ -139,6 +139,63 @@ def test_two_pages_talk_at_a_time(server):
     with connect(server) as one, connect(server) as two:
         for page in (one, two, one):
             assert ask(page, "hello")["tab"] == "pixels"
+
+
+# Pages without a socket
+
+
+def post(server, frame, name="ask/1", token=None, **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    headers = {"Origin": f"http://127.0.0.1:{server.port}"} | headers
+    connection.request("POST", f"/{server.token if token is None else token}/{name}", frame, headers)
+    found = connection.getresponse()
+    return found.status, found.read()
+
+
+@pytest.mark.parametrize(
+    "question", [{"do": "hello"}, {"do": "pixels.export", "state": SQUARE, "kind": "png"}, {"do": "no"}, {}]
+)
+def test_post_is_answered_as_a_socket_is(server, question):
+    frame = pack({"id": 1, **question}, [])
+    with connect(server) as page:
+        page.send(frame)
+        assert post(server, frame) == (200, page.recv(timeout=20))
+
+
+def test_post_of_a_page_finds_what_the_page_has_kept(server):
+    opened = post(server, pack({"id": 1, "do": "mesh.open", "name": "a.obj"}, [b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3"]))
+    assert answer_of(opened[1])["n_triangles"] == 1
+    kept = [answer_of(post(server, pack({"id": 2, "do": "mesh.open"}, []), f"ask/{key}")[1])["name"] for key in "12"]
+    assert kept == ["a.obj", "torus-knot"]
+
+
+def test_post_of_strangers_is_refused(server):
+    frame = pack({"id": 1, "do": "hello"}, [])
+    assert post(server, frame, Origin="http://evil.example") == (
+        403,
+        b"Origin must be this page: others may not talk to it.\n",
+    )
+    assert post(server, frame, token="x") == (403, b"The address must hold the token that the terminal shows.\n")
+    for name in ("", "ask", "ask/", "tell/1", "ask/" + "1" * 65):
+        assert post(server, frame, name) == (404, b"There is nothing to ask here.\n")
+
+
+def test_post_that_is_too_large_is_refused(server, monkeypatch):
+    monkeypatch.setattr(module, "MAX_MESSAGE_BYTES", 1000)
+    assert post(server, bytes(1001)) == (413, b"A message may have 1000 bytes.\n")
+
+
+def test_page_that_posts_nothing_for_long_is_closed(monkeypatch):
+    monkeypatch.setattr(module, "POSTING_SECONDS", 0.2)
+    monkeypatch.setattr(module, "MAX_PAGES", 1)
+    server, frame = Server(Content(), idle=0.5), pack({"id": 1, "do": "hello"}, [])
+    server.start()
+    assert post(server, frame)[0] == 200
+    assert post(server, frame, "ask/2") == (403, b"At most 1 pages may be open at a time.\n")
+    time.sleep(0.4)
+    assert post(server, frame, "ask/2")[0] == 200
+    server._thread.join(10)
+    assert not server._thread.is_alive()
 
 
 def test_more_pages_than_may_be_open_are_refused(server, monkeypatch):

@@ -56,6 +56,13 @@ def test_powers_outside_code_are_not_read_as_bold(page):
     assert re.findall(r"(?m)^(?!    ).*\d\*\*-?\d.*$", text) == []  # 2**62 to 2**30 shows as a bold "62 to 2"
 
 
+def test_packages_are_named_by_what_can_be_installed_before_a_release_too():
+    told = [*PAGES, *FRONT, *(ROOT / "src").rglob("*.py")]
+    assert len(told) > 100
+    named = [path.name for path in told if re.search(r"install .?topleft\[", path.read_text(encoding="utf-8"))]
+    assert named == []
+
+
 def test_index_lists_every_page_once():
     listed = [path for path, _ in links(DOCS / "README.md") if DOCS in path.parents]
     assert sorted(listed) == [page for page in PAGES if page != DOCS / "README.md"]

@@ -75,7 +75,7 @@ def test_matrix_that_is_no_camera_is_told(matrix, message):
 
 @pytest.mark.parametrize("red", ["red", "#ff0000", "#f00", "rgb(255, 0, 0)", (255, 0, 0), (1.0, 0.0, 0.0), (1.0, 0, 0),
                                  np.array([1, 0, 0], np.float32), np.array([255, 0, 0])])  # fmt: skip
-def test_red_is_red(red):
+def test_color_in_each_notation_is_the_same_bytes(red):
     assert tl.render(CUBE, CAMERA, SIZE, color=red, shading="unlit")[12, 16].tolist() == [255, 0, 0, 255]
     assert tl.render(CUBE, CAMERA, SIZE, background=red)[0, 0].tolist() == [255, 0, 0, 255]
     assert tl.Material(red).color == tl.Light((0, 0, 1), color=red).color == tl.Fog(1, 2, red).color == (255, 0, 0)
@@ -125,7 +125,7 @@ def test_scene_takes_what_as_mesh_takes():
     assert [one.transform[0, 0] for one in scene] == [1, 2, 1, 2, 1]
 
 
-def test_quads_are_cut():
+def test_quads_are_cut_by_as_mesh_and_refused_by_mesh():
     assert tl.as_mesh((QUAD, [[0, 1, 2, 3]])).triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert tl.Scene([(QUAD, [[0, 1, 2, 3]])]).n_triangles == 2
     with raises(ValueError, "(T, 3), got (1, 4); topleft.as_mesh((vertices, faces)).triangles cuts quads"):

@@ -9,7 +9,7 @@ from PIL import Image
 from topleft.testing import assert_same_picture
 
 
-def test_same_pictures_pass():
+def test_assert_same_picture_of_equal_arrays_passes():
     for picture in (np.eye(4, dtype=bool), np.zeros((2, 3, 4), np.uint8), np.full((2, 2), np.nan), np.zeros((0, 5))):
         assert_same_picture(picture, picture.copy())
 
@@ -58,7 +58,7 @@ def test_other_kinds_of_pictures_fail(got, expected, message):
         assert_same_picture(got, expected)
 
 
-def test_difference_is_drawn(tmp_path):
+def test_assert_same_picture_draws_the_difference_to_its_path(tmp_path):
     got, expected = np.zeros((3, 4), np.float32), np.zeros((3, 4), np.float32)
     got[0, 1], got[2, 3], got[1, 1] = 1, 0.5, np.nan
     with pytest.raises(AssertionError, match=r"the difference is drawn in .*off\.png"):

@@ -10,7 +10,7 @@ import pytest
 from gltf_files import QUAD, TRIANGLE, GltfFile, glb_of
 
 import topleft as tl
-from topleft._meshes.io.gltf.draco import declared_by_draco
+from topleft._meshes.io.gltf.draco import DracoBytes, declared_by_draco
 from topleft.errors import MeshError, MeshWarning
 
 QUAD_STRIP = [0, 1, 3, 2]
@@ -556,11 +556,11 @@ def test_load_cameras_of_other_formats_are_none(tmp_path):
 DRACO = "KHR_draco_mesh_compression"
 
 
-def draco_file(content, n_vertices, n_corners):
+def draco_file(content, n_vertices, n_corners, position_id=0):
     file = GltfFile(extensionsRequired=[DRACO])
     position = file.add("accessors", {"componentType": 5126, "count": n_vertices, "type": "VEC3"})
     indices = file.add("accessors", {"componentType": 5125, "count": n_corners, "type": "SCALAR"})
-    packed = {DRACO: {"bufferView": file.view(content), "attributes": {"POSITION": 0}}}
+    packed = {DRACO: {"bufferView": file.view(content), "attributes": {"POSITION": position_id}}}
     file.node(mesh=file.mesh({"attributes": {"POSITION": position}, "indices": indices, "extensions": packed}))
     return file
 
@@ -595,13 +595,87 @@ def test_gltf_of_draco_that_declares_too_much_is_refused_before_it_is_unpacked(t
         tl.load(tmp_path / "a.glb", max_vertices=40_400)
 
 
+@pytest.mark.parametrize("level", [0, 1, 7, 10])
+@pytest.mark.parametrize("n", [1, 3, 200, 260])
+def test_draco_attributes_are_found_behind_the_connectivity(level, n):
+    n_vertices = (n + 1) ** 2
+    uv = np.random.default_rng(n).uniform(0, 1, (n_vertices, 2))
+    own = {1: np.zeros((n_vertices, 5), np.uint8), 2: np.zeros((n_vertices, 3))}
+    content, *_ = grid_of_draco(n, compression_level=level, tex_coord=uv, generic_attributes=own)
+    size = declared_by_draco(content)
+    assert (size.n_triangles, size.n_vertices) == (2 * n * n, n_vertices)
+    assert size.row_bytes == 12 + 8 + 4 * 5 + 4 * 3
+    assert size.n_rows in (n_vertices, 6 * n * n)
+
+
+@pytest.mark.parametrize("level", [0, 7])
+def test_gltf_of_draco_with_more_attributes_than_its_vertices_allow_is_refused(tmp_path, monkeypatch, level):
+    """As a file of 58 kB, which took 1 GB."""
+    own = {k: np.zeros((201**2, 120), np.uint32) for k in range(4)}
+    content, *n = grid_of_draco(200, compression_level=level, generic_attributes=own)
+    monkeypatch.setattr("DracoPy.decode", lambda content: pytest.fail("it was unpacked"))
+    tmp_path.joinpath("a.glb").write_bytes(draco_file(content, *n).glb())
+    with pytest.raises(MeshError, match=r"has (1219605|7245000) vertices, more than the 1000000 of max_vertices"):
+        tl.load(tmp_path / "a.glb", max_vertices=1_000_000)
+
+
+def test_gltf_of_draco_counts_the_attributes_of_all_parts(tmp_path):
+    own = {0: np.zeros((201**2, 100), np.uint32)}
+    content, n_vertices, n_corners = grid_of_draco(200, compression_level=7, generic_attributes=own)
+    file = draco_file(content, n_vertices, n_corners, position_id=1)
+    n_like = n_corners * 412 // 64  # there may be seams
+    path = tmp_path / "a.glb"
+    path.write_bytes(file.glb())
+    assert len(tl.load(path, max_vertices=2 * n_like).triangles) == n_corners / 3
+    file.tree["meshes"][0]["primitives"] *= 3
+    path.write_bytes(file.glb())
+    with pytest.raises(MeshError, match=f"vertices, more than the {2 * n_like} of max_vertices"):
+        tl.load(path, max_vertices=2 * n_like)
+
+
+def packed_tags(tags, chances):
+    """The states of an asymmetric numeral system, from the last tag to the first, as Draco writes them."""
+    before, state, packed = np.cumsum([0, *chances]).tolist(), 1 << 14, bytearray()
+    for tag in reversed(tags):
+        while state >= chances[tag] << 10:
+            packed.append(state & 255)
+            state >>= 8
+        high, low = divmod(state, chances[tag])
+        state = (high << 12) + low + before[tag]
+    last = state - (1 << 14)
+    n = next(n for n in range(1, 5) if last < 1 << 8 * n - 2)
+    return bytes(packed) + (last | n - 1 << 8 * n - 2).to_bytes(n, "little")
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 300])
+def test_draco_symbols_with_tags_are_skipped_with_their_bits(n):
+    chances = [0, 3000, 1000, 0, 0, 90, 6]
+    table = bytes([7, 3]) + b"".join((c << 2 | 1).to_bytes(2, "little") for c in chances[1:3])
+    table += bytes([1 << 2 | 3]) + b"".join((c << 2 | 1).to_bytes(2, "little") for c in chances[5:])
+    tags = np.random.default_rng(n).choice(7, n, p=np.array(chances) / 4096).tolist()
+    packed = packed_tags(tags, chances)
+    size = (
+        len(packed).to_bytes(1, "little") if len(packed) < 128 else bytes([len(packed) & 127 | 128, len(packed) >> 7])
+    )
+    values = b"\xff" * ((sum(tags) + 7) // 8)
+    rest = DracoBytes(b"\0" + table + size + packed + values + b"\x4d", 0)
+    rest.skip_symbols(n)
+    assert rest.byte() == 0x4D
+
+
+def test_draco_more_symbols_with_tags_than_are_read_are_refused_with_the_number():
+    content = b"DRACO\2\2\1\1\0\0" + b"\2\4\4\1\0\0\0" + b"\0\0" * 2 + b"\x81\x80\x40\0"
+    with pytest.raises(MeshError, match="has 1048577 symbols with tags, more than 1048576"):
+        declared_by_draco(content)
+
+
 def test_draco_metadata_is_skipped():
     content, _, _ = grid_of_draco(3)
     entry = b"\x01a\x02xy"
     own = b"\x01" + entry + b"\x00"  # one entry, nothing below
     nested = b"\x00\x01\x01b" + own
     packed = content[:9] + b"\x00\x80" + b"\x02\x00" + own + b"\x01" + nested + own + content[11:]
-    assert declared_by_draco(packed) == declared_by_draco(content) == (18, 16)
+    assert declared_by_draco(packed) == declared_by_draco(content) == (18, 16, 16, 12)
 
 
 @pytest.mark.parametrize(

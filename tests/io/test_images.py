@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from topleft._meshes.io import images, png
+from topleft._meshes.io import images, png, tiff
 from topleft.errors import ImageError
 
 PICTURE = np.arange(4 * 5 * 4, dtype=np.uint8).reshape(4, 5, 4)
@@ -54,6 +54,29 @@ def test_save_image_npz_keeps_arrays_by_name(tmp_path):
     with np.load(tmp_path / "a.npz") as arrays:
         assert sorted(arrays) == ["x", "y"]
         assert arrays["x"].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("limit", [1 << 32, 0], ids=["plain", "big"])
+@pytest.mark.parametrize("shape", [(700, 90), (40, 50, 2)], ids=["strips", "pages"])
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_save_image_tiff_keeps_floats_to_the_bit(tmp_path, monkeypatch, dtype, shape, limit):
+    tifffile = pytest.importorskip("tifffile", reason="no tifffile")
+    monkeypatch.setattr(tiff, "LIMIT_CLASSIC", limit)  # from so many bytes on offsets have 64 bits
+    array = np.random.default_rng(4).standard_normal(shape).astype(dtype)
+    array[0, 0], array[1, 0] = np.inf, np.nan
+    images.save_image(tmp_path / "a.tif", array)
+    with tifffile.TiffFile(tmp_path / "a.tif") as found:
+        assert (found.is_bigtiff, len(found.pages)) == (limit == 0, array[0, 0].size)
+        channels = array.reshape(*shape[:2], -1)
+        for k, page in enumerate(found.pages):
+            assert page.asarray().tobytes() == channels[..., k].tobytes()
+
+
+def test_save_image_tiff_keeps_colours_and_alpha(tmp_path):
+    images.save_image(tmp_path / "a.tif", PICTURE)
+    with Image.open(tmp_path / "a.tif") as image:
+        assert (image.mode, image.n_frames) == ("RGBA", 1)
+        assert np.array_equal(np.asarray(image), PICTURE)
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "int32", "float32"])
@@ -128,7 +151,8 @@ def test_save_image_over_a_folder_is_refused(tmp_path):
         ("a", PICTURE, "format '' is none of"),
         ("a.png", PICTURE.astype(float), r"cannot write '.*a.png': .png holds uint8 .*; got float64 \(4, 5, 4\)"),
         ("a.jpg", PICTURE[..., :2], r".jpg holds uint8 \(H, W\), .*; got uint8 \(4, 5, 2\)"),
-        ("a.tif", PICTURE[0, 0].astype(np.float32), r"holds .*, float32 \(H, W, K\); got float32 \(4,\)"),
+        ("a.tif", PICTURE[0, 0].astype(np.float32), r"holds .*, float64 \(H, W, K\); got float32 \(4,\)"),
+        ("a.tif", np.zeros((2, 3), np.int64), r"holds .*; got int64 \(2, 3\); \.npy holds it as it is"),
         ("a.png", PICTURE[:0], r"a picture of shape \(0, 5, 4\) has no pixels"),
         ("a.png", {"x": PICTURE}, "several arrays by name need .npz"),
     ],

@@ -101,6 +101,24 @@ def test_bresenham_draws_the_row_of_a_split_twice():
     assert np.unique(np.argwhere(drawn > 1)[:, 0]).tolist() == [210]
 
 
+@pytest.mark.parametrize("name", ONCE)
+@pytest.mark.parametrize("scene", ["composite-major-right", "composite-major-left"])
+def test_composite_is_drawn_as_its_whole_by_the_exact_ones(name, scene):
+    vertices, _ = scenes.TUTORIAL_SCENES[scene]()
+    whole = tl.overdraw(vertices[[0, 1, 3]], [[0, 1, 2]], SIZE, method=name)
+    assert np.array_equal(counts(scene, name), whole)
+    assert whole.max() == 1
+
+
+@pytest.mark.parametrize("scene", ["composite-major-right", "composite-major-left"])
+@pytest.mark.parametrize("name", ["point_in_triangle", "bresenham_scanline"])
+def test_composite_is_drawn_twice_where_it_is_cut_by_closed_edges(name, scene):
+    drawn = counts(scene, name)
+    vertices, _ = scenes.TUTORIAL_SCENES[scene]()
+    first, last = sorted(vertices[[1, 2], 0].astype(int))
+    assert np.argwhere(drawn > 1).tolist() == [[70, x] for x in range(first, last + 1)]
+
+
 def test_bresenham_wireframe_is_the_outline_of_the_flat_parts():
     vertices, _ = scenes.TUTORIAL_SCENES["horizontal-edge"]()
     (a, b, c), drawn = vertices.astype(int), counts("horizontal-edge", "bresenham_scanline/wireframe")

@@ -238,7 +238,7 @@ def test_plan_checks_indices():
     ("size", "triangles"), [((0, 5), [[0, 1, 2]]), ((7, 0), [[0, 1, 2]]), (SIZE, np.empty((0, 3), np.int32))]
 )
 @pytest.mark.parametrize("outputs", ["coverage", "color", "depth"])
-def test_plan_of_nothing(size, triangles, outputs):
+def test_plan_without_triangles_or_pixels_explains_itself(size, triangles, outputs):
     plan = tl.plan(boxes(8)[0], triangles, size, outputs=outputs).measure(1)
     assert plan.explain().startswith(plan.verb)
 

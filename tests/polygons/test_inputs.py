@@ -129,7 +129,7 @@ def test_grid_is_in_units_of_the_data():
 
 
 @pytest.mark.parametrize("rings", [[], (np.empty((0, 2)), [0], [0]), (np.empty((0, 2)), [0])])
-def test_nothing_is_nowhere(rings):
+def test_no_rings_give_empty_pictures(rings):
     assert not tl.polygons(rings, SIZE).any()
     assert not tl.polygons(rings, SIZE, sampling="area").any()
     assert not tl.polygons(rings, SIZE, sampling="outer").any()
@@ -138,7 +138,7 @@ def test_nothing_is_nowhere(rings):
 
 
 @pytest.mark.parametrize("size", [(0, 0), (0, 4), (4, 0)])
-def test_picture_without_pixels(size):
+def test_size_without_pixels_gives_arrays_of_that_shape(size):
     assert tl.polygons(SQUARE, size).shape == size[::-1]
     assert tl.polygons([[SQUARE]], size, values="index").shape == size[::-1]
     assert tl.polygons(SQUARE, size, sampling="area").shape == size[::-1]
@@ -151,7 +151,7 @@ def test_rings_without_area_are_empty():
             assert not tl.polygons(ring, SIZE, sampling=sampling).any()
 
 
-def test_a_million_holes():
+def test_square_with_a_million_holes_keeps_three_quarters_of_each_pixel():
     side = 1000
     at = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 1, 2)
     holes = at + np.array([(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)])

@@ -13,9 +13,13 @@ from hypothesis import given
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
+from topleft._core import engine
 from topleft._core.base import memory
 from topleft._core.polygons import overlap
-from topleft._core.polygons.prepared import Prepared
+from topleft._core.polygons.draw import cells_for
+from topleft._core.polygons.polygons import frame_of
+from topleft._core.polygons.prepared import Prepared, prepare
+from topleft._core.polygons.rings import as_rings
 from topleft.methods.reference import polygons as ref
 
 UNIT = 2.0**-24
@@ -175,6 +179,26 @@ def test_table_in_many_blocks_is_the_same_on_each_thread(monkeypatch):
             table = tl.overlap(drawn, (50, 40), threads=threads)
             for name in ("starts", "pixels", "areas"):
                 assert (getattr(table, name) == getattr(expected, name)).all()
+
+
+@pytest.mark.parametrize("size", [(1, 5), (5, 1), (1, 1)])
+def test_table_of_one_column_or_row_is_that_part_of_a_wider_one(size):
+    ring = [(-3, -2), (0.75, -2), (9, 3.5), (0.25, 7)]
+    areas = dense(tl.overlap([[ring]], (5, 5)))[0, : size[1], : size[0]]
+    assert (dense(tl.overlap([[ring]], size))[0] == areas).all()
+    assert areas.any()
+
+
+def test_table_of_a_range_leaves_the_polygons_behind_it():
+    rings = as_rings([[square(i, 1, i + 1, 2)] for i in range(1, 7)])
+    found, frame = frame_of(rings, (9, 9), (0, 0), 8, 1, 1, 100)
+    prepared = prepare(memory.FRESH, found, frame, is_nonzero=False)
+    prepared.certify(assume_valid=False)
+    starts, pixels, areas = np.full(7, -1), np.empty(200, np.int32), np.empty(200, np.float32)
+    cells_of_rows = np.full(cells_for(prepared, 9), engine.CELL_CLEAR, np.int32)
+    starts[0] = 0
+    prepared.compiled.list_shares(0, 4, starts, pixels, areas, cells_of_rows, prepared.piece_scratch())
+    assert starts.tolist() == [0, 1, 2, 3, 4, -1, -1]
 
 
 def test_table_that_a_thread_cannot_finish_raises(monkeypatch):

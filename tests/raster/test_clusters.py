@@ -338,7 +338,7 @@ def test_out_and_background_are_as_without():
     assert_same(out[1], expected.depth)
 
 
-def test_mesh_of_nothing():
+def test_clusters_of_no_triangles_draw_nothing():
     mesh = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32)
     assert not draw(mesh, Clusters(*mesh), transform=np.eye(4)).mask.any()
 

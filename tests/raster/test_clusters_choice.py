@@ -9,8 +9,9 @@ from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
 from topleft._core.raster.clusters import Backoff, Clusters
 from topleft._core.raster.view import View
-from topleft._meshes.picture import instances
-from topleft._meshes.picture.instances import PlacedScene, count_layers, rasterize_shot, survey_instances
+from topleft._meshes.picture import rounds
+from topleft._meshes.picture.instances import PlacedScene, rasterize_shot
+from topleft._meshes.picture.rounds import count_layers, survey_instances
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import scene_through
 
@@ -171,8 +172,8 @@ def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outsid
 def test_scene_asks_before_it_draws_clusters(monkeypatch, force):
     scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
     drawn = []
-    draw = instances.draw_round
-    monkeypatch.setattr(instances, "draw_round", lambda *a, **k: drawn.append(1) or draw(*a, **k))
+    draw = rounds.draw_round
+    monkeypatch.setattr(rounds, "draw_round", lambda *a, **k: drawn.append(1) or draw(*a, **k))
     camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
     for layers, n_drawn in ((3.0, 1), (100.0, 0)):
         drawn.clear()

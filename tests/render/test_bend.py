@@ -11,9 +11,10 @@ from engine_cases import on
 import topleft as tl
 from topleft import scenes
 from topleft._meshes.camera.camera import Camera
+from topleft._meshes.camera.lens import OpenCVLens
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture import bend as bend_file
-from topleft._meshes.picture.bend import bend
+from topleft._meshes.picture.bend import LensMap, bend
 
 SIZE = (160, 120)
 K = np.array([[110.0, 0.0, 80.0], [0.0, 110.0, 60.0], [0.0, 0.0, 1.0]])
@@ -200,6 +201,32 @@ def test_bend_leaves_no_edge_that_is_off_by_more_than_the_tolerance(lens, size):
             seen = camera.lens.bend(((1 - share) * a + share * b) @ camera.view[:3, :3].T + camera.view[:3, 3])
             off = np.abs(px(seen) - px((1 - share) * bent_a + share * bent_b)).max(axis=1)
             assert off[spread > 1].max(initial=0) <= camera.lens.tolerance_px * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("lens", [BARREL, PINCUSHION, FISHEYE], ids=["barrel", "pincushion", "fisheye"])
+def test_bend_splits_a_triangle_alike_from_each_of_its_corners(lens):
+    camera = camera_of(lens, np.eye(4))
+    rng = np.random.default_rng(8)
+    out = rng.normal(size=(1000, 1, 2))
+    out /= np.sqrt((out**2).sum(axis=2, keepdims=True))
+    middle, reach = rng.uniform(0, 0.65, (1000, 1, 1)), rng.uniform(0.02, 0.3, (1000, 1, 1))
+    flat = out * (middle + reach * [[-1], [0.02], [1]])  # along a radius, one side as long as the other two
+    flat += out[..., ::-1] * [-1, 1] * [[0], [1e-3], [0]]
+    corners = np.concatenate([flat, np.ones((1000, 3, 1))], axis=2)
+    counts = []
+    for k in range(3):
+        turned = np.roll(corners, k, axis=1).reshape(-1, 3)
+        bent = bend(turned, np.arange(3000).reshape(-1, 3), camera, camera.lens, SIZE)
+        counts.append(np.bincount(bent.source, minlength=1000))
+    assert (counts[0] == 2).sum() > 50
+    assert (counts[0] == counts[1]).all()
+    assert (counts[0] == counts[2]).all()
+
+
+def test_second_derivative_of_a_tangential_lens_is_that_of_its_formula():
+    tangential = LensMap(OpenCVLens(p1=0.02), np.array([[100.0, 0, 0], [0, 100, 0]]), (80.0, 60.0))
+    # x: 2 p1 x y, y: p1 (x^2 + 3 y^2): all second derivatives, squared, sum to (2^2 + 2^2) + (2^2 + 6^2), times p1^2.
+    assert tangential._bends(np.array([1.0, 0.9, 0.7]), 2**-8) == pytest.approx(100 * 0.02 * 48**0.5, rel=1e-9)
 
 
 @ON_EACH_LENS

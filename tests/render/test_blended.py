@@ -13,6 +13,7 @@ from topleft._core.raster.peel import peel_meshes
 from topleft._meshes.picture.blended import blended_masks
 from topleft._meshes.picture.instances import draw_nearest, place
 from topleft._meshes.picture.shade import ShadingOptions
+from topleft._meshes.picture.shot import Shot
 
 SIZE = (120, 90)
 CAMERA = tl.Camera.look_at((0.3, 0.2, 4))
@@ -171,7 +172,7 @@ def test_every_sample_sees_all_layers_of_small_triangles():
     assert (count[inner] == 4).sum() > 1000
     many = tl.render(mesh, camera, size, background=(0, 0, 0, 0), sampling="msaa4")[..., 3]
     assert (np.abs(many[inner].astype(int) - alpha[inner]) > 1).mean() < 1e-3
-    placed, view = place(tl.Scene([knot]), camera, size, {"sampling": "msaa4"})
+    placed, view = place(Shot.of(tl.Scene([knot]), camera, size), {"sampling": "msaa4"})
     frags, snapped = draw_nearest(placed, view), [placed.snap(0)]
     for k, at in enumerate(frags.positions):
         ids, depth = peel_meshes(SCRATCH, [snapped], view, 16, is_farthest=False, at_fx=at)

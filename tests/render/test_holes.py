@@ -12,7 +12,7 @@ from leaf_cases import CAMERA, HOLES, LEAF, N_LAYERS, SIZE, cut, layers
 import topleft as tl
 from topleft._core import engine
 from topleft._core.engine.isa import build_info
-from topleft._meshes.picture.holes import cut_of, cut_out, cuts_of
+from topleft._meshes.picture.holes import cuts_of, draw_visible
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.transparent import solid_layers
 
@@ -89,9 +89,8 @@ def test_cutout_of_a_triangle_that_the_near_plane_cuts(bits):
     floor = [[-9, 0, 8], [9, 0, 8], [0, 0, -60]]
     mesh = tl.Mesh(floor, [[0, 1, 2]], uv=np.array(floor)[:, [0, 2]] / 4, materials=(LEAF,))
     camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
-    frags = tl.rasterize_mesh(mesh, camera, SIZE, subpixel_bits=bits)
-    before = frags.mask
-    cut_out(frags, mesh, camera, cut_of(mesh))
+    before = tl.rasterize_mesh(mesh, camera, SIZE, subpixel_bits=bits).mask
+    frags = draw_visible(Shot.of(mesh, camera, SIZE), subpixel_bits=bits)
     assert not (frags.mask & ~before).any()
     assert 0.3 < frags.mask.sum() / before.sum() < 0.8  # 7 of 15 diagonals, and the far end is the mean of all
 
@@ -104,11 +103,9 @@ def test_cutout_keeps_what_has_no_holes_and_is_cut_by_the_near_plane(sampling, b
     mesh = tl.Mesh(corners, [[0, 1, 2], [3, 4, 5]], uv=uv, materials=(LEAF, tl.Material()), material_of_triangle=rows)
     camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
     options = {"sampling": sampling, "subpixel_bits": bits}
-    frags = tl.rasterize_mesh(mesh, camera, SIZE, **options)
     alone = [replace(mesh, triangles=mesh.triangles[k : k + 1], material_of_triangle=[1 - k]) for k in range(2)]
-    floor, leaf = (tl.rasterize_mesh(one, camera, SIZE, **options) for one in alone)
-    for drawn, own in ((frags, mesh), (leaf, alone[1])):
-        cut_out(drawn, own, camera, cut_of(own))
+    floor = tl.rasterize_mesh(alone[0], camera, SIZE, **options)
+    frags, leaf = (draw_visible(Shot.of(own, camera, SIZE), **options) for own in (mesh, alone[1]))
     shows_floor, shows_leaf = floor.samples_triangle == 0, leaf.samples_triangle == 0
     assert (shows_floor & ~shows_leaf).sum() > 1000
     assert shows_leaf.sum() > 1000

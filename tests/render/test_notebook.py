@@ -35,7 +35,7 @@ def test_large_fragments_are_shown_smaller():
     assert opened(frags._repr_png_()).shape == (4, 683, 4)
 
 
-def test_nothing_shows_nothing():
+def test_mesh_or_picture_of_nothing_has_no_png():
     assert tl.Mesh(np.zeros((0, 3)), np.zeros((0, 3), int))._repr_png_() is None
     assert tl.rasterize_mesh(CUBE, size=(0, 5))._repr_png_() is None
 

@@ -44,7 +44,7 @@ def as_drawn(draw):
 @ON_EACH_ISA
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("test", TESTS)
-def test_ids_and_depth(isa, test, threads):
+def test_ids_and_depth_in_bands_equal_the_whole(isa, test, threads):
     vertices, triangles = strewn(1)
     for cull in ("none", "back", "front"):
 
@@ -60,7 +60,7 @@ def test_ids_and_depth(isa, test, threads):
 
 
 @ON_EACH_ISA
-def test_counts_and_labels(force, isa):
+def test_counts_and_colours_in_bands_equal_the_whole(force, isa):
     vertices, triangles = strewn(2)
     colors = np.random.default_rng(0).random((len(triangles), 2), np.float32)
     force(saved_rows=0.0, saved_store=1e6)
@@ -78,7 +78,7 @@ def test_counts_and_labels(force, isa):
     {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"subpixel_bits": "exact"}, {"method": "scanline"},
     {"origin": (40, -30)}, {"sampling": "msaa4"}, {"viewport": (500, 400)},
 ])  # fmt: skip
-def test_options(options):
+def test_rasterize_in_bands_with_options_equals_the_whole(options):
     vertices, triangles = strewn(3, 120)
 
     def draw():
@@ -130,7 +130,7 @@ def test_which_are_drawn_so():
         assert in_bands(grid, cells, (wide, tall)) is is_so
 
 
-def test_bad_indices():
+def test_index_outside_the_vertices_is_refused_in_bands():
     vertices, triangles = strewn(5)
     triangles[17, 1] = len(vertices)
     with bands(are_drawn=True), pytest.raises(IndexError, match="17"):
@@ -140,7 +140,7 @@ def test_bad_indices():
 @ON_EACH_ISA
 @pytest.mark.parametrize("sampling_", ["area", "center"])
 @pytest.mark.parametrize(("channels", "blend"), [(4, "over"), (4, "replace"), (3, "replace"), (2, "over"), (1, "add")])
-def test_colours(isa, sampling_, channels, blend):
+def test_fill_in_bands_equals_the_whole(isa, sampling_, channels, blend):
     vertices, triangles = strewn(6)
     colors = np.random.default_rng(1).integers(0, 256, (len(triangles), channels)).astype(np.uint8)
     colors[::2, -1] = 255

@@ -43,7 +43,7 @@ def palette(n: int, channels: int, dtype: type) -> np.ndarray:
 
 @pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_coverage_and_counts(shape, sampling):
+def test_coverage_and_counts_of_few_triangles_equal_those_of_many(shape, sampling):
     few, many = meshes(SHAPES[shape])
     assert (tl.coverage(*few, SIZE, sampling=sampling) == tl.coverage(*many, SIZE, sampling=sampling)).all()
     assert (tl.overdraw(*few, SIZE, sampling=sampling) == tl.overdraw(*many, SIZE, sampling=sampling)).all()
@@ -51,7 +51,7 @@ def test_coverage_and_counts(shape, sampling):
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("size", [SIZE, (800, 333), (61, 3000)])
-def test_areas(shape, size):
+def test_areas_of_few_triangles_equal_those_of_many(shape, size):
     few, many = meshes(np.concatenate([SHAPES[shape], SHAPES["level"]]))
     for verb in (tl.coverage, tl.overdraw):
         assert (verb(*few, size, sampling="area") == verb(*many, size, sampling="area")).all()
@@ -59,7 +59,7 @@ def test_areas(shape, size):
 
 @pytest.mark.parametrize("blend", ["replace", "over", "add", "multiply"])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_colours_by_area(shape, blend):
+def test_fill_by_area_over_a_background_equals_one_over_a_picture(shape, blend):
     """The same over a background as over a picture, and whole as by windows that are too narrow for runs."""
     vertices, triangles = meshes(np.concatenate([SHAPES[shape], SHAPES["level"]]))[0]
     for dtype, alpha in ((np.uint8, 255), (np.uint8, 100), (np.float32, 1)):

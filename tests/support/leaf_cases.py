@@ -3,7 +3,8 @@
 import numpy as np
 
 import topleft as tl
-from topleft._meshes.picture.holes import cut_of, cut_out
+from topleft._meshes.picture.holes import draw_visible
+from topleft._meshes.picture.shot import Shot
 
 SIZE = (90, 70)
 CAMERA = tl.Camera.look_at((0.4, 0.3, 3), near=0.5, far=9)
@@ -28,7 +29,4 @@ def layers(order):
 
 
 def cut(mesh, size=SIZE, **options):
-    frags = tl.rasterize_mesh(mesh, CAMERA, size, **options)
-    if found := cut_of(mesh):
-        cut_out(frags, mesh, CAMERA, found, threads=options.get("threads"))
-    return frags
+    return draw_visible(Shot.of(mesh, CAMERA, size), **options)

@@ -106,4 +106,4 @@ def test_wrong_arguments_raise(call, kind, message):
 def test_import_without_jax_says_how_to_get_it():
     code = "import sys; sys.modules['jax'] = None\ntry: import topleft.jax\nexcept ImportError as e: print(e)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "topleft.jax needs JAX: pip install 'topleft[jax]'\n"
+    assert done.stdout == "topleft.jax needs JAX: pip install jax\n"

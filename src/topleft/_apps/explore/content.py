@@ -21,9 +21,6 @@ from topleft.errors import MeshError
 MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000
 """Of what is drawn magnified."""
 
-SCENES: tuple[str, ...] = ("shared-edge", *scenes.TUTORIAL_SCENES, *failure_scenes.FAILURE_SCENES)
-"""Names of what is drawn magnified, in the order of the page."""
-
 BASICS = {
     "shared-edge": "two triangles that share an edge through pixel centres",
     "wide": "a triangle wider than tall", "tall": "a triangle taller than wide",
@@ -37,12 +34,19 @@ FANS = {
     "tight-fan": "16 thin triangles round one vertex, downwards",
     "tight-fan-sideways": "the same fan, to the right",
 }
-SPLITS = {"two-triangles": "a square cut along a diagonal", "square-of-four": "the same square cut into four"}
+SPLITS = {
+    "two-triangles": "a square cut along a diagonal", "square-of-four": "the same square cut into four",
+    "composite-major-right": "a triangle cut at its middle vertex: flat bottom, flat top; long edge on the right",
+    "composite-major-left": "the same, long edge on the left",
+}  # fmt: skip
 KINDS = {"gap": "a pixel that nobody draws", "overdraw": "a pixel drawn twice", "wrong": "another triangle shows"}
 FAMILIES = {
     "any": "random triangles", "far": "vertices {} px away", "large": "triangles of {} px",
     "dense": "triangles of {} px", "fan": "a fan of {}", "hub": "a hub of {}", "edge": "an edge {} px from a centre",
 }  # fmt: skip
+
+SCENES: tuple[str, ...] = (*BASICS, *FANS, *SPLITS, *failure_scenes.FAILURE_SCENES)
+"""Names of what is drawn magnified, in the order of the page."""
 
 
 def scene_groups() -> list[list[Any]]:

@@ -1,8 +1,8 @@
 """Serves the page and its socket: on the loopback, under an address that holds a token.
 
-Whoever lacks the token, comes from a page of another origin or calls the machine by another name is refused with a
-sentence. A question that takes long does not hold up others: each is answered in a thread. The server ends itself when
-every page has been closed for a while.
+Where a proxy lets no WebSocket through, the page posts the same frames one by one. Whoever lacks the token, comes from
+a page of another origin or calls the machine by another name is refused with a sentence. A question that takes long
+does not hold up others: each is answered in a thread. The server ends itself when all pages are closed for a while.
 
 Based on: I. Fette, A. Melnikov, RFC 6455, The WebSocket Protocol, 2011; the checks of Host and Origin are those against
 DNS rebinding and cross-site WebSocket hijacking.
@@ -16,6 +16,7 @@ import socket
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any
 
@@ -46,6 +47,9 @@ MAX_MESSAGE_BYTES = 256 << 20
 MAX_PAGES = 16
 """Open at a time."""
 
+POSTING_SECONDS = 90.0
+"""After its last question a page without a socket is taken for closed; it asks every 20, in the background every 60."""
+
 FILES: Mapping[str, str] = {
     "": "text/html; charset=utf-8",
     "explore.css": "text/css; charset=utf-8",
@@ -62,6 +66,15 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
 }
 """Nothing is fetched from elsewhere, nothing is kept, and no other page may hold this one."""
+
+
+@dataclass
+class PostingPage:
+    """A page without a socket: its session, one question at a time, and when it is forgotten."""
+
+    session: Session
+    turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+    forgetting: asyncio.TimerHandle | None = None
 
 
 class Server:
@@ -84,6 +97,7 @@ class Server:
         self._socket = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
         self.port: int = self._socket.getsockname()[1]
         self._pages = 0
+        self._posting: dict[str, PostingPage] = {}
         self._end: asyncio.Event | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._closing: asyncio.TimerHandle | None = None
@@ -123,6 +137,7 @@ class Server:
             routes=[
                 WebSocketRoute("/{path:path}", self._talk),
                 Route("/{path:path}", self._serve_file, methods=["GET"]),
+                Route("/{path:path}", self._answer_post, methods=["POST"]),
             ]
         )
 
@@ -155,6 +170,20 @@ class Server:
         if self._loop is not None and self._end is not None and seconds < float("inf"):
             self._closing = self._loop.call_later(seconds, self._end.set)
 
+    def _come(self) -> str:
+        """Count a page in; returns why it may not come, "" when it may."""
+        if self._pages >= MAX_PAGES:
+            return f"At most {MAX_PAGES} pages may be open at a time."
+        self._pages += 1
+        self._close_in(float("inf"))
+        return ""
+
+    def _go(self) -> None:
+        """Count a page out."""
+        self._pages -= 1
+        if not self._pages:
+            self._close_in(self.idle)
+
     # What comes in
 
     def refusal(self, headers: Mapping[str, str], token: str, *, is_socket: bool) -> str:
@@ -183,36 +212,65 @@ class Server:
         why = self.refusal(page.headers, token, is_socket=True)
         if not why and name != "socket":
             why = "There is no such socket here."
-        if not why and self._pages >= MAX_PAGES:
-            why = f"At most {MAX_PAGES} pages may be open at a time."
-        if why:
+        if why := why or self._come():
             await page.send_denial_response(PlainTextResponse(why + "\n", 403, HEADERS))
             return
-        await page.accept()
-        self._pages += 1
-        self._close_in(float("inf"))
         try:
+            await page.accept()
             await self._answer_all(page, Session(self.content))
         except WebSocketDisconnect:
             pass
         finally:
-            self._pages -= 1
-            if not self._pages:
-                self._close_in(self.idle)
+            self._go()
 
     async def _answer_all(self, page: WebSocket, session: Session) -> None:
         while True:
             message: Mapping[str, Any] = await page.receive()
             if message["type"] == "websocket.disconnect":
                 return
-            try:
-                frame = message.get("bytes")
-                request = unpack(frame) if frame is not None else {**read_header(message["text"]), "parts": []}
-            except ValueError as error:
-                reply = Reply({"id": None, "error": str(error)})
-            else:
-                reply = await asyncio.to_thread(answer, session, request)
-            await page.send_bytes(pack(*split(reply)))
+            frame = message.get("bytes")
+            await page.send_bytes(await reply_to(session, message["text"] if frame is None else frame))
+
+    async def _answer_post(self, request: Request) -> Response:
+        token, _, name = request.path_params["path"].partition("/")
+        if why := self.refusal(request.headers, token, is_socket=True):
+            return PlainTextResponse(why + "\n", 403, HEADERS)
+        verb, _, key = name.partition("/")
+        if verb != "ask" or not 0 < len(key) <= 64:
+            return PlainTextResponse("There is nothing to ask here.\n", 404, HEADERS)
+        frame = bytearray()
+        async for piece in request.stream():
+            frame += piece
+            if len(frame) > MAX_MESSAGE_BYTES:
+                return PlainTextResponse(f"A message may have {MAX_MESSAGE_BYTES} bytes.\n", 413, HEADERS)
+        if key not in self._posting:
+            if why := self._come():
+                return PlainTextResponse(why + "\n", 403, HEADERS)
+            self._posting[key] = PostingPage(Session(self.content))
+        page = self._posting[key]
+        async with page.turn:
+            if page.forgetting is not None:
+                page.forgetting.cancel()
+            reply = await reply_to(page.session, bytes(frame))
+            page.forgetting = asyncio.get_running_loop().call_later(POSTING_SECONDS, self._forget, key)
+        return Response(reply, headers={**HEADERS, "Content-Type": "application/octet-stream"})
+
+    def _forget(self, key: str) -> None:
+        """A page without a socket has asked nothing for long."""
+        if not self._posting[key].turn.locked():
+            del self._posting[key]
+            self._go()
+
+
+async def reply_to(session: Session, message: bytes | str) -> bytes:
+    """The frame that answers a frame, or a header alone."""
+    try:
+        request = unpack(message) if isinstance(message, bytes) else {**read_header(message), "parts": []}
+    except ValueError as error:
+        reply = Reply({"id": None, "error": str(error)})
+    else:
+        reply = await asyncio.to_thread(answer, session, request)
+    return pack(*split(reply))
 
 
 class EventServer(uvicorn.Server):

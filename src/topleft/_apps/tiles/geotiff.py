@@ -15,7 +15,6 @@ Standard, 1.0, 2023; Adobe Photoshop TIFF Technical Note 3, 2005 (the predictor 
 from __future__ import annotations
 
 import os
-import struct
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,16 +28,16 @@ from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, ch
 from topleft._apps.tiles.store import TileStore, begin, level_size, n_levels_to
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_number, check_progress
-from topleft._core.base.georeference import Tags, geo_tags, nodata_tag
+from topleft._core.base.georeference import geo_tags, nodata_tag
 from topleft._core.base.options import check_choice
 from topleft._core.base.remote import as_location
+from topleft._core.base.tiff import LIMIT_CLASSIC, Tags, directory, directory_bytes, header
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
 
 
 COMPRESSIONS = ("deflate", "none")
-LIMIT_CLASSIC = 1 << 32  # bytes that offsets of a plain TIFF reach
 
 
 @dataclass(frozen=True)
@@ -166,10 +165,6 @@ def write_geotiff(
     return written
 
 
-TYPES = {"H": (3, 2), "I": (4, 4), "d": (12, 8), "s": (2, 1), "Q": (16, 8)}
-"""The number and the size of a type of TIFF, by the letter of `struct`."""
-
-
 @dataclass
 class LevelTiles:
     """Where the tiles of a level lie in the file."""
@@ -188,14 +183,14 @@ def assemble(raster: Tiles, store: TiffStore, out: IO[bytes], nodata: float | No
     n_tiles = sum(own.lengths.size for own in levels)
     is_big = n_bytes + 16 * n_tiles + 4096 * len(levels) >= LIMIT_CLASSIC
     tags = [tags_of(store, level, own, is_big, nodata, more) for level, own in enumerate(levels)]
-    at = 16 if is_big else 8
+    at = len(header(is_big))
     starts = []
     for own_tags in tags:
         starts.append(at)
         at += directory_bytes(own_tags, is_big)
     for own in reversed(levels):
         at = place_tiles(own, len(blank), at)
-    out.write(struct.pack("<2sHHHQ", b"II", 43, 8, 0, starts[0]) if is_big else struct.pack("<2sHI", b"II", 42, 8))
+    out.write(header(is_big))
     for level, own in enumerate(levels):
         following = starts[level + 1] if level + 1 < len(starts) else 0
         out.write(directory(tags_of(store, level, own, is_big, nodata, more), starts[level], following, is_big))
@@ -266,37 +261,3 @@ def tags_of(
     if nodata is not None:
         tags[42113] = nodata_tag(nodata)
     return dict(sorted(tags.items()))
-
-
-def value_bytes(letter: str, values: Any) -> bytes:
-    """The numbers of a tag."""
-    return bytes(values) if letter == "s" else np.asarray(values).astype(f"<{NUMPY[letter]}").tobytes()
-
-
-NUMPY = {"H": "u2", "I": "u4", "Q": "u8", "d": "f8"}
-
-
-def directory_bytes(tags: Tags, is_big: bool) -> int:
-    """How many bytes a directory takes, with what does not fit into it."""
-    entry, inline, ends = (20, 8, 16) if is_big else (12, 4, 6)
-    sizes = [TYPES[letter][1] * len(values) for letter, values in tags.values()]
-    return ends + entry * len(tags) + sum(-(-size // 8) * 8 for size in sizes if size > inline)
-
-
-def directory(tags: Tags, at: int, following: int, is_big: bool) -> bytes:
-    """The bytes of a directory that lies at a place in the file; `following`: where the next one lies."""
-    entry, inline = (20, 8) if is_big else (12, 4)
-    head = struct.pack("<Q" if is_big else "<H", len(tags))
-    tail = struct.pack("<Q" if is_big else "<I", following)
-    entries, outside = [], []
-    outside_at = at + len(head) + entry * len(tags) + len(tail)
-    for number, (letter, values) in tags.items():
-        content = value_bytes(letter, values)
-        field = content.ljust(inline, b"\0")
-        if len(content) > inline:
-            field = struct.pack("<Q" if is_big else "<I", outside_at)
-            padded = content.ljust(-(-len(content) // 8) * 8, b"\0")
-            outside.append(padded)
-            outside_at += len(padded)
-        entries.append(struct.pack("<HHQ" if is_big else "<HHI", number, TYPES[letter][0], len(values)) + field)
-    return b"".join([head, *entries, tail, *outside])

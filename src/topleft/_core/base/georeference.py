@@ -16,10 +16,8 @@ import numpy as np
 
 from topleft._core.base.array_types import F64, Array
 from topleft._core.base.arrays import shown
+from topleft._core.base.tiff import Tags
 from topleft.errors import MissingPackageError
-
-Tags = dict[int, tuple[str, Any]]
-"""Of TIFF, by their number: the letter of `struct`, and the numbers."""
 
 Six = tuple[float, float, float, float, float, float]
 

@@ -292,27 +292,8 @@ cdef class ShadedScene:
             raise_if_given_up()
 
 
-def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles,
-            int32_t[:, ::1] ids, float[:, ::1] depth, int64_t first_row, int64_t n_rows):
-    """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
-    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
-    cdef tl_target target
-    cdef tl_slice slice = no_slice()
-    if n_rows == 0 or ids.shape[1] == 0:
-        return
-    memset(&target, 0, sizeof(target))
-    target.sink, target.stride_px = <tl_sink>4, ids.shape[1]  # nearest
-    target.pixels, target.depth = &ids[first_row, 0], &depth[first_row, 0]
-    slice.ids, slice.end = &opaque[0], opaque.shape[0] - 1  # the last is there to be read
-    slice.is_first = slice.is_last = True
-    with nogil:
-        K.draw(&mesh.snapped, &window, &target, &slice)
-        K.cut_out(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &triangles[0], triangles.shape[0], &target)
-    raise_if_given_up()
-
-
-def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids,
-                 float[:, :, ::1] depth, bint is_peeled, int64_t first_row, int64_t n_rows):
+def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids,
+            float[:, :, ::1] depth, bint is_peeled, int64_t first_row, int64_t n_rows):
     """Draw triangles, but for what their materials cut out, over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
     cdef int64_t height = ids.shape[1], width = ids.shape[2]
     cdef tl_window window = mesh.window(first_row, n_rows, width)

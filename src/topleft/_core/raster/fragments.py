@@ -143,6 +143,8 @@ class Fragments:
     _split: SplitSamples | None = None
     #: The mesh that it was drawn from; None where that is not kept.
     corners: GivenCorners | None = None
+    #: Whether attributes are given for each instance of a scene.
+    _is_of_scene = False
     #: Ids and depth of these, (S, H, W).
     _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
 
@@ -193,6 +195,10 @@ class Fragments:
         """Return each mesh that some sample sees, as the first does: its index, and what its triangle 0 is called."""
         return [(0, self._snapped, 0)]
 
+    def _counts(self) -> list[tuple[int, int]]:
+        """Vertices and triangles of each mesh that was drawn."""
+        return [(self._n_vertices, self._n_triangles)]
+
     def _parts_of(self, i: int, mesh: Any) -> Any:  # noqa: ARG002
         """Return mesh `i` as it was drawn: itself, but for a lens."""
         return mesh
@@ -237,6 +243,11 @@ class Fragments:
             return np.moveaxis(self._split.sample_ids, 0, -1)
         _, planes = self._sampled()
         return self.id[..., None] if planes is None else np.moveaxis(planes[0], 0, -1)
+
+    @property
+    def samples_id(self) -> NDArray[Any]:
+        """What `id` is, by sample, (H, W, S)."""
+        return self.samples_triangle
 
     @property
     def samples_depth(self) -> NDArray[np.float32]:

@@ -18,30 +18,27 @@ from topleft._core.base.defaults import SUFFIXES
 from topleft._core.base.georeference import geo_tags, nodata_tag
 from topleft._core.base.grid import Grid
 from topleft._core.base.remote import Location, as_location
+from topleft._core.base.tiff import Tags
 from topleft._core.base.whole_file import write_whole
-from topleft._meshes.io import png
+from topleft._meshes.io import png, tiff
 from topleft.errors import ImageError
 
 BYTES = ("uint8 (H, W)", "uint8 (H, W, 3)", "uint8 (H, W, 4)")
+NUMBERS = (*BYTES, "uint16 (H, W)", "int32 (H, W)", *(f"float{n} (H, W{k})" for k in ("", ", K") for n in (32, 64)))
 HOLDS: Mapping[str, tuple[str, ...]] = {
     ".png": (*BYTES, "uint8 (H, W, 2)", "uint16 (H, W)"),
     ".jpg": BYTES,
     ".jpeg": BYTES,
     ".webp": BYTES,
-    ".tif": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)", "float32 (H, W, K)"),
-    ".tiff": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)", "float32 (H, W, K)"),
+    ".tif": NUMBERS,
+    ".tiff": NUMBERS,
 }
 
 PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
     ".jpg": ("JPEG", {"quality": 92, "subsampling": 0}),
     ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
     ".webp": ("WEBP", {"lossless": True}),  # ids and normals must survive
-    ".tif": ("TIFF", {"compression": "tiff_adobe_deflate"}),
-    ".tiff": ("TIFF", {"compression": "tiff_adobe_deflate"}),
 }
-
-TYPES = {"s": 2, "H": 3, "d": 12}
-"""The numbers of types of TIFF, by the letter of `struct`."""
 
 #: Pixels a side that libjpeg and WebP encode.
 MOST_SIDE = {".jpg": 65_500, ".jpeg": 65_500, ".webp": 16_383}
@@ -64,9 +61,10 @@ def save_image(
         is whatever fsspec can write to, "s3://bucket/name.png".
     image : (H, W), (H, W, 3) or (H, W, 4) uint8, or (H, W) bool
         The picture; a mask becomes 0 and 255. PNG also holds (H, W, 2) uint8, grey with alpha, and (H, W) uint16; TIFF
-        also (H, W) of uint16, int32 or float32, and (H, W, K) float32, a page for each channel. For .npy any array, for
-        .npz any array or several by name. PNG holds neither ids nor floats: they are refused, for they would have to be
-        scaled, which `ViewLayers.save` does (ids plus 1, distances in millimetres); .tif and .npy hold both.
+        also (H, W) of uint16, int32, float32 or float64, and (H, W, K) of floats, a page for each channel. For .npy
+        any array, for .npz any array or several by name. PNG holds neither ids nor floats: they are refused, for they
+        would have to be scaled, which `ViewLayers.save` does (ids plus 1, distances in millimetres); .tif and .npy hold
+        both.
     background : (3,) of 0 to 255
         What shows through in JPEG, which has no alpha.
     text : mapping of str to str, optional
@@ -118,36 +116,27 @@ def save_image(
     if suffix == ".png":
         write_whole(place, lambda file: file.writelines(png.pieces(picture, text=text)))
         return
+    if suffix in (".tif", ".tiff"):
+        place_tags = None if grid is None else _geo_tags(grid, picture)
+        write_whole(place, lambda file: file.writelines(tiff.pieces(picture, place_tags)))
+        return
     if suffix in (".jpg", ".jpeg") and picture.shape[2:] == (4,):
         picture = composite(picture, background)
     from PIL import Image  # 10 ms that PNG does without
 
     kind, options = PILLOW_OPTIONS[suffix]
-    if grid is not None:
-        options = {**options, "tiffinfo": _geo_info(grid, picture)}
-    if picture.dtype == np.float32 and picture.ndim == 3:
-        first, *others = (Image.fromarray(np.ascontiguousarray(channel)) for channel in np.moveaxis(picture, -1, 0))
-        options = {**options, "save_all": True, "append_images": others}
-    else:
-        first = Image.fromarray(picture)
-    # In memory first: Pillow's JPEG encoder does not notice a disk that is full, its TIFF one reads back what it wrote.
+    # In memory first: Pillow's JPEG encoder does not notice a disk that is full.
     encoded = io.BytesIO()
-    first.save(encoded, format=kind, **options)
+    Image.fromarray(picture).save(encoded, format=kind, **options)
     write_whole(place, lambda file: file.write(encoded.getbuffer()))
 
 
-def _geo_info(grid: Grid, picture: npt.NDArray[Any]) -> Any:
-    """The tags of a GeoTIFF, for Pillow."""
-    from PIL.TiffImagePlugin import ImageFileDirectory_v2
-
+def _geo_tags(grid: Grid, picture: npt.NDArray[Any]) -> Tags:
+    """The tags of a GeoTIFF."""
     if picture.shape[:2] != grid.size[::-1]:
         raise ValueError(f"image must have the shape of the grid, {grid.size[::-1]}, got {picture.shape[:2]}")
-    tags = geo_tags(grid.crs, grid.transform) | ({} if grid.nodata is None else {42113: nodata_tag(grid.nodata)})
-    info = ImageFileDirectory_v2()
-    for number, (letter, values) in tags.items():
-        info.tagtype[number] = TYPES[letter]
-        info[number] = values.rstrip(b"\0").decode() if letter == "s" else tuple(values)
-    return info
+    nodata: Tags = {} if grid.nodata is None else {42113: nodata_tag(grid.nodata)}
+    return geo_tags(grid.crs, grid.transform) | nodata
 
 
 def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
@@ -163,9 +152,10 @@ def _check_holds(path: Location, image: npt.NDArray[Any]) -> None:
     channels = "".join(f", {n}" for n in image.shape[2:])
     found = {f"{image.dtype} (H, W{channels})", f"{image.dtype} (H, W{', K' * (image.ndim - 2)})"}
     if image.ndim < 2 or not found & set(kinds):
+        others = ".npy holds it as it is" if kinds is NUMBERS else ".tif and .npy hold ids and floats"
         raise ImageError(
             f"cannot write {str(path)!r}: {path.suffix} holds {', '.join(kinds)}; got {image.dtype} {image.shape}"
-            + "; .tif and .npy hold ids and floats" * (image.dtype.kind in "if")
+            + f"; {others}" * (image.dtype.kind in "if")
         )
     most = MOST_SIDE.get(path.suffix.lower())
     if most is not None and max(image.shape[:2]) > most:

@@ -21,6 +21,7 @@ from topleft._core.base.notes import tell
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.references import InputFile, Moment
 from topleft._meshes.model.joined import joined
+from topleft._meshes.model.material import TEXTURES
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft.errors import MeshError, MissingPackageError
@@ -170,7 +171,16 @@ def _mesh(source: InputFile, crease: float) -> Mesh | Points:
             line.partition(": ")[2].removesuffix(" not drawn") for line in source.notes.lines if "not drawn" in line
         ]
         raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
+    if any(part.uv is None and part.uv1 is None and _has_textures(part) for part in parts):
+        source.notes.add("textures not drawn, for want of texture coordinates")
     return joined(parts, crease)
+
+
+def _has_textures(part: Mesh) -> bool:
+    """Whether a triangle has a material with a texture."""
+    rows = part.material_of_triangle
+    used = part.materials if rows is None else [part.materials[i] for i in np.unique(rows)]
+    return any(getattr(own, name) is not None for own in used for name in TEXTURES)
 
 
 def _parts(source: InputFile) -> list[Mesh]:

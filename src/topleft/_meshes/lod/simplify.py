@@ -85,7 +85,7 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     ValueError
         If an option is out of range.
     MissingPackageError
-        If fast-simplification is not installed: ``pip install 'topleft[simplify]'``.
+        If fast-simplification is not installed: ``pip install fast-simplification``.
 
     Notes
     -----

@@ -31,12 +31,11 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
 from topleft._meshes.picture.fragments import SceneFragments, shown_of
-from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place
+from topleft._meshes.picture.holes import Mask, cuts_of, draw_solid
+from topleft._meshes.picture.instances import PlacedScene, place
 from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
-
-Mask = npt.NDArray[np.bool_]
 
 BLENDING = (Shading.SMOOTH, Shading.FLAT, Shading.UNLIT)
 """What else a picture tells, it tells of the surface that is nearest, as if it were opaque."""
@@ -86,7 +85,7 @@ def glass_of(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) 
     if masks is None:
         return None
     shot.scene.check_counted("a scene that something shows through")
-    placed, view = place(shot.scene, shot.camera, shot.size, view_options, material=options.material)
+    placed, view = place(shot, view_options, material=options.material)
     if placed.bent is not None:  # the parts that a lens makes of the triangles
         masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
     return Glass(placed, view, masks, shot.camera, options)
@@ -109,7 +108,7 @@ class Glass:
 
     def draw_opaque(self) -> SceneFragments:
         """The visibility buffer of what is opaque."""
-        return draw_nearest(self.whole.of(collapsed(self.whole.scene, self.masks)), self.view)
+        return draw_solid(self.whole, self.view, self.camera, cuts_of(self.scene, self.under.material), self.masks)
 
     @cached_property
     def blended(self) -> PlacedScene:

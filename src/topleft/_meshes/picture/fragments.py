@@ -1,7 +1,7 @@
 """Holds what each instance shows in a visibility buffer: of a mesh or a scene, with or without a lens.
 
-Input: ids that count the triangles of all instances, and what they were drawn from. Output: `SceneFragments`,
-`BentFragments`, and their parts: rectangles of pixels with the fragments and the mesh as they were drawn.
+Input: ids that count the triangles of all instances, and what they were drawn from. Output: `SceneFragments`, and its
+parts: rectangles of pixels with the fragments and the mesh as they were drawn.
 """
 
 from __future__ import annotations
@@ -9,22 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
-import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_aligned, as_array, set_aligned, shown
+from topleft._core.base.arrays import as_aligned, as_array, as_values, set_aligned, shown
 from topleft._core.base.memory import empty
 from topleft._core.raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
 from topleft._core.raster.peel import DepthLayers
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.shade import ShownInstance
-from topleft._meshes.scene.scene import Scene, counted_ranges
+from topleft._meshes.scene.scene import Instance, Scene, counted_ranges
 
 if TYPE_CHECKING:
     from topleft._meshes.picture.instances import PlacedScene
@@ -37,40 +36,62 @@ WHOLE = slice(None), slice(None)
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """What one instance shows: its index, the rectangle of pixels round that, and the fragments there."""
+class VisiblePart:
+    """What one instance shows: its index, the rectangle of pixels round that, and what was drawn there.
+
+    `frags` count the triangles that were drawn: of a lens those of `bent`, else those of the mesh.
+    """
 
     i: int
     box: tuple[slice, slice]
     frags: Fragments
+    instance: Instance
+    bent: BentMesh | None = None
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh of the instance."""
+        return self.instance.mesh
+
+    @property
+    def place(self) -> F64:
+        """World from object, (4, 4)."""
+        return self.instance.transform
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:
         """Where in the rectangle the instance shows."""
         return self.frags.mask
 
-
-@dataclass(frozen=True, eq=False)
-class VisiblePart(Part):
-    """A part, the mesh of the instance that shows there, and world from object, (4, 4)."""
-
-    mesh: Mesh
-    place: F64
-
     @cached_property
     def shown(self) -> ShownInstance:
         """The mesh as it was drawn, for kernels."""
-        ((i, snapped, first),) = self.frags._drawn()
-        return ShownInstance(snapped, self.frags._parts_of(i, self.mesh), self.place, first)
+        ((_, snapped, first),) = self.frags._drawn()
+        mesh = self.mesh if self.bent is None else self.bent.mesh_of(self.mesh)
+        return ShownInstance(snapped, mesh, self.place, first)
 
+    def interpolate(self, values: Any, background: float, *, derivatives: bool = False) -> NDArray[np.float32]:
+        """Return an attribute of the mesh in the rectangle, or its derivatives."""
+        array: NDArray[Any] = as_values(values, len(self.mesh.vertices), len(self.mesh.triangles))
+        if self.bent is not None and (derivatives or self.bent.parts is not None):
+            corners = array if array.ndim == 3 else array.reshape(len(array), -1)[self.mesh.triangles]
+            corners = self.bent.at_corners(corners).astype(np.float32)
+            found = self.frags._derivatives(corners) if derivatives else self.frags._interpolated(corners, background)
+            return found if array.ndim > 1 else found[:, :, 0]
+        return self.frags._derivatives(array) if derivatives else self.frags._interpolated(array, background)
 
-PartT = TypeVar("PartT", bound=Part)
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the three vertices of the triangle of the mesh that shows in each pixel."""
+        if self.bent is None or self.bent.parts is None:
+            return self.frags.barycentric()
+        corners = np.broadcast_to(np.eye(3, dtype=np.float32), (len(self.mesh.triangles), 3, 3))
+        return self.interpolate(corners, 0.0)
 
 
 def parts_of(frags: Fragments, scene: Scene) -> Sequence[VisiblePart]:
     """What each instance shows that shows anything, of the scene that was drawn; a mesh shows one part."""
-    parts: Sequence[Part] = getattr(frags, "parts", [Part(0, WHOLE, frags)])
-    return [VisiblePart(one.i, one.box, one.frags, scene[one.i].mesh, scene[one.i].transform) for one in parts]
+    parts: Sequence[VisiblePart] | None = getattr(frags, "parts", None)
+    return [VisiblePart(0, WHOLE, frags, scene[0])] if parts is None else parts
 
 
 def shown_of(frags: Fragments, scene: Scene) -> Sequence[ShownInstance]:
@@ -80,19 +101,16 @@ def shown_of(frags: Fragments, scene: Scene) -> Sequence[ShownInstance]:
 
 
 def join(
-    parts: Sequence[PartT], shape: tuple[int, ...], background: Any, make: Callable[[PartT], NDArray[Any]],
-    dtype: npt.DTypeLike = np.float32,
-) -> NDArray[Any]:  # fmt: skip
+    parts: Sequence[VisiblePart], shape: tuple[int, ...], background: Any, make: Callable[[VisiblePart], NDArray[Any]]
+) -> NDArray[np.float32]:
     """A picture made part by part; what is made of a part that is all of it is returned, not copied."""
     if len(parts) == 1 and parts[0].box == WHOLE:
         return make(parts[0])
-    picture = empty(shape, dtype)
+    picture = empty(shape, np.float32)
     picture[...] = background
     for part in parts:
-        to, made = picture[part.box], make(part)
-        if to.ndim > 2 and to.shape[2:] == (4,) and to.dtype == made.dtype == np.uint8 and made.flags.c_contiguous:
-            to, made = to.view(np.uint32), made.view(np.uint32)  # a pixel at once
-        np.copyto(to, made, where=part.seen.reshape(part.seen.shape + (1,) * (to.ndim - 2)))
+        to = picture[part.box]
+        np.copyto(to, make(part), where=part.seen.reshape(part.seen.shape + (1,) * (to.ndim - 2)))
     return picture
 
 
@@ -142,18 +160,30 @@ class SceneFragments(InstanceIds, Fragments):
     (0, -1)
     """
 
-    _planes: Any  # Ids, and depth
+    _is_of_scene = True
+
+    #: What was drawn of the one instance that there is, at the first sample; None where that is not kept.
+    _one: Fragments | None = None
 
     def __init__(
         self, ids: Ids, depth: NDArray[np.float32], placed: PlacedScene, positions: Sequence[tuple[int, int]]
     ) -> None:
         """Take planes (S, H, W) of what was drawn, and where their samples lie."""
-        self.drawn_planes = ids, depth
+        self._given = ids, depth
         self.placed = placed
         self.positions = positions
-        self._planes = placed.whole_ids(ids), depth
-        self.id, self._depth = self._planes[0][0], depth[0]
-        self.samples_id = np.moveaxis(self._planes[0], 0, -1)
+        self.id, self._depth = placed.whole_ids(ids[0]), depth[0]
+
+    @property
+    def drawn_planes(self) -> tuple[Ids, NDArray[np.float32]]:
+        """The planes (S, H, W) of what was drawn; of one instance they are drawn now, if they were not."""
+        return self._given if self._one is None else (self._one._sampled()[1] or self._given)
+
+    @cached_property
+    def _planes(self) -> Any:  # type: ignore[override]
+        """The same in terms of the whole scene."""
+        ids, depth = self.drawn_planes
+        return self.placed.whole_ids(ids), depth
 
     def __repr__(self) -> str:
         height, width = self.id.shape
@@ -161,7 +191,8 @@ class SceneFragments(InstanceIds, Fragments):
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the parts refer to memory of this one, and are made there."""
-        return {name: value for name, value in vars(self).items() if name != "parts"}
+        own = vars(self) | {"_given": self.drawn_planes}
+        return {name: value for name, value in own.items() if name not in ("parts", "_one", "_snapped_instances")}
 
     __setstate__ = set_aligned
 
@@ -180,7 +211,12 @@ class SceneFragments(InstanceIds, Fragments):
     @cached_property
     def instance(self) -> NDArray[np.int32]:
         """Index of the instance that shows, int32, -1 where there is none."""
-        return self._found[0]
+        return super().instance if self._one is not None else self._found[0]
+
+    @property
+    def samples_id(self) -> Ids:
+        """What `id` is, of each sample, (H, W, S)."""
+        return np.moveaxis(self._planes[0], 0, -1)
 
     @cached_property
     def samples_instance(self) -> NDArray[np.int32]:
@@ -196,7 +232,10 @@ class SceneFragments(InstanceIds, Fragments):
         return self.placed.whole_ids(ids)
 
     def _seen(self) -> SeenSamples:
-        return SeenSamples.of(*self.drawn_planes)
+        return SeenSamples.of(*self._given) if self._one is None else self._one._seen()
+
+    def _counts(self) -> list[tuple[int, int]]:
+        return counts_of(self.whole)
 
     def _parts_of(self, i: int, mesh: Mesh) -> Mesh:
         return mesh if self.placed.bent is None else self.placed.bent[i].mesh_of(mesh)
@@ -206,6 +245,8 @@ class SceneFragments(InstanceIds, Fragments):
 
     @cached_property
     def _snapped_instances(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
+        if self._one is not None:
+            return tuple(self._one._drawn())
         ids, first_ids = self.drawn_planes[0], self.placed.first_ids
         width, height = ids.shape[:0:-1]
         if len(first_ids) == 2:  # there is one, wherever it shows
@@ -223,24 +264,28 @@ class SceneFragments(InstanceIds, Fragments):
             found.append((i, mesh.at_sample(*self.positions[0]), first))
         return tuple(found)
 
-    def _at_sample(self, i: int) -> SceneFragments:
+    def _at_sample(self, i: int) -> Self:
         """Return ids, depth and attributes at one sample of each pixel."""
         i = as_sample(i, len(self.positions))
         ids, depth = self.drawn_planes
-        return SceneFragments(ids[i : i + 1], depth[i : i + 1], self.placed, self.positions[i : i + 1])
+        return type(self)(ids[i : i + 1], depth[i : i + 1], self.placed, self.positions[i : i + 1])
 
-    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> SceneFragments:
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Self:
         """Return what is left when no other pixels than these show a triangle."""
         ids = np.full((1, *self.id.shape), -1, self.id.dtype)
         ids[0, rows, cols] = self.drawn_planes[0][0, rows, cols]
-        return SceneFragments(ids, self.depth[None], self.placed, self.positions[:1])
+        return type(self)(ids, self.depth[None], self.placed, self.positions[:1])
 
     @cached_property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[VisiblePart, ...]:
         """What each instance shows that shows anything, in their order."""
         return tuple(self._make_parts())
 
-    def _make_parts(self) -> Iterator[Part]:
+    def _make_parts(self) -> Iterator[VisiblePart]:
+        bent = self.placed.bent
+        if self._one is not None and self.placed.scene.n_triangles:
+            yield VisiblePart(0, WHOLE, self._one, self.whole[0], None if bent is None else bent[0])
+            return
         _, boxes = self._found
         for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
             left, top, right, bottom = boxes[i].tolist()
@@ -251,12 +296,11 @@ class SceneFragments(InstanceIds, Fragments):
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
             frags.corners = self.placed.corners(i)
-            bent = self.placed.bent
-            yield Part(i, box, frags if bent is None else BentFragments(frags, bent[i], self.whole[i].mesh))
+            yield VisiblePart(i, box, frags, self.whole[i], None if bent is None else bent[i])
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel; see `Fragments`."""
-        return join(self.parts, (*self.id.shape, 3), 0.0, lambda part: part.frags.barycentric())
+        return join(self.parts, (*self.id.shape, 3), 0.0, lambda part: part.barycentric())
 
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
         """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
@@ -264,7 +308,7 @@ class SceneFragments(InstanceIds, Fragments):
         rows = [engine.product(view[2], instance.transform) for instance in self.whole]
         meshes = [instance.mesh for instance in self.whole]
         values = [-(engine.product(mesh.vertices, row[:3]) + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
-        return self.interpolate(values, background=np.inf)
+        return self._interpolated(values, np.inf)
 
     def _checked(self, values: Any) -> list[NDArray[Any]]:
         n = len(self.whole)
@@ -281,14 +325,32 @@ class SceneFragments(InstanceIds, Fragments):
     def _interpolated(self, arrays: list[NDArray[Any]], background: float) -> NDArray[np.float32]:  # type: ignore[override]
         """The attribute, part by part."""
         shape = *self.id.shape, *arrays[0].shape[1:][-1:]
-        return join(
-            self.parts, shape, background, lambda part: part.frags.interpolate(arrays[part.i], background=background)
-        )
+        return join(self.parts, shape, background, lambda part: part.interpolate(arrays[part.i], background))
 
     def _derivatives(self, arrays: list[NDArray[Any]]) -> NDArray[np.float32]:  # type: ignore[override]
         """The derivatives, part by part."""
         shape = *self.id.shape, *arrays[0].shape[1:][-1:], 2
-        return join(self.parts, shape, 0.0, lambda part: part.frags.interpolate(arrays[part.i], derivatives=True)[1])
+        return join(self.parts, shape, 0.0, lambda part: part.interpolate(arrays[part.i], 0.0, derivatives=True))
+
+
+class MeshFragments(SceneFragments):
+    """The visibility buffer of a mesh that was drawn as its scene of one instance: behind a lens, or with holes.
+
+    `triangle` and `id` hold triangles of the mesh, and attributes are those of its vertices.
+    """
+
+    _is_of_scene = False
+
+    def __repr__(self) -> str:
+        return Fragments.__repr__(self)
+
+    @property
+    def _n_triangles(self) -> int:  # type: ignore[override]
+        return self.whole.n_triangles
+
+    def _checked(self, values: Any) -> list[NDArray[Any]]:
+        (counts,) = self._counts()
+        return [as_values(values, *counts)]
 
 
 class SceneDepthLayers(InstanceIds, DepthLayers):
@@ -370,83 +432,12 @@ def local_part(ids: Ids, first: int, end: int) -> NDArray[np.int32]:
 
 def local_ids(ids: Ids, instance: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
     """Return the index of each triangle in its mesh, -1 for -1."""
+    if len(first_ids) == 2:
+        return cast("NDArray[np.int32]", ids)
     first: NDArray[Any] = np.append(first_ids[:-1], 0).astype(ids.dtype)
     return (ids - first[instance]).astype(np.int32, copy=False)  # instance -1 takes the last of them, 0
 
 
-class BentFragments(Fragments):
-    """The visibility buffer of a mesh whose triangles were drawn in parts, in terms of the whole ones.
-
-    Made by `rasterize_mesh` for cameras with a lens. `triangle` holds triangles of the mesh, and attributes are those
-    of its vertices.
-    """
-
-    def __init__(self, drawn: Fragments, bent: BentMesh, mesh: Mesh) -> None:
-        super().__init__(
-            bent.whole_ids(drawn.triangle), drawn.depth, drawn._snapped, len(mesh.vertices), len(mesh.triangles)
-        )
-        self.drawn, self.bent = drawn, bent
-        self._mesh = mesh
-
-    def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
-        """Return the fragments of each of several samples, and their planes (S, H, W), of whole triangles."""
-        if self._planes is None:
-            samples, planes = self.drawn._sampled()
-            self._samples = tuple(BentFragments(sample, self.bent, self._mesh) for sample in samples)
-            self._planes = planes and (self.bent.whole_ids(planes[0]), planes[1])
-        return self._samples, self._planes
-
-    def _whole(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
-        return self.bent.whole_ids(ids)
-
-    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
-        return self.drawn._drawn()
-
-    def _parts_of(self, i: int, mesh: Mesh) -> Mesh:  # noqa: ARG002
-        return self.bent.mesh_of(mesh)
-
-    def _seen(self) -> SeenSamples:
-        return self.drawn._seen()
-
-    def again(self) -> BentFragments:
-        """Return the same made anew from the parts, whose buffers have changed."""
-        return BentFragments(self.drawn, self.bent, self._mesh)
-
-    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
-        """Return what is left when no other pixels than these show a triangle."""
-        return BentFragments(self.drawn.only(rows, cols), self.bent, self._mesh)
-
-    def barycentric(self) -> NDArray[np.float32]:
-        """Return the weights of the three vertices of the triangle that shows in each pixel."""
-        if not len(self.bent.triangles):
-            return np.zeros((*self.triangle.shape, 3), np.float32)
-        if self.bent.parts is None:
-            return self.drawn.barycentric()
-        return self._interpolated(np.broadcast_to(np.eye(3, dtype=np.float32), (len(self._mesh.triangles), 3, 3)), 0.0)
-
-    def distance(self, camera: Viewer) -> NDArray[np.float32]:
-        """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
-        view = view_of(camera)
-        return self.interpolate(-(engine.product(self._mesh.vertices, view[2, :3]) + view[2, 3]), background=np.inf)
-
-    def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
-        """The attribute of checked values, by way of the parts."""
-        if not len(self.bent.triangles):
-            channels = array.shape[-1:] if array.ndim > 1 else ()
-            return np.full((*self.triangle.shape, *channels), background, np.float32)
-        own = array if self.bent.parts is None else self._corners_of_parts(array)
-        out = self.drawn.interpolate(own, background=background)
-        return out if array.ndim > 1 else out.reshape(self.triangle.shape)
-
-    def _derivatives(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The derivatives of checked values, by way of the parts."""
-        if not len(self.bent.triangles):
-            channels = array.shape[-1:] if array.ndim > 1 else ()
-            return np.zeros((*self.triangle.shape, *channels, 2), np.float32)
-        _, slopes = self.drawn.interpolate(self._corners_of_parts(array), derivatives=True)
-        return slopes if array.ndim > 1 else slopes[..., 0, :]
-
-    def _corners_of_parts(self, array: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Checked values at the corners of the parts, (T, 3, K)."""
-        corners = array if array.ndim == 3 else array.reshape(len(array), -1)[self._mesh.triangles]
-        return self.bent.at_corners(corners)
+def counts_of(scene: Scene) -> list[tuple[int, int]]:
+    """Vertices and triangles of the mesh of each instance."""
+    return [(len(one.mesh.vertices), len(one.mesh.triangles)) for one in scene]

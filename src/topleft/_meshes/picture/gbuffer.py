@@ -23,8 +23,7 @@ from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import VisiblePart, join, parts_of
-from topleft._meshes.picture.holes import cuts_of, without_holes
-from topleft._meshes.picture.instances import rasterize_shot
+from topleft._meshes.picture.holes import cuts_of, draw_visible
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene
 
@@ -125,20 +124,16 @@ class GBuffer:
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels, without what materials cut out."""
-        return self._cut(rasterize_shot(self.shot, self.rasterizer, self.look.get("material"), **self.options))
+        return draw_visible(self.shot, self.rasterizer, self.look.get("material"), **self.options)
 
     def sampled(self, sampling: str) -> Fragments:
         """Return the same with several samples a pixel."""
-        material = self.look.get("material")
-        return self._cut(rasterize_shot(self.shot, material=material, sampling=sampling, **self.options))
+        return draw_visible(self.shot, material=self.look.get("material"), sampling=sampling, **self.options)
 
     @cached_property
     def has_holes(self) -> bool:
         """Whether materials cut something out."""
         return any(cuts_of(self.scene, self.look.get("material")))
-
-    def _cut(self, frags: Fragments) -> Fragments:
-        return without_holes(frags, self.scene, self.camera, self.look.get("material"))
 
     @cached_property
     def parts(self) -> Sequence[VisiblePart]:

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, set_aligned, shown
-from topleft._core.base.memory import FRESH, SCRATCH, KeptMemory, Memory, check_fits, empty
+from topleft._core.base.memory import FRESH, SCRATCH, Memory, check_fits, empty
 from topleft._core.base.options import Cull, DepthTest, Sampling, Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.classic import refuse_classic
-from topleft._core.raster.cluster_draw import ClusteredMesh, Survey, draw_clustered, equal_bands
+from topleft._core.raster.cluster_draw import ClusteredMesh, equal_bands
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.peel import DepthLayers, check_peel, draw_layers_of, peel_meshes
@@ -29,9 +29,9 @@ from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
-from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
-from topleft._meshes.picture.fragments import BentFragments, Ids, SceneDepthLayers, SceneFragments
+from topleft._meshes.picture.fragments import Ids, MeshFragments, SceneDepthLayers, SceneFragments
+from topleft._meshes.picture.rounds import draw_placed, front_to_back, pays_in_clusters
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.through_lens import DrawnScene, scene_through
 from topleft._meshes.scene.scene import Instance, Scene
@@ -45,18 +45,6 @@ MOST_PIXELS_OF_PART = 1 << 30
 
 #: cull codes of a view (tl_cull) for an instance that mirrors.
 MIRRORED = {0: 0, 1: 2, 2: 1}
-
-#: Instances that tell what a picture shows of all, and clusters of each: less than a tenth of a millisecond.
-SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
-
-#: Instances that are drawn before it is looked which others they hide.
-FIRST_ROUND = 16
-
-#: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
-CELLS = 128
-
-#: Which end of a box each of its corners has, axis by axis.
-CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.bool_)
 
 
 class PlacedScene:
@@ -81,9 +69,10 @@ class PlacedScene:
         may_cluster: bool = True,
         material: Material | None = None,
         first_id: int = 0,
+        is_mesh: bool = False,
     ) -> None:
         self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
-        self._view, self._first_id = view, first_id
+        self._view, self._first_id, self._is_mesh = view, first_id, is_mesh
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
@@ -112,6 +101,21 @@ class PlacedScene:
         """Return another scene to draw, made for this picture alone, seen in the same way."""
         drawn = self._drawn._replace(scene=scene)
         return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False, material=self._material)
+
+    def fragments(self, ids: Ids, depth: NDArray[np.float32], positions: Sequence[tuple[int, int]]) -> SceneFragments:
+        """Return planes (S, H, W) of what was drawn as fragments of the scene, or of the mesh that it is of."""
+        return (MeshFragments if self._is_mesh else SceneFragments)(ids, depth, self, positions)
+
+    def fragments_of(self, drawn: Fragments, view: View) -> SceneFragments:
+        """Return the same of the one instance that there is, which was drawn alone."""
+        frags = self.fragments(drawn.id[None], drawn.depth[None], self.positions(view))
+        frags._one = drawn
+        return frags
+
+    @staticmethod
+    def positions(view: View) -> list[tuple[int, int]]:
+        """Where the samples of a pixel lie."""
+        return list(map(tuple, sample_positions(view.sampling.n_samples, view.grid_bits).tolist()))
 
     def whole_ids(self, ids: Ids) -> Ids:
         """Return ids in terms of the whole scene: as they are, but for a lens."""
@@ -340,120 +344,6 @@ class PlacedScene:
             is_first = False
 
 
-def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
-    """Tell whether a scene whose meshes may be drawn in clusters is, and note that they are drawn."""
-    scene = placed.scene
-    n = scene.n_triangles
-    wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
-    if not all(wanted) or not scene.backoff.is_over():
-        return False
-    survey = survey_instances(placed)
-    pays = choices.pays_to_draw_instances(view, n // len(scene), survey, lambda: count_layers(scene, clip_from_world))
-    scene.backoff.note(pays=pays)
-    return pays
-
-
-def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the instances by the distance of the middle of their boxes: by w, or by z where all w are equal."""
-    boxes = np.empty((len(scene), 6))
-    for mesh, at in scene.meshes.values():
-        boxes[at] = mesh.vertex_box
-    middles = 0.5 * (boxes[:, :3] + boxes[:, 3:])
-    middles = (scene.transforms[:, :3, :3] * middles[:, None]).sum(axis=2) + scene.transforms[:, :3, 3]
-    row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
-    return np.argsort(engine.product(middles, row[:3]), kind="stable")
-
-
-def survey_instances(placed: PlacedScene) -> Survey:
-    """Return what becomes of the clusters of a scene, by some of its instances."""
-    some = range(0, len(placed.scene), -(-len(placed.scene) // SURVEYED_INSTANCES))
-    weights = [placed.scene[i].mesh.triangles.shape[0] for i in some]
-    surveys = [ClusteredMesh(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
-    return Survey(*np.average(surveys, axis=0, weights=weights).tolist())
-
-
-def count_layers(scene: Scene, clip_from_world: NDArray[np.float64]) -> float:
-    """Return how many boxes of instances lie one behind the other, on the mean over the picture where there are any."""
-    lows, highs = scene.boxes[:, :3], scene.boxes[:, 3:]
-    corners = np.where(CORNERS, highs[:, None], lows[:, None])
-    matrices = scene.clip_from_objects(clip_from_world)
-    clip = (matrices[:, None, :, :3] * corners[:, :, None]).sum(axis=3) + matrices[:, None, :, 3]
-    clip = clip[(clip[..., 3] > 0).all(axis=1)]  # a box about the eye has no outline
-    cells = np.rint((clip[..., :2] / clip[..., 3:] + 1) * (0.5 * CELLS)).clip(0, CELLS).astype(np.intp)
-    (left, top), (right, bottom) = cells.min(axis=1).T, cells.max(axis=1).T
-    steps = np.zeros((CELLS + 1, CELLS + 1), np.intp)
-    for row, column, step in ((top, left, 1), (top, right, -1), (bottom, left, -1), (bottom, right, 1)):
-        np.add.at(steps, (row, column), step)
-    n_of_cell = steps.cumsum(axis=0).cumsum(axis=1)
-    return float(n_of_cell.sum() / max(1, np.count_nonzero(n_of_cell)))
-
-
-def draw_placed(
-    placed: PlacedScene,
-    order: NDArray[np.intp],
-    targets: Sequence[engine.Target],
-    positions: Sequence[tuple[int, int]],
-    height: int,
-    n_threads: int,
-    *,
-    is_first: bool,
-) -> bool:
-    """Draw what each sample sees into targets, as `PlacedScene.draw` does; returns as `draw_clustered` does."""
-    memories = [KeptMemory() for _ in range(n_threads)]
-    return all(
-        draw_rounds(placed, order, target, height, at, memories, is_first=is_first)
-        for target, at in zip(targets, positions, strict=True)
-    )
-
-
-def draw_rounds(
-    placed: PlacedScene,
-    order: NDArray[np.intp],
-    target: engine.Target,
-    height: int,
-    at: tuple[int, int],
-    memories: Sequence[Memory],
-    *,
-    is_first: bool,
-) -> bool:
-    """Draw what a sample sees into a target, as `draw_placed` does.
-
-    In rounds, each of about as many instances as those before it together: of the others those are left out that lie
-    outside, between samples, or behind what has been drawn.
-    """
-    keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
-    order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
-    first, n = 0, FIRST_ROUND if keeps_order else len(order)
-    while first < len(order):
-        end = min(first + n, len(order))
-        ends = {"is_first": is_first and first == 0, "is_last": end == len(order)}
-        if not draw_round(placed, order[first:end], target, height, at, memories, **ends):
-            return False
-        if end < len(order):
-            order = np.append(order[:end], placed.shown(order[end:], target, at, is_drawn=True))
-        first = n = end
-    return True
-
-
-def draw_round(
-    placed: PlacedScene,
-    some: NDArray[np.intp],
-    target: engine.Target,
-    height: int,
-    at: tuple[int, int],
-    memories: Sequence[Memory],
-    **ends: bool,
-) -> bool:
-    """Draw what a sample sees of some instances, each thread those in its rows; returns as `draw_clustered` does."""
-    tops = placed.split_rows(some, height, min(height, len(memories)))
-
-    def own(first: int, end: int) -> list[int]:
-        shown = some if len(tops) == 2 else placed.shown(some, target, at, (first, end), is_drawn=False)
-        return shown.tolist()
-
-    return draw_clustered(memories, tops, own, lambda i: ClusteredMesh(*placed.clustered(i)), target, at, **ends)
-
-
 def rows_of(
     scenes: list[engine.SnappedMesh], target: engine.Target, *, is_first: bool, is_last: bool
 ) -> Callable[[int, int], None]:
@@ -467,21 +357,15 @@ def rows_of(
 
 
 def place(
-    scene: Scene,
-    camera: Camera,
-    size: tuple[int, int],
-    options: dict[str, Any],
-    *,
-    with_depth: bool = True,
-    material: Material | None = None,
+    shot: Shot, options: dict[str, Any], *, with_depth: bool = True, material: Material | None = None
 ) -> tuple[PlacedScene, View]:
     """Return the scene as the camera sees it, and the checked options of a verb; `material`: whose backs are culled."""
-    view = View.parse(size, cast(ViewOptions, options))
+    view = View.parse(shot.size, cast(ViewOptions, options))
     if with_depth:
         refuse_classic(view, "depth")
         refuse_many(view, "rasterize")
-    drawn = scene_through(scene, camera, view.viewport, near_clip=view.near_clip)
-    return PlacedScene(drawn, view, with_depth=with_depth, material=material), view
+    drawn = scene_through(shot.scene, shot.camera, view.viewport, near_clip=view.near_clip)
+    return PlacedScene(drawn, view, with_depth=with_depth, material=material, is_mesh=shot.is_mesh), view
 
 
 def rasterize_shot(
@@ -500,13 +384,12 @@ def rasterize_shot(
     as `is_split` of `View`.
     """
     if not shot.is_mesh:
-        placed, view = place(shot.scene, shot.camera, shot.size, options, material=material)
-        return draw_nearest(placed, view, depth_test, background_depth)
+        return draw_nearest(*place(shot, options, material=material), depth_test, background_depth, is_split=is_split)
     out = options.pop("out", None)
     with lent(rasterizer, shot.size) as memory:
-        placed, _ = place(shot.scene, shot.camera, shot.size, options, material=material)
+        placed, view = place(shot, options, material=material)
         drawn = draw_one(memory, placed, depth_test, background_depth, out, is_split=is_split)
-    return drawn if placed.bent is None else BentFragments(drawn, placed.bent[0], shot.scene[0].mesh)
+    return drawn if placed.bent is None else placed.fragments_of(drawn, view)
 
 
 @contextmanager
@@ -539,14 +422,18 @@ def draw_one(
 
 
 def draw_nearest(
-    placed: PlacedScene, view: View, depth_test: DepthTestOption | None = "less", background_depth: float | None = None
+    placed: PlacedScene,
+    view: View,
+    depth_test: DepthTestOption | None = "less",
+    background_depth: float | None = None,
+    *,
+    is_split: bool = False,
 ) -> SceneFragments:
-    """Return the visibility buffer of what `place` returned."""
-    (width, height), n = view.size, view.sampling.n_samples
-    positions: list[tuple[int, int]] = list(map(tuple, sample_positions(n, view.grid_bits).tolist()))
+    """Return the visibility buffer of what `place` returned; `is_split` as in `View`, of one instance."""
     if len(placed.scene) == 1:
-        frags = draw_one(FRESH, placed, depth_test, background_depth)
-        return SceneFragments(*(frags._sampled()[1] or (frags.id[None], frags.depth[None])), placed, positions)
+        return placed.fragments_of(draw_one(FRESH, placed, depth_test, background_depth, is_split=is_split), view)
+    (width, height), positions = view.size, placed.positions(view)
+    n = len(positions)
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     check_fits((n, height, width), np.int32, np.float32)
@@ -592,7 +479,7 @@ def peel_shot(
 ) -> DepthLayers:
     """Return the nearest layers of what is drawn; options as those of `peel`, without `transform`."""
     shot.scene.check_counted("a scene that is peeled")
-    placed, view = place(shot.scene, shot.camera, shot.size, options, material=material)
+    placed, view = place(shot, options, material=material)
     if shot.is_mesh:
         mesh = shot.scene[0].mesh
         return draw_layers_of(mesh.vertices, mesh.triangles, placed.view_of(0), layers, depth_test)
@@ -602,7 +489,7 @@ def peel_shot(
 
 def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
     """Return the mask of what is drawn; options as those of `coverage`, without `transform`."""
-    placed, view = place(shot.scene, shot.camera, shot.size, options, with_depth=False)
+    placed, view = place(shot, options, with_depth=False)
     if len(placed.scene) == 1:
         mesh = placed.scene[0].mesh
         return draw_coverage(SCRATCH, mesh.vertices, mesh.triangles, placed.view_of(0), out)

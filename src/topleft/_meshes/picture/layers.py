@@ -135,7 +135,7 @@ def uv(gbuffer: GBuffer) -> Array:
     def make(part: VisiblePart) -> Array:
         if part.mesh.uv is None:
             return np.full((*part.seen.shape, 2), np.nan, np.float32)
-        return part.frags.interpolate(part.mesh.uv, background=np.nan)
+        return part.interpolate(part.mesh.uv, np.nan)
 
     return gbuffer.join((2,), np.nan, make)
 

@@ -23,8 +23,7 @@ from topleft._meshes.camera.camera import Camera, CameraLike
 from topleft._meshes.camera.matrices import box_corners
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import SceneFragments
-from topleft._meshes.picture.holes import without_holes
-from topleft._meshes.picture.instances import rasterize_shot
+from topleft._meshes.picture.holes import draw_visible
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import CullOption
@@ -302,9 +301,7 @@ def object_masks(
 
 def seen_in(scene: Scene, camera: Camera, size: tuple[int, int], options: dict[str, Any]) -> tuple[I32, I32]:
     """Which instance shows (H, W), without what materials cut out, and the boxes of pixels round each (N, 4)."""
-    frags = rasterize_shot(Shot(scene, None, camera, size), **options)
-    frags = without_holes(frags, scene, camera, None, threads=options["threads"])
-    return cast(SceneFragments, frags)._found
+    return cast(SceneFragments, draw_visible(Shot(scene, None, camera, size), **options))._found
 
 
 def window_of(instance: Instance, camera: Camera, size: tuple[int, int], canvas: Window) -> Window:

@@ -25,7 +25,7 @@ from topleft._meshes.picture.blended import glass_of
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
 from topleft._meshes.picture.edges import draw_all_edges
 from topleft._meshes.picture.fragments import SceneFragments
-from topleft._meshes.picture.holes import without_holes
+from topleft._meshes.picture.holes import draw_visible
 from topleft._meshes.picture.instances import rasterize_shot
 from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import LookOptions, ShadingOptions
@@ -130,12 +130,8 @@ def render(
         return shade_cloud(draw_cloud(shot.cloud, shot.camera, shot.size, **view), shot.cloud, shot.camera, options)
     shot = shot.within(tolerance, cull=cull, material=options.material)
     glass = glass_of(shot, options, view)
-    if glass is None:
-        frags = rasterize_shot(shot, rasterizer, options.material, **view)
-    else:
-        frags = glass.draw_opaque()
+    frags = draw_visible(shot, rasterizer, options.material, **view) if glass is None else glass.draw_opaque()
     scene, camera = shot.scene, shot.camera
-    frags = without_holes(frags, scene, camera, options.material, threads=threads)
     picture = shade_by(frags, scene, camera, options)
     if glass is not None:
         glass.lay_over(picture, cast(SceneFragments, frags))

@@ -20,7 +20,7 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture.cloud import shade_cloud
-from topleft._meshes.picture.fragments import SceneFragments, shown_of
+from topleft._meshes.picture.fragments import counts_of, shown_of
 from topleft._meshes.picture.shade import Shading, ShadingOptions, shade_instances, shade_numbers
 from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import ShadingOption
@@ -124,23 +124,16 @@ def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
     """Raise an error unless the mesh or scene can be the one that was drawn: kernels index its arrays by fragments."""
     if not isinstance(frags, Fragments):
         raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
-    whole = frags.whole if isinstance(frags, SceneFragments) else None
-    kind = Mesh if whole is None else Scene
+    kind = Scene if frags._is_of_scene else Mesh
     if not isinstance(mesh, kind):
         raise TypeError(f"mesh must be a {kind.__name__}, got {type(mesh).__name__}")
-    given = counts_of(scene_of(mesh))
-    drawn = [(frags._n_vertices, frags._n_triangles)] if whole is None else counts_of(whole)
+    drawn, given = frags._counts(), counts_of(scene_of(mesh))
     if len(drawn) != len(given):
         raise ValueError(f"mesh must be the scene that was drawn, of {len(drawn)} instances, got one of {len(given)}")
     for k, (old, new) in enumerate(zip(drawn, given, strict=True)):
         if old != new:
-            name = "mesh" if whole is None else f"mesh[{k}]"
+            name = f"mesh[{k}]" if frags._is_of_scene else "mesh"
             raise ValueError(
                 f"{name} must be the one that was drawn, with {old[0]} vertices and {old[1]} triangles, "
                 f"got {new[0]} and {new[1]}"
             )
-
-
-def counts_of(scene: Scene) -> list[tuple[int, int]]:
-    """Vertices and triangles of the mesh of each instance."""
-    return [(len(one.mesh.vertices), len(one.mesh.triangles)) for one in scene]

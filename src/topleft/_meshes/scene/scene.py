@@ -23,7 +23,7 @@ from topleft._core.base.color import ColorLike
 from topleft._core.raster.clusters import Backoff
 from topleft._meshes.io.load import load
 from topleft._meshes.model.material import Material
-from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
+from topleft._meshes.model.mesh import Mesh, extreme_points, trusted_mesh, used_vertices
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.pose import as_pose
@@ -436,6 +436,6 @@ def collapsed(scene: Scene, masks: Sequence[npt.NDArray[np.bool_] | None], *, ke
             if mask is None:
                 made[key] = Mesh(mesh.vertices[mesh.triangles[:1, 0]], np.zeros_like(mesh.triangles))
             else:
-                made[key] = Mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
+                made[key] = trusted_mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
         instances.append(instance.with_mesh(made[key]))
     return Scene(instances)

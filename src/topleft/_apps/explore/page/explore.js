@@ -75,19 +75,45 @@ class Line {
   }
 }
 
+// A WebSocket; where none is let through, POST.
 function socketLine(onLost) {
   const socket = new WebSocket(new URL("socket", document.baseURI).href.replace(/^http/, "ws").replace(/#.*/, ""));
   socket.binaryType = "arraybuffer";
   const line = new Line((header, parts) => socket.send(pack(header, parts)), onLost);
   socket.onmessage = ({data}) => line.hear(unpack(data));
-  socket.onclose = () => line.lose();
   return new Promise((resolve, reject) => {
-    socket.onopen = () => resolve(line);
-    socket.onerror = () => fetch(document.baseURI).then(
-      () => reject(new Error("the page is there, but its WebSocket is blocked: a proxy or an extension between the browser and "
-        + "Python stops it. Open the address without them.")),
-      () => reject(new Error("the explorer has ended: start it again")));
+    const fallBack = () => {
+      clearTimeout(late);
+      socket.onopen = socket.onerror = null;
+      socket.close();
+      fetch(document.baseURI).then(() => resolve(postLine(onLost)), () => reject(new Error("the explorer has ended: start it again")));
+    };
+    const late = setTimeout(fallBack, 4000);
+    socket.onerror = fallBack;
+    socket.onopen = () => {
+      clearTimeout(late);
+      socket.onclose = () => line.lose();
+      resolve(line);
+    };
   });
+}
+
+// The same frames, a POST each, one after the other. It asks every 20 s, or it would be taken for closed.
+function postLine(onLost) {
+  const page = crypto.getRandomValues(new Uint32Array(4)).join("-"), url = new URL(`ask/${page}`, document.baseURI);
+  let last = Promise.resolve();
+  const post = async (frame) => {
+    const answer = await fetch(url, {method: "POST", body: frame});
+    if (!answer.ok) throw new Error((await answer.text()).trim());
+    line.hear(unpack(await answer.arrayBuffer()));
+  };
+  const line = new Line((header, parts) => {
+    const frame = pack(header, parts);
+    last = last.then(() => post(frame)).catch(({message}) => (clearInterval(alive), line.lose(message)));
+  }, onLost);
+  const alive = setInterval(() => line.ask("hello").catch(() => {}), 20000);
+  line.note = "WebSocket is blocked by a proxy or an extension: the page asks by HTTP, which takes longer.";
+  return line;
 }
 
 // A page without Python: a worker answers.
@@ -400,16 +426,24 @@ function pixelsPart(app, panel) {
     for (const [name, value] of Object.entries({x, y, width, height: 1})) rect?.setAttribute(name, value);
   }
 
-  // The largest whole number of screen pixels a pixel that lets all pictures fit, in the columns that allow most.
+  // The largest whole number of screen pixels a pixel that lets all pictures fit, in the columns that allow most; below
+  // LEAST_CELL they may be higher than the window, which then scrolls.
+  const LEAST_CELL = 6;
   function fit() {
     const n = part.views.size, [width, height] = state.size, isNarrow = stage.clientWidth < 480;
-    const room = isNarrow ? Infinity : Math.max(420, innerHeight - 120);
-    let best = [0, 1];
-    for (let columns = 1; columns <= (isNarrow ? 1 : n); columns++) {
+    const room = Math.max(420, innerHeight - 120), most = isNarrow ? 1 : n;
+    const cellOf = (columns, room) => {
       const wide = ((stage.clientWidth + 24) / columns - 24) / (width + 2);
-      const high = (room / Math.ceil(n / columns) - 84) / (height + 2);
-      const cell = Math.max(1, Math.floor(Math.min(wide, high, 44)));
+      return Math.max(1, Math.floor(Math.min(wide, (room / Math.ceil(n / columns) - 84) / (height + 2), 44)));
+    };
+    let best = [0, 1];
+    for (let columns = 1; columns <= most; columns++) {
+      const cell = cellOf(columns, isNarrow ? Infinity : room);
       if (cell > best[0]) best = [cell, columns];
+    }
+    for (let columns = 1; columns <= most && best[0] < LEAST_CELL; columns++) {
+      const cell = Math.min(LEAST_CELL, cellOf(most + 1 - columns, Infinity));
+      if (cell > best[0]) best = [cell, most + 1 - columns];
     }
     const [cell, columns] = best, px = (n) => `${cell * n}px`;
     part.cell = cell;
@@ -648,6 +682,7 @@ function stepsPart(app, panel) {
       const scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : drawn;
       const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view, [width, height] = size;
       const asked = JSON.stringify([view.scene, method, subpixel_bits]);
+      if (!trace) told.textContent = "The steps are being recorded.";
       trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
       if (asked !== JSON.stringify([view.scene, view.method, view.subpixel_bits])) return;  // a link has come in between
       methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
@@ -998,6 +1033,7 @@ export async function start(root, connect, hasAddress = true) {
   root.app = app;
   if (hasAddress) addEventListener("hashchange", () => location.hash !== noted && app.restore(location.hash));
   if (!app.restore(hasAddress && location.hash ? location.hash : app.hello.fragment)) app.show(app.hello.tab);
+  if (app.line.note) app.say(app.line.note);
   return app;
 }
 

@@ -36,6 +36,9 @@ POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 N_FLAT_AT_ONCE = 1 << 16
 """Triangles whose normals are computed together: 10 MB."""
 
+DRACO_VERTEX_BYTES = 64
+"""Attributes of Draco that have more than so many bytes a vertex count as further vertices: 0.5 GB at most, in 2 s."""
+
 READ_EXTENSIONS = frozenset({
     "EXT_mesh_gpu_instancing", "EXT_texture_avif", "EXT_texture_webp", "KHR_draco_mesh_compression",
     "KHR_materials_emissive_strength",
@@ -429,9 +432,11 @@ class _Reader:
                 f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install DracoPy"
             ) from None
         content = self._accessors.view(draco["bufferView"]).tobytes()
-        n_triangles, n_vertices = declared_by_draco(content)
-        self._source.budget.check("max_triangles", n_triangles)
-        self._source.budget.check("max_vertices", n_vertices)
+        size = declared_by_draco(content)
+        self._source.budget.check("max_triangles", size.n_triangles)
+        n_like = size.n_rows * size.row_bytes // DRACO_VERTEX_BYTES
+        self._source.budget.check("max_vertices", max(n_like, size.n_vertices))
+        self._source.budget.spend("max_vertices", max(0, n_like - size.n_vertices))
         mesh = DracoPy.decode(content)
         self._source.budget.check("max_vertices", len(mesh.points))
         values = {}
