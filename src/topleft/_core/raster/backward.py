@@ -252,5 +252,7 @@ def area_vjp(
         engine.area_vjp(corners_px[part], own, values, of_pixels, g_corners[part])
 
     run_parts(work, len(rows), threads_of_rows(len(rows), parse_threads(threads)))
-    out = np.stack([np.bincount(rows.ravel(), g, len(points)) for g in g_corners.T], axis=1)
+    out = np.zeros(points_px.shape)
+    for axis in range(2):
+        out[:, axis] = np.bincount(rows.ravel(), g_corners[:, axis], len(points))
     return out if points.shape[1] == 2 else np.column_stack([out, np.zeros(len(out))])
