@@ -53,10 +53,10 @@ if TYPE_CHECKING:
     from topleft._apps.diagram.pixel_grid import pixel_grid
     from topleft._apps.explore.open import Explorer, explore
     from topleft._apps.tiles.tiles import Tiles, tiles
+    from topleft._core.raster.merge import merge
     from topleft._meshes.grid.bake import Baked, bake
     from topleft._meshes.grid.viewshed import Viewshed, viewshed
     from topleft._meshes.grid.voxels import Voxels, voxelize
-    from topleft._meshes.picture.merge import merge
     from topleft._meshes.picture.object_masks import ObjectMasks, object_masks
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
@@ -76,7 +76,7 @@ _LATE = {
     "Window": "topleft._meshes.windows.raster",
     "bake": "topleft._meshes.grid.bake",
     "explore": "topleft._apps.explore.open",
-    "merge": "topleft._meshes.picture.merge",
+    "merge": "topleft._core.raster.merge",
     "object_masks": "topleft._meshes.picture.object_masks",
     "pixel_grid": "topleft._apps.diagram.pixel_grid",
     "render_batch": "topleft._apps.batch.batch",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from comparing import assert_same
@@ -11,7 +13,7 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import bounding_sphere, orbit_view
 from topleft._meshes.camera.viewpoints import turntable
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.scene.scene import Scene
+from topleft._meshes.scene.scene import Instance, Scene, world_corners
 
 SIZE = (640, 480)
 K = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])
@@ -348,3 +350,30 @@ def test_off_center_halves_make_the_whole(ortho):
 def test_camera_more_impossible_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def instances_of_a_sphere(n):
+    sphere = Mesh(*scenes.icosphere(5))
+    places = [[[1, 0, 0, i], [0, 0, 1, i % 3], [0, -1, 0, 0.5 * i % 2], [0, 0, 0, 1]] for i in range(n)]
+    return Scene([Instance(sphere, place) for place in places])
+
+
+def test_framing_a_scene_takes_the_memory_of_one_instance():
+    def peak(n):
+        scene = instances_of_a_sphere(n)
+        tracemalloc.start()
+        Camera.framing(scene)
+        peaked = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peaked
+
+    assert peak(80) < 1.5 * peak(4)
+
+
+@pytest.mark.parametrize("fit", ["sphere", "box", "points", "silhouette"])
+def test_framing_a_scene_is_framing_all_of_its_corners(fit):
+    scene = instances_of_a_sphere(7)
+    got = Camera.framing(scene, fit=fit)
+    expected = Camera.framing(np.concatenate([world_corners(instance) for instance in scene]), fit=fit)
+    assert_same(got.view, expected.view)
+    assert_same(got.projection, expected.projection)

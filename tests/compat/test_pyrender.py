@@ -276,3 +276,9 @@ def test_runner_says_how_it_is_called(given, capsys):
     assert capsys.readouterr().err.startswith(
         ("usage: python -m topleft.compat NAME", "topleft.compat: there is no file")
     )
+
+
+def test_primitive_with_alpha_per_vertex_keeps_it_in_bytes():
+    colors = [[1, 0, 0, 0], [1, 0, 0, 0.5], [1, 0, 0, 1], [1, 0, 0, 2]]
+    drawn = pr.Primitive(positions=WALL, indices=QUAD, color_0=np.array(colors)).drawn()
+    assert drawn.colors[:, 3].tolist() == [0, 128, 255, 255]

@@ -1,5 +1,6 @@
 """The programs of the README, and of the pages that it leads to first, run as they stand there."""
 
+import inspect
 import re
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from PIL import Image
 
 from topleft import scenes
+from topleft.pytest_plugin import KeptPictures
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *(ROOT / f"docs/guide/{name}.md" for name in ("layers", "pictures", "grids"))]
@@ -140,7 +142,8 @@ def test_program_of_a_task_runs(name, folder):
     exec(STEPS[name], names)
     for thing in list(names.values()):
         if getattr(thing, "__name__", "").startswith("test_"):
-            thing()
+            pictures = KeptPictures(Path("pictures"), is_updating=True)
+            thing(*[pictures.check for name in inspect.signature(thing).parameters if name == "assert_picture"])
 
 
 def test_first_mask_is_the_one_of_the_page(folder, capsys):

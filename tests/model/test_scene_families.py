@@ -1,5 +1,6 @@
 """Families of scenes: each is what its name says."""
 
+import numpy as np
 import pytest
 
 from topleft.scene_families import FAMILIES, HUBS
@@ -26,3 +27,13 @@ def test_fan_has_as_many_triangles_as_it_says(hub):
 @pytest.mark.parametrize("name", FAMILIES["fan"].axes[0].values)
 def test_fan_in_the_frame_has_as_many_triangles_as_its_name(name):
     assert len(FAMILIES["fan"].make(FAMILIES["fan"].axes[0].values[name], 1).triangles) == int(name)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", FAMILIES)
+def test_triangles_of_a_family_turn_one_way(name, seed):
+    family = FAMILIES[name]
+    scene = family.make(*(next(iter(axis.values.values())) for axis in family.axes), seed)
+    a, b, c = np.moveaxis(scene.vertices[scene.triangles] - scene.vertices.mean(axis=0), 1, 0)
+    areas = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert (areas < 0 if name == "edge" else areas > 0).all()

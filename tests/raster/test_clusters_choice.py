@@ -10,10 +10,9 @@ from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
 from topleft._core.raster.clusters import Backoff, Clusters
 from topleft._core.raster.view import View
 from topleft._meshes.picture import rounds
-from topleft._meshes.picture.instances import PlacedScene, rasterize_shot
+from topleft._meshes.picture.instances import PlacedScene, rasterize_shot, scene_through
 from topleft._meshes.picture.rounds import count_layers, survey_instances
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.picture.through_lens import scene_through
 
 SIZE = (160, 120)
 CAMERA = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)

@@ -144,6 +144,16 @@ def test_render_cuts_holes_out(bits):
     assert 0.2 < (picture[..., 3] == 255).sum() / tl.rasterize_mesh(alone, CAMERA, SIZE).mask.sum() < 0.8
 
 
+def test_holes_are_cut_in_the_memory_of_a_rasterizer():
+    own, mesh = tl.Rasterizer(SIZE), layers((0, 1, 2, 3))
+    frags = draw_visible(Shot.of(mesh, CAMERA, SIZE), own)
+    assert_same(frags.triangle, cut(mesh).triangle)
+    again = draw_visible(Shot.of(layers((3, 2, 1, 0)), CAMERA, SIZE), own)
+    assert np.shares_memory(again.triangle, frags.triangle)
+    with pytest.raises(ValueError, match="rasterizer must have the size"):
+        tl.render(mesh, CAMERA, (8, 8), rasterizer=own)
+
+
 def pieces(mesh):
     """The leaves and the wall of `layers`, an instance each."""
     rows = mesh.material_of_triangle[::2]

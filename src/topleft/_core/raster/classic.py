@@ -136,12 +136,6 @@ def fill_classic(
     return result
 
 
-def refuse_classic(view: View, what: str) -> None:
-    """Raise an error when a classic was asked for what only the engine does."""
-    if view.classic is not None:
-        raise ValueError(f"method {view.classic.name!r} has no {what}; use 'auto', 'edge' or 'scanline'")
-
-
 def check_options(method: Method, view: View) -> None:
     """Raise an error for an option that would change the picture and that a classic does not have."""
     if view.transform is not None:

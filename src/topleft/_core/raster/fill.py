@@ -19,7 +19,7 @@ from topleft._core.base.memory import Memory
 from topleft._core.base.options import Alpha, Blend, Per, Resolve, Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.classic import fill_classic, refuse_classic
+from topleft._core.raster.classic import fill_classic
 from topleft._core.raster.rasterize import canvas_of, draw, draw_all_samples
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, SamplePass, draw_means, sample_positions
 from topleft._core.raster.snap import Snapped, snap_mesh
@@ -193,7 +193,7 @@ def draw_labels(
     for name, value, choices_of in wishes:
         if value not in choices_of:
             raise ValueError(f"{name} must be {choices_of[-1]!r} for labels, which do not mix, got {value!r}")
-    refuse_classic(view, "labels")
+    view.refuse_classic("labels")
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     if len(own) != snapped.n_triangles:
         raise ValueError(f"colors must have {snapped.n_triangles} rows, one per triangle, for labels, got {len(own)}")

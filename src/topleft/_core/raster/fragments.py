@@ -143,8 +143,8 @@ class Fragments:
     _split: SplitSamples | None = None
     #: The mesh that it was drawn from; None where that is not kept.
     corners: GivenCorners | None = None
-    #: Whether attributes are given for each instance of a scene.
-    _is_of_scene = False
+    #: What attributes are given for: "Mesh", "Scene" (for each instance) or "Points".
+    _subject_kind = "Mesh"
     #: Ids and depth of these, (S, H, W).
     _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
 

@@ -18,7 +18,6 @@ from topleft._core.base.memory import FRESH, SCRATCH, Memory, check_fits
 from topleft._core.base.options import DepthTest, Sampling, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.sampling import bits_of_bands
 from topleft._core.raster.snap import Snapped, refuse_changed, snap_mesh
@@ -171,7 +170,7 @@ def draw_layers_of(
 
 def check_peel(view: View, layers: int, depth_test: str) -> tuple[int, bool]:
     """Return how many layers are wanted, and whether the larger depth comes first, after checking the options."""
-    refuse_classic(view, "depth")
+    view.refuse_classic("depth")
     if view.sampling is not Sampling.CENTER:
         raise ValueError(f"sampling {str(view.sampling)!r} gives no sorted layers: peel takes 'center'")
     return as_layers(layers), parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER

@@ -17,7 +17,6 @@ from topleft._core.base.memory import FRESH, Memory, check_fits
 from topleft._core.base.options import DepthTest, PointShape, Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import refuse_many
 from topleft._core.raster.sampling import sample_positions
@@ -49,6 +48,8 @@ class PointFragments(Fragments):
     >>> frags.point.tolist()
     [[0, 0, 1, 1], [0, 0, 1, 1]]
     """
+
+    _subject_kind = "Points"
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], n_points: int) -> None:
         """Take planes (S, H, W), one a sample.
@@ -182,7 +183,7 @@ def points(
     """
     checked = View.parse(size, view, why_snapped="the corners of points lie on the grid")
     refuse_many(checked, "points")
-    refuse_classic(checked, "points")
+    checked.refuse_classic("points")
     if checked.cull:
         raise ValueError("points have no side to cull")
     kind, test = parse(PointShape, "shape", shape), parse(DepthTest, "depth_test", depth_test)

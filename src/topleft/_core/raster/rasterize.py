@@ -20,7 +20,7 @@ from topleft._core.base.options import DepthTest, Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Drawing, Route
-from topleft._core.raster.classic import draw_classic, refuse_classic
+from topleft._core.raster.classic import draw_classic
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.sampling import (
@@ -249,7 +249,7 @@ def draw_fragments(
     names: NDArray[np.int32] | None = None,
 ) -> Fragments:
     """`rasterize`, on the memory given; with `names` triangle i is called names[i], which ascend."""
-    refuse_classic(view, "depth")
+    view.refuse_classic("depth")
     refuse_many(view, "rasterize")
     options = FragmentOptions.parse(depth_test, background_depth, out)
     corners = GivenCorners(vertices, triangles, view.transform, view.viewport, view.origin, view.zero_to_one)

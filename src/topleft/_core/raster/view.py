@@ -143,6 +143,11 @@ class View:
         if self.plan is not None:
             self.plan.mark(stage)
 
+    def refuse_classic(self, what: str) -> None:
+        """Raise an error when a classic was asked for what only the engine does."""
+        if self.classic is not None:
+            raise ValueError(f"method {self.classic.name!r} has no {what}; use 'auto', 'edge' or 'scanline'")
+
     @property
     def test(self) -> int:
         """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""

@@ -24,7 +24,7 @@ from topleft._meshes.scene.adapt import is_mesh_like
 from topleft._meshes.scene.scene import Scene, as_subject, world_corners
 from topleft.typing import UpOption
 
-Framed: TypeAlias = Mesh | Points | F64
+Framed: TypeAlias = Mesh | Scene | Points | F64
 
 FRAMING_MARGIN = 1.05
 """What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
@@ -34,11 +34,9 @@ SILHOUETTE_MARGIN = 0.05
 
 
 def as_framed(subject: MeshLike | Scene | npt.ArrayLike) -> Framed:
-    """What is to be framed: a mesh, or points, by themselves, in a cloud, or of a scene in the world."""
-    if isinstance(subject, Scene):
-        return np.concatenate([np.empty((0, 3)), *map(world_corners, subject)])
-    if isinstance(subject, Points) or is_mesh_like(subject):
-        return as_subject(subject)  # type: ignore[return-value]  # a scene was told apart
+    """What is to be framed: a mesh, a scene, or points, by themselves or in a cloud."""
+    if isinstance(subject, Scene | Points) or is_mesh_like(subject):
+        return as_subject(subject)
     return as_real("subject", subject)
 
 
@@ -52,6 +50,8 @@ def points_to_frame(subject: Framed) -> F64:
     """
     if isinstance(subject, Points):
         points = np.asarray(subject.positions, np.float64)
+    elif isinstance(subject, Scene):
+        points = np.concatenate([np.empty((0, 3)), *map(world_corners, subject)])
     else:
         points = np.asarray(used_vertices(subject), np.float64) if isinstance(subject, Mesh) else subject
     if points.ndim != 2 or points.shape[1] != 3:
@@ -67,7 +67,10 @@ def ends_to_frame(subject: Framed) -> F64:
     """A few of those points, which have the box and the bounding sphere of all."""
     if isinstance(subject, Mesh | Points) and len(subject.triangles if isinstance(subject, Mesh) else subject):
         return subject.extreme_points()
-    return extreme_points(points_to_frame(subject))
+    if isinstance(subject, Scene) and subject.n_triangles and np.isfinite(ends := subject.extreme_points()).all():
+        return ends
+    points = points_to_frame(subject)
+    return extreme_points(lambda: points)
 
 
 def bounding_sphere(ends: F64) -> tuple[F64, float]:

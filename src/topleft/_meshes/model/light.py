@@ -8,6 +8,7 @@ extension KHR_lights_punctual, 2018 (the cone of a spot).
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.arrays import as_number, as_vector
+from topleft._core.base.arrays import as_number, as_vector, shown
 from topleft._core.base.color import Color, ColorLike, as_color
 from topleft._core.base.options import parse
 from topleft.typing import LightKindOption, SpaceOption
@@ -188,3 +189,16 @@ def as_not_negative(name: str, value: float) -> float:
     if not 0 <= as_number(name, value) < math.inf:
         raise ValueError(f"{name} must be finite and not negative, got {value!r}")
     return float(value)
+
+
+def as_lights(lights: object) -> Sequence[Light]:
+    """Return one light or several as a sequence."""
+    if isinstance(lights, Light):
+        return (lights,)
+    if not isinstance(lights, Iterable) or isinstance(lights, np.ndarray | str | dict):
+        raise TypeError(f"lights must be a Light or a sequence of them, got {shown(lights)}")
+    found = tuple(lights)
+    for light in found:
+        if not isinstance(light, Light):
+            raise TypeError(f"lights must be of Light, got {type(light).__name__}: a direction is Light((0, 1, 0))")
+    return found

@@ -5,7 +5,7 @@ Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages u
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, get_args
@@ -176,7 +176,8 @@ class Mesh:
 
     @cached_property
     def _extreme_points(self) -> F64:
-        return read_only(extreme_points(used_vertices(self)))
+        used = used_vertices(self)
+        return read_only(extreme_points(lambda: used))
 
     def vertex_normals(self) -> FloatArray:
         """Normals (V, 3): those of the mesh where it has them, else angle-weighted ones, float64.
@@ -309,8 +310,13 @@ def used_vertices(mesh: Mesh) -> FloatArray:
     return mesh.vertices if is_used.all() else mesh.vertices[is_used]
 
 
-def extreme_points(*parts: FloatArray) -> F64:
+def extreme_points(*parts: Callable[[], FloatArray]) -> F64:
     """A few points, float64, which have the box and the bounding sphere of all points of all parts (N, 3), N > 0.
+
+    Parameters
+    ----------
+    *parts : callable
+        Each returns its points, twice: one part is in memory at a time.
 
     Returns
     -------
@@ -318,10 +324,14 @@ def extreme_points(*parts: FloatArray) -> F64:
         Of each of P parts the two ends along each axis, and what is farthest from the centre of the box of all parts.
     """
     # column by column: NumPy takes twenty times as long along rows of three
-    rows = [[int(end(part[:, axis])) for end in (np.argmin, np.argmax) for axis in range(3)] for part in parts]
-    ends = np.concatenate([part[own] for part, own in zip(parts, rows, strict=True)]).astype(np.float64)
+    ends = np.concatenate([_ends(part()) for part in parts]).astype(np.float64)
     center = ends.min(axis=0) / 2 + ends.max(axis=0) / 2
-    return np.concatenate([ends, [_farthest(part, center) for part in parts]])
+    return np.concatenate([ends, [_farthest(part(), center) for part in parts]])
+
+
+def _ends(points: FloatArray) -> FloatArray:
+    """The first of the points that lie farthest out along each axis, (6, 3)."""
+    return points[[int(end(points[:, axis])) for end in (np.argmin, np.argmax) for axis in range(3)]]
 
 
 def _farthest(points: FloatArray, center: F64) -> FloatArray:
@@ -334,7 +344,7 @@ def _farthest(points: FloatArray, center: F64) -> FloatArray:
         k = int(squared.argmax())
         if squared[k] > most:
             row, most = first + k, float(squared[k])
-    return points[row]
+    return points[row].copy()  # a view would keep all of them
 
 
 def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:

@@ -141,7 +141,7 @@ class Points:
 
     @cached_property
     def _extreme_points(self) -> F64:
-        found: F64 = read_only(extreme_points(self.positions))
+        found: F64 = read_only(extreme_points(lambda: self.positions))
         return found
 
     def __getstate__(self) -> dict[str, Any]:

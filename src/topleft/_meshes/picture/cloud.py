@@ -1,14 +1,10 @@
-"""Draws clouds of points: their visibility buffer, their picture and their layers.
+"""Draws clouds of points: their visibility buffer and their picture.
 
-Input: `Points`, a camera. Output: `PointFragments`, a picture (H, W, 4) uint8, or arrays by name.
+Input: `Points`, a camera. Output: `PointFragments`, a picture (H, W, 4) uint8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
@@ -19,7 +15,6 @@ from topleft._core.base.array_types import F32, F64, U8
 from topleft._core.base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._core.base.memory import FRESH
 from topleft._core.base.options import PointShape
-from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.points import PointFragments, draw_points
 from topleft._core.raster.rasterize import refuse_many
 from topleft._core.raster.view import View, ViewOptions
@@ -65,7 +60,7 @@ def draw_cloud(
             positions = through_lens(eye, bent, camera.lens, projection, frame)
     view = View.parse(size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
     refuse_many(view, "a cloud")
-    refuse_classic(view, "points")
+    view.refuse_classic("points")
     return draw_points(FRESH, positions, sizes, PointShape(cloud.shape), view)
 
 
@@ -182,86 +177,19 @@ def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
     return cosine / (1 + light.falloff * engine.row_products(way, way) / unit_of_eye**2)
 
 
-@dataclass(frozen=True, eq=False)
-class CloudBuffer:
-    """A cloud and who looks at it; as `GBuffer` is of meshes."""
+def normals_at(cloud: Points, camera: Camera, turn: F64) -> F64:
+    """Unit normals (N, 3) of points on the side that is seen, turned from eye space by a matrix (3, 3); 0: none.
 
-    subject: Points
-    camera: Camera
-    size: tuple[int, int]
-    options: dict[str, Any] = field(default_factory=dict)
-    look: dict[str, Any] = field(default_factory=dict)
-    camera_to: Camera | None = None
-    transforms_to: F64 | None = None
-    n_instances: int = 1
-
-    @cached_property
-    def frags(self) -> PointFragments:
-        """The visibility buffer, at the centres of the pixels."""
-        return draw_cloud(self.subject, self.camera, self.size, **self.options)
-
-    def spread(self, values: npt.NDArray[np.floating[Any]], background: float) -> F32:
-        """Values of the points, (N,) or (N, K), at the pixels."""
-        return self.frags.interpolate(values, background=background)
-
-    @property
-    def eye(self) -> F64:
-        """The points in eye space, (N, 3)."""
-        return moved(self.subject.positions, self.camera.view)
-
-
-def silhouette(buffer: CloudBuffer) -> npt.NDArray[Any]:
-    """Where points are, (H, W): bool, or the share of samples, float32."""
-    sampling = buffer.look.get("sampling", "center")
-    if sampling == "center":
-        return buffer.frags.mask
-    return draw_share(buffer.subject, buffer.camera, buffer.size, sampling=sampling, **buffer.options)
-
-
-def alpha(buffer: CloudBuffer) -> U8:
-    """How much of the pixel is covered, (H, W) uint8, 255 for all of it."""
-    return np.rint(silhouette(buffer).astype(np.float32) * np.float32(255)).astype(np.uint8)
-
-
-def distance(buffer: CloudBuffer) -> F32:
-    """Distance of the point along the view, (H, W) float32."""
-    return buffer.spread(-buffer.eye[:, 2], np.inf)
-
-
-def ray_distance(buffer: CloudBuffer) -> F32:
-    """Distance of the point from the eye, (H, W) float32."""
-    if not buffer.camera.projection[3, :3].any():
-        return distance(buffer)
-    return buffer.spread(np.sqrt(engine.row_products(buffer.eye, buffer.eye)), np.inf)
-
-
-def camera_normal(buffer: CloudBuffer) -> F32:
-    """The normal of the point in eye space, on the side that is seen, (H, W, 3) float32."""
-    if buffer.subject.normals is None:
+    Raises
+    ------
+    ValueError
+        If there are no normals.
+    """
+    if cloud.normals is None:
         raise ValueError("normals need points that have them")
-    return buffer.spread(in_eye_space(buffer.subject, buffer.camera, np.arange(len(buffer.subject)))[1], 0.0)
-
-
-def world_normal(buffer: CloudBuffer) -> F32:
-    """The same in the world."""
-    if buffer.subject.normals is None:
-        raise ValueError("normals need points that have them")
-    back = np.eye(4)
-    back[:3, :3] = buffer.camera.view[:3, :3].T  # the transpose, where positions take the inverse
-    _, own = in_eye_space(buffer.subject, buffer.camera, np.arange(len(buffer.subject)))
-    return buffer.spread(unit_or_zero(moved(own, back)), 0.0)
-
-
-CLOUD_LAYERS: Mapping[str, Callable[[CloudBuffer], npt.NDArray[Any]]] = MappingProxyType({
-    "alpha": alpha,
-    "silhouette": silhouette,
-    "depth": lambda buffer: buffer.frags.depth,
-    "distance": distance,
-    "ray_distance": ray_distance,
-    "triangle": lambda buffer: buffer.frags.point,
-    "instance": lambda buffer: buffer.frags.instance,
-    "world_position": lambda buffer: buffer.spread(buffer.subject.positions, np.nan),
-    "world_normal": world_normal,
-    "camera_normal": camera_normal,
-})  # fmt: skip
-"""The layers that points have beside colours and flow, as `LAYERS` of `layers.py`."""
+    _, normals = in_eye_space(cloud, camera, np.arange(len(cloud)))
+    if (turn == np.eye(3)).all():
+        return normals
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn
+    return unit_or_zero(moved(normals, matrix))

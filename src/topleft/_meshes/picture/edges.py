@@ -14,8 +14,8 @@ import numpy.typing as npt
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import wireframe
 from topleft._meshes.camera.camera import Camera
+from topleft._meshes.picture.bend import bend
 from topleft._meshes.picture.shade import ShadingOptions
-from topleft._meshes.picture.through_lens import seen_through
 from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import CullOption
 
@@ -63,9 +63,10 @@ def draw_edges(
     """Draw the edges of triangles over the picture (H, W, 4), those that are not behind a depth (H, W)."""
     height, width = depth.shape
     size = width, height
-    vertices, triangles, transform, bent = seen_through(vertices, triangles, camera, size)
-    if bent is not None:
-        triangles, cull = bent.outline(transform, cull), "none"
+    transform = camera.clip_from_world(size) if camera.lens is None else camera.clip_from_eye(size)
+    if camera.lens is not None:
+        bent = bend(vertices, triangles, camera, camera.lens, size)
+        vertices, triangles, cull = bent.points_eye, bent.outline(transform, cull), "none"
     lines = wireframe(
         vertices, triangles, size, transform=transform, depth=depth, antialias=True, cull=cull,
         threads=threads,

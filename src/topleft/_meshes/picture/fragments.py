@@ -160,7 +160,7 @@ class SceneFragments(InstanceIds, Fragments):
     (0, -1)
     """
 
-    _is_of_scene = True
+    _subject_kind = "Scene"
 
     #: What was drawn of the one instance that there is, at the first sample; None where that is not kept.
     _one: Fragments | None = None
@@ -339,7 +339,7 @@ class MeshFragments(SceneFragments):
     `triangle` and `id` hold triangles of the mesh, and attributes are those of its vertices.
     """
 
-    _is_of_scene = False
+    _subject_kind = "Mesh"
 
     def __repr__(self) -> str:
         return Fragments.__repr__(self)

@@ -1,6 +1,6 @@
-"""Evaluates where in space each visible pixel of a mesh or scene lies, when a layer asks for it.
+"""Evaluates where in space each visible pixel of a mesh, scene or cloud lies, when a layer asks for it.
 
-Input: `Mesh` or `Scene`, `Camera`. Output: `GBuffer`, from which `layers` are taken.
+Input: `Shot`. Output: `GBuffer`, from which `layers` are taken.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.normals import moved
+from topleft._meshes.picture.cloud import draw_cloud
 from topleft._meshes.picture.fragments import VisiblePart, join, parts_of
 from topleft._meshes.picture.holes import cuts_of, draw_visible
 from topleft._meshes.picture.shot import Shot
@@ -77,7 +78,7 @@ def points_of(part: VisiblePart) -> F64:
 
 @dataclass(frozen=True, eq=False)
 class GBuffer:
-    """A mesh or scene and who looks at it.
+    """A mesh, scene or cloud and who looks at it.
 
     Parameters
     ----------
@@ -124,6 +125,8 @@ class GBuffer:
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels, without what materials cut out."""
+        if self.shot.cloud is not None:
+            return draw_cloud(self.shot.cloud, self.camera, self.size, **self.options)
         return draw_visible(self.shot, self.rasterizer, self.look.get("material"), **self.options)
 
     def sampled(self, sampling: str) -> Fragments:
@@ -133,7 +136,7 @@ class GBuffer:
     @cached_property
     def has_holes(self) -> bool:
         """Whether materials cut something out."""
-        return any(cuts_of(self.scene, self.look.get("material")))
+        return self.shot.cloud is None and any(cuts_of(self.scene, self.look.get("material")))
 
     @cached_property
     def parts(self) -> Sequence[VisiblePart]:
@@ -146,11 +149,20 @@ class GBuffer:
         """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each part."""
         return join(self.parts, (*self.frags.depth.shape, *channels), background, make)
 
-    def evaluate(
-        self, part: VisiblePart, what: PointKind, rows: F64, background: float, *, size: tuple[int, int] = (0, 0)
-    ) -> npt.NDArray[Any]:
-        """What `evaluate` does, with the threads of this buffer."""
-        return evaluate(part, what, rows, background, size=size, threads=self.options.get("threads"))
+    def tell(
+        self, kind: PointKind, rows_of: Callable[[F64], F64], channels: tuple[int, ...], background: float
+    ) -> npt.NDArray[np.float32]:
+        """What matrices tell of the points that show: rows (N, 4) for world from object; of a cloud of the centres."""
+        threads, cloud = self.options.get("threads"), self.shot.cloud
+        if cloud is None:
+            return self.join(
+                channels, background, lambda one: evaluate(one, kind, rows_of(one.place), background, threads=threads)
+            )
+        rows = rows_of(np.eye(4))
+        values = moved(cloud.positions, np.resize(rows, (3, 4)))[:, : len(rows)]
+        if kind is PointKind.LENGTH:
+            values = np.sqrt(engine.row_products(values, values))
+        return self.frags.interpolate(values if channels else values.reshape(-1), background=background)
 
 
 def project(points: F64, camera: Camera, transform: F64, size: tuple[int, int]) -> F64:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, I32
+from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import Rasterizer
@@ -27,7 +28,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.fragments import SceneFragments
-from topleft._meshes.picture.instances import PlacedScene, draw_nearest, place, rasterize_shot
+from topleft._meshes.picture.instances import PlacedScene, draw_nearest, lent, place, rasterize_shot
 from topleft._meshes.picture.look import ShadingInputs, Surface
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
@@ -86,7 +87,8 @@ def draw_visible(
     if not any(cuts):
         return rasterize_shot(shot, rasterizer, material, **options)
     shot.scene.check_counted("a scene with holes in its materials")
-    return draw_solid(*place(shot, options, material=material), shot.camera, cuts)
+    with lent(rasterizer if shot.is_mesh else None, shot.size) as memory:
+        return draw_solid(*place(shot, options, material=material), shot.camera, cuts, memory=memory)
 
 
 def draw_solid(
@@ -95,13 +97,15 @@ def draw_solid(
     camera: Camera,
     cuts: Sequence[Cut | None],
     masks: Sequence[Mask | None] | None = None,
+    *,
+    memory: Memory = FRESH,
 ) -> SceneFragments:
     """The visibility buffer of what `place` returned, without what is cut out, and without the triangles of masks.
 
     First all triangles without holes are drawn, then, instance by instance, the others.
     """
     holed = holed_instances(placed.whole, cuts, camera, placed.bent)
-    solid = draw_nearest(placed.of(solid_scene(placed.scene, holed, masks)), view)
+    solid = draw_nearest(placed.of(solid_scene(placed.scene, holed, masks)), view, memory=memory)
     ids, depth = cast("tuple[I32, F32]", solid.drawn_planes)
     for k, at in enumerate(solid.positions if ids.size else ()):
         draw_holed(placed, holed, ids[k : k + 1], depth[k : k + 1], at=at, threads=view.threads)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from topleft._core.base.memory import FRESH, SCRATCH, Memory, check_fits, empty
 from topleft._core.base.options import Cull, DepthTest, Sampling, Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.cluster_draw import ClusteredMesh, equal_bands
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.fragments import Fragments, GivenCorners
@@ -29,11 +28,13 @@ from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
+from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
+from topleft._meshes.model.mesh import trusted_mesh
+from topleft._meshes.picture.bend import BentMesh, bend
 from topleft._meshes.picture.fragments import Ids, MeshFragments, SceneDepthLayers, SceneFragments
 from topleft._meshes.picture.rounds import draw_placed, front_to_back, pays_in_clusters
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.picture.through_lens import DrawnScene, scene_through
 from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import DepthTestOption
 
@@ -45,6 +46,39 @@ MOST_PIXELS_OF_PART = 1 << 30
 
 #: cull codes of a view (tl_cull) for an instance that mirrors.
 MIRRORED = {0: 0, 1: 2, 2: 1}
+
+
+#: What a mirrored instance is mirrored by again, to stand in eye space.
+MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+
+
+class DrawnScene(NamedTuple):
+    """What is drawn of a scene, and the scene itself, which ids count the triangles of."""
+
+    scene: Scene
+    whole: Scene
+    clip_from_world: NDArray[np.float64]
+    bent: tuple[BentMesh, ...] | None
+
+
+def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnScene:
+    """The scene as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it.
+
+    What is bent stands in eye space, mirrored instances mirrored twice: so they stay mirrored, for `cull`.
+    """
+    if camera.lens is None:
+        return DrawnScene(scene, scene, camera.clip_from_world(frame), None)
+    scene.check_counted("a scene behind a lens")
+    many, instances = [], []
+    for instance in scene:
+        mesh = instance.mesh
+        own = camera.placed(instance.transform)
+        bent = bend(mesh.vertices, mesh.triangles, own, camera.lens, frame, near_clip=near_clip)
+        place = MIRROR if instance.is_mirrored else np.eye(4)
+        points = bent.points_eye * np.diag(MIRROR)[:3] if instance.is_mirrored else bent.points_eye
+        many.append(bent)
+        instances.append(Instance(trusted_mesh(points, bent.triangles), place))
+    return DrawnScene(Scene(instances), scene, camera.clip_from_eye(frame), tuple(many))
 
 
 class PlacedScene:
@@ -362,7 +396,7 @@ def place(
     """Return the scene as the camera sees it, and the checked options of a verb; `material`: whose backs are culled."""
     view = View.parse(shot.size, cast(ViewOptions, options))
     if with_depth:
-        refuse_classic(view, "depth")
+        view.refuse_classic("depth")
         refuse_many(view, "rasterize")
     drawn = scene_through(shot.scene, shot.camera, view.viewport, near_clip=view.near_clip)
     return PlacedScene(drawn, view, with_depth=with_depth, material=material, is_mesh=shot.is_mesh), view
@@ -428,10 +462,11 @@ def draw_nearest(
     background_depth: float | None = None,
     *,
     is_split: bool = False,
+    memory: Memory = FRESH,
 ) -> SceneFragments:
-    """Return the visibility buffer of what `place` returned; `is_split` as in `View`, of one instance."""
+    """Return the visibility buffer of what `place` returned; `is_split` as in `View`, and `memory`: of one instance."""
     if len(placed.scene) == 1:
-        return placed.fragments_of(draw_one(FRESH, placed, depth_test, background_depth, is_split=is_split), view)
+        return placed.fragments_of(draw_one(memory, placed, depth_test, background_depth, is_split=is_split), view)
     (width, height), positions = view.size, placed.positions(view)
     n = len(positions)
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
@@ -493,7 +528,7 @@ def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
     if len(placed.scene) == 1:
         mesh = placed.scene[0].mesh
         return draw_coverage(SCRATCH, mesh.vertices, mesh.triangles, placed.view_of(0), out)
-    refuse_classic(view, "a scene")
+    view.refuse_classic("a scene")
     width, height = view.size
     n = view.sampling.n_samples
     is_share = n > 1 or view.sampling is Sampling.AREA

@@ -7,6 +7,7 @@ with alpha.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 from topleft._core.base.array_types import U8
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
@@ -24,6 +25,8 @@ from topleft._meshes.picture.fragments import counts_of, shown_of
 from topleft._meshes.picture.shade import Shading, ShadingOptions, shade_instances, shade_numbers
 from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import ShadingOption
+
+SUBJECTS: dict[str, type] = {"Mesh": Mesh, "Scene": Scene, "Points": Points}
 
 
 def shade(
@@ -101,16 +104,13 @@ def shade(
     (32, 32, 4)
     """
     camera = as_camera(camera)
-    if not isinstance(mesh, Points):
-        check_drawn(frags, mesh)
+    check_drawn(frags, mesh)
     options = ShadingOptions.parse(
         shading, color, background, depth_range, lights, ambient, material, matcap, fog, environment, threads
     )
-    if isinstance(mesh, Points):
-        if not (isinstance(frags, PointFragments) and frags._n_vertices == len(mesh)):
-            raise ValueError(f"frags must be those of the {len(mesh)} points, got {frags!r}")
-        return shade_cloud(frags, mesh, camera, options)
-    return shade_by(frags, scene_of(mesh), camera, options)
+    if frags._subject_kind == "Points":
+        return shade_cloud(cast(PointFragments, frags), cast(Points, mesh), camera, options)
+    return shade_by(frags, scene_of(cast(Mesh, mesh)), camera, options)
 
 
 def shade_by(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOptions) -> U8:
@@ -120,19 +120,19 @@ def shade_by(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOpt
     return shade_instances(shown_of(frags, scene), frags._seen(), camera, options)
 
 
-def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
-    """Raise an error unless the mesh or scene can be the one that was drawn: kernels index its arrays by fragments."""
+def check_drawn(frags: Fragments, mesh: Mesh | Scene | Points) -> None:
+    """Raise an error unless the subject can be the one that was drawn: kernels index its arrays by fragments."""
     if not isinstance(frags, Fragments):
         raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
-    kind = Scene if frags._is_of_scene else Mesh
-    if not isinstance(mesh, kind):
-        raise TypeError(f"mesh must be a {kind.__name__}, got {type(mesh).__name__}")
-    drawn, given = frags._counts(), counts_of(scene_of(mesh))
+    kind, drawn = frags._subject_kind, frags._counts()
+    if not isinstance(mesh, SUBJECTS[kind]):
+        raise TypeError(f"mesh must be a {kind}, got {type(mesh).__name__}")
+    given = [(len(cast(Points, mesh)),) * 2] if kind == "Points" else counts_of(scene_of(cast(Mesh, mesh)))
     if len(drawn) != len(given):
         raise ValueError(f"mesh must be the scene that was drawn, of {len(drawn)} instances, got one of {len(given)}")
     for k, (old, new) in enumerate(zip(drawn, given, strict=True)):
         if old != new:
-            name = f"mesh[{k}]" if frags._is_of_scene else "mesh"
+            name = f"mesh[{k}]" if kind == "Scene" else "mesh"
             raise ValueError(
                 f"{name} must be the one that was drawn, with {old[0]} vertices and {old[1]} triangles, "
                 f"got {new[0]} and {new[1]}"

@@ -12,7 +12,7 @@ Pictures", SIGGRAPH 1977 (highlights).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -22,7 +22,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
-from topleft._core.base.arrays import INT32_MAX, shown
+from topleft._core.base.arrays import INT32_MAX
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
 from topleft._core.base.defaults import DEFAULT_CREASE
 from topleft._core.base.memory import empty
@@ -32,7 +32,7 @@ from topleft._core.raster.fragments import Fragments, SeenSamples
 from topleft._core.raster.sampling import sample_positions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.environment import Environment
-from topleft._meshes.model.light import AMBIENT, TO_HEADLIGHT, Fog, Light, as_not_negative
+from topleft._meshes.model.light import AMBIENT, TO_HEADLIGHT, Fog, Light, as_lights, as_not_negative
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
@@ -110,10 +110,12 @@ class ShadingOptions:
     ) -> ShadingOptions:
         """Check the options of a call."""
         mode = parse(Shading, "shading", shading)
-        lights = (lights,) if isinstance(lights, Light) else lights
-        if lights is not None and (not isinstance(lights, Iterable) or isinstance(lights, np.ndarray | str | dict)):
-            raise TypeError(f"lights must be a Light or a sequence of them, got {shown(lights)}")
-        _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog, environment=environment)
+        lights = None if lights is None else as_lights(lights)
+        kinds = {"material": Material, "matcap": Texture, "fog": Fog, "environment": Environment}
+        for (name, kind), value in zip(kinds.items(), (material, matcap, fog, environment), strict=True):
+            if value is not None and not isinstance(value, kind):
+                article = "an" if kind is Environment else "a"
+                raise TypeError(f"{name} must be {article} {kind.__name__}, got {type(value).__name__}")
         if mode is Shading.MATCAP and matcap is None:
             raise ValueError("matcap must be a Texture for shading 'matcap', got None")
         if environment is not None:  # which lights by itself
@@ -392,17 +394,3 @@ def shade_normals(
     run_parts(lambda first, end: scene.shade_normals(ids, out, first, end - first), len(ids),
               threads_for(threads, n_triangles))  # fmt: skip
     return out
-
-
-def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object, environment: object) -> None:
-    for light in lights:
-        if not isinstance(light, Light):
-            raise TypeError(f"lights must be of Light, got {type(light).__name__}: a direction is Light((0, 1, 0))")
-    kinds = (
-        ("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog),
-        ("environment", environment, Environment),
-    )  # fmt: skip
-    for name, value, kind in kinds:
-        if value is not None and not isinstance(value, kind):
-            article = "an" if kind is Environment else "a"
-            raise TypeError(f"{name} must be {article} {kind.__name__}, got {type(value).__name__}")

@@ -12,7 +12,6 @@ from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_size
 from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
 from topleft._meshes.lod.detail import detailed
-from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft._meshes.scene.scene import IN_PLACE, Scene, as_meshes, as_subject, scene_of
 
@@ -40,11 +39,14 @@ class Shot:
         seen_by = camera_for(subject, camera, checked)
         if isinstance(subject, Points):
             return cls(NOTHING, subject, seen_by, checked)
-        return cls(scene_of(subject), None, seen_by, checked, is_mesh=isinstance(subject, Mesh))
+        scene = scene_of(subject)
+        return cls(scene, None, seen_by, checked, is_mesh=scene is not subject)
 
     @property
-    def subject(self) -> Mesh | Scene:
-        """The mesh or scene, as `shade` takes it."""
+    def subject(self) -> Any:
+        """The points, the mesh or the scene, as verbs take it."""
+        if self.cloud is not None:
+            return self.cloud
         return self.scene[0].mesh if self.is_mesh else self.scene
 
     def within(self, tolerance: float, **options: Any) -> Shot:

@@ -23,7 +23,6 @@ from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import CameraLike, as_camera
 from topleft._meshes.io.layer_files import save_layers
 from topleft._meshes.model.points import Points
-from topleft._meshes.picture.cloud import CloudBuffer
 from topleft._meshes.picture.gbuffer import GBuffer
 from topleft._meshes.picture.layers import LAYERS, draw_layers
 from topleft._meshes.picture.shade import LookOptions
@@ -74,9 +73,7 @@ class ViewLayers(Mapping[str, Array]):
         ValueError
             If there is no such layer; and as `save_layers` does.
         """
-        if layer is not None and not (isinstance(layer, str) and layer in self):
-            raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
-        return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
+        return save_layers(path, self if layer is None else {layer: self._named(layer)}, scale=scale)
 
     def rle(
         self, layer: LayerOption = "instance", *, labels: npt.ArrayLike | None = None, compressed: bool = True
@@ -107,11 +104,15 @@ class ViewLayers(Mapping[str, Array]):
         >>> view.rle("instance", compressed=False)[0]["counts"][:4]
         [13, 4, 2, 4]
         """
-        if not (isinstance(layer, str) and layer in self):
-            raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
+        found = self._named(layer)
         if layer == "instance" and labels is None and self._n_instances is not None:
             labels = np.arange(self._n_instances)
-        return to_rle(self[layer], labels=labels, compressed=compressed)
+        return to_rle(found, labels=labels, compressed=compressed)
+
+    def _named(self, layer: str) -> Array:
+        if not (isinstance(layer, str) and layer in self):
+            raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
+        return self[layer]
 
 
 class LayerLookOptions(LookOptions, total=False):
@@ -258,7 +259,7 @@ def gbuffer_of(
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **look: Any,
-) -> GBuffer | CloudBuffer:
+) -> GBuffer:
     """Return what layers are taken of; arguments as for `render_layers`.
 
     Raises
@@ -279,8 +280,6 @@ def gbuffer_of(
         None if camera_to is None else as_camera(camera_to, "camera_to"),
         None if transforms_to is None else as_transforms(transforms_to, n),
     )
-    if shot.cloud is not None:
-        return CloudBuffer(shot.cloud, shot.camera, shot.size, options, look, *flow)
     return GBuffer(shot, options, look, *flow, rasterizer)
 
 

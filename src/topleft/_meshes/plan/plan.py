@@ -18,7 +18,6 @@ from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import DepthTest, Sampling, parse
-from topleft._core.raster.classic import refuse_classic
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.costs import cost_table
 from topleft._core.raster.fill import Style, draw_fill
@@ -218,7 +217,7 @@ class Plan:
         ValueError
             If the call asks for another size, sampling, method, side to cull or number of sub-pixel bits.
         """
-        refuse_classic(view, "plan")
+        view.refuse_classic("plan")
         if view.is_exact != self._view.is_exact:
             wishes = ("exact" if view.is_exact else view.subpixel_bits for view in (self._view, view))
             raise ValueError("plan is for subpixel_bits={!r}, got {!r}: make another with topleft.plan".format(*wishes))
@@ -340,7 +339,7 @@ def plan(
     elif tolerance:
         raise ValueError("tolerance needs a mesh and a camera in the place of vertices and triangles")
     checked = replace(View.parse(size, options), is_split=mesh is not None)
-    refuse_classic(checked, "plan")
+    checked.refuse_classic("plan")
     if checked.sampling in (Sampling.OUTER, Sampling.INNER, Sampling.AREA) and verb == "rasterize":
         raise ValueError(f"sampling {str(checked.sampling)!r} gives no ids: outputs must be 'coverage' or 'overdraw'")
     found = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)

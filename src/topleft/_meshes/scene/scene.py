@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -345,7 +345,9 @@ class Scene:
         ValueError
             If there are no triangles.
         """
-        used = [world_corners(instance) for instance in self.instances if len(instance.mesh.triangles)]
+        drawn = [instance for instance in self.instances if len(instance.mesh.triangles)]
+        points = {id(mesh): used_vertices(mesh) for mesh, _ in self.meshes.values()}
+        used = [partial(moved, points[id(instance.mesh)], instance.transform) for instance in drawn]
         if not used:
             raise ValueError("a scene without triangles has no bounds")
         return extreme_points(*used)

@@ -18,7 +18,6 @@ from topleft._core.base.arrays import INT32_MAX, as_array, shown
 from topleft._core.base.options import DepthTest, parse
 from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.raster.fragments import Fragments
-from topleft._meshes.picture.fragments import SceneFragments
 from topleft.typing import DepthTestOption
 
 RULES = {DepthTest.LESS: 0, DepthTest.GREATER: 1, None: 2}  # tl_merge_rule in csrc/tiles.h
@@ -153,7 +152,7 @@ def _as_buffer(buffer: Any, i: int) -> tuple[I32, F32]:
 
 def _planes_of(frags: Fragments) -> tuple[Any, Any]:
     """Ids and depth, (H, W) or (H, W, S); ids of a scene are those of all its triangles."""
-    samples = frags.samples_id if isinstance(frags, SceneFragments) else frags.samples_triangle
+    samples = frags.samples_id
     return (samples, frags.samples_depth) if np.shape(samples)[-1:] != (1,) else (frags.id, frags.depth)
 
 
