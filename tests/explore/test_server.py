@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from topleft._apps.explore.content import scene
 from topleft._apps.explore.messages import pack, read_header, split, unpack
 from topleft._apps.explore.session import Content, Reply
 
@@ -270,6 +271,11 @@ def test_explore_serves_meanwhile_and_returns_the_vertices_that_were_moved(capsy
         moved = [[2, 2], [7, 1], [1, 7]]
         ask(page, "pixels.draw", state=SQUARE | {"vertices": moved})
         assert explorer.vertices.tolist() == moved
+
+
+def test_explore_without_arguments_has_the_vertices_of_its_two_triangles():
+    with tl.explore(wait=False, browser=False) as explorer:
+        assert explorer.vertices.tolist() == scene("shared-edge")["vertices"]
 
 
 def test_waiting_explorer_returns_when_it_is_closed():

@@ -93,7 +93,7 @@ def content_of_name(name: str, size: Any = None) -> Content:
     if "#" in name and (name.startswith(("#", "http://127.0.0.1:", "http://localhost:", "http://[::1]:"))):
         return Content(fragment=name.partition("#")[2])
     if name in SCENES:
-        return Content("pixels", {"scene": name}, name=name)
+        return Content("pixels", {**scene(name), "scene": name}, name=name)
     if name in scenes.SHAPES:
         return Content("mesh", mesh=Mesh(*scenes.shape(name)), name=name)
     path = Path(name)

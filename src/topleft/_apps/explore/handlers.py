@@ -18,13 +18,13 @@ from topleft.errors import TopleftError
 def hello(session: Session, _: Request) -> Reply:
     """What the page starts with."""
     content = session.content
-    given = content.pixels or {"scene": SCENES[0]}
+    given = content.pixels or {**scene(SCENES[0]), "scene": SCENES[0]}
     return Reply(
         {
             "tab": content.tab,
             "name": content.name,
             "fragment": content.fragment,
-            "pixels": {**scene(given["scene"]), **given} if "scene" in given else given,
+            "pixels": given,
             "scenes": SCENES,
             "groups": scene_groups(),
             "methods": pixels.methods(),
