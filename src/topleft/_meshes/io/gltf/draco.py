@@ -148,10 +148,12 @@ def _skip_walk(rest: DracoBytes, traversal: int) -> bool:
     if traversal not in (STANDARD, VALENCE):
         raise MeshError(f"what is compressed is no mesh of Draco 2.2 (traversal {traversal})")
     n_with_seams = rest.byte()
-    rest.skip_numbers(2)  # symbols, and those where the walk splits
+    for _ in range(2):  # symbols, and those where the walk splits
+        rest.number()
     n_splits = rest.number()
-    rest.skip_numbers(2 * n_splits)
-    rest.skip((n_splits + 7) // 8)
+    if n_splits:
+        rest.skip_numbers(2 * n_splits)
+        rest.skip((n_splits + 7) // 8)
     if traversal == STANDARD:
         rest.skip(rest.number())
     for _ in range(1 + n_with_seams):
