@@ -32,14 +32,13 @@ typedef struct {
     int64_t n, n_columns;
 } tl_grad_sums;
 
-/* The numbers that a triangle sums up: X0, Y0; gradients of a_k, three times, and of z/w: times X, times Y, and alone.
- * */
-enum { TL_SUMS_OF_FACE = 14 };
+/* The numbers that a triangle sums up of where pixels lie; and of attributes, up to TL_FEW_COLUMNS. */
+enum { TL_SUMS_OF_POINTS = 16, TL_SUMS_OF_VALUES = 12, TL_FEW_COLUMNS = 4 };
 
 /* Gradients of where pixels lie in triangles.  g_db may be NULL. */
 typedef struct {
     const void *rast, *g_rast, *g_db;
-    tl_grad_sums *faces;    /* by triangle, TL_SUMS_OF_FACE columns: scratch */
+    tl_grad_sums *faces;    /* by triangle, TL_SUMS_OF_POINTS columns: scratch */
     tl_grad_sums *vertices; /* x, y, z, w */
 } tl_grad_points;
 
@@ -52,6 +51,7 @@ typedef struct {
     const void *rast, *rast_db;
     void *out, *out_da; /* (height, width, n_columns), (height, width, 2 n_wanted) or NULL */
     void *g_rast, *g_rast_db;
+    tl_grad_sums *faces; /* by triangle, the last TL_SUMS_OF_VALUES columns: scratch */
 } tl_grad_values;
 
 /* A texture with its halvings, and where it is looked at.  Backward `out` is a gradient, and the last are written. */
@@ -95,7 +95,7 @@ typedef struct {
     const void *target;  /* (height, width, n_columns) */
     double scale;        /* gradients are those of the sum of squares times half of it */
     void *scratch;       /* TL_LOSS_WINDOW rows of pixels of 8 + 4 n_columns numbers */
-    tl_grad_sums *faces; /* TL_SUMS_OF_FACE columns: scratch */
+    tl_grad_sums *faces; /* by triangle, columns for points and for values: scratch */
     tl_grad_sums *of_points, *of_edges, *of_attr;
 } tl_grad_loss;
 

@@ -119,7 +119,8 @@ static void pull_rows(const tl_grad_view *view, const tl_grad_loss *l, const los
                                    .n_columns = l->n_columns,
                                    .rast = window_of(w, WINDOW_RAST),
                                    .out = window_of(w, WINDOW_G_COLOR),
-                                   .g_rast = window_of(w, WINDOW_G_RAST)};
+                                   .g_rast = window_of(w, WINDOW_G_RAST),
+                                   .faces = l->faces};
     const tl_grad_points points = {.rast = values.rast, .g_rast = values.g_rast, .faces = l->faces};
     e.rast = values.rast, e.color = window_of(w, WINDOW_COLOR);
     e.g_out = window_of(w, WINDOW_G_OUT), e.g_color = values.out;
@@ -150,8 +151,10 @@ static double grad_loss(const tl_grad_view *view, const tl_grad_loss *l)
     }
     const tl_grad_points points = {.faces = l->faces, .vertices = l->of_points};
     close_points(view, &points);
+    close_values(view, &(tl_grad_values){.n_attr = l->n_attr, .n_columns = l->n_columns, .faces = l->faces},
+                 l->of_attr);
+    leave_band(l->faces);
     leave_band(l->of_edges);
-    leave_band(l->of_attr);
     return sum;
 }
 

@@ -80,12 +80,6 @@ TL_INLINE void store_point(const tl_grad_view *view, const grad_triangle *t, con
     }
 }
 
-/* Rows of ids as `grad_points` has them. */
-typedef struct {
-    const int32_t *lowest;
-    int64_t step, first_id;
-} id_rows;
-
 static void points_of_ids(const tl_grad_view *view, const id_rows *ids, void *const *out)
 {
     grad_triangle t;
@@ -257,23 +251,19 @@ TL_INLINE void points_of_span(const tl_grad_view *view, const grad_span *s, floa
 
 static void points_in_lanes(const tl_grad_view *view, const id_rows *ids, float *rast, float *rast_db)
 {
-    grad_span s = {.bad_id = -1};
-    for (s.row = view->first_row; s.row < view->end_row; s.row++)
-        for (s.first = 0; s.first < view->width; s.first += TL_GRAD_SPAN) {
-            const int64_t at = 4 * (s.row * view->width + s.first);
-            s.n = view->width - s.first < TL_GRAD_SPAN ? (int)(view->width - s.first) : TL_GRAD_SPAN;
-            list_runs_of(&s, ids->lowest + ids->step * s.row + s.first, ids->first_id, 0);
-            find_corners(&s, view, view->n_vertices);
-            set_point_numbers(view, &s, 0);
-            points_of_span(view, &s, rast + at, rast_db ? rast_db + at : 0);
-        }
+    grad_span s = TL_BEFORE_SPANS(view);
+    while (next_grad_span(view, ids, view->n_vertices, &s)) {
+        const int64_t at = 4 * (s.row * view->width + s.first);
+        set_point_numbers(view, &s, 0);
+        points_of_span(view, &s, rast + at, rast_db ? rast_db + at : 0);
+    }
 }
 
 /* See kernels.h. */
 static void grad_points(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
                         void *rast_db)
 {
-    const id_rows rows = {ids, step, first_id};
+    const id_rows rows = {ids, step, first_id, 0};
     void *const out[2] = {rast, rast_db};
     if (view->is_f64)
         points_of_ids(view, &rows, out);
@@ -289,8 +279,11 @@ typedef struct {
 /* What a row of pixels sums up. */
 typedef struct {
     double a[4], a_x[4]; /* gradients of a_k and of z/w, and times X */
-    double q[3][2];      /* of q_k alone */
+    double q[2][3];      /* of the first two numbers of q_k alone */
 } row_sums;
+
+/* Where a triangle sums them up: about X0 and Y0, times X, times Y, and as they are. */
+enum { FACE_BEGUN = 2, FACE_X = 4, FACE_Y = 8, FACE_ONE = 12 };
 
 /* Adds the gradients at X. */
 TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, const point_gradients *g, double x,
@@ -309,7 +302,7 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
     for (int axis = 0; has_db && axis < 2; axis++) {
         const double step = 2.0 * view->scale[axis] * r, g_du = g->db[axis] * step, g_dv = g->db[2 + axis] * step;
         const double both = g_du * u + g_dv * v;
-        s->q[0][axis] += g_du - both, s->q[1][axis] += g_dv - both, s->q[2][axis] -= both;
+        s->q[axis][0] += g_du - both, s->q[axis][1] += g_dv - both, s->q[axis][2] -= both;
         g_u -= g_du * t->sum[axis], g_v -= g_dv * t->sum[axis];
         g_total -= (g_du * (t->q[0][axis] - u * t->sum[axis]) + g_dv * (t->q[1][axis] - v * t->sum[axis])) * r;
     }
@@ -324,25 +317,31 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
         s->a[k] += g_a[k], s->a_x[k] += g_a[k] * x;
 }
 
-/* Adds what a run has summed up at Y, its X beginning `from` off the triangle's, to the triangle's sums. */
-TL_INLINE void close_row(const row_sums *s, double from, double y, double *sums)
+/* Adds what a run that begins at x, y has summed up to the sums of its triangle: gradients of a_k, and times X. */
+TL_INLINE void close_row(const double *a, const double *a_x, double x, double y, double *sums)
 {
-    for (int k = 0; k < 4; k++) {
-        sums[2 + 3 * k] += s->a_x[k] + from * s->a[k] + (k < 3 ? s->q[k][0] : 0.0);
-        sums[3 + 3 * k] += y * s->a[k] + (k < 3 ? s->q[k][1] : 0.0);
-        sums[4 + 3 * k] += s->a[k];
-    }
+    if (sums[FACE_BEGUN] == 0.0)
+        sums[0] = x, sums[1] = y, sums[FACE_BEGUN] = 1.0;
+    x -= sums[0], y -= sums[1];
+    for (int k = 0; k < 4; k++)
+        sums[FACE_X + k] += a_x[k] + x * a[k];
+    for (int k = 0; k < 4; k++)
+        sums[FACE_Y + k] += y * a[k];
+    for (int k = 0; k < 4; k++)
+        sums[FACE_ONE + k] += a[k];
 }
 
 /* Gradients of q_k, of z_k and of w_k, from the sums of a triangle.  z/w is sum z_k a_k / D, with D = sum w_k a_k the
  * same at every pixel: the determinant of the corners. */
 TL_INLINE void pull_depth(const grad_triangle *t, const double *sums, double by_q[3][3], double *g_z, double *g_w)
 {
-    const double *moments = sums + 11;
+    const double moments[3] = {sums[FACE_X + 3], sums[FACE_Y + 3], sums[FACE_ONE + 3]};
     double under = 0.0, g_under = 0.0;
-    memcpy(by_q, sums + 2, 9 * sizeof *sums);
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
+        for (int c = 0; c < 3; c++)
+            by_q[k][c] = sums[FACE_X + 4 * c + k];
         under += t->w[k] * t->q[k][2], g_z[k] = g_w[k] = 0.0;
+    }
     if (under == 0.0 || (moments[0] == 0.0 && moments[1] == 0.0 && moments[2] == 0.0))
         return;
     for (int k = 0; k < 3; k++) {
@@ -404,58 +403,47 @@ TL_INLINE void pull_span(const tl_grad_view *view, grad_span *s, const float *g_
         out[3] = vf_select(vm_and(vf_ge(z_most, at.zw), vf_ge(at.zw, vf_sub(zero, z_most))), g[2], zero);
         for (int k = 0; k < 4; k++)
             out[k] = vf_select(p.is_shown, out[k], zero);
-        store_some_quads(s->rows + 4 * p.x, p.n, out);
+        store_some_quads(s->rows + 4 * p.x, TL_LANES, out);
     }
 }
-
-#define TL_COUNT_16 {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}
 
 /* Adds the rows of the runs of a span to the sums of their triangles. */
 TL_INLINE void close_span(const tl_grad_view *view, const grad_span *s, const double *inverses, tl_grad_sums *faces)
 {
-    static const float columns[TL_SUMMED] = TL_COUNT_16;
+    static const float columns[TL_SUMMED] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     const double y = middle_at(view, 1, s->row);
     for (int r = 0; r < s->n_runs; r++) {
+        const double step = 2.0 * view->scale[0], scale[4] = {inverses[r], inverses[r], inverses[r], 1.0};
+        double a[4] = {0}, a_x[4] = {0};
         if (s->ids[r] < 0)
             continue;
-        const double x = middle_at(view, 0, s->first + s->begins[r]);
-        const int is_new = faces->slot_of[s->ids[r]] < 0;
-        double *sums = sums_of(faces, s->ids[r]);
-        row_sums all = {{0}, {0}, {{0}}};
-        if (is_new)
-            sums[0] = x, sums[1] = y;
         for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) { /* some at a time, in float32 */
             const int n = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
-            float sum[4] = {0}, sum_x[4] = {0};
-            sum_quads(s->rows + 4 * i, n, sum);
-            sum_weighed_quads(s->rows + 4 * i, columns, 1, n, sum_x);
-            for (int k = 0; k < 4; k++) {
-                all.a[k] += (double)sum[k];
-                all.a_x[k] += (double)sum_x[k] + (double)(i - s->begins[r]) * (double)sum[k];
-            }
+            float sum[4], sum_x[4];
+            sum_fours(s->rows + 4 * i, n, sum);
+            sum_weighed_fours(s->rows + 4 * i, columns, 1, n, sum_x);
+            for (int k = 0; k < 4; k++)
+                a[k] += (double)sum[k];
+            for (int k = 0; k < 4; k++)
+                a_x[k] += (double)sum_x[k] + (double)(i - s->begins[r]) * (double)sum[k];
         }
-        for (int k = 0; k < 4; k++) {
-            all.a[k] *= k < 3 ? inverses[r] : 1.0;
-            all.a_x[k] *= (k < 3 ? inverses[r] : 1.0) * 2.0 * view->scale[0];
-        }
-        close_row(&all, x - sums[0], y - sums[1], sums);
+        for (int k = 0; k < 4; k++)
+            a[k] *= scale[k];
+        for (int k = 0; k < 4; k++)
+            a_x[k] *= scale[k] * step;
+        close_row(a, a_x, middle_at(view, 0, s->first + s->begins[r]), y, sums_of(faces, s->ids[r]));
     }
 }
 
 static int64_t pull_points_in_lanes(const tl_grad_view *view, const tl_grad_points *p)
 {
-    grad_span s = {.bad_id = -1};
+    grad_span s = TL_BEFORE_SPANS(view);
     double inverses[TL_GRAD_ROOM] = {0};
-    for (s.row = view->first_row; s.row < view->end_row; s.row++)
-        for (s.first = 0; s.first < view->width; s.first += TL_GRAD_SPAN) {
-            const int64_t at = 4 * (s.row * view->width + s.first);
-            s.n = view->width - s.first < TL_GRAD_SPAN ? (int)(view->width - s.first) : TL_GRAD_SPAN;
-            list_runs_of(&s, 0, 0, (const float *)p->rast + at);
-            find_corners(&s, view, view->n_vertices);
-            set_point_numbers(view, &s, inverses);
-            pull_span(view, &s, (const float *)p->g_rast + at);
-            close_span(view, &s, inverses, p->faces);
-        }
+    while (next_grad_span(view, &(id_rows){.rast = p->rast}, view->n_vertices, &s)) {
+        set_point_numbers(view, &s, inverses);
+        pull_span(view, &s, (const float *)p->g_rast + 4 * (s.row * view->width + s.first));
+        close_span(view, &s, inverses, p->faces);
+    }
     return s.bad_id;
 }
 
@@ -466,11 +454,7 @@ TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p,
     while (next_shown(view, p->rast, view->n_vertices, &run, is_f64)) {
         row_sums s;
         const double x = middle_at(view, 0, run.column), y = middle_at(view, 1, run.row);
-        const int is_new = p->faces->slot_of[run.id] < 0;
-        double *sums = sums_of(p->faces, run.id);
         memset(&s, 0, sizeof s);
-        if (is_new)
-            sums[0] = x, sums[1] = y;
         load_seen_triangle(view, run.id, x, y, &t, is_f64);
         for (int64_t i = 0; i < run.n; i++) {
             const int64_t at = 4 * (run.at + i);
@@ -482,7 +466,10 @@ TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p,
                 g.db[c] = get_real(p->g_db, at + c, is_f64);
             pull_point(view, &t, &g, 2.0 * view->scale[0] * (double)i, has_db, &s);
         }
-        close_row(&s, x - sums[0], y - sums[1], sums);
+        double *sums = sums_of(p->faces, run.id);
+        close_row(s.a, s.a_x, x, y, sums);
+        for (int k = 0; k < 3; k++)
+            sums[FACE_X + k] += s.q[0][k], sums[FACE_Y + k] += s.q[1][k];
     }
     return run.bad_id;
 }
@@ -498,8 +485,7 @@ static int64_t pull_point_rows(const tl_grad_view *view, const tl_grad_points *p
 static void close_points(const tl_grad_view *view, const tl_grad_points *p)
 {
     for (int64_t i = 0; i < p->faces->n; i++)
-        close_triangle(view, p->faces->rows[i], p->faces->sums + TL_SUMS_OF_FACE * i, p->vertices, view->is_f64);
-    leave_band(p->faces);
+        close_triangle(view, p->faces->rows[i], p->faces->sums + p->faces->n_columns * i, p->vertices, view->is_f64);
     leave_band(p->vertices);
 }
 
@@ -508,6 +494,7 @@ static int64_t grad_points_vjp(const tl_grad_view *view, const tl_grad_points *p
 {
     const int64_t bad_id = pull_point_rows(view, p);
     close_points(view, p);
+    leave_band(p->faces);
     return bad_id;
 }
 

@@ -36,6 +36,13 @@ typedef struct {
     _Alignas(64) float rows[4 * TL_GRAD_ROOM]; /* four numbers a pixel, to be summed up */
 } grad_span;
 
+/* Where the ids of pixels stand: rows of them, to which first_id is added; or, unless it is NULL, `rast`. */
+typedef struct {
+    const int32_t *lowest;
+    int64_t step, first_id;
+    const float *rast;
+} id_rows;
+
 /* Some pixels of a span, and which run each lane has. */
 typedef struct {
     const grad_span *span;
@@ -113,9 +120,11 @@ TL_INLINE void store_some_quads(float *p, int n, const vf *columns)
     copy_rows(p, some, n, 4);
 }
 
-/* Lists the runs of a span: of a row of ids, to which first_id is added, or of numbers of `rast`. */
-TL_INLINE void list_runs_of(grad_span *s, const int32_t *ids, int64_t first_id, const float *rast)
+/* Lists the runs of a span. */
+TL_INLINE void list_span_runs(grad_span *s, const tl_grad_view *view, const id_rows *from)
 {
+    const float *rast = from->rast ? from->rast + 4 * (s->row * view->width + s->first) : 0;
+    const int32_t *ids = rast ? 0 : from->lowest + from->step * s->row + s->first;
     const vi none = vi_set1(-1);
     vi before = vi_set1(INT32_MIN);
     s->n_runs = 0;
@@ -129,7 +138,7 @@ TL_INLINE void list_runs_of(grad_span *s, const int32_t *ids, int64_t first_id, 
             id = ids_of_numbers(columns[3]);
         } else {
             id = n < TL_LANES ? vi_load_masked(inside, ids + x) : vi_load(ids + x);
-            id = vi_select(vi_gt(id, none), vi_add(id, vi_set1((int32_t)first_id)), none);
+            id = vi_select(vi_gt(id, none), vi_add(id, vi_set1((int32_t)from->first_id)), none);
         }
         const vm starts = vm_and_not(inside, vi_eq(id, vi_shift_in(id, before)));
         vi_compress(s->ids + s->n_runs, starts, id);
@@ -165,6 +174,23 @@ TL_INLINE void find_corners(grad_span *s, const tl_grad_view *view, int64_t n_ro
     }
 }
 
+/* A span that lies before those of a band. */
+#define TL_BEFORE_SPANS(view) {.row = (view)->first_row - 1, .first = (view)->width, .bad_id = -1}
+
+/* The next span of a band, with its runs and their corners, rows below n_rows; 0 when there are no more. */
+TL_INLINE int next_grad_span(const tl_grad_view *view, const id_rows *ids, int64_t n_rows, grad_span *s)
+{
+    s->first += s->n;
+    if (s->first >= view->width)
+        s->first = 0, s->row++;
+    if (s->row >= view->end_row || view->width == 0)
+        return 0;
+    s->n = view->width - s->first < TL_GRAD_SPAN ? (int)(view->width - s->first) : TL_GRAD_SPAN;
+    list_span_runs(s, view, ids);
+    find_corners(s, view, n_rows);
+    return 1;
+}
+
 /* The pixels of vector i; is_quads: in the order of quads. */
 TL_INLINE span_lanes lanes_of_span(const grad_span *s, int i, vi pixel, int is_quads)
 {
@@ -190,18 +216,22 @@ TL_INLINE vf from_begin(const span_lanes *p)
     return vf_from_vi(vi_sub(vi_add(p->pixel, vi_set1(p->x)), vi_pick(p->span->begins + p->first, p->run)));
 }
 
-/* Sums of rows of four numbers, and of these times one of each row of `weights`. */
-TL_INLINE void sum_quads(const float *rows, int n, float *sum)
+/* Sums of rows of four numbers, TL_SUMMED at most; and of these times a weight each, one every `stride`. */
+TL_INLINE void sum_fours(const float *rows, int n, float *sum)
 {
+    float a[4] = {0};
     for (int i = 0; i < n; i++)
         for (int k = 0; k < 4; k++)
-            sum[k] += rows[4 * i + k];
+            a[k] += rows[4 * i + k];
+    memcpy(sum, a, sizeof a);
 }
-TL_INLINE void sum_weighed_quads(const float *rows, const float *weights, int stride, int n, float *sum)
+TL_INLINE void sum_weighed_fours(const float *rows, const float *weights, int stride, int n, float *sum)
 {
+    float a[4] = {0};
     for (int i = 0; i < n; i++)
         for (int k = 0; k < 4; k++)
-            sum[k] += rows[4 * i + k] * weights[stride * i];
+            a[k] += rows[4 * i + k] * weights[stride * i];
+    memcpy(sum, a, sizeof a);
 }
 
 #endif

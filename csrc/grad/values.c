@@ -13,8 +13,6 @@
 #include "grad/spans.h"
 #include "lanes/lanes.h"
 
-#define TL_FEW_COLUMNS 4
-
 /* First numbers of the attributes of the corners of a triangle. */
 TL_INLINE void attr_rows(const tl_grad_view *view, int32_t id, int64_t n_columns, int64_t *rows)
 {
@@ -98,17 +96,11 @@ TL_INLINE void set_value_numbers(const tl_grad_values *v, grad_span *s, int n)
     }
 }
 
-/* The next span of a band, after those before it; 0 when there are no more. */
+/* The next span of a band, with the numbers of its runs; 0 when there are no more. */
 TL_INLINE int next_value_span(const tl_grad_view *view, const tl_grad_values *v, grad_span *s, int n)
 {
-    s->first += s->n;
-    if (s->first >= view->width)
-        s->first = 0, s->row++;
-    if (s->row >= view->end_row || view->width == 0)
+    if (!next_grad_span(view, &(id_rows){.rast = v->rast}, v->n_attr, s))
         return 0;
-    s->n = view->width - s->first < TL_GRAD_SPAN ? (int)(view->width - s->first) : TL_GRAD_SPAN;
-    list_runs_of(s, 0, 0, (const float *)v->rast + 4 * (s->row * view->width + s->first));
-    find_corners(s, view, v->n_attr);
     set_value_numbers(v, s, n);
     return 1;
 }
@@ -134,7 +126,7 @@ TL_INLINE void store_columns(float *p, int n_pixels, const vf *columns, int n)
 TL_INLINE int64_t values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, int n)
 {
     const vi order = n == 4 ? order_of_quads() : vi_iota();
-    grad_span s = {.row = view->first_row - 1, .first = view->width, .bad_id = -1};
+    grad_span s = TL_BEFORE_SPANS(view);
     clear_band(view, v->out_da, 2 * v->n_wanted);
     while (next_value_span(view, v, &s, n)) {
         const int64_t at = s.row * view->width + s.first;
@@ -280,61 +272,78 @@ TL_INLINE void pull_value_span(grad_span *s, const float *g_out, float *g_rast, 
     }
 }
 
-/* Adds the rows of the runs of a span to the sums of their corners, some at a time in float32. */
-TL_INLINE void close_value_span(const tl_grad_view *view, const grad_span *s, const float *rast, tl_grad_sums *sums,
-                                int n)
+/* Where a triangle sums up attributes: those of each times u, times v, and as they are. */
+TL_INLINE double *value_sums(tl_grad_sums *faces, double *sums) { return sums + faces->n_columns - TL_SUMS_OF_VALUES; }
+
+/* Adds the rows of the runs of a span to the sums of their triangles, some at a time in float32. */
+TL_INLINE void close_value_span(const grad_span *s, const float *rast, tl_grad_sums *faces)
 {
     for (int r = 0; r < s->n_runs; r++) {
-        double all[3][4] = {{0}}, *to[3];
         if (s->ids[r] < 0)
             continue;
+        double *to = value_sums(faces, sums_of(faces, s->ids[r]));
         for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) {
-            const int n_pixels = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
-            float sum[3][4] = {{0}};
-            sum_weighed_quads(s->rows + 4 * i, rast + 4 * i, 4, n_pixels, sum[0]);
-            sum_weighed_quads(s->rows + 4 * i, rast + 4 * i + 1, 4, n_pixels, sum[1]);
-            sum_quads(s->rows + 4 * i, n_pixels, sum[2]);
+            const int n = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
+            float sum[3][4];
+            sum_weighed_fours(s->rows + 4 * i, rast + 4 * i, 4, n, sum[0]);
+            sum_weighed_fours(s->rows + 4 * i, rast + 4 * i + 1, 4, n, sum[1]);
+            sum_fours(s->rows + 4 * i, n, sum[2]);
             for (int k = 0; k < 3; k++)
                 for (int c = 0; c < 4; c++)
-                    all[k][c] += (double)sum[k][c];
-        }
-        corner_sums(view, sums, s->ids[r], to);
-        for (int c = 0; c < n; c++) {
-            to[0][c] += all[0][c], to[1][c] += all[1][c];
-            to[2][c] += all[2][c] - all[0][c] - all[1][c];
+                    to[4 * k + c] += (double)sum[k][c];
         }
     }
 }
 
-TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int n)
+TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, int n)
 {
-    grad_span s = {.row = view->first_row - 1, .first = view->width, .bad_id = -1};
+    grad_span s = TL_BEFORE_SPANS(view);
     while (next_value_span(view, v, &s, n)) {
         const int64_t at = s.row * view->width + s.first;
         pull_value_span(&s, (const float *)v->out + n * at, (float *)v->g_rast + 4 * at, n);
-        close_value_span(view, &s, (const float *)v->rast + 4 * at, sums, n);
+        close_value_span(&s, (const float *)v->rast + 4 * at, v->faces);
     }
     return s.bad_id;
 }
 
+/* Whether attributes are summed up by triangle first. */
+TL_INLINE int sums_by_face(const tl_grad_view *view, const tl_grad_values *v)
+{
+    return !view->is_f64 && has_few_values(v) && v->n_columns <= TL_FEW_COLUMNS && !v->out_da;
+}
+
 static int64_t pull_value_rows(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
-    if (view->is_f64)
-        return pull_values(view, v, sums, 1);
-    switch (has_few_values(v) && !v->out_da ? v->n_columns : 0) {
-    case 1: return pull_values_in_lanes(view, v, sums, 1);
-    case 2: return pull_values_in_lanes(view, v, sums, 2);
-    case 3: return pull_values_in_lanes(view, v, sums, 3);
-    case 4: return pull_values_in_lanes(view, v, sums, 4);
-    default: return pull_values(view, v, sums, 0);
+    switch (sums_by_face(view, v) ? v->n_columns : 0) {
+    case 1: return pull_values_in_lanes(view, v, 1);
+    case 2: return pull_values_in_lanes(view, v, 2);
+    case 3: return pull_values_in_lanes(view, v, 3);
+    case 4: return pull_values_in_lanes(view, v, 4);
+    default: return view->is_f64 ? pull_values(view, v, sums, 1) : pull_values(view, v, sums, 0);
     }
+}
+
+/* Ends a band: from sums of triangles to those of their corners. */
+static void close_values(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
+{
+    for (int64_t i = 0; sums_by_face(view, v) && i < v->faces->n; i++) {
+        const double *of = value_sums(v->faces, v->faces->sums + v->faces->n_columns * i);
+        double *to[3];
+        corner_sums(view, sums, v->faces->rows[i], to);
+        for (int64_t c = 0; c < v->n_columns; c++) {
+            to[0][c] += of[c], to[1][c] += of[4 + c];
+            to[2][c] += of[8 + c] - of[c] - of[4 + c];
+        }
+    }
+    leave_band(sums);
 }
 
 /* See kernels.h. */
 static int64_t grad_values_vjp(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
     const int64_t bad_id = pull_value_rows(view, v, sums);
-    leave_band(sums);
+    close_values(view, v, sums);
+    leave_band(v->faces);
     return bad_id;
 }
 

@@ -91,6 +91,32 @@ def test_barycentric_vjp_is_that_of_an_attribute():
     np.testing.assert_allclose(frags.barycentric_vjp(g), frags.interpolate_vjp(corners, g)[1], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("columns", "options"),
+    [(3, {}), (4, {}), (4, {"clip_depth": "zero_to_one"}), (3, {"transform": np.diag([0.9, 1.1, 1.0, 1.2]) + 0.05})],
+)
+def test_depth_vjp_is_differences(columns, options):
+    vertices, triangles = clip_scene()
+    vertices = vertices[:, :columns]
+    if columns == 3 and not options:
+        vertices = vertices * [6, 5, 1] + [6, 5, 0]
+    frags, g = tl.rasterize(vertices, triangles, (12, 10), **options), RNG.normal(size=(10, 12))
+
+    def depths(at):
+        pos = in_pixels(frags.corners, at)[0]
+        out = np.zeros(frags.mask.shape)
+        for y, x in np.argwhere(frags.mask):
+            row = triangles[frags.triangle[y, x]]
+            parts = np.linalg.inv(pos[row][:, [0, 1, 3]].T) @ [x + 0.5, y + 0.5, 1]
+            out[y, x] = (parts @ pos[row, 2]) / (parts @ pos[row, 3])
+        is_half = (columns == 4 or "transform" in options) and "clip_depth" not in options
+        return np.where(frags.mask, (out + 1) / 2, 0) if is_half else out
+
+    np.testing.assert_allclose(depths(vertices)[frags.mask], frags.depth[frags.mask], atol=0.02)  # the snap
+    expected = by_differences(lambda at: (g * depths(at)).sum(), vertices)
+    np.testing.assert_allclose(frags.depth_vjp(g), expected, rtol=1e-6, atol=1e-6)
+
+
 def test_gradients_of_triangles_without_area_are_0():
     vertices = np.array([[0.0, 0], [8, 0], [0, 8], [2, 2], [4, 4], [6, 6]])
     frags = tl.rasterize(vertices, [[0, 1, 2], [3, 4, 5]], (8, 8))
@@ -232,6 +258,16 @@ def test_area_vjp_with_colours_is_the_sum_over_channels():
     found = tl.area_vjp(points, triangles, (10, 10), g, colors=colours)
     parts = [tl.area_vjp(points, [row], (10, 10), g @ colour) for row, colour in zip(triangles, colours, strict=True)]
     np.testing.assert_allclose(found, sum(parts), rtol=1e-12)
+
+
+def test_area_vjp_of_any_threads_has_the_same_bits():
+    points, triangles = RNG.uniform(0, 40, (60, 2)), RNG.integers(0, 60, (50, 3))
+    g = RNG.normal(size=(40, 40))
+    one = tl.area_vjp(points, triangles, 40, g, threads=1)
+    for threads in (2, 3, 50, None):
+        assert_same(tl.area_vjp(points, triangles, 40, g, threads=threads), one)
+    alone = [tl.area_vjp(points, [row], 40, g, threads=1) for row in triangles]
+    np.testing.assert_allclose(one, sum(alone), rtol=1e-12, atol=1e-12)
 
 
 def test_area_vjp_of_overdraw_on_the_grid_of_the_snap():

@@ -1,7 +1,9 @@
 # Tensors of pixels and their gradients. Included by kernels.pyx.
 
 MOST_LEVELS = TL_MOST_LEVELS
-SUMS_OF_FACE = TL_SUMS_OF_FACE
+SUMS_OF_POINTS = TL_SUMS_OF_POINTS
+SUMS_OF_VALUES = TL_SUMS_OF_VALUES
+FEW_COLUMNS = TL_FEW_COLUMNS
 IDS_ROOM = TL_IDS_ROOM
 LOSS_WINDOW = TL_LOSS_WINDOW
 
@@ -56,7 +58,7 @@ cdef class GradientView:
                    int64_t first, int64_t end) -> int:
         """Sum up gradients of vertices from rows of those of `rast` and, unless None, of `rast_db`.
 
-        `faces`: scratch by triangle, SUMS_OF_FACE columns. Returns the number of a triangle that does not exist, or -1.
+        `faces`: scratch by triangle, SUMS_OF_POINTS columns. Returns the number of a triangle that does not exist, or -1.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_points p
@@ -68,10 +70,11 @@ cdef class GradientView:
         return bad
 
     def values(self, attr: Array, const int32_t[::1] wanted, arrays: tuple[Array | None, ...],
-               GradientSums sums or None, int64_t first, int64_t end) -> int:
+               GradientSums faces or None, GradientSums sums or None, int64_t first, int64_t end) -> int:
         """Write rows of attributes (V, K); with sums, of their gradients. Returns as `points_vjp` does.
 
-        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for what is not there.
+        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for what is not there. `faces`, with
+        sums: scratch by triangle, SUMS_OF_VALUES columns, for FEW_COLUMNS at most.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_values v
@@ -86,6 +89,7 @@ cdef class GradientView:
                 bad = K.grad_values(&view, &v)
             return bad
         v.g_rast, v.g_rast_db = <void *>first_of(arrays[4]), <void *>first_of(arrays[5])
+        v.faces = &faces.sums
         with nogil:
             bad = K.grad_values_vjp(&view, &v, &sums.sums)
         return bad
@@ -158,7 +162,8 @@ cdef class GradientView:
 
         `ids`: those of the picture, whether row 0 is on top, what is added to them. `mesh` and `scratch[0]` are those
         of `edges`, `codes` the rule and what squares count by; `scratch[1]` holds LOSS_WINDOW rows of 8 + 4 K numbers a
-        pixel. `sums`: by triangle, SUMS_OF_FACE columns; by vertex, of points and of edges; by row of `attr`.
+        pixel. `sums`: by triangle, columns as `points_vjp` and `values` take them; by vertex, of points and of edges; by
+        row of `attr`.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_loss l

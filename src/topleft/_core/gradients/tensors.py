@@ -117,6 +117,12 @@ def points(
     return rast, rast_db
 
 
+def faces_of(grid: PixelGrid, band: Band, n_columns: int, n_values: int) -> engine.GradientSums:
+    """Return room for sums by triangle: so many columns, and where there are few values those of them."""
+    more = engine.SUMS_OF_VALUES if 0 < n_values <= engine.FEW_COLUMNS else 0
+    return sums_of(len(grid.tri), n_columns + more, band, grid.width, "faces")
+
+
 def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
     """Return the gradient of `pos`."""
     out = np.zeros(pos.shape, pos.dtype)
@@ -124,7 +130,7 @@ def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Ar
     def work(band: Band, sums: engine.GradientSums) -> int:
         i = band.picture
         slopes = None if g_db is None else g_db[i]
-        faces = sums_of(len(grid.tri), engine.SUMS_OF_FACE, band, grid.width, "faces")
+        faces = faces_of(grid, band, engine.SUMS_OF_POINTS, 0)
         return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, faces, sums, band.first, band.end)
 
     grid.refuse(grid.bands.add_up(work, out, 3))
@@ -144,7 +150,7 @@ def values(
         i = band.picture
         slopes = (None, None) if rast_db is None else (rast_db[i], out_da[i])
         arrays = rast[i], slopes[0], out[i], slopes[1]
-        return view.values(of(attr, i), columns, arrays, None, band.first, band.end)
+        return view.values(of(attr, i), columns, arrays, None, None, band.first, band.end)
 
     grid.refuse(grid.bands.run(work))
     return out, out_da
@@ -169,7 +175,8 @@ def values_vjp(
         i = band.picture
         db, da, g = (None if one is None else one[i] for one in (rast_db, g_da, g_db))
         arrays = rast[i], db, g_out[i], da, g_rast[i], g
-        return view.values(of(attr, i), columns, arrays, sums, band.first, band.end)
+        faces = faces_of(grid, band, 0, attr.shape[2])
+        return view.values(of(attr, i), columns, arrays, faces, sums, band.first, band.end)
 
     grid.refuse(grid.bands.add_up(work, g_attr, 3))
     return g_attr, g_rast, g_db
@@ -310,7 +317,7 @@ def squares(
 
     def work(band: Band) -> tuple[list[engine.GradientSums], float]:
         i, width = band.picture, grid.width
-        faces = sums_of(len(grid.tri), engine.SUMS_OF_FACE, band, width, "faces")
+        faces = faces_of(grid, band, engine.SUMS_OF_POINTS, n)
         sums = [
             sums_of(n_vertices, 4, band, 3 * width, "points"),
             sums_of(n_vertices, 4, band, 6 * width, "edges"),

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_real, as_size, shown
+from topleft._core.base.threads import parse_threads, run_parts, threads_of_rows
 from topleft._core.gradients import tensors
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid
 from topleft.typing import EdgesOption
@@ -25,6 +26,7 @@ class Given(Protocol):
     transform: Any
     viewport: tuple[int, int]
     origin: tuple[int, int]
+    zero_to_one: bool
 
 
 class ShownMesh(Protocol):
@@ -81,6 +83,13 @@ class Backward:
         g = self.as_grad("grad", grad, 3)
         g_rast = np.zeros_like(self.rast)
         g_rast[..., 0], g_rast[..., 1] = g[..., 0] - g[..., 2], g[..., 1] - g[..., 2]
+        return self.to_vertices(tensors.points_vjp(self.grid, self.pos, self.rast, g_rast, None))
+
+    def depth(self, grad: ArrayLike) -> Floats:
+        """Return the gradient of the vertices from that of the depth."""
+        is_pixels = self.given.transform is None and self.vertices.shape[1] < 4
+        g_rast = np.zeros_like(self.rast)
+        g_rast[..., 2] = self.as_grad("grad", grad) * (1.0 if is_pixels or self.given.zero_to_one else 0.5)
         return self.to_vertices(tensors.points_vjp(self.grid, self.pos, self.rast, g_rast, None))
 
     def interpolate(
@@ -171,6 +180,7 @@ def area_vjp(
     grad: ArrayLike,
     *,
     colors: ArrayLike | None = None,
+    threads: int | None = None,
 ) -> Floats:
     """Return the gradient of vertices from that of exact areas, as ``sampling="area"`` has them.
 
@@ -188,6 +198,8 @@ def area_vjp(
         times colours, which is `fill` over black where no triangles overlap.
     colors : array_like, shape (T, C), optional
         Of each triangle.
+    threads : int, optional
+        As in `rasterize`; never changes a bit.
 
     Returns
     -------
@@ -231,6 +243,16 @@ def area_vjp(
     given = as_pixels("grad", grad)
     if given.shape != shape:
         raise ValueError(f"grad must have shape {shape}, got {given.shape}")
+    corners_px, g_corners = points_px[rows].reshape(-1, 2), np.zeros((3 * len(rows), 2))
+    of_pixels = given.reshape(height, width, -1)
+
+    def work(first: int, end: int) -> None:
+        own, part = np.arange(3 * (end - first), dtype=np.int32).reshape(-1, 3), slice(3 * first, 3 * end)
+        values = None if of_triangles is None else of_triangles[first:end]
+        engine.area_vjp(corners_px[part], own, values, of_pixels, g_corners[part])
+
+    run_parts(work, len(rows), threads_of_rows(len(rows), parse_threads(threads)))
     out = np.zeros(points_px.shape)
-    engine.area_vjp(points_px, rows, of_triangles, given.reshape(height, width, -1), out)
+    for axis in range(2):
+        out[:, axis] = np.bincount(rows.ravel(), g_corners[:, axis], len(points))
     return out if points.shape[1] == 2 else np.column_stack([out, np.zeros(len(out))])

@@ -38,6 +38,8 @@ class GivenCorners(NamedTuple):
     transform: ArrayLike | None
     viewport: tuple[int, int]
     origin: tuple[int, int] = (0, 0)
+    zero_to_one: bool = False
+    """Whether depth is z/w, not (z/w + 1) / 2; pixels with depth have theirs as it is."""
 
     def homogeneous(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
         """Corners of triangles (N, 3, 3) float64 as (x w, y w, w), x and y in pixels, not snapped."""
@@ -451,6 +453,18 @@ class Fragments:
                [-0.03125,  0.     ]])
         """
         return Backward.of(self).weights(grad)
+
+    def depth_vjp(self, grad: ArrayLike) -> NDArray[np.float64]:
+        """Return the gradient of the vertices from that of `depth`, (H, W), as `interpolate_vjp` does.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, 0, 0.0], [4, 0, 1.0], [0, 4, 0.0]], [[0, 1, 2]], (1, 1))
+        >>> frags.depth_vjp([[1.0]])[:, 2]  # the weights of the corners
+        array([0.75 , 0.125, 0.125])
+        """
+        return Backward.of(self).depth(grad)
 
     def antialias(self, picture: ArrayLike, *, edges: EdgesOption = "area") -> NDArray[Any]:
         """Return a picture of what shows with smooth silhouettes.

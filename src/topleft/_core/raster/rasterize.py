@@ -252,7 +252,7 @@ def draw_fragments(
     view.refuse_classic("depth")
     refuse_many(view, "rasterize")
     options = FragmentOptions.parse(depth_test, background_depth, out)
-    corners = GivenCorners(vertices, triangles, view.transform, view.viewport, view.origin)
+    corners = GivenCorners(vertices, triangles, view.transform, view.viewport, view.origin, view.zero_to_one)
     frags = draw_clusters(memory, vertices, view, options)
     if frags is not None:
         return frags.drawn_from(corners)

@@ -238,7 +238,7 @@ class PlacedScene:
     def corners(self, i: int) -> GivenCorners:
         """Return what an instance is drawn from."""
         mesh, view = self.scene[i].mesh, self.view_of(i)
-        return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport, view.origin)
+        return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport, view.origin, view.zero_to_one)
 
     def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
