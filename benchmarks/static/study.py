@@ -16,7 +16,7 @@ import sys
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -36,7 +36,7 @@ from topleft._core.raster.choices import ClusterRoute
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.costs import cost_table
-from topleft._meshes.picture import instances
+from topleft._meshes.picture import instances, rounds
 
 WHOLE = {"pays_to_cluster": False}
 FORCED = {"pays_to_cluster": True, "pays_to_draw_clusters": True, "pays_to_draw_instances": True}
@@ -121,7 +121,9 @@ def counting(counts: ClusterCounts) -> Iterator[None]:
             return super().draw_rows(*arguments, **options)
 
     rasterize = sys.modules["topleft._core.raster.rasterize"]  # not the verb of the same name
-    with patch.object(rasterize, "ClusteredMesh", CountedScene), patch.object(instances, "ClusteredMesh", CountedScene):
+    with ExitStack() as patched:
+        for module in (rasterize, instances, rounds):
+            patched.enter_context(patch.object(module, "ClusteredMesh", CountedScene))
         yield
 
 

@@ -12,7 +12,7 @@ from comparing import assert_same
 import topleft as tl
 
 SIZE = (2000, 2000)
-LATEST_S = 0.5  # of the CPU; below 0.2 with one thread, and a machine that does other things takes longer by the clock
+LATEST_S = 0.5  # of the CPU, for each thread; it takes below 0.2, and by the clock longer on a machine that does others
 
 
 def random_triangles(n, extent_px):
@@ -111,7 +111,7 @@ def seconds_after_interrupt(draw):
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("name", DRAWS)
 def test_a_long_draw_interrupted_ends_soon(name, threads):
-    assert seconds_after_interrupt(lambda: DRAWS[name](threads)) < LATEST_S
+    assert seconds_after_interrupt(lambda: DRAWS[name](threads)) < threads * LATEST_S
 
 
 @pytest.mark.parametrize("name", ["coverage by area", "fill over by area", "coverage of msaa16", "fill over"])

@@ -42,23 +42,23 @@ def scenes(make, n):
 
 @PIXEL
 def test_overdraw_adversarial_pixels_equals_reference(make):
-    for scene, _ in scenes(make, 40):
+    for scene, _ in scenes(make, 15):
         comparing.check_overdraw(scene)
 
 
 @CLIP
 def test_overdraw_adversarial_clip_space_equals_reference(make):
-    for scene, _ in scenes(make, 40):
+    for scene, _ in scenes(make, 15):
         comparing.check_overdraw(scene)
 
 
-@settings(max_examples=1000)
+@settings(max_examples=400)
 @given(pixel_scenes())
 def test_overdraw_any_pixels_equals_reference(scene):
     comparing.check_overdraw(scene)
 
 
-@settings(max_examples=1000)
+@settings(max_examples=400)
 @given(clip_scenes())
 def test_overdraw_any_clip_space_equals_reference(scene):
     comparing.check_overdraw(scene)
@@ -93,12 +93,12 @@ def test_overdraw_each_number_of_bits_equals_reference(bits):
 
 def test_overdraw_meshes_that_fill_the_frame_cover_each_sample_once():
     for make in (jittered_grid, sphere_round_the_eye):
-        for scene, _ in scenes(make, 60):
+        for scene, _ in scenes(make, 24):
             assert (comparing.check_overdraw(scene) == 1).all()
 
 
 def test_overdraw_closed_fan_covers_no_sample_twice():
-    for scene, _ in scenes(fan, 30):
+    for scene, _ in scenes(fan, 18):
         counts = comparing.check_overdraw(scene)
         assert counts.max() == 1
         hub, ring = scene.vertices[-1], scene.vertices[:-1]
@@ -108,14 +108,14 @@ def test_overdraw_closed_fan_covers_no_sample_twice():
 
 
 def test_overdraw_floor_through_the_near_plane_covers_each_sample_once():
-    for scene, _ in scenes(floor, 30):
+    for scene, _ in scenes(floor, 18):
         counts = comparing.check_overdraw(scene)
         assert counts.max() == 1
         assert (counts[len(counts) // 2 + 1 :] == 1).all()  # below the horizon
 
 
 def test_overdraw_t_junctions_on_the_grid_leave_no_gap():
-    for scene, _ in scenes(t_junctions, 60):
+    for scene, _ in scenes(t_junctions, 24):
         counts = comparing.check_overdraw(scene)
         if (scene.vertices * 256 % 1 == 0).all():
             assert counts.max() == 1
@@ -154,21 +154,21 @@ def test_reference_and_int64_reference_agree():
 
 @PIXEL
 def test_rasterize_painters_order_equals_reference(make):
-    for scene, _ in scenes(make, 10):
+    for scene, _ in scenes(make, 6):
         comparing.check_painters_ids(scene)
 
 
 @DEPTH_TEST
 @PIXEL
 def test_rasterize_flat_depths_with_ties_equal_reference(make, depth_test):
-    for scene, rng in scenes(make, 6):
+    for scene, rng in scenes(make, 4):
         comparing.check_ids(with_depth(scene, rng, flat=True), depth_test)
 
 
 @DEPTH_TEST
 @PIXEL
 def test_rasterize_sloping_depths_within_bound(make, depth_test):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 3):
         comparing.check_fragments(with_depth(scene, rng), depth_test)
 
 
@@ -185,14 +185,14 @@ def far_slivers(rng, n=30, side=20):
 
 @DEPTH_TEST
 def test_rasterize_far_slivers_within_bound(depth_test):
-    for scene, rng in scenes(far_slivers, 6):
+    for scene, rng in scenes(far_slivers, 4):
         comparing.check_fragments(with_depth(scene, rng), depth_test)
 
 
 @DEPTH_TEST
 @CLIP
 def test_rasterize_clip_space_depths_within_bound(make, depth_test):
-    for scene, _ in scenes(make, 8):
+    for scene, _ in scenes(make, 5):
         comparing.check_fragments(scene, depth_test)
 
 
@@ -208,7 +208,7 @@ def test_rasterize_any_clip_space_within_bound(scene, depth_test):
 
 @pytest.mark.parametrize("depth_test", ["less", "greater"])
 def test_rasterize_each_triangle_alone_explains_the_whole(depth_test):
-    for scene, rng in scenes(jittered_grid, 6):
+    for scene, rng in scenes(jittered_grid, 4):
         scene = with_depth(scene, rng)
         alone = [
             tl.rasterize(scene.vertices, t[None], scene.size, depth_test=depth_test).depth for t in scene.triangles
@@ -225,13 +225,13 @@ def test_rasterize_each_triangle_alone_explains_the_whole(depth_test):
 
 @PIXEL
 def test_interpolate_pixels_within_bound(make):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 3):
         comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
 
 
 @CLIP
 def test_interpolate_clip_space_within_bound(make):
-    for scene, rng in scenes(make, 8):
+    for scene, rng in scenes(make, 5):
         comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
 
 
@@ -252,14 +252,14 @@ def test_interpolate_any_clip_space_within_bound(scene, seed):
 
 @PIXEL
 def test_fill_flat_equals_reference(make):
-    for scene, rng in scenes(make, 6):
+    for scene, rng in scenes(make, 4):
         colors = rng.integers(0, 256, (len(scene.triangles), rng.integers(1, 5)), np.uint8)
         comparing.check_fill_uint8(scene, colors, "triangle")
 
 
 @PIXEL
 def test_fill_gouraud_uint8_equals_reference(make):
-    for scene, rng in scenes(make, 6):
+    for scene, rng in scenes(make, 4):
         colors = rng.integers(0, 256, (len(scene.vertices), rng.integers(1, 5)), np.uint8)
         comparing.check_fill_uint8(scene, colors, "vertex")
 
@@ -293,26 +293,26 @@ def test_fill_any_gouraud_uint8_equals_reference(scene, seed, n_channels):
 
 @PIXEL
 def test_fill_gouraud_float32_within_bound(make):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 3):
         comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 3)).astype(np.float32))
 
 
 @CLIP
 def test_fill_flat_clip_space_equals_reference(make):
-    for scene, rng in scenes(make, 6):
+    for scene, rng in scenes(make, 4):
         colors = rng.integers(0, 256, (len(scene.triangles), 3), np.uint8)
         comparing.check_fill_uint8(scene, colors, "triangle")
 
 
 @CLIP
 def test_fill_gouraud_uint8_clip_space_but_for_ties_equals_reference(make):
-    for scene, rng in scenes(make, 8):
+    for scene, rng in scenes(make, 5):
         comparing.check_fill_uint8_cut(scene, rng.integers(0, 256, (len(scene.vertices), 3), np.uint8))
 
 
 @CLIP
 def test_fill_gouraud_float32_clip_space_within_bound(make):
-    for scene, rng in scenes(make, 8):
+    for scene, rng in scenes(make, 5):
         comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 2)).astype(np.float32))
 
 
