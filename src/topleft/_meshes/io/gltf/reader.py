@@ -435,14 +435,14 @@ class _Reader:
             ) from None
         self._source.budget.spend("max_nodes", 1)  # it takes the time of two
         view = draco["bufferView"]
-        content = self._accessors.view(view).tobytes()
-        size, mesh = self._meshes_of_draco.get(view) or (declared_by_draco(content), None)
+        content = self._accessors.view(view)
+        size, mesh = self._meshes_of_draco.get(view) or (declared_by_draco(content.tobytes()), None)
         self._source.budget.check("max_triangles", size.n_triangles)
         n_like = size.n_rows * size.row_bytes // DRACO_VERTEX_BYTES
         self._source.budget.check("max_vertices", max(n_like, size.n_vertices))
         self._source.budget.spend("max_vertices", max(0, n_like - size.n_vertices))
         if mesh is None:
-            mesh = DracoPy.decode(content)
+            mesh = DracoPy.decode(content.tobytes())
             self._meshes_of_draco[view] = size, mesh
         self._source.budget.check("max_vertices", len(mesh.points))
         values = {}
