@@ -2,7 +2,7 @@
 
 FOLDER is a checkout that the user has; nothing of it is kept.  pyrender: its unit tests, with `topleft.compat.pyrender`
 for `import pyrender`.  mujoco: the models under FOLDER, each drawn by `mujoco.Renderer` and by topleft: pixels whose
-object differs, depth away from outlines, and CPU time in turns.
+object differs, depth away from outlines, and CPU time in turns.  Clients of arrays, bop=FOLDER say: array_clients.py.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
 from benchmarks.report.tables import table
+from benchmarks.small.array_clients import ARRAY_CLIENTS, lines_of
 
 MODES = ("color", "depth", "segmentation")
 WANTED = 1e-4
@@ -110,7 +111,7 @@ def draw(mujoco: Any, renderer: Any, data: Any, mode: str, shadows: bool) -> np.
     return renderer.render()
 
 
-CLIENTS = {"pyrender": run_pyrender, "mujoco": run_mujoco}
+CLIENTS = {"pyrender": run_pyrender, "mujoco": run_mujoco, **ARRAY_CLIENTS}
 
 
 def run(options: argparse.Namespace, save: Save) -> Record:
@@ -142,6 +143,9 @@ def lines(record: Record) -> Iterator[str]:
             counts = [str(row[name]) for name in ("geoms", "off", "off_inside")]
             rows.append([row["model"], *counts, f"{row['depth']:.1e}", *speed])
         yield from table(head, rows)
+    for name in ARRAY_CLIENTS:
+        if name in record:
+            yield from lines_of(name, record[name])
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:

@@ -43,6 +43,7 @@ def install_pyrender() -> None:
 INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
     "mujoco": put_into("mujoco", "Renderer", "mujoco"),
+    "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
 })  # fmt: skip
 
 
