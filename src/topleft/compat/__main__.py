@@ -40,10 +40,18 @@ def install_pyrender() -> None:
     stands_for("pyrender.constants", module="pyrender.values")()
 
 
+def install_pytorch3d() -> None:
+    """Have PyTorch3D call `rasterize_meshes` of topleft, its `MeshRasterizer` too."""
+    for name in ("rasterize_meshes", "rasterizer"):
+        put_into(f"pytorch3d.renderer.mesh.{name}", "rasterize_meshes", "pytorch3d")()
+    put_into("pytorch3d.renderer", "rasterize_meshes", "pytorch3d")()
+
+
 INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
     "mujoco": put_into("mujoco", "Renderer", "mujoco"),
     "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
+    "pytorch3d": install_pytorch3d,
 })  # fmt: skip
 
 
