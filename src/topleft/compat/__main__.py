@@ -6,6 +6,7 @@ follows are its arguments.
 
 from __future__ import annotations
 
+import os
 import runpy
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -40,8 +41,15 @@ def install_pyrender() -> None:
     stands_for("pyrender.constants", module="pyrender.values")()
 
 
+def install_trimesh() -> None:
+    """Have `scene.save_image` of trimesh be that of `topleft.compat.trimesh`, and pyglet open no window on import."""
+    os.environ.setdefault("PYGLET_SHADOW_WINDOW", "0")
+    import_module("topleft.compat.trimesh").install()
+
+
 INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
+    "trimesh": install_trimesh,
     "mujoco": put_into("mujoco", "Renderer", "mujoco"),
 })  # fmt: skip
 

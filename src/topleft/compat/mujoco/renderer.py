@@ -12,15 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 import topleft as tl
-from topleft.compat._arrays import F64, light_of_bytes, over
+from topleft.compat._arrays import F64, SHOWN_AS_LIGHT, over
 from topleft.compat.mujoco import shapes
 from topleft.compat.mujoco.looks import Looks, lights_of
 
 SAMPLES = ((16, "msaa16"), (8, "msaa8"), (4, "msaa4"), (2, "msaa2"))
 """Samples of a pixel of a model's quality, and the sampling with as many."""
-
-SHOWN = np.rint(255 * light_of_bytes()).astype(np.uint8).tobytes()
-"""What MuJoCo shows for each sRGB byte: it adds light up in the numbers of the picture, which are light here."""
 
 BEHIND = 0.3
 """Opacity of a plane that is seen from below."""
@@ -175,7 +172,7 @@ class Renderer:
             return np.broadcast_to(np.asarray(sky, np.uint8), (self._height, self._width, 4))[..., :3].copy()
         look: dict[str, Any] = {"background": "transparent", "lights": lights, "ambient": ambient}
         picture = tl.render(subject, camera, self._size, sampling=self._sampling, **look)
-        return over(picture, SHOWN, sky)[..., :3]
+        return over(picture, SHOWN_AS_LIGHT, sky)[..., :3]
 
     def _depth(self) -> npt.NDArray[Any]:
         camera, _ = camera_of(self._scene.camera, self._size)
@@ -254,7 +251,7 @@ class Renderer:
             turned = np.eye(4)
             turned[:3, :3] = camera.view[:3, :3]
             picture = tl.render(sky, tl.Camera(turned, camera.projection), self._size, background="black")
-            self._sky = key, over(picture, SHOWN, (0, 0, 0, 255))
+            self._sky = key, over(picture, SHOWN_AS_LIGHT, (0, 0, 0, 255))
         return self._sky[1]
 
 
