@@ -26,15 +26,6 @@ def stands_for(*names: str, module: str) -> Callable[[], None]:
     return install
 
 
-def put_into(name: str, attribute: str, module: str) -> Callable[[], None]:
-    """What puts the thing of a module of topleft into the one of another library."""
-
-    def install() -> None:
-        setattr(import_module(name), attribute, getattr(import_module(f"topleft.compat.{module}"), attribute))
-
-    return install
-
-
 def install_pyrender() -> None:
     """Have `import pyrender` give `topleft.compat.pyrender`, with `pyrender.constants`."""
     stands_for("pyrender", module="pyrender")()
@@ -47,10 +38,15 @@ def install_trimesh() -> None:
     import_module("topleft.compat.trimesh").install()
 
 
+def install_mujoco() -> None:
+    """Have MuJoCo's own calls draw by `topleft.compat.mujoco`, and with them Gymnasium and dm_control."""
+    import_module("topleft.compat.mujoco").install()
+
+
 INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
     "trimesh": install_trimesh,
-    "mujoco": put_into("mujoco", "Renderer", "mujoco"),
+    "mujoco": install_mujoco,
 })  # fmt: skip
 
 
