@@ -4,7 +4,7 @@ FOLDER is a checkout that the user has; nothing of it is kept.  pyrender: its un
 for `import pyrender`.  trimesh: its tests of scenes and pictures, and its models, by topleft and, where there is a
 display (xvfb-run) and pyglet 1, by its own window: CPU time of a picture, and how far its numbers are off.  mujoco: the
 models under FOLDER, each drawn by `mujoco.Renderer` and by topleft: pixels whose object differs, depth away from
-outlines, and CPU time in turns.
+outlines, and CPU time in turns.  Clients of arrays, bop=FOLDER say: array_clients.py.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
 from benchmarks.report.tables import table
+from benchmarks.small.array_clients import ARRAY_CLIENTS, lines_of
 
 MODES = ("color", "depth", "segmentation")
 WANTED = 1e-4
@@ -155,7 +156,7 @@ def draw(mujoco: Any, renderer: Any, data: Any, mode: str, shadows: bool) -> np.
     return renderer.render()
 
 
-CLIENTS = {"pyrender": run_pyrender, "trimesh": run_trimesh, "mujoco": run_mujoco}
+CLIENTS = {"pyrender": run_pyrender, "trimesh": run_trimesh, "mujoco": run_mujoco, **ARRAY_CLIENTS}
 
 
 def run(options: argparse.Namespace, save: Save) -> Record:
@@ -172,10 +173,10 @@ def run(options: argparse.Namespace, save: Save) -> Record:
 
 def lines(record: Record) -> Iterator[str]:
     """A table for each client."""
-    for name in CLIENTS:
-        if tests := record.get(name, {}).get("tests"):
+    for name in ("pyrender", "trimesh"):
+        if name in record:
             yield f"tests of {name} on topleft.compat.{name}"
-            rows = [[row["file"], str(row["passed"]), str(row["other"])] for row in tests]
+            rows = [[row["file"], str(row["passed"]), str(row["other"])] for row in record[name]["tests"]]
             yield from table(["file", "passed", "failed"], rows)
     if "trimesh" in record:
         yield "models of trimesh beside its window, 640x480: CPU time of a PNG, mean difference of its numbers"
@@ -193,6 +194,9 @@ def lines(record: Record) -> Iterator[str]:
             counts = [str(row[name]) for name in ("geoms", "off", "off_inside")]
             rows.append([row["model"], *counts, f"{row['depth']:.1e}", *speed])
         yield from table(head, rows)
+    for name in ARRAY_CLIENTS:
+        if name in record:
+            yield from lines_of(name, record[name])
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:

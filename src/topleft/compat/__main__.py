@@ -47,6 +47,7 @@ INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
     "trimesh": install_trimesh,
     "mujoco": install_mujoco,
+    "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
 })  # fmt: skip
 
 
