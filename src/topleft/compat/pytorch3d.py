@@ -6,7 +6,6 @@ Has `rasterize_meshes`, `MeshRasterizer`, `RasterizationSettings` and `Fragments
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 import topleft as tl
-from topleft.compat._arrays import F64
+from topleft.compat._arrays import F64, detached, library_of
 
 __all__ = ["Fragments", "MeshRasterizer", "RasterizationSettings", "rasterize_meshes"]
 
@@ -193,7 +192,7 @@ def rasterize_meshes(
     half = np.array([max(width / height, 1.0), max(height / width, 1.0)])
     verts, faces, counts = packed(meshes)
     of = library_of(verts)
-    places = np.asarray(verts.detach() if hasattr(verts, "detach") else verts, np.float64)
+    places = detached(verts).astype(np.float64)
     ids = np.full((len(counts), height, width, faces_per_pixel), -1, np.int64)
     half = np.array([max(width / height, 1.0), max(height / width, 1.0)])
     for own, first, n in zip(ids, np.cumsum(counts) - counts, counts, strict=True):
@@ -223,11 +222,6 @@ def packed(meshes: Any) -> tuple[Any, Any, list[int]]:
     firsts = np.cumsum([0, *(len(verts) for verts, _ in pairs)])
     faces = [own.reshape(-1, 3) + first for (_, own), first in zip(pairs, firsts, strict=False)]
     return np.concatenate([verts for verts, _ in pairs]), np.concatenate(faces), [len(own) for own in faces]
-
-
-def library_of(values: Any) -> Any:
-    """PyTorch for a tensor, NumPy for an array: both have the functions that are used here."""
-    return sys.modules["torch"] if type(values).__module__.startswith("torch") else np
 
 
 def draw(
