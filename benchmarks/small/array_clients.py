@@ -134,7 +134,40 @@ def write_ply(path: Path, n: int) -> None:
     path.write_bytes("\n".join(lines).encode() + points.tobytes() + faces.tobytes())
 
 
-ARRAY_CLIENTS: Mapping[str, Client] = {"bop": run_bop}
+def run_pytorch3d(folder: Path, options: argparse.Namespace) -> list[Record]:
+    """Expected values of the tests of PyTorch3D without blur, and spheres by its kernel for the CPU and by topleft."""
+    sys.path.insert(0, str(folder))
+    import torch
+    from pytorch3d.renderer.mesh.rasterize_meshes import rasterize_meshes
+    from pytorch3d.structures import Meshes
+    from tests.test_rasterize_meshes import TestRasterizeMeshes
+
+    from topleft.compat import pytorch3d
+
+    torch.set_num_threads(1)
+    for name in ("_simple_triangle_raster", "_test_back_face_culling"):  # each raises if a value is not as expected
+        getattr(TestRasterizeMeshes(), name)(pytorch3d.rasterize_meshes, torch.device("cpu"), bin_size=0)
+    rows: list[Record] = []
+    for n, k, in_space in ((1_280, 1, True), (1_280, 4, True), (5_120, 1, True), (5_120, 1, False)):
+        vertices, triangles = tl.scenes.blob(n)
+        points = torch.tensor(vertices * 0.7 + [0, 0, 2.5], dtype=torch.float32)
+        meshes = Meshes(verts=[points], faces=[torch.tensor(np.array(triangles), dtype=torch.int64)])
+        draws = [
+            lambda own=own, meshes=meshes, k=k, in_space=in_space: own(
+                meshes, 128, 0.0, k, perspective_correct=in_space
+            )
+            for own in (rasterize_meshes, pytorch3d.rasterize_meshes)
+        ]
+        theirs, ours = ([np.asarray(part) for part in draw()] for draw in draws)
+        same = theirs[0] == ours[0]
+        case = f"{n} faces, {k} a pixel, {'in space' if in_space else 'on the screen'}"
+        row = {"case": case, "pixels": int((theirs[0] >= 0).sum()), "differ": int((~same).sum())}
+        row["off"] = max(float(np.abs(a - b)[same].max()) for a, b in zip(theirs[1:], ours[1:], strict=True))
+        rows.append(row | timed(*draws, options.rounds))
+    return rows
+
+
+ARRAY_CLIENTS: Mapping[str, Client] = {"bop": run_bop, "pytorch3d": run_pytorch3d}
 
 
 def lines_of(name: str, rows: list[Record]) -> Iterator[str]:

@@ -1,10 +1,11 @@
-"""Products of poses and colours of floats, the same bits on every processor.
+"""Products of poses and colours of floats, the same bits on every processor; tensors as arrays.
 
-Input: matrices (4, 4), colours as other libraries have them. Output: matrices, sRGB bytes.
+Input: matrices (4, 4), colours as other libraries have them, tensors of PyTorch. Output: matrices, sRGB bytes, arrays.
 """
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -110,3 +111,13 @@ def light_of_bytes() -> F64:
 
 SHOWN_AS_LIGHT = np.rint(255 * light_of_bytes()).astype(np.uint8).tobytes()
 """The light of each sRGB byte: of libraries that add light up in the numbers of the picture, which are light here."""
+
+
+def library_of(values: Any) -> Any:
+    """PyTorch for a tensor, NumPy for anything else: what is used of them has the same names in both."""
+    return sys.modules["torch"] if type(values).__module__.startswith("torch") else np
+
+
+def detached(values: Any) -> npt.NDArray[Any]:
+    """The numbers of a tensor, or of anything that NumPy reads."""
+    return np.asarray(values.detach() if hasattr(values, "detach") else values)
