@@ -167,7 +167,7 @@ class View:
         checked = as_size(size)
         if options.keys() <= KEPT_OPTIONS:
             with suppress(TypeError):  # what cannot be hashed is looked at below
-                return kept_view(checked, why_snapped, **options)
+                return kept_view(checked, why_snapped, **cast("dict[str, Any]", options))
         return cls._parse(checked, options, why_snapped, has_poses=has_poses)
 
     @classmethod
