@@ -2,7 +2,10 @@
 
 import math
 import os
+import re
+import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +13,7 @@ import pytest
 from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
-from topleft.compat.mujoco import Renderer, shapes
+from topleft.compat.mujoco import Renderer, hook, install, shapes
 
 SIZE = (64, 48)
 QUALITY = (28, 16)
@@ -232,6 +235,73 @@ def test_pictures_have_the_same_bits_on_each_isa(isa, renderer):
         expected = renderer.render()
     with on(isa):
         assert_same(renderer.render(), expected)
+
+
+@pytest.fixture
+def hooked(renderer, monkeypatch):
+    """MuJoCo's module with the calls of topleft, a rectangle of the size, and the renderer."""
+    for name in (*hook.PLATFORMS, *hook.OF_DM_CONTROL):
+        monkeypatch.setitem(sys.modules, name, None)
+    fake = sys.modules["mujoco"]
+    fake.mjtRndFlag.mjRND_SEGMENT, fake.mjtDepthMap = 8, SimpleNamespace(mjDEPTH_ZEROFAR=1)
+    renderer.scene.flags[8] = 0
+    install()
+    return fake, SimpleNamespace(width=SIZE[0], height=SIZE[1]), renderer
+
+
+def test_calls_of_mujoco_fill_arrays_from_the_lowest_row(hooked):
+    mujoco, rectangle, own = hooked
+    con = mujoco.MjrContext(own.model, 150)
+    mujoco.mjr_render(rectangle, own.scene, con)
+    rgb, depth = np.zeros(SIZE[0] * SIZE[1] * 3, np.uint8), np.zeros(SIZE[::-1], np.float32)
+    mujoco.mjr_readPixels(rgb, depth, rectangle, con)
+    assert_same(rgb.reshape(48, 64, 3)[::-1], own.render())
+    own.enable_depth_rendering()
+    near, far = 0.01, 50.0
+    distance = near / (1 - depth.astype(np.float64) * (1 - near / far))
+    assert (np.abs(distance / own.render()[::-1] - 1) < 1e-4).all()
+    con.readDepthMap = 1
+    reversed_depth = np.zeros_like(depth)
+    mujoco.mjr_readPixels(None, reversed_depth, rectangle, con)
+    assert np.abs(1 - depth - reversed_depth).max() < 1e-7
+
+
+def test_segments_of_mujoco_are_numbers_in_three_bytes(hooked):
+    mujoco, rectangle, own = hooked
+    own.scene.flags[8] = 1
+    own.scene.geoms[1].segid = 70000
+    con = mujoco.MjrContext(own.model)
+    mujoco.mjr_render(rectangle, own.scene, con)
+    own.scene.flags[8] = 0  # as Gymnasium does it, before it reads
+    rgb = np.zeros((48, 64, 3), np.uint8)
+    mujoco.mjr_readPixels(rgb, None, rectangle, con)
+    found = (rgb[::-1].astype(int) << [0, 8, 16]).sum(axis=2)
+    own.enable_segmentation_rendering()
+    assert_same(found, np.array([1, 70001, 3, 0])[own.render()[..., 0]])
+
+
+def test_pixels_of_another_size_than_was_rendered_are_refused(hooked):
+    mujoco, rectangle, own = hooked
+    con = mujoco.MjrContext(own.model)
+    with pytest.raises(ValueError, match=r"viewport must have the size of what mjr_render drew last, got \(64, 48\)"):
+        mujoco.mjr_readPixels(np.zeros((48, 64, 3), np.uint8), None, rectangle, con)
+
+
+def test_contexts_of_all_platforms_make_nothing_current(hooked):
+    for name in hook.PLATFORMS:
+        own = sys.modules[name].GLContext(640, 480)
+        own.make_current()
+        own.free()
+    assert hooked[0].Renderer is Renderer
+
+
+@pytest.mark.parametrize("package", ["gymnasium", "dm_control"])
+def test_program_of_the_robots_page_runs(package):
+    pytest.importorskip(package)
+    page = Path(__file__).parents[2].joinpath("docs", "guide", "robots.md").read_text(encoding="utf-8")
+    (program,) = [code for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if package in code]
+    done = subprocess.run([sys.executable, "-c", f"{program}\nprint(frame.shape)"], capture_output=True, text=True)
+    assert done.stdout.strip() in ("(480, 480, 3)", "(240, 320, 3)"), done.stderr
 
 
 MODEL = """

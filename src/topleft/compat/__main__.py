@@ -6,6 +6,7 @@ follows are its arguments.
 
 from __future__ import annotations
 
+import os
 import runpy
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -25,24 +26,38 @@ def stands_for(*names: str, module: str) -> Callable[[], None]:
     return install
 
 
-def put_into(name: str, attribute: str, module: str) -> Callable[[], None]:
-    """What puts the thing of a module of topleft into the one of another library."""
-
-    def install() -> None:
-        setattr(import_module(name), attribute, getattr(import_module(f"topleft.compat.{module}"), attribute))
-
-    return install
-
-
 def install_pyrender() -> None:
     """Have `import pyrender` give `topleft.compat.pyrender`, with `pyrender.constants`."""
     stands_for("pyrender", module="pyrender")()
     stands_for("pyrender.constants", module="pyrender.values")()
 
 
+def install_pytorch3d() -> None:
+    """Have PyTorch3D call `rasterize_meshes` of topleft, its `MeshRasterizer` too."""
+    own = import_module("topleft.compat.pytorch3d")
+    for name in ("renderer", "renderer.mesh.rasterize_meshes", "renderer.mesh.rasterizer"):
+        setattr(import_module(f"pytorch3d.{name}"), "rasterize_meshes", own.rasterize_meshes)  # noqa: B010
+
+
+def install_trimesh() -> None:
+    """Have `scene.save_image` of trimesh be that of `topleft.compat.trimesh`, and pyglet open no window on import."""
+    os.environ.setdefault("PYGLET_SHADOW_WINDOW", "0")
+    import_module("topleft.compat.trimesh").install()
+
+
+def install_mujoco() -> None:
+    """Have MuJoCo's own calls draw by `topleft.compat.mujoco`, and with them Gymnasium and dm_control."""
+    import_module("topleft.compat.mujoco").install()
+
+
 INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
-    "mujoco": put_into("mujoco", "Renderer", "mujoco"),
+    "trimesh": install_trimesh,
+    "mujoco": install_mujoco,
+    "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
+    "pytorch3d": install_pytorch3d,
+    "custom_rasterizer": stands_for("custom_rasterizer", module="custom_rasterizer"),
+    "texture_baker": stands_for("texture_baker", module="texture_baker"),
 })  # fmt: skip
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 import topleft as tl
-from topleft.compat._arrays import F64, U8, light_of_bytes, over, product, srgb_bytes
+from topleft.compat._arrays import F64, U8, light_of_bytes, over, product, srgb_bytes, view_of
 from topleft.compat.pyrender.graph import Node, Primitive, Scene, material_drawn
 from topleft.compat.pyrender.values import GLTF, DirectionalLight, Light, RenderFlags, SpotLight
 
@@ -119,12 +119,7 @@ class Shot:
         assert node is not None
         assert node.camera is not None
         self.scene, self.size, self.point_size, self.flags = scene, size, point_size, flags
-        pose = scene.get_pose(node)
-        pose[:3, :3] = pose[:3, :3] / np.sqrt((pose[:3, :3] ** 2).sum(axis=0))  # a scaled node scales no picture
-        view = np.eye(4)
-        view[:3, :3] = pose[:3, :3].T
-        view[:3, 3] = -product(view[:3, :3], pose[:3, 3:])[:, 0]
-        self.camera = tl.Camera(view, node.camera.get_projection_matrix(*size))
+        self.camera = tl.Camera(view_of(scene.get_pose(node)), node.camera.get_projection_matrix(*size))
         self.background = np.rint(255 * np.clip(scene.bg_color, 0, 1)).astype(np.uint8)
         self.cull: Any = "none" if flags & RenderFlags.SKIP_CULL_FACES else None
 
