@@ -3,8 +3,8 @@
  * In: `rast`, attributes, gradients of their picture.  Out: sums by vertex, sums by row of attributes.
  *
  * With a_k and the total as in points.c, an attribute is P / total, P = sum A_k a_k; here A_k are less that of the last
- * corner.  So a triangle needs the sums of h = g / total and of h_total = -sum h P / total, times X, times Y and as they
- * are: gradients of A_k are those of h with q_k, and those of a_k are sum A_k h + h_total. */
+ * corner.  So a triangle needs the sums of h = g / total and of h_total = -sum h P / total, as they are, times X and
+ * times Y: gradients of A_k are those of h with q_k, and those of a_k are sum A_k h + h_total. */
 #ifndef TL_GRAD_COLORS_C
 #define TL_GRAD_COLORS_C
 
