@@ -394,8 +394,8 @@ typedef struct tl_kernels {
     void (*grad_points)(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
                         void *rast_db);
 
-    /* The sums by vertex of what the gradients of `rast` and of `rast_db` give in a band.  Returns, as the next ones do,
-     * the number of a triangle that does not exist, or -1. */
+    /* The sums by vertex of what the gradients of `rast` and of `rast_db` give in a band.  Returns, as those of values
+     * and of colors do, the number of a triangle that does not exist, or -1. */
     int64_t (*grad_points_vjp)(const tl_grad_view *view, const tl_grad_points *points);
 
     /* Attributes in a band, and what they change by. */
