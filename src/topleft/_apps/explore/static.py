@@ -37,8 +37,8 @@ SETS = ("simd128", "scalar")
 """The instruction sets of the kernels; a page fetches one."""
 
 SCRIPTS = (
-    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js", "race.js", "mesh.js",
-    "camera.js", "files.js",
+    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js",
+    "race.js", "mesh.js", "camera.js", "files.js",
 )  # fmt: skip
 
 LIT = ("smooth", "flat", "unlit", "normals")
