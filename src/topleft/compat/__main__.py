@@ -56,6 +56,8 @@ INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "mujoco": install_mujoco,
     "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
     "pytorch3d": install_pytorch3d,
+    "custom_rasterizer": stands_for("custom_rasterizer", module="custom_rasterizer"),
+    "texture_baker": stands_for("texture_baker", module="texture_baker"),
 })  # fmt: skip
 
 

@@ -121,3 +121,30 @@ def library_of(values: Any) -> Any:
 def detached(values: Any) -> npt.NDArray[Any]:
     """The numbers of a tensor, or of anything that NumPy reads."""
     return np.asarray(values.detach() if hasattr(values, "detach") else values)
+
+
+def interpolated(values: Any, corners: npt.NDArray[Any], weights: Any, seen: npt.NDArray[np.intp]) -> Any:
+    """Values of vertices at the pixels that show a face, 0 at others; of tensors with gradients.
+
+    Parameters
+    ----------
+    values : (V, C) tensor or array
+    corners : (N, 3) integers
+        The vertices of what each pixel shows that shows something.
+    weights : (P, 3) tensor or array
+        Of all pixels.
+    seen : (N,) intp
+        Which pixels show something.
+
+    Returns
+    -------
+    (P, C) tensor or array
+    """
+    of = library_of(weights)
+    rows, names = of.asarray(seen), of.asarray(corners.astype(np.int64))
+    own = weights[rows]
+    a, b, c = (values[names[:, k]] * own[:, k : k + 1] for k in range(3))
+    found = a + b + c
+    picture = of.zeros((len(weights), found.shape[1]), dtype=found.dtype)
+    picture[rows] = found
+    return picture
