@@ -82,7 +82,7 @@ class PixelGrid:
         return (self.n_pictures, self.height, self.width, *columns)
 
     def refuse(self, bad: int) -> None:
-        """Raise an error for the number of a triangle that does not exist."""
+        """Raise an error for the id of a triangle that does not exist."""
         if bad >= 0:
             raise IndexError(f"rast must hold ids of the {len(self.tri)} triangles of tri plus 1, got {bad + 1}")
 
@@ -363,7 +363,7 @@ def squares(
 
 
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return of each edge 3 * the triangle across it + the corner there that it is opposite to, int32 (T, 3); -1: none.
+    """Return for each edge 3 * the triangle across it + its opposite corner there, int32 (T, 3); -1: none.
 
     Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next; there, and
     where two triangles are wound differently, it is -2 less that.
