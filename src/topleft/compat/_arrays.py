@@ -90,7 +90,7 @@ def over(picture: U8, table: bytes, background: Any) -> U8:
         Its alpha counts as that of a colour: what is drawn is laid over it.
     """
     alpha = picture[..., 3]
-    found = np.frombuffer(bytearray(picture.tobytes().translate(table)), np.uint8).reshape(picture.shape)
+    found = np.frombuffer(bytearray(np.ascontiguousarray(picture)).translate(table), np.uint8).reshape(picture.shape)
     found[..., 3] = 255
     behind = np.broadcast_to(np.asarray(background, np.uint8), picture.shape)
     np.copyto(found.view(np.uint32), np.ascontiguousarray(behind).view(np.uint32), where=(alpha == 0)[..., None])

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
@@ -37,7 +37,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import ShadingInputs, Surface, material_row
+from topleft._meshes.picture.look import ShadingInputs, Surface, light_rows, material_row
 from topleft.typing import ShadingOption
 
 MIN_PX_PER_THREAD = 1 << 14
@@ -92,6 +92,11 @@ class ShadingOptions:
     threads: int | None
     shows_opacity: bool = False
     """Whether the picture's alpha is the opacity of the surface."""
+
+    @cached_property
+    def light_rows(self) -> F64 | None:
+        """The lights as kernels take them."""
+        return None if self.lights is None else light_rows(self.lights)
 
     @classmethod
     def parse(
@@ -275,7 +280,7 @@ def look_of(
         options.environment is not None or options.shows_opacity,
     )
     look = ShadingInputs(shown.snapped, mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
-    look.set_lights(options.lights, options.ambient, shown.place)
+    look.set_lights(options.light_rows, options.ambient, shown.place)
     if options.environment is not None or any(one.is_metallic_rough for one in own):
         look.set_environment(options.environment, shown.place)
     if options.shows_opacity:
