@@ -5,7 +5,8 @@ a GPU, and where pyrender is not installed. Depth, ids, culling, blending, textu
 drawn; shadows, wireframes, lines, normals as lines and text are not, and the viewer is missing.
 """
 
-from topleft.compat.pyrender.graph import Mesh, Node, Primitive, Scene
+from topleft.compat.pyrender.graph import Node, Scene
+from topleft.compat.pyrender.meshes import Mesh, Primitive
 from topleft.compat.pyrender.renderer import OffscreenRenderer
 from topleft.compat.pyrender.values import (
     GLTF,

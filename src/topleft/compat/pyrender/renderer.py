@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 import topleft as tl
 from topleft.compat._arrays import F64, U8, light_of_bytes, over, product, srgb_bytes, view_of
-from topleft.compat.pyrender.graph import Node, Primitive, Scene, material_drawn
+from topleft.compat.pyrender.graph import Node, Scene
+from topleft.compat.pyrender.meshes import Primitive, material_drawn
 from topleft.compat.pyrender.values import GLTF, DirectionalLight, Light, RenderFlags, SpotLight
 
 F32 = npt.NDArray[np.float32]
