@@ -212,24 +212,18 @@ class PlacedScene:
     @cached_property
     def _sides(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
         """The `tl_cull` of each instance, and which have triangles with two sides beside others with one."""
-        culls, is_mixed = self._sides_as_they_are
-        is_mirrored = np.array([one.is_mirrored for one in self.scene.instances], np.bool_)
-        return (np.where(is_mirrored, MIRRORED[culls], culls) if is_mirrored.any() else culls), is_mixed
-
-    @cached_property
-    def _sides_as_they_are(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """The same if no instance is mirrored; kept with the scene, unless another material counts."""
         view, key = self._view, (self._view.cull, self._view.sides_by_material)
         known: dict[Any, Any] = self.whole.known if self._material is None else {}
-        if key not in known:
-            culls: NDArray[np.int32] = np.full(len(self.scene), view.cull, np.int32)
-            is_mixed = np.zeros(len(culls), np.bool_)
+        if key not in known:  # which holds wherever the scene stands, but for what is mirrored
+            sides: NDArray[np.int32] = np.full(len(self.scene), view.cull, np.int32)
+            is_mixed = np.zeros(len(sides), np.bool_)
             for _, _, at in self.whole.looks(self._material) if view.sides_by_material else ():
-                culls[at], is_single = self._sides_of(self.whole[at[0]])
+                sides[at], is_single = self._sides_of(self.whole[at[0]])
                 is_mixed[at] = is_single is not None
-            known[key] = culls, is_mixed
-        found: tuple[NDArray[np.int32], NDArray[np.bool_]] = known[key]
-        return found
+            known[key] = sides, is_mixed
+        culls, is_mixed = known[key]
+        is_mirrored = np.array([one.is_mirrored for one in self.scene.instances], np.bool_)
+        return (np.where(is_mirrored, MIRRORED[culls], culls) if is_mirrored.any() else culls), is_mixed
 
     def _sides_of(self, whole: Instance) -> tuple[int, NDArray[np.uint8] | None]:
         """The `tl_cull` of an instance that is no mirror; 1 for each triangle with one side, where others have two."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
@@ -92,11 +92,6 @@ class ShadingOptions:
     threads: int | None
     shows_opacity: bool = False
     """Whether the picture's alpha is the opacity of the surface."""
-
-    @cached_property
-    def light_rows(self) -> F64 | None:
-        """The lights as kernels take them."""
-        return None if self.lights is None else light_rows(self.lights)
 
     @classmethod
     def parse(
@@ -187,8 +182,9 @@ class Lit:
         if self.n_triangles and all(size):
             self.subpixel_bits = shown[0].snapped.subpixel_bits
             finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
+            lights = None if options.lights is None else light_rows(options.lights)
             tables = [
-                look_of(one, view, camera, size, options, finds_inverse_w=finds_inverse_w).shading
+                look_of(one, view, camera, size, options, lights, finds_inverse_w=finds_inverse_w).shading
                 for one, view in zip(shown, views_of(shown, camera), strict=True)
             ]
             self.scene = scene_of_tables(shown, tables)
@@ -264,10 +260,11 @@ def look_of(
     camera: Camera,
     size: tuple[int, int],
     options: ShadingOptions,
+    lights: F64 | None,
     *,
     finds_inverse_w: bool,
 ) -> ShadingInputs:
-    """What kernels read of an instance that is seen by `view`, eye from object."""
+    """What kernels read of an instance that is seen by `view`, eye from object, in lights as `light_rows` has them."""
     mesh = shown.mesh
     material = shown.material if options.material is None else options.material
     own = mesh.materials if material is None else (material,)
@@ -280,7 +277,7 @@ def look_of(
         options.environment is not None or options.shows_opacity,
     )
     look = ShadingInputs(shown.snapped, mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
-    look.set_lights(options.light_rows, options.ambient, shown.place)
+    look.set_lights(lights, options.ambient, shown.place)
     if options.environment is not None or any(one.is_metallic_rough for one in own):
         look.set_environment(options.environment, shown.place)
     if options.shows_opacity:
