@@ -44,9 +44,9 @@ def view_of(pose: npt.ArrayLike) -> F64:
 def dots_along(segments: F64, clip_from_world: F64, size: tuple[int, int]) -> tuple[F64, npt.NDArray[np.intp]]:
     """Points on segments (N, 2, 3), at most half a pixel apart in a picture, and the segment of each.
 
-    What lies outside the picture has none.
+    What lies outside the picture has none. Segments may have more numbers than x, y and z, which points get, too.
     """
-    ends = product(np.concatenate([segments, np.ones((len(segments), 2, 1))], axis=2), clip_from_world.T)
+    ends = product(np.concatenate([segments[..., :3], np.ones((len(segments), 2, 1))], axis=2), clip_from_world.T)
     first, last = np.zeros(len(segments)), np.ones(len(segments))
     for axis in range(3):
         for side in (-1, 1):  # Liang and Barsky, 1984

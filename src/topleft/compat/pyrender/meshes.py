@@ -60,7 +60,7 @@ class Primitive(Box):
     indices : (T, 3) int, optional
     material : MetallicRoughnessMaterial, optional
     mode : int
-        One of `GLTF`; lines are not drawn.
+        One of `GLTF`; lines are a pixel wide.
     poses : (N, 4, 4) float, optional
         Where it stands, as often as there are poses.
     """
@@ -148,6 +148,16 @@ class Primitive(Box):
             return flat[np.stack([0 * k, k + 1, k + 2], axis=1)]
         odd = k % 2
         return flat[np.stack([k, k + 1 + odd, k + 2 - odd], axis=1)]
+
+    def segments(self) -> F64:
+        """The lines (N, 2, 6) of a primitive of lines: ends, and their colours, 0 to 1."""
+        colors = np.broadcast_to(self.material.baseColorFactor[:3], self.positions.shape)
+        ends = np.concatenate([self.positions, colors if self.color_0 is None else self.color_0[:, :3]], axis=1)
+        flat = np.arange(len(ends)) if self.indices is None else self.indices.reshape(-1)
+        if self.mode == GLTF.LINES:
+            return ends[flat[: len(flat) // 2 * 2].reshape(-1, 2)]
+        following = np.roll(flat, -1) if self.mode == GLTF.LINE_LOOP else flat[1:]
+        return ends[np.stack([flat[: len(following)], following], axis=1)]
 
 
 class Mesh(Box):
