@@ -209,7 +209,7 @@ class BuildTopleft(build_ext):
         with ThreadPoolExecutor(self.parallel) as pool:
             waiting = []
             for ext in self.extensions:  # the engine first
-                units = self.engine_units(ext, pool) if ext.name == ENGINE else [(ext, FLAGS_CLASSIC, [])]
+                units = self.engine_units(ext, pool) if ext.name == ENGINE else self.classic_units(ext)
                 jobs = [
                     pool.submit(self.compile_unit, source, [*warnings, *own, *last], define)
                     for source, own, define in units
@@ -280,6 +280,10 @@ class BuildTopleft(build_ext):
         units += [(ROOT / "csrc/meshlets/meshlets.c", flags_vbmi, [])] if has_vbmi else []
         return [*units, (ROOT / "csrc/dispatch.c", FLAGS_C, macros)]
 
+    def classic_units(self, ext: Extension) -> list[tuple[Path | Extension, list[str], list[tuple[str, str]]]]:
+        """Return the units of the classics: what draws, and what draws with its steps told."""
+        return [(ext, FLAGS_CLASSIC, []), (ROOT / Path(ext.sources[0]).with_name("steps.c"), FLAGS_C, [])]
+
     def isas_to_build(self, pool: ThreadPoolExecutor) -> list[Isa]:
         """Return the kernel units to build: those asked for, or all that the compiler can build."""
         wanted = wanted_isas()
@@ -338,13 +342,14 @@ class BuildTopleft(build_ext):
 
     def compile_unit(self, source: Path | Extension, flags: list[str], macros: list[tuple[str, str]]) -> Path:
         """Return the object of one source, compiled again when the source, a header or a flag changed."""
-        own_headers: list[Path] = []
+        folder = (ROOT / source.sources[0] if isinstance(source, Extension) else source).parent
+        own_headers = [] if folder.is_relative_to(ROOT / "csrc") else files_in(str(folder.relative_to(ROOT)), ".h")
         if isinstance(source, Extension):
-            own_headers = files_in(str(Path(source.sources[0]).parent), ".h")
             source = self.cython(source)
         target = self.temp / (source.stem + ".o")
-        is_ours = source.is_relative_to(ROOT / "csrc")  # what Cython made includes the headers of the contract alone
-        headers = files_in("csrc", ".c", ".h") if is_ours else [*sorted((ROOT / "csrc").glob("*.h")), *own_headers]
+        is_ours = source.is_relative_to(ROOT / "csrc")  # other units include the headers of the contract alone
+        contract = [*sorted((ROOT / "csrc").glob("*.h")), ROOT / "csrc/base/integers.h"]
+        headers = files_in("csrc", ".c", ".h") if is_ours else [*contract, *own_headers]
         sources = [source, *headers]
 
         def make() -> None:

@@ -19,8 +19,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-UNITS = sorted((ROOT / "src/topleft/_apps/explore/wasm").glob("*.c"))
 CLASSICS = ROOT / "src/topleft/methods/classics"
+UNITS = [*sorted((ROOT / "src/topleft/_apps/explore/wasm").glob("*.c")), CLASSICS / "steps.c"]
 PAGE = ROOT / "src/topleft/_apps/explore/page"
 COMPILER = "clang --target=wasm32-wasi --sysroot=/usr"
 FLAGS = [

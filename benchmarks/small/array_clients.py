@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,102 @@ def write_ply(path: Path, n: int) -> None:
     path.write_bytes("\n".join(lines).encode() + points.tobytes() + faces.tobytes())
 
 
-ARRAY_CLIENTS: Mapping[str, Client] = {"bop": run_bop}
+def run_pytorch3d(folder: Path, options: argparse.Namespace) -> list[Record]:
+    """Expected values of the tests of PyTorch3D without blur, and spheres by its kernel for the CPU and by topleft."""
+    sys.path.insert(0, str(folder))
+    import torch
+    from pytorch3d.renderer.mesh.rasterize_meshes import rasterize_meshes
+    from pytorch3d.structures import Meshes
+    from tests.test_rasterize_meshes import TestRasterizeMeshes
+
+    from topleft.compat import pytorch3d
+
+    torch.set_num_threads(1)
+    for name in ("_simple_triangle_raster", "_test_back_face_culling"):  # each raises if a value is not as expected
+        getattr(TestRasterizeMeshes(), name)(pytorch3d.rasterize_meshes, torch.device("cpu"), bin_size=0)
+    rows: list[Record] = []
+    for n, k, in_space in ((1_280, 1, True), (1_280, 4, True), (5_120, 1, True), (5_120, 1, False)):
+        vertices, triangles = tl.scenes.blob(n)
+        points = torch.tensor(vertices * 0.7 + [0, 0, 2.5], dtype=torch.float32)
+        meshes = Meshes(verts=[points], faces=[torch.tensor(np.array(triangles), dtype=torch.int64)])
+        draws = [
+            lambda own=own, meshes=meshes, k=k, in_space=in_space: own(
+                meshes, 128, 0.0, k, perspective_correct=in_space
+            )
+            for own in (rasterize_meshes, pytorch3d.rasterize_meshes)
+        ]
+        theirs, ours = ([np.asarray(part) for part in draw()] for draw in draws)
+        same = theirs[0] == ours[0]
+        case = f"{n} faces, {k} a pixel, {'in space' if in_space else 'on the screen'}"
+        row = {"case": case, "pixels": int((theirs[0] >= 0).sum()), "differ": int((~same).sum())}
+        row["off"] = max(float(np.abs(a - b)[same].max()) for a, b in zip(theirs[1:], ours[1:], strict=True))
+        rows.append(row | timed(*draws, options.rounds))
+    return rows
+
+
+def run_custom_rasterizer(folder: Path, options: argparse.Namespace) -> list[Record]:
+    """Faces and weights by the kernel of Hunyuan3D for the CPU, whose compiled module lies in the folder."""
+    sys.path.insert(0, str(folder))
+    import torch
+
+    from topleft.compat import custom_rasterizer
+
+    kernel = import_module("custom_rasterizer_kernel")  # after PyTorch, whose libraries it needs
+    torch.set_num_threads(1)
+    rows: list[Record] = []
+    for n, size in zip(SIZES, (256, 512, 1024), strict=True):
+        vertices, triangles = tl.scenes.blob(n)
+        camera = tl.Camera.look_at((0, 0.7, 3), fov_y_deg=45)
+        pos = torch.tensor(tl.scenes.to_clip(vertices, camera.clip_from_world(size)), dtype=torch.float32)
+        tri = torch.tensor(np.array(triangles), dtype=torch.int32)
+        draws = [
+            lambda pos=pos, tri=tri, size=size: kernel.rasterize_image(pos, tri, torch.zeros(0), size, size, 1e-6, 0),
+            lambda pos=pos, tri=tri, size=size: custom_rasterizer.rasterize(pos[None], tri, (size, size)),
+        ]
+        row = compare_faces(*(draw() for draw in draws)) | timed(*draws, options.rounds)
+        rows.append({"case": f"{n} faces, {size}x{size}"} | row)
+    return rows
+
+
+def run_texture_baker(folder: Path, options: argparse.Namespace) -> list[Record]:
+    """Faces and weights of atlases by the kernel of Stable Fast 3D for the CPU, and by topleft."""
+    import torch
+
+    sys.path.insert(0, str(folder))
+    import texture_baker
+
+    from topleft.compat.texture_baker import TextureBaker
+
+    torch.set_num_threads(1)
+    rows: list[Record] = []
+    for n, size in zip(SIZES, (512, 1024, 2048), strict=True):
+        points, triangles = tl.scenes.planar_mesh(n // 2, 1, 1)
+        uv, faces = torch.tensor(points, dtype=torch.float32), torch.tensor(np.array(triangles))
+        theirs, ours = (
+            lambda own=own, uv=uv, faces=faces, size=size: own.rasterize(uv, faces, size)
+            for own in (texture_baker.TextureBaker(), TextureBaker())
+        )
+        drawn = [(rast[..., 3] + 1, rast[..., :3]) for rast in (theirs(), ours())]
+        row = compare_faces(*drawn) | timed(theirs, ours, options.rounds)
+        rows.append({"case": f"{n} faces, {size}x{size}"} | row)
+    return rows
+
+
+def compare_faces(theirs: Any, ours: Any) -> Record:
+    """Pixels whose face, counted from 1, differs, and by what the weights of 99 % of the others are off."""
+    (ids, weights), (own_ids, own_weights) = ([np.asarray(part) for part in parts] for parts in (theirs, ours))
+    same = (ids == own_ids) & (ids > 0)
+    row: Record = {"pixels": int((ids > 0).sum()), "differ": int((ids != own_ids).sum())}
+    row["off"] = float(np.quantile(np.abs(weights - own_weights).max(axis=2)[same], 0.99))
+    return row
+
+
+ARRAY_CLIENTS: Mapping[str, Client] = {
+    "bop": run_bop,
+    "pytorch3d": run_pytorch3d,
+    "custom_rasterizer": run_custom_rasterizer,
+    "texture_baker": run_texture_baker,
+}
 
 
 def lines_of(name: str, rows: list[Record]) -> Iterator[str]:

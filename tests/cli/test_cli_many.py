@@ -561,7 +561,7 @@ def is_running(pid):
 @pytest.fixture(params=get_all_start_methods())
 def many_pictures(request, folder):
     """A run with two processes, once it has begun to write."""
-    options = ["octahedron", "tetrahedron", "--jobs", "2", "-o", "p/", *SMALL, "--views", "20000"]
+    options = ["octahedron", "tetrahedron", "--jobs", "2", "-o", "p/", *SMALL, "--views", "4000"]
     command = [sys.executable, *topleft_with(request.param), "render", *options]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         for _ in range(20_000):

@@ -15,8 +15,10 @@ from topleft._apps.explore.content import SCENES, scene
 from topleft._apps.explore.handlers import answer
 from topleft._apps.explore.messages import split
 from topleft._apps.explore.session import Content, Session
-from topleft._apps.explore.static import LAYERS, SETS, write_static
+from topleft._apps.explore.static import LAYERS, N_SEEDS, SETS, write_static
+from topleft._apps.explore.trace import TRACED
 from topleft.methods import CLASSICS
+from topleft.scene_families import FAMILIES
 
 NODE = shutil.which("node")
 PAGE = files("topleft._apps.explore").joinpath("page")
@@ -119,6 +121,54 @@ def test_reasons_of_pixels_are_those_of_python(ask):
             question = {"do": "pixels.probe", "state": state, "pixel": pixel, "sample": int(rng.integers(0, n))}
             questions += [question, question | {"method": "exact"}]
     check(ask, questions)
+
+
+def steps_of(state, method, bits=8):
+    """The question of how a method draws a state."""
+    taken = {name: state[name] for name in ("vertices", "triangles", "size", "origin") if name in state}
+    return {"do": "steps.trace", **taken, "method": method, "subpixel_bits": bits}
+
+
+def test_steps_of_each_method_are_those_of_python(ask):
+    states = [one for one in random_states() if len(one["triangles"]) < 12][:2]
+    states = [DEEP, *(one | {"size": [min(n, 24) for n in one["size"]]} for one in states)]
+    check(ask, [steps_of(one, method, (8, 0, 4)[i % 3]) for method in TRACED for i, one in enumerate(states)])
+
+
+def test_steps_of_far_vertices_and_windows_are_those_of_python(ask):
+    scenes = [name for name in SCENES if name.startswith(("far", "large"))][:6]
+    check(ask, [steps_of(scene(name), method) for name in scenes for method in ("edge", "scanline", "row_crossing")])
+
+
+def test_sentences_of_steps_that_are_refused_are_those_of_python(ask):
+    whole = SQUARE | {"vertices": [[0, 0], [900, 0], [0, 900], [900, 900]], "size": [900, 900]}
+    far = SQUARE | {"vertices": [[1.5, 2**52], [9.5, 1.5], [1.5, 9.5], [9.5, 9.5]]}
+    questions = [steps_of(SQUARE, "auto"), steps_of(SQUARE, "best"), steps_of(SQUARE | {"size": [2000, 3]}, "edge")]
+    questions += [steps_of(whole, "edge"), steps_of(whole, "point_in_triangle"), steps_of(far, "edge", 16)]
+    check(ask, [*questions, steps_of(far, "edge"), steps_of(far, "lerp_scanline")])
+
+
+def race_of(family, share, i):
+    """The question of a race of a family, from its mildest value, 0, to its harshest, 1."""
+    positions = [round(share * (len(axis.values) - 1)) for axis in FAMILIES[family].axes]
+    return {"do": ("race.draw", "race.column")[i % 2], "family": family, "positions": positions, "seed": i % N_SEEDS}
+
+
+def test_races_are_those_of_python(ask):
+    harsh = ["far", "far", "far-sliver", "sliver", "edge", "edge"]
+    races = [race_of(name, share, i + k) for i, name in enumerate(FAMILIES) for k, share in enumerate((0, 0.5))]
+    check(ask, [*races, *(race_of(name, 1, i) for i, name in enumerate(harsh))])
+
+
+def test_sentences_of_races_that_are_refused_are_those_of_python(ask):
+    bad = [{"family": "none", "positions": [1]}, {"family": "fan", "positions": [1, 2]}]
+    check(ask, [{"do": "race.draw", **one} for one in bad])
+
+
+def test_window_far_away_is_that_of_python(ask):
+    far = 2**50
+    state = SQUARE | {"vertices": [[x + far, y - far] for x, y in SQUARE["vertices"]], "origin": [far, -far]}
+    check(ask, [{"do": "pixels.draw", "state": state | more} for more in ({"exact": True}, {"subpixel_bits": "exact"})])
 
 
 def test_edits_are_those_of_python(ask):
@@ -284,6 +334,19 @@ def test_memory_is_that_of_the_mesh_however_often_it_is_drawn_or_opened(ask, tmp
     round_of_questions = opened_and_drawn("cube.obj", path, views_of(4, np.random.default_rng(1)))
     replies = ask(round_of_questions * 6)
     assert replies[-1]["memory"] == replies[len(round_of_questions)]["memory"]
+
+
+def test_file_that_memory_does_not_hold_leaves_the_mesh_before(ask, tmp_path):
+    path = tmp_path / "binary.stl"
+    path.write_bytes(files_of_meshes()["binary.stl"])
+    opened = {"do": "mesh.open", "name": "binary.stl", "file": str(path)}
+    view = {"do": "mesh.draw", "size": [64, 48]}
+    _, first, full, second, named, moved, last = ask(
+        [opened, view, opened | {"is_full": True}, view, {"do": "mesh.open"}, view | {"azimuth": 90}, view]
+    )
+    assert full["error"] == "not enough memory"
+    assert named["name"] == "binary.stl"
+    assert first["bytes"] == second["bytes"] == last["bytes"] != moved["bytes"]
 
 
 def test_question_without_memory_is_refused_and_the_next_one_is_answered(ask):

@@ -94,9 +94,9 @@ def sampled():
 def instances():
     options = {}, {"cull": "back"}, {"sampling": "msaa4"}
     return [
-        choices.pays_to_draw_instances(view, n, survey, lambda k=layers: k)
+        choices.pays_to_draw_instances(view, n_instances, n, survey, lambda k=layers: k)
         for view in views(*options, sizes=SIZES[:1])
-        for n, survey, layers in product(COUNTS[::2], surveys(), (1.0, 2.9, 3.0))
+        for n, survey, (layers, n_instances) in product(COUNTS[::2], surveys(), ((1.0, 2), (2.9, 40), (3.0, 1000)))
     ]
 
 
@@ -142,7 +142,7 @@ DECIDED = {
     "clusters": (11760, 4461, "503a6b0a084dae9f"),
     "meshlets": (114912, 35990, "9d17c939f804ff9d"),
     "sampled": (65664, 20955, "057125f20bfde487"),
-    "instances": (24624, 7754, "454f524ad8754b67"),
+    "instances": (24624, 9395, "f71629e0c5b6b304"),
     "flat": (10752, 5238, "cae0f22b1ce82c8d"),
     "sorting": (64512, 7382, "3ed8e8a7b0759050"),
     "bounds": (10752, 3570, "1d9105453eb874e7"),

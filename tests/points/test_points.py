@@ -5,13 +5,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, on
+from engine_cases import ON_EACH_ISA, THREADS, kept, on
 
 import topleft as tl
 from topleft._core.raster.sampling import POSITIONS
-from topleft.methods.reference.points import points as exact_points
+from topleft.methods.reference.points import points
 
 SIZE = (23, 17)
+exact_points = kept(points)
 
 
 def strewn(seed, n=60):

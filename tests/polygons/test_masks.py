@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, kept, on
 from hypothesis import given
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
@@ -14,12 +14,15 @@ from topleft._core.base.options import Sampling
 from topleft._core.raster.sampling import POSITIONS
 from topleft.methods.reference import polygons as ref
 
+polygon_areas = kept(ref.polygon_areas)
+polygon_mask = kept(ref.polygon_mask)
+
 RULES = ["evenodd", "nonzero"]
 ON_EACH_RULE = pytest.mark.parametrize("rule", RULES)
 
 
 def squares(polygon, size, rule, **view):
-    areas = ref.polygon_areas(polygon, size, rule, **view)
+    areas = polygon_areas(polygon, size, rule, **view)
     return {
         "outer": np.array([[a > 0 for a in row] for row in areas]),
         "inner": np.array([[a == 1 for a in row] for row in areas]),
@@ -32,7 +35,7 @@ def squares(polygon, size, rule, **view):
 def test_mask_of_wild_rings_equals_reference(isa, rule, seed):
     polygon = wild_polygon(np.random.default_rng(seed))
     with on(isa):
-        assert (tl.polygons(polygon, SIZE, rule=rule) == ref.polygon_mask(polygon, SIZE, rule)).all()
+        assert (tl.polygons(polygon, SIZE, rule=rule) == polygon_mask(polygon, SIZE, rule)).all()
 
 
 @ON_EACH_ISA
@@ -68,7 +71,7 @@ def test_labels_of_wild_polygons_are_the_last_masks(isa, rule, seed):
     drawn = [wild_polygon(rng) for _ in range(5)]
     expected = np.full(SIZE[::-1], -1)
     for i, polygon in enumerate(drawn):
-        expected[ref.polygon_mask(polygon, SIZE, rule)] = i
+        expected[polygon_mask(polygon, SIZE, rule)] = i
     with on(isa):
         assert (tl.polygons(drawn, SIZE, rule=rule, values="index") == expected).all()
         assert (tl.polygons(drawn, SIZE, rule=rule) == (expected >= 0)).all()
@@ -80,7 +83,7 @@ def test_mask_on_each_grid_equals_reference(isa, bits):
     for seed in range(25):
         polygon = wild_polygon(np.random.default_rng(seed), SIZE, min(bits, 10))
         for rule in RULES:
-            exact = ref.polygon_mask(polygon, SIZE, rule, subpixel_bits=bits)
+            exact = polygon_mask(polygon, SIZE, rule, subpixel_bits=bits)
             with on(isa):
                 assert (tl.polygons(polygon, SIZE, rule=rule, subpixel_bits=bits) == exact).all()
 
@@ -93,7 +96,7 @@ def test_rings_that_reach_far_out_equal_reference(isa, reach):
         ring = rng.uniform(-1, 1, (5, 2)) * reach
         ring[0] = rng.uniform(0, 5, 2)
         for rule in RULES:
-            exact = ref.polygon_mask([ring], SIZE, rule)
+            exact = polygon_mask([ring], SIZE, rule)
             touched = squares([ring], SIZE, rule)
             with on(isa):
                 assert (tl.polygons(ring, SIZE, rule=rule) == exact).all()
@@ -117,7 +120,7 @@ def test_picture_far_from_the_origin_is_that_at_the_origin():
 def test_several_samples_are_the_share_of_masks(isa, n_samples):
     for seed in range(8):
         polygon = wild_polygon(np.random.default_rng(seed))
-        masks = [ref.polygon_mask(polygon, SIZE, sample=at) for at in POSITIONS[n_samples]]
+        masks = [polygon_mask(polygon, SIZE, sample=at) for at in POSITIONS[n_samples]]
         with on(isa):
             share = tl.polygons(polygon, SIZE, sampling=f"msaa{n_samples}")
         assert share.dtype == np.float32

@@ -1,6 +1,7 @@
 """What the engine must draw, and whether it does: on one instruction set and another, with any number of threads."""
 
 import os
+import pickle
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -23,6 +24,19 @@ DEPTH_TESTS = ("less", "greater", None)
 
 #: Stands above all other marks: pytest then draws a scene on each instruction set before it makes the next.
 ON_EACH_ISA = pytest.mark.parametrize("isa", tl.build_info()["isa_available"])
+
+
+def kept(exact):
+    """A slow reference that keeps its answers: every instruction set is compared with the same one."""
+    answers = {}
+
+    def answer(*arguments, **options):
+        key = pickle.dumps((arguments, options))
+        if key not in answers:
+            answers[key] = exact(*arguments, **options)
+        return answers[key]
+
+    return answer
 
 
 @contextmanager

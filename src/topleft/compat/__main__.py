@@ -32,6 +32,13 @@ def install_pyrender() -> None:
     stands_for("pyrender.constants", module="pyrender.values")()
 
 
+def install_pytorch3d() -> None:
+    """Have PyTorch3D call `rasterize_meshes` of topleft, its `MeshRasterizer` too."""
+    own = import_module("topleft.compat.pytorch3d")
+    for name in ("renderer", "renderer.mesh.rasterize_meshes", "renderer.mesh.rasterizer"):
+        setattr(import_module(f"pytorch3d.{name}"), "rasterize_meshes", own.rasterize_meshes)  # noqa: B010
+
+
 def install_trimesh() -> None:
     """Have `scene.save_image` of trimesh be that of `topleft.compat.trimesh`, and pyglet open no window on import."""
     os.environ.setdefault("PYGLET_SHADOW_WINDOW", "0")
@@ -48,6 +55,9 @@ INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "trimesh": install_trimesh,
     "mujoco": install_mujoco,
     "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
+    "pytorch3d": install_pytorch3d,
+    "custom_rasterizer": stands_for("custom_rasterizer", module="custom_rasterizer"),
+    "texture_baker": stands_for("texture_baker", module="texture_baker"),
 })  # fmt: skip
 
 

@@ -1,10 +1,11 @@
-"""Products of poses and colours of floats, the same bits on every processor.
+"""Products of poses and colours of floats, the same bits on every processor; tensors as arrays.
 
-Input: matrices (4, 4), colours as other libraries have them. Output: matrices, sRGB bytes.
+Input: matrices (4, 4), colours as other libraries have them, tensors of PyTorch. Output: matrices, sRGB bytes, arrays.
 """
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -110,3 +111,40 @@ def light_of_bytes() -> F64:
 
 SHOWN_AS_LIGHT = np.rint(255 * light_of_bytes()).astype(np.uint8).tobytes()
 """The light of each sRGB byte: of libraries that add light up in the numbers of the picture, which are light here."""
+
+
+def library_of(values: Any) -> Any:
+    """PyTorch for a tensor, NumPy for anything else: what is used of them has the same names in both."""
+    return sys.modules["torch"] if type(values).__module__.startswith("torch") else np
+
+
+def detached(values: Any) -> npt.NDArray[Any]:
+    """The numbers of a tensor, or of anything that NumPy reads."""
+    return np.asarray(values.detach() if hasattr(values, "detach") else values)
+
+
+def interpolated(values: Any, corners: npt.NDArray[Any], weights: Any, seen: npt.NDArray[np.intp]) -> Any:
+    """Values of vertices at the pixels that show a face, 0 at others; of tensors with gradients.
+
+    Parameters
+    ----------
+    values : (V, C) tensor or array
+    corners : (N, 3) integers
+        The vertices of what each pixel shows that shows something.
+    weights : (P, 3) tensor or array
+        Of all pixels.
+    seen : (N,) intp
+        Which pixels show something.
+
+    Returns
+    -------
+    (P, C) tensor or array
+    """
+    of = library_of(weights)
+    rows, names = of.asarray(seen), of.asarray(corners.astype(np.int64))
+    own = weights[rows]
+    a, b, c = (values[names[:, k]] * own[:, k : k + 1] for k in range(3))
+    found = a + b + c
+    picture = of.zeros((len(weights), found.shape[1]), dtype=found.dtype)
+    picture[rows] = found
+    return picture

@@ -5,7 +5,7 @@ compared; a variant's name stands after a slash. Their kernels are imported when
 
 classics/    draws triangles as the literature does: a compiled kernel for each classic
 reference/   draws triangles exactly and slowly, in integers and fractions: what all others are held against
-twins/       draws as the classics and the production walkers do, in Python, step by step
+twins/       draws as the classics do, in Python
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from typing import Any, get_args
 import numpy as np
 
 from topleft import Mesh
-from topleft._apps.explore import mesh_view, pixels
+from topleft._apps.explore import mesh_view, pixels, race, trace
 from topleft._apps.explore.content import MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES, SCENES, scene
 from topleft._apps.explore.handlers import hello
 from topleft._apps.explore.session import Content, Request, Session
@@ -26,25 +26,27 @@ from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.picture.shade import plain_numbers
 from topleft.errors import MissingPackageError
-from topleft.methods import CLASSICS
-from topleft.methods.classics.classic_kernels import FORMS
+from topleft.methods import CLASSICS, find_method
+from topleft.methods.classics.classic_kernels import FORMS, list_kinds
 from topleft.methods.reference import sampling
+from topleft.scene_families import FAMILIES, walk
 from topleft.scenes import shape
 from topleft.typing import CullOption, DepthTestOption, SamplingOption
 
 SETS = ("simd128", "scalar")
 """The instruction sets of the kernels; a page fetches one."""
 
-TABS = ("pixels", "mesh")
-"""Parts of the page that work without Python."""
-
 SCRIPTS = (
-    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "mesh.js", "camera.js", "files.js",
+    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "steps.js", "race.js", "mesh.js",
+    "camera.js", "files.js",
 )  # fmt: skip
 
 LIT = ("smooth", "flat", "unlit", "normals")
 LAYERS = (*LIT, "triangle", "overdraw")
 """What a frame of a mesh shows without Python."""
+
+N_SEEDS = 3
+"""Of each scene of the part Race."""
 
 CHOICES = ("layer", "sampling", "cull", "fov", "up", "spin")
 """What a page without Python lets choose of a mesh."""
@@ -73,6 +75,7 @@ def write_static(folder: Path, content: Content) -> list[Path]:
     made["data.json"] = json.dumps(data_of(content), allow_nan=False, separators=(",", ":")).encode()
     mesh, _ = first_mesh(content)
     made["mesh.bin"] = mesh.vertices.tobytes() + mesh.triangles.tobytes()
+    made["race.bin"] = race_scenes()[1]
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, text in made.items():
@@ -99,7 +102,7 @@ def data_of(content: Content) -> dict[str, Any]:
         "look": Look,
     }
     return {
-        "hello": {**greeting, "tabs": TABS, "saves": (), "has_plan": False},
+        "hello": {**greeting, "saves": (), "has_plan": False},
         "states": {name: scene(name) for name in SCENES},
         "defaults": defaults,
         "limits": {
@@ -108,6 +111,9 @@ def data_of(content: Content) -> dict[str, Any]:
         },
         "mesh": mesh_data(content),
         "classics": classics(),
+        "n_classics": len(FORMS),
+        "steps": steps_data(),
+        "race": race_data(),
         "samples": sampling.SAMPLE_POSITIONS,
         "colors": pixels.COLORS.tolist(),
         "triangle_colors": [pixels.css(color) for color in pixels.triangle_colors(21)],
@@ -144,6 +150,48 @@ def mesh_data(content: Content) -> dict[str, Any]:
         **plain_numbers(mesh),
         "light_of_srgb": LIGHT_OF_SRGB.tolist(),
     }  # fmt: skip
+
+
+def steps_data() -> dict[str, Any]:
+    """What the part Steps knows besides the kernels."""
+    return {
+        "kinds": list_kinds(), "methods": trace.TRACED,
+        "about": {name: trace.about(find_method(name)) for name in trace.TRACED},
+        "max_steps": trace.MAX_STEPS, "max_side_px": trace.MAX_SIDE_PX, "max_triangles": trace.MAX_TRIANGLES,
+    }  # fmt: skip
+
+
+def race_data() -> dict[str, Any]:
+    """What the part Race knows besides the numbers of its scenes; what lies between them is Python's."""
+    greeting: Request = dict(race.answer_families(Session(Content()), {}).header)
+    for family in greeting["families"].values():
+        family["axes"] = [{**axis, "is_continuous": False} for axis in family["axes"]]
+    entries = [
+        {"name": one.name, "method": one.method, "bits": one.bits, "snap": one.snap,
+         "winding": find_method(one.method).claims.winding}
+        for one in race.entries()
+    ]  # fmt: skip
+    shown = {"n_seeds": N_SEEDS, "entries": entries, "shares": race.SHARES, "scenes": race_scenes()[0]}
+    return {**greeting, **shown}
+
+
+def race_scenes() -> tuple[dict[str, list[dict[str, Any]]], bytes]:
+    """The scenes of all families, from mild to harsh, and their numbers: vertices of each seed, then triangles."""
+    parts: list[bytes] = []
+    scenes: dict[str, list[dict[str, Any]]] = {name: [] for name in FAMILIES}
+    at = 0
+    for name, family in FAMILIES.items():
+        for _, values in walk(family):
+            made = [family.make(*values, seed) for seed in range(N_SEEDS)]
+            first = made[0]
+            scenes[name].append({
+                "at": at, "n_vertices": len(first.vertices), "n_triangles": len(first.triangles), "size": first.size,
+                "origin": [str(one) for one in first.origin], "copies": first.copies,  # beyond what a number holds
+            })  # fmt: skip
+            parts += [*(one.vertices.tobytes() for one in made), first.triangles.tobytes()]
+            parts.append(bytes(-sum(map(len, parts[-N_SEEDS - 1 :])) % 8))
+            at += sum(map(len, parts[-N_SEEDS - 2 :]))
+    return scenes, b"".join(parts)
 
 
 def classics() -> dict[str, dict[str, Any]]:

@@ -1,14 +1,13 @@
 """Records how a method draws, step by step: for a teacher who plays, pauses and goes back.
 
-In: triangles in pixels and the name of a method. Out: `Trace`, the steps of the method's pure twin with the numbers
-that decide each of them. Nothing is computed here: the page shows the steps of the twin.
+In: triangles in pixels and the name of a method. Out: `Trace`, the steps of the method's kernel with the numbers that
+decide each of them. Nothing is computed here: the kernel is compiled a second time with its steps told (steps.h).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,19 +16,25 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import overdraw
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._core.base.arrays import as_size
-from topleft.methods import CLASSICS, METHODS, find_method
+from topleft.methods import CLASSICS, METHODS, Method, find_method
+from topleft.methods.classics import classic_kernels
 
-#: The methods that have a pure twin with steps.
+#: The methods that tell their steps.
 TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
 
 MAX_STEPS = 40_000
 """Of a trace: 10 MB on the way to the page."""
 
-MAX_ORIGIN_PX, MAX_SIDE_PX, MAX_TRIANGLES = 1024, 1024, 1000
+MAX_SIDE_PX, MAX_TRIANGLES = 1024, 1000
+MAX_SUBPIXELS = 2**60
+"""Of a vertex: sums of products of its coordinates have 128 bits."""
+
+HEAD_WORDS, MOST_WORDS = 6, 24
+"""Words of a step before its numbers, and with them; the set-up of a triangle has up to twice as many."""
 
 
 class TraceStep(NamedTuple):
-    """One thing that a twin did.
+    """One thing that a method did.
 
     Attributes
     ----------
@@ -64,7 +69,7 @@ class Trace:
     size : (int, int)
     steps : tuple of TraceStep
     counts : ndarray of int32, shape (H, W)
-        The picture of the twin: how often each pixel is drawn.
+        How often each pixel is drawn.
     """
 
     method: str
@@ -79,83 +84,6 @@ class Trace:
             if step.is_drawn:
                 counts[step.y, step.x : step.last + 1] += 1
         return counts
-
-
-class Recorder:
-    """What a pure twin tells its steps to, of one triangle after the other."""
-
-    def __init__(self, size: tuple[int, int], origin: tuple[int, int] = (0, 0)) -> None:
-        """Take steps in that window of the picture."""
-        self.steps: list[TraceStep] = []
-        self.triangle = 0
-        self._size, self._origin = size, origin
-
-    def __call__(self, kind: str, x: int, y: int, **values: Any) -> None:
-        """Take a step, or all those of a box."""
-        if kind == "box":
-            self._take_box(x, y, **values)
-            return
-        (width, height), (x0, y0) = self._size, self._origin
-        first, last, row = max(x - x0, 0), min(values.pop("last", x) - x0, width - 1), y - y0
-        if kind == "row" or kind == "triangle":
-            first = last = x - x0
-        elif first > last or not 0 <= row < height:
-            return
-        if kind == "row" and not 0 <= row < height:
-            return
-        is_drawn = bool(values.pop("is_drawn", kind == "span"))
-        numbers = {name: plain(value) for name, value in values.items()}
-        self._take(TraceStep(kind, self.triangle, first, row, last, is_drawn, numbers))
-
-    def _take_box(self, x: int, y: int, is_drawn: NDArray[np.bool_], **values: NDArray[Any]) -> None:
-        skipped = tuple(max(0, o - at) for o, at in zip(self._origin[::-1], (y, x), strict=True))
-        part = np.s_[skipped[0] :, skipped[1] :]
-        x, y, is_drawn = x + skipped[1] - self._origin[0], y + skipped[0] - self._origin[1], is_drawn[part]
-        self._check(is_drawn.size)
-        for (row, column), here in np.ndenumerate(is_drawn):
-            numbers = {name: plain(array[part][row, column]) for name, array in values.items()}
-            at = x + column
-            self._take(TraceStep("test", self.triangle, at, y + row, at, bool(here), numbers))
-
-    def _take(self, step: TraceStep) -> None:
-        self._check(1)
-        self.steps.append(step)
-
-    def _check(self, n: int) -> None:
-        if len(self.steps) + n > MAX_STEPS:
-            raise ValueError(f"a trace must have {MAX_STEPS} steps at most: draw fewer triangles, or a smaller picture")
-
-
-def plain(value: Any) -> Any:
-    """Return a number, or numbers, as Python has them."""
-    if isinstance(value, np.ndarray | tuple | list):
-        return [plain(one) for one in value]
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def find_twin(name: str, subpixel_bits: int) -> Callable[..., NDArray[np.int32]]:
-    """Return the pure twin of a method: ``twin(vertices, triangles, size, record=...)`` gives counts.
-
-    Raises
-    ------
-    ValueError
-        If there is no such method, or it has no twin.
-    """
-    method = find_method(name)
-    if name not in TRACED:
-        raise ValueError(f"method must be one of {', '.join(map(repr, TRACED))} to be traced, got {name!r}")
-    module, _, variant = name.partition("/")
-    if method.code is not None:
-        module, variant = "topleft.methods.twins.walks", name
-    else:
-        module = f"topleft.methods.twins.{module}"
-    draw = import_module(module).overdraw
-    options = {"subpixel_bits": subpixel_bits} if method.code is not None or method.has_subpixel_bits else {}
-
-    def twin(vertices: Any, triangles: Any, size: tuple[int, int], record: Recorder) -> NDArray[np.int32]:
-        return draw(vertices, triangles, size, variant, record, **options)
-
-    return twin
 
 
 def trace(
@@ -180,33 +108,58 @@ def trace(
     subpixel_bits : int
         Of a method that has any.
     origin : (x, y), pixels
-        Where the window lies in the picture, 0 to 1024: a twin draws from the corner of the picture on.
+        Where the window lies in the picture; the steps are those of the window.
 
     Raises
     ------
     ValueError
-        As `topleft.overdraw`; for a method without a twin; and where there would be more than 40,000 steps.
+        As `topleft.overdraw`; for "auto", which draws many pixels at a time; and where there would be more than 40,000
+        steps.
     """
-    size, draw = as_size(size), find_twin(method, subpixel_bits)
+    size, found = as_size(size), find_method(method)
+    if method not in TRACED:
+        raise ValueError(f"method must be one of {', '.join(map(repr, TRACED))} to be traced, got {method!r}")
     x, y = (int(at) for at in origin)
-    if not 0 <= min(x, y) <= max(x, y) <= MAX_ORIGIN_PX:
-        raise ValueError(f"origin must lie in 0 to {MAX_ORIGIN_PX} to be traced, got {(x, y)}")
     if max(size) > MAX_SIDE_PX or len(np.asarray(triangles)) > MAX_TRIANGLES:
         raise ValueError(
             f"a trace must have {MAX_SIDE_PX} pixels a side and {MAX_TRIANGLES} triangles at most, got {size} and "
             f"{len(np.asarray(triangles))}"
         )
-    xy = np.asarray(vertices, np.float64)[:, :2]
-    found = find_method(method)
+    xy = np.array(np.asarray(vertices, np.float64)[:, :2], order="C")
+    corners = np.ascontiguousarray(triangles, np.int32).reshape(-1, 3)
     options: dict[str, Any] = {"method": method, "origin": (x, y)}
     if found.code is not None or found.has_subpixel_bits:
         options["subpixel_bits"] = subpixel_bits
-    overdraw(xy, triangles, size, **options)  # checks it all
-    recorder, counts = Recorder(size, (x, y)), np.zeros((size[1], size[0]), np.int32)
-    for i, row in enumerate(np.asarray(triangles).reshape(-1, 3).tolist()):
-        recorder.triangle = i
-        counts += draw(xy, [row], (x + size[0], y + size[1]), recorder)[y:, x:]
-    return Trace(method, size, tuple(recorder.steps), counts)
+    overdraw(xy, corners, size, **options)  # checks it all
+    if found.code is not None and (far := abs(xy[corners]).max(initial=0) * 2.0**subpixel_bits) >= MAX_SUBPIXELS:
+        raise ValueError(f"vertices must lie within 2**60 sub-pixels of 0 to be traced, got {far:.6g}")
+    return Trace(method, size, *recorded(xy, corners, (x, y, *size), method, options.get("subpixel_bits", 8)))
+
+
+def recorded(
+    xy: NDArray[np.float64], triangles: NDArray[np.int32], window: tuple[int, int, int, int], method: str, bits: int
+) -> tuple[tuple[TraceStep, ...], NDArray[np.int32]]:
+    """Return the steps, and how often each pixel is drawn."""
+    counts = np.zeros(window[:1:-1], np.int32)
+    words = np.empty(MOST_WORDS * (MAX_STEPS + len(triangles)), np.int64)
+    if (n := classic_kernels.trace(method, xy, triangles, counts, window, words, bits)) > MAX_STEPS:
+        raise ValueError(f"a trace must have {MAX_STEPS} steps at most: draw fewer triangles, or a smaller picture")
+    kinds, steps, at = classic_kernels.list_kinds(), [], 0
+    for _ in range(n):
+        kind, triangle, x, y, last, is_drawn = words[at : at + HEAD_WORDS].tolist()
+        at += HEAD_WORDS
+        name, side, is_real, numbers = kinds[kind]
+        values: dict[str, Any] = {"side": side} if side else {}
+        for number, length in numbers:
+            pairs = words[at : at + 2 * length]
+            at += 2 * length
+            if is_real:
+                own = pairs.view(np.float64)[::2].tolist()
+            else:
+                own = [(high << 64) + low % 2**64 for low, high in pairs.reshape(-1, 2).tolist()]
+            values[number] = own[0] if length == 1 else own
+        steps.append(TraceStep(name, triangle, x, y, last, bool(is_drawn), values))
+    return tuple(steps), counts
 
 
 def told(steps: Sequence[TraceStep]) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
@@ -242,6 +195,11 @@ def change_of(before: Any, value: Any) -> str:
     return f"{value - before:+.6g}"
 
 
+def about(method: Method) -> str:
+    """What a page says of a method."""
+    return f"{method.summary[0].upper()}{method.summary[1:]}. {method.source}."
+
+
 def answer(_: Session, request: Request) -> Reply:
     """Answer the page: steps as lists [x, y, last, is drawn, triangle, kind, sentence, values], and the outlines."""
     origin = tuple(request.get("origin", (0, 0)))
@@ -262,7 +220,7 @@ def answer(_: Session, request: Request) -> Reply:
     header = {
         "size": made.size,
         "steps": steps,
-        "about": f"{method.summary[0].upper()}{method.summary[1:]}. {method.source}.",
+        "about": about(method),
         "methods": TRACED,
         "outlines": [" ".join(f"{x},{y}" for x, y in corners[row].tolist()) for row in request["triangles"]],
     }

@@ -87,7 +87,7 @@ def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
     if isinstance(color, str):
         named = color_of_name(name, color)
         channels: tuple[int, ...] = named if n_channels == 4 or named[3] < 255 else named[:3]
-    elif type(color) is tuple and all(type(channel) is int and 0 <= channel <= 255 for channel in color):
+    elif type(color) is tuple and set(map(type, color)) == {int} and min(color) >= 0 and max(color) <= 255:
         channels = (*color, 255) if n_channels == 4 and len(color) == 3 else color  # as below, without an array
     else:
         array = as_array(name, color)
@@ -105,7 +105,7 @@ def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
         channels = tuple(map(int, array.tolist()))
         if n_channels == 4 and len(channels) == 3:
             channels = (*channels, 255)
-    if len(channels) != n_channels or not all(0 <= channel <= 255 for channel in channels):
+    if len(channels) != n_channels or min(channels) < 0 or max(channels) > 255:
         raise ValueError(f"{name} must be {n_channels} numbers of 0 to 255, got {shown(color)}")
     return channels
 

@@ -300,14 +300,33 @@ def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: 
     return are_many and survey.front <= costs.cluster_front and hidden <= most_hidden
 
 
-def pays_to_draw_instances(view: View, n_triangles: int, survey: Survey, count_layers: Callable[[], float]) -> bool:
+def pays_to_draw_instances(
+    view: View, n_instances: int, n_triangles: int, survey: Survey, count_layers: Callable[[], float]
+) -> bool:
     """Tell whether a scene in clusters is drawn from these; `n_triangles`: of an instance, on the mean.
 
     `survey`: as for one mesh; `count_layers`: how many instances lie one behind the other.
     """
-    least = cost_table().cluster_scene[view.sampling.n_samples > 1]
-    pays = survey.outside >= least and pays_to_draw_clusters(view, n_triangles, survey)
-    return pays or count_layers() >= cost_table().cluster_layers
+    costs = cost_table()
+
+    def gains(n_layers: float, left_out: float) -> bool:
+        """Whether instances of so many layers take longer than the share of them that is drawn from clusters."""
+        whole_ns = instance_ns(view, n_triangles, n_layers / n_instances)
+        return whole_ns >= (1 - left_out) * (whole_ns + costs.cluster_drawn)
+
+    is_outside = survey.outside >= costs.cluster_scene[view.sampling.n_samples > 1]
+    if is_outside and pays_to_draw_clusters(view, n_triangles, survey) and gains(1.0, survey.outside):
+        return True
+    n_layers, (least, n_drawn) = count_layers(), costs.cluster_layers
+    return n_layers >= least and gains(n_layers, 1 - n_drawn / n_layers)
+
+
+def instance_ns(view: View, n_triangles: int, share: float) -> float:
+    """Return about how long an instance takes whose box covers a share of the picture."""
+    costs, n_pixels = cost_table(), share * view.size[0] * view.size[1]
+    row_ns, sample_ns, _ = costs.work_ids
+    n_rows = n_triangles * max(1.0, math.sqrt(2 * n_pixels / n_triangles))
+    return view.sampling.n_samples * (costs.work_triangle * n_triangles + row_ns * n_rows + sample_ns * n_pixels)
 
 
 def pays_to_share_instances(n_triangles: int, n_rows: float) -> bool:

@@ -154,7 +154,8 @@ class Camera:
         width, height = as_size(size)
         projection = self.projection.copy()
         if self.aspect is not None and width > 0 and height > 0:
-            projection[0] = projection[0] * (self.aspect * height) / width
+            projection[0] *= self.aspect * height
+            projection[0] /= width
         return projection
 
     def straightened(self) -> Camera:

@@ -265,7 +265,7 @@ class ShadingInputs:
         self.is_in_eye_space, self.view, self.camera = not keeps_angles, view, camera
         self.mesh = shading_mesh_of(mesh) if keeps_angles else ShadingMesh(mesh, view)
         viewport, normals = snapped.viewport, None
-        has_w = viewport is not None and bool(camera.projection[3, :3].any())
+        has_w = viewport is not None and any(camera.projection[3, :3].tolist())
         finds_inverse_w = has_w and finds_inverse_w and snapped.can_find_inverse_w
         if has_w and not finds_inverse_w:
             own = self.mesh.normals[: len(mesh.vertices)]

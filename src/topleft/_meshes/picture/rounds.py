@@ -6,6 +6,7 @@ In: a `PlacedScene`, targets.  Out: whether clusters pay; what each sample sees,
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,12 +39,13 @@ CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.
 def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
     """Tell whether a scene whose meshes may be drawn in clusters is, and note that they are drawn."""
     scene = placed.scene
-    n = scene.n_triangles
+    n, n_instances = scene.n_triangles, len(scene)
     wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
     if not all(wanted) or not scene.backoff.is_over():
         return False
     survey = survey_instances(placed)
-    pays = choices.pays_to_draw_instances(view, n // len(scene), survey, lambda: count_layers(scene, clip_from_world))
+    layers = partial(count_layers, scene, clip_from_world)
+    pays = choices.pays_to_draw_instances(view, n_instances, n // n_instances, survey, layers)
     scene.backoff.note(pays=pays)
     return pays
 

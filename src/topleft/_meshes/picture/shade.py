@@ -167,6 +167,8 @@ class ShownInstance(NamedTuple):
 
 def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
     """Eye from object of each instance, (4, 4), as a camera without a lens sees it."""
+    if len(shown) == 1:
+        return [engine.product(camera.view, shown[0].place)]
     places = np.concatenate([one.place for one in shown], axis=1)
     return list(np.ascontiguousarray(engine.product(camera.view, places).reshape(4, -1, 4).transpose(1, 0, 2)))
 

@@ -50,20 +50,25 @@ static inline void step_line(classic_line *l)
 }
 
 /* Takes the pixels of row y; first and last stay what they were when there is none. */
-static inline void take_run(classic_line *l, int64_t y, int64_t *first, int64_t *last)
+static inline void take_run(const classic_target *t, classic_line *l, int64_t y, int64_t *first, int64_t *last,
+                            int is_right)
 {
+    (void)t, (void)is_right;
     if (l->n_left && l->y == y)
         *first = l->x;
     while (l->n_left && l->y == y) {
+        CLASSIC_STEP(t, is_right ? CLASSIC_RIGHT_LINE : CLASSIC_LEFT_LINE, l->x, y, l->x, 0, l->error);
         *last = l->x;
         step_line(l);
     }
 }
 
-static void draw_line(const classic_target *t, classic_point a, classic_point b)
+static void draw_line(const classic_target *t, classic_point a, classic_point b, int is_right)
 {
     classic_line l = start_line(a, b);
+    (void)is_right;
     while (l.n_left && l.y < t->y1) {
+        CLASSIC_STEP(t, is_right ? CLASSIC_RIGHT_LINE : CLASSIC_LEFT_LINE, l.x, l.y, l.x, 0, l.error);
         plot(t, l.x, l.y);
         step_line(&l);
     }
@@ -75,8 +80,8 @@ static void fill_basic(const classic_target *t, classic_point a, classic_point b
 {
     const classic_point right_top = is_flat_top ? b : a, right_end = is_flat_top ? c : b;
     if (form == BRESENHAM_SCANLINE_WIREFRAME) {
-        draw_line(t, a, c);
-        draw_line(t, right_top, right_end);
+        draw_line(t, a, c, 0);
+        draw_line(t, right_top, right_end, 1);
         fill_span(t, is_flat_top ? a.y : c.y, is_flat_top ? a.x : c.x, b.x);
         return;
     }
@@ -85,8 +90,10 @@ static void fill_basic(const classic_target *t, classic_point a, classic_point b
     int64_t left_first = left.x, left_last = left.x, right_first = right.x, right_last = right.x;
     const int64_t y_end = form == BRESENHAM_SCANLINE_TOP_LEFT ? c.y : c.y + 1;
     for (int64_t y = a.y; y < smaller(t->y1, y_end); y++) {
-        take_run(&left, y, &left_first, &left_last);
-        take_run(&right, y, &right_first, &right_last);
+        take_run(t, &left, y, &left_first, &left_last, 0);
+        take_run(t, &right, y, &right_first, &right_last, 1);
+        CLASSIC_STEP(t, CLASSIC_ROW_LINES, left_first, y, left_first, 0, left_first, left_last, right_first,
+                     right_last);
         if (form == BRESENHAM_SCANLINE_TOP_LEFT)
             fill_span(t, y, left_first, right_first - 1);
         else /* which end of a run lies outside depends on the side and on the way that the line goes */
@@ -117,6 +124,7 @@ static void fill_bresenham_scanline(const classic_target *t, const double *va, c
     sort_points(&a, &b);
     sort_points(&b, &c);
     sort_points(&a, &b);
+    CLASSIC_STEP(t, CLASSIC_SET_UP, a.x, a.y, a.x, 0, a.x, a.y, b.x, b.y, c.x, c.y);
     if (a.y == c.y) { /* a point or a horizontal line */
         fill_span(t, a.y, a.x, c.x - short_by);
         return;

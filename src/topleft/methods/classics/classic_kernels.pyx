@@ -28,6 +28,16 @@ cdef extern from "classics.h":
     classic_line start_line(classic_point a, classic_point b) noexcept nogil
     void step_line(classic_line *l) noexcept nogil
 
+cdef extern from "trace.h":
+    ctypedef struct classic_kind:
+        const char *name
+        const char *side
+        int is_real
+        const char *numbers
+    const classic_kind CLASSIC_KINDS[]
+    int64_t trace_steps(int method, int form, int subpixel_bits, const double *vertices, int64_t stride, const int32_t *triangles,
+                        int64_t n, const int64_t *window, int32_t *counts, int64_t *words, int64_t n_words) noexcept nogil
+
 #: The variants of each method, in the order of their numbers; methods in the order of theirs.
 FORMS: dict[str, tuple[str, ...]] = {
     CLASSICS[i].name.decode(): tuple([
@@ -75,6 +85,46 @@ def draw(str method, vertices, triangles, pixels, tuple window, int sink, str va
             PyBuffer_Release(&corners)
     finally:
         PyBuffer_Release(&points)
+
+
+def list_kinds():
+    """Return the kinds of steps by their number: name, side, whether numbers are real, and their names and lengths."""
+    found, i = [], 0
+    while CLASSIC_KINDS[i].name != NULL:
+        numbers = [word.split(":") for word in CLASSIC_KINDS[i].numbers.decode().split(",") if word]
+        found.append((CLASSIC_KINDS[i].name.decode(), CLASSIC_KINDS[i].side.decode(), bool(CLASSIC_KINDS[i].is_real),
+                      [(name, int(n)) for name, n in numbers]))
+        i += 1
+    return found
+
+
+def trace(str method, vertices, triangles, counts, tuple window, words, int subpixel_bits=8):
+    """Draw counts over a cleared window, write the steps as words of int64 (steps.h), and return how many there are.
+
+    The method is a classic with its variant, or "edge" or "scanline", as production walks.
+    """
+    cdef int form, number, n_lent = 0
+    cdef int64_t n
+    cdef int64_t[4] place
+    cdef Py_buffer[4] lent
+    name, _, variant = method.partition("/")
+    place = window
+    if name in FORMS:
+        number, form = list(FORMS).index(name), FORMS[name].index(variant)
+    else:
+        number, form = CLASSIC_N, ("edge", "scanline").index(method)
+    try:
+        for array, item_size, n_columns in ((vertices, 8, 2), (triangles, 4, 3), (counts, 4, 1), (words, 8, 0)):
+            lend(array, &lent[n_lent], item_size, n_columns, PyBUF_WRITABLE if n_lent > 1 else 0)
+            n_lent += 1
+        with nogil:
+            n = trace_steps(number, form, subpixel_bits, <const double *>lent[0].buf, lent[0].shape[1],
+                            <const int32_t *>lent[1].buf, lent[1].shape[0], place, <int32_t *>lent[2].buf,
+                            <int64_t *>lent[3].buf, lent[3].shape[0])
+    finally:
+        for i in range(n_lent):
+            PyBuffer_Release(&lent[i])
+    return n
 
 
 def line_pixels(int64_t x0, int64_t y0, int64_t x1, int64_t y1):

@@ -25,9 +25,11 @@ static void fill_edge_increment(const classic_target *t, const double *a, const 
             return;
     } else if (!snap_edges(&e, t, a, b, c, subpixel_bits, form == EDGE_INCREMENT_BOTTOM_RIGHT))
         return;
+    note_edges(&e, t);
     for (int64_t y = e.y_first; y <= e.y_last; y++) {
         int64_t w0 = e.value[0], w1 = e.value[1], w2 = e.value[2];
         for (int64_t x = e.x_first; x <= e.x_last; x++) {
+            CLASSIC_STEP(t, CLASSIC_TEST, x, y, x, (w0 | w1 | w2) >= 0, w0, w1, w2);
             if ((w0 | w1 | w2) >= 0) /* no sign bit in any of them */
                 put(t, x, y);
             w0 += e.step_x[0], w1 += e.step_x[1], w2 += e.step_x[2];

@@ -8,8 +8,9 @@ typedef struct {
     int64_t x_first, x_last, y_first, y_last; /* pixels to visit: bounding box within the window */
     /* at the centre of (x_first, y_first), with the bias; a sample is inside where all are >= 0 */
     int64_t value[3];
-    int64_t step_x[3]; /* one pixel to the right */
-    int64_t step_y[3]; /* one pixel down */
+    int64_t step_x[3];           /* one pixel to the right */
+    int64_t step_y[3];           /* one pixel down */
+    int64_t x[3], y[3], bias[3]; /* the corners, clockwise as seen; -1 on the edges that own nothing */
 } classic_edges;
 
 /* Of an edge of a triangle with positive signed area. */
@@ -37,11 +38,20 @@ static inline int set_up_edges(classic_edges *e, const classic_target *t, int64_
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         const int64_t dx = x[j] - x[i], dy = y[j] - y[i];
-        const int is_owned = bottom_right ? is_bottom_right(dx, dy) : is_top_left(dx, dy);
-        e->value[k] = dx * (e->y_first * pixel + half - y[i]) - dy * (e->x_first * pixel + half - x[i]) - !is_owned;
+        e->x[k] = x[k], e->y[k] = y[k];
+        e->bias[k] = -!(bottom_right ? is_bottom_right(dx, dy) : is_top_left(dx, dy));
+        e->value[k] = dx * (e->y_first * pixel + half - y[i]) - dy * (e->x_first * pixel + half - x[i]) + e->bias[k];
         e->step_x[k] = -dy * pixel, e->step_y[k] = dx * pixel;
     }
     return 1;
+}
+
+static inline void note_edges(const classic_edges *e, const classic_target *t)
+{
+    (void)e, (void)t;
+    CLASSIC_STEP(t, CLASSIC_SET_UP_EDGES, e->x_first, e->y_first, e->x_first, 0, e->x[0], e->y[0], e->x[1], e->y[1],
+                 e->x[2], e->y[2], e->x_first, e->x_last, e->y_first, e->y_last, e->bias[0], e->bias[1], e->bias[2],
+                 e->step_x[0], e->step_x[1], e->step_x[2], e->step_y[0], e->step_y[1], e->step_y[2]);
 }
 
 /* Sets up from vertices snapped to `subpixel_bits`, as the library snaps them; one bit more where there is none, so that

@@ -30,13 +30,16 @@ enum { FLOAT_BARYCENTRIC = 0, FLOAT_BARYCENTRIC_FLOAT64 = 1 };
         const int64_t x_last = pixel_floor(greatest_##real(greatest_##real(ax, bx), cx), t->x0 - 1, t->x1 - 1);    \
         const int64_t y_first = pixel_floor(least_##real(least_##real(ay, by), cy), t->y0, t->y1);                 \
         const int64_t y_last = pixel_floor(greatest_##real(greatest_##real(ay, by), cy), t->y0 - 1, t->y1 - 1);    \
+        CLASSIC_REAL_STEP(t, CLASSIC_SET_UP_REAL, x_first, y_first, x_first, 0, ax, ay, bx, by, cx, cy, area);     \
         for (int64_t y = y_first; y <= y_last; y++) {                                                              \
             const real y_center = (real)y + (real)0.5;                                                             \
             for (int64_t x = x_first; x <= x_last; x++) {                                                          \
                 const real x_center = (real)x + (real)0.5;                                                         \
-                if (cross_of_##real(bx, by, cx, cy, x_center, y_center) * inv_area >= 0 &&                         \
-                    cross_of_##real(cx, cy, ax, ay, x_center, y_center) * inv_area >= 0 &&                         \
-                    cross_of_##real(ax, ay, bx, by, x_center, y_center) * inv_area >= 0)                           \
+                const real w0 = cross_of_##real(bx, by, cx, cy, x_center, y_center) * inv_area;                    \
+                const real w1 = cross_of_##real(cx, cy, ax, ay, x_center, y_center) * inv_area;                    \
+                const real w2 = cross_of_##real(ax, ay, bx, by, x_center, y_center) * inv_area;                    \
+                CLASSIC_REAL_STEP(t, CLASSIC_TEST_REAL, x, y, x, w0 >= 0 && w1 >= 0 && w2 >= 0, w0, w1, w2);       \
+                if (w0 >= 0 && w1 >= 0 && w2 >= 0)                                                                 \
                     put(t, x, y);                                                                                  \
             }                                                                                                      \
         }                                                                                                          \

@@ -20,6 +20,7 @@ static inline int64_t lerp(int64_t a, int64_t b, int64_t i, int64_t height)
 
 static inline void fill_between(const classic_target *t, int64_t y, int64_t x, int64_t other)
 {
+    CLASSIC_STEP(t, CLASSIC_ROW_LERP, x < other ? x : other, y, 0, 0, x, other);
     fill_span(t, y, x < other ? x : other, x < other ? other : x);
 }
 
@@ -37,6 +38,7 @@ static void fill_lerp_scanline(const classic_target *t, const double *a, const d
     const int64_t height = r.y - p.y;
     if (!height) /* horizontal, or a point: the height divides */
         return;
+    CLASSIC_STEP(t, CLASSIC_SET_UP, p.x, p.y, p.x, 0, p.x, p.y, q.x, q.y, r.x, r.y);
     if (form == LERP_SCANLINE_PLUS_ONE) {
         for (int64_t y = larger(p.y, t->y0); y < smaller(q.y + 1, t->y1); y++)
             fill_between(t, y, lerp(p.x, r.x, y - p.y, height), lerp(p.x, q.x, y - p.y, q.y - p.y + 1));

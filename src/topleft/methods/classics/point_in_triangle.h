@@ -30,6 +30,8 @@ static void fill_point_in_triangle(const classic_target *t, const double *va, co
             swap_points(&b, &c);
         bias[0] = bias_of(a, b), bias[1] = bias_of(b, c), bias[2] = bias_of(c, a);
     }
+    CLASSIC_STEP(t, CLASSIC_SET_UP, larger(t->x0, smaller(smaller(a.x, b.x), c.x)),
+                 larger(t->y0, smaller(smaller(a.y, b.y), c.y)), 0, 0, a.x, a.y, b.x, b.y, c.x, c.y);
     const int64_t y_end = smaller(t->y1, larger(larger(a.y, b.y), c.y) + 1);
     const int64_t x_end = smaller(t->x1, larger(larger(a.x, b.x), c.x) + 1);
     for (int64_t y = larger(t->y0, smaller(smaller(a.y, b.y), c.y)); y < y_end; y++)
@@ -37,7 +39,10 @@ static void fill_point_in_triangle(const classic_target *t, const double *va, co
             const classic_point p = {x, y};
             const int64_t w0 = cross_of_points(a, b, p) + bias[0], w1 = cross_of_points(b, c, p) + bias[1];
             const int64_t w2 = cross_of_points(c, a, p) + bias[2];
-            if ((w0 >= 0 && w1 >= 0 && w2 >= 0) || (form == POINT_IN_TRIANGLE && w0 <= 0 && w1 <= 0 && w2 <= 0))
+            const int is_inside =
+                (w0 >= 0 && w1 >= 0 && w2 >= 0) || (form == POINT_IN_TRIANGLE && w0 <= 0 && w1 <= 0 && w2 <= 0);
+            CLASSIC_STEP(t, CLASSIC_TEST, x, y, x, is_inside, w0, w1, w2);
+            if (is_inside)
                 put(t, x, y);
         }
 }

@@ -16,14 +16,14 @@
 
 enum { ROW_CROSSING = 0, ROW_CROSSING_WITH_AREA = 1, ROW_CROSSING_FRONT = 2, ROW_CROSSING_BACK = 3 };
 
-/* Widens a span to where an edge crosses a row. */
-static inline void ask_edge(int64_t *first, int64_t *last, int64_t y, classic_point a, classic_point b)
+/* Widens a span to where an edge crosses a row, and returns it; NaN where it does not. */
+static inline float ask_edge(int64_t *first, int64_t *last, int64_t y, classic_point a, classic_point b)
 {
     if (a.y == b.y || y < smaller(a.y, b.y) || y > larger(a.y, b.y))
-        return;
-    const int64_t x =
-        (int64_t)floorf((float)a.x + (float)(y - a.y) * (float)(b.x - a.x) / (float)(b.y - a.y) + (float)0.5);
-    *first = smaller(*first, x), *last = larger(*last, x);
+        return NAN;
+    const float at = floorf((float)a.x + (float)(y - a.y) * (float)(b.x - a.x) / (float)(b.y - a.y) + (float)0.5);
+    *first = smaller(*first, (int64_t)at), *last = larger(*last, (int64_t)at);
+    return at;
 }
 
 static void fill_row_crossing(const classic_target *t, const double *va, const double *vb, const double *vc, int form,
@@ -35,12 +35,15 @@ static void fill_row_crossing(const classic_target *t, const double *va, const d
     if ((form != ROW_CROSSING && area == 0) || (form == ROW_CROSSING_FRONT && area > 0) ||
         (form == ROW_CROSSING_BACK && area < 0))
         return;
+    CLASSIC_STEP(t, CLASSIC_SET_UP_AREA, a.x, a.y, a.x, 0, a.x, a.y, b.x, b.y, c.x, c.y, area);
     const int64_t y_end = smaller(t->y1, larger(larger(a.y, b.y), c.y) + 1);
     for (int64_t y = larger(t->y0, smaller(smaller(a.y, b.y), c.y)); y < y_end; y++) {
         int64_t first = t->x1, last = t->x0 - 1; /* empty */
-        ask_edge(&first, &last, y, a, b);
-        ask_edge(&first, &last, y, b, c);
-        ask_edge(&first, &last, y, c, a);
+        const float ab = ask_edge(&first, &last, y, a, b);
+        const float bc = ask_edge(&first, &last, y, b, c);
+        const float ca = ask_edge(&first, &last, y, c, a);
+        (void)ab, (void)bc, (void)ca;
+        CLASSIC_REAL_STEP(t, CLASSIC_ROW_CROSSING, first, y, first, 0, ab, bc, ca);
         fill_span(t, y, first, last);
     }
 }

@@ -9,13 +9,21 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* What a method tells of a step, by steps.h: the kind, pixels x to last of row y, whether they are drawn, and the numbers
+ * that decided it, whole or real.  Nothing, unless that file was included before. */
+#ifndef CLASSIC_STEP
+#define CLASSIC_STEP(t, kind, x, y, last, is_drawn, ...) ((void)0)
+#define CLASSIC_REAL_STEP(t, kind, x, y, last, is_drawn, ...) ((void)0)
+#endif
+
 typedef enum { CLASSIC_MASK = 0, CLASSIC_COUNT = 1, CLASSIC_LABEL = 2 } classic_sink; /* Sink in options.py */
 
 typedef struct {
     void *pixels; /* uint8 for MASK, int32 otherwise */
     classic_sink sink;
-    int32_t label;          /* of the triangle being drawn */
-    int64_t x0, y0, x1, y1; /* window of the whole picture, pixels, half-open */
+    int32_t label;               /* of the triangle being drawn */
+    int64_t x0, y0, x1, y1;      /* window of the whole picture, pixels, half-open */
+    struct classic_trace *trace; /* of steps.h alone */
 } classic_target;
 
 typedef struct {
@@ -63,6 +71,7 @@ static inline void put(const classic_target *t, int64_t x, int64_t y)
 /* Draws one pixel, if it lies in the window. */
 static inline void plot(const classic_target *t, int64_t x, int64_t y)
 {
+    CLASSIC_STEP(t, CLASSIC_SPAN, x, y, x, 1, 0);
     if (t->x0 <= x && x < t->x1 && t->y0 <= y && y < t->y1)
         put(t, x, y);
 }
@@ -70,6 +79,7 @@ static inline void plot(const classic_target *t, int64_t x, int64_t y)
 /* Draws the pixels first to last of a row, both of them included. */
 static inline void fill_span(const classic_target *t, int64_t y, int64_t first, int64_t last)
 {
+    CLASSIC_STEP(t, CLASSIC_SPAN, first, y, last, 1, 0);
     if (y < t->y0 || y >= t->y1)
         return;
     uint8_t *mask = t->pixels; /* bytes may overlay `t` itself: read it once, or there is no memset */

@@ -31,6 +31,7 @@ static void fill_zigzag(const classic_target *t, const double *a, const double *
     (void)form;
     if (!snap_edges(&e, t, a, b, c, subpixel_bits, 0))
         return;
+    note_edges(&e, t);
     /* Start below the topmost vertex, and step to the left until the first row lies to the right. */
     const double top_x = a[1] <= (b[1] < c[1] ? b[1] : c[1]) ? a[0] : b[1] <= c[1] ? b[0] : c[0];
     int64_t x = pixel_floor(top_x, e.x_first, e.x_last);
@@ -44,6 +45,7 @@ static void fill_zigzag(const classic_target *t, const double *a, const double *
     int64_t way = 1;
     for (int64_t y = e.y_first; y <= e.y_last; y++, way = -way) {
         for (;;) {
+            CLASSIC_STEP(t, CLASSIC_TEST_WAY, x, y, x, (w[0] | w[1] | w[2]) >= 0, w[0], w[1], w[2], way);
             if ((w[0] | w[1] | w[2]) >= 0)
                 put(t, x, y);
             if (x == (way > 0 ? e.x_last : e.x_first) || is_behind(w, e.step_x, e.step_y, way))

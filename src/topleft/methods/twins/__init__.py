@@ -1,4 +1,4 @@
-"""Twins in Python of the classics and of the production walkers, written for reading.
+"""Twins in Python of the classics, written for reading.
 
-A twin draws the pixels of its kernel in `topleft.methods.classics`, and tells a recorder of its steps.
+A twin draws the pixels of its kernel in `topleft.methods.classics`.
 """

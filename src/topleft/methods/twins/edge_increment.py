@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture, to_pixels
+from topleft.methods.twins._picture import Pixel, corners_of, new_picture, to_pixels
 
 Triple = tuple[int, int, int]
 
@@ -23,8 +23,6 @@ class Edges(NamedTuple):
     value: Triple  # at the centre of the first pixel, with the bias
     step_x: Triple  # one pixel to the right
     step_y: Triple  # one pixel down
-    corners: tuple[Pixel, Pixel, Pixel]  # clockwise as seen, in units
-    bias: Triple  # -1 on the edges that own nothing
 
 
 def set_up(corners: list[tuple[float, float]], size: Pixel, variant: str, subpixel_bits: int) -> Edges | None:
@@ -46,17 +44,16 @@ def set_up(corners: list[tuple[float, float]], size: Pixel, variant: str, subpix
     )
     if area == 0 or columns[0] > columns[1] or rows[0] > rows[1]:
         return None
-    value, step_x, step_y, biases = [], [], [], []
+    value, step_x, step_y = [], [], []
     for p, q in ((b, c), (c, a), (a, b)):  # opposite the first, second and third corner
         dx, dy = q[0] - p[0], q[1] - p[1]
         is_top_left = dy < 0 or (dy == 0 and dx > 0)
         is_bottom_right = dy > 0 or (dy == 0 and dx < 0)
         bias = 0 if (is_bottom_right if variant == "bottom-right" else is_top_left) else -1
-        biases.append(bias)
         value.append(dx * (rows[0] * unit + half - p[1]) - dy * (columns[0] * unit + half - p[0]) + bias)
         step_x.append(-dy * unit)
         step_y.append(dx * unit)
-    return Edges(columns, rows, triple(value), triple(step_x), triple(step_y), points, triple(biases))
+    return Edges(columns, rows, triple(value), triple(step_x), triple(step_y))
 
 
 def triple(values: list[int]) -> Triple:
@@ -70,23 +67,8 @@ def add(values: Triple, steps: Triple, n: int = 1) -> Triple:
     return values[0] + n * steps[0], values[1] + n * steps[1], values[2] + n * steps[2]
 
 
-def note_set_up(record: Record, e: Edges) -> None:
-    """Tell a recorder of the set-up."""
-    a, b, c = e.corners
-    record(
-        "triangle", e.columns[0], e.rows[0], a=a, b=b, c=c, columns=e.columns, rows=e.rows, bias=e.bias,
-        step_x=e.step_x, step_y=e.step_y,
-    )  # fmt: skip
-
-
 def overdraw(
-    vertices: Any,
-    triangles: Any,
-    size: Pixel,
-    variant: str = "",
-    record: Record | None = None,
-    *,
-    subpixel_bits: int = 8,
+    vertices: Any, triangles: Any, size: Pixel, variant: str = "", *, subpixel_bits: int = 8
 ) -> NDArray[np.int32]:
     """Return how often each pixel is drawn: int32, shape (H, W)."""
     counts, _ = new_picture(size)
@@ -94,16 +76,12 @@ def overdraw(
         e = set_up(corners, size, variant, subpixel_bits)
         if e is None:
             continue
-        if record:
-            note_set_up(record, e)
         of_row = e.value
         for y in range(e.rows[0], e.rows[1] + 1):
             w = of_row
             for x in range(e.columns[0], e.columns[1] + 1):
                 is_inside = min(w) >= 0
                 counts[y, x] += is_inside
-                if record:
-                    record("test", x, y, is_drawn=is_inside, E0=w[0], E1=w[1], E2=w[2])
                 w = add(w, e.step_x)
             of_row = add(of_row, e.step_y)
     return counts

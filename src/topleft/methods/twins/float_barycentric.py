@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture
+from topleft.methods.twins._picture import Pixel, corners_of, new_picture
 
 
 def cross(a: Any, b: Any, x: Any, y: Any) -> Any:
@@ -18,12 +18,10 @@ def cross(a: Any, b: Any, x: Any, y: Any) -> Any:
     return (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
 
 
-def overdraw(
-    vertices: Any, triangles: Any, size: Pixel, variant: str = "", record: Record | None = None
-) -> NDArray[np.int32]:
+def overdraw(vertices: Any, triangles: Any, size: Pixel, variant: str = "") -> NDArray[np.int32]:
     """Return how often each pixel is drawn: int32, shape (H, W)."""
     real: Any = np.float64 if variant == "float64" else np.float32
-    counts, _ = new_picture(size, record)
+    counts, _ = new_picture(size)
     with np.errstate(all="ignore"):  # what overflows covers nothing
         for corners in corners_of(vertices, triangles):
             a, b, c = np.array(corners, real)
@@ -38,10 +36,5 @@ def overdraw(
             y = np.arange(first_y, last_y + 1).astype(real)[:, None] + real(0.5)
             weights = [cross(p, q, x, y) * inv_area for p, q in ((b, c), (c, a), (a, b))]
             is_inside = np.all([w >= 0 for w in weights], axis=0)
-            if record:
-                record("triangle", first_x, first_y, a=a, b=b, c=c, area=area)
-                record(
-                    "box", first_x, first_y, is_drawn=is_inside, **dict(zip(("w0", "w1", "w2"), weights, strict=True))
-                )
             counts[first_y : first_y + len(y), first_x : first_x + len(x)] += is_inside
     return counts

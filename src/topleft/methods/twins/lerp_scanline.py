@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture, to_pixels
+from topleft.methods.twins._picture import Pixel, corners_of, new_picture, to_pixels
 
 
 def lerp(a: int, b: int, i: int, height: int) -> int:
@@ -18,11 +18,9 @@ def lerp(a: int, b: int, i: int, height: int) -> int:
     return a + int(np.float32(b - a) * (np.float32(i) / np.float32(height)))
 
 
-def overdraw(
-    vertices: Any, triangles: Any, size: Pixel, variant: str = "", record: Record | None = None
-) -> NDArray[np.int32]:
+def overdraw(vertices: Any, triangles: Any, size: Pixel, variant: str = "") -> NDArray[np.int32]:
     """Return how often each pixel is drawn: int32, shape (H, W)."""
-    counts, span = new_picture(size, record)
+    counts, span = new_picture(size)
     extra = 1 if variant == "plus-one" else 0
     for corners in corners_of(vertices, triangles):
         a, b, c = to_pixels(corners)
@@ -34,8 +32,6 @@ def overdraw(
             b, c = c, b
         if a[1] == c[1]:
             continue
-        if record:
-            record("triangle", *a, a=a, b=b, c=c)
         # The middle row: drawn by both halves, or by the upper one unless that has no height.
         if variant == "plus-one":
             upper, lower = range(a[1], b[1] + 1), range(b[1], c[1] + 1)
@@ -47,7 +43,5 @@ def overdraw(
             for y in rows:
                 long_x = lerp(a[0], c[0], y - a[1], c[1] - a[1])
                 short_x = lerp(top[0], bottom[0], y - top[1], bottom[1] - top[1] + extra)
-                if record:
-                    record("row", min(long_x, short_x), y, long_x=long_x, short_x=short_x)
                 span(y, min(long_x, short_x), max(long_x, short_x))
     return counts

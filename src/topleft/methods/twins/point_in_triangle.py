@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture, to_pixels
+from topleft.methods.twins._picture import Pixel, corners_of, new_picture, to_pixels
 
 
 def cross(a: Pixel, b: Pixel, x: Any, y: Any) -> Any:
@@ -23,11 +23,9 @@ def bias(a: Pixel, b: Pixel) -> int:
     return 0 if b[1] < a[1] or (b[1] == a[1] and b[0] > a[0]) else -1
 
 
-def overdraw(
-    vertices: Any, triangles: Any, size: Pixel, variant: str = "", record: Record | None = None
-) -> NDArray[np.int32]:
+def overdraw(vertices: Any, triangles: Any, size: Pixel, variant: str = "") -> NDArray[np.int32]:
     """Return how often each pixel is drawn: int32, shape (H, W)."""
-    counts, _ = new_picture(size, record)
+    counts, _ = new_picture(size)
     for corners in corners_of(vertices, triangles):
         a, b, c = to_pixels(corners)
         if variant == "top-left" and cross(a, b, *c) < 0:
@@ -42,8 +40,5 @@ def overdraw(
         is_inside = (w >= 0).all(axis=0)
         if not variant:
             is_inside |= (w <= 0).all(axis=0)
-        if record:
-            record("triangle", first_x, first_y, a=a, b=b, c=c)
-            record("box", first_x, first_y, is_drawn=is_inside, E0=w[0], E1=w[1], E2=w[2])
         counts[first_y : first_y + len(y), first_x : first_x + len(x)] += is_inside
     return counts

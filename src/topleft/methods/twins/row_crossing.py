@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture, to_pixels
+from topleft.methods.twins._picture import Pixel, corners_of, new_picture, to_pixels
 
 
 def crossings(a: Pixel, b: Pixel, y: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -22,11 +22,9 @@ def crossings(a: Pixel, b: Pixel, y: NDArray[np.int64]) -> NDArray[np.float32]:
     return np.where((y < min(a[1], b[1])) | (y > max(a[1], b[1])), np.float32(np.nan), x)
 
 
-def overdraw(
-    vertices: Any, triangles: Any, size: Pixel, variant: str = "", record: Record | None = None
-) -> NDArray[np.int32]:
+def overdraw(vertices: Any, triangles: Any, size: Pixel, variant: str = "") -> NDArray[np.int32]:
     """Return how often each pixel is drawn: int32, shape (H, W)."""
-    counts, span = new_picture(size, record)
+    counts, span = new_picture(size)
     for corners in corners_of(vertices, triangles):
         a, b, c = to_pixels(corners)
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
@@ -37,11 +35,6 @@ def overdraw(
             continue
         y = np.arange(min(a[1], b[1], c[1]), max(a[1], b[1], c[1]) + 1)
         x = np.stack([crossings(a, b, y), crossings(b, c, y), crossings(c, a, y)])
-        if record:
-            record("triangle", *a, a=a, b=b, c=c, area=area)
         for row, first, last in zip(y.tolist(), np.nanmin(x, axis=0), np.nanmax(x, axis=0), strict=True):
-            if record:
-                at = x[:, row - int(y[0])].tolist()
-                record("row", int(first), row, ab=at[0], bc=at[1], ca=at[2])
             span(row, int(first), int(last))
     return counts

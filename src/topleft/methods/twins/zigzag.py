@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture
-from topleft.methods.twins.edge_increment import Edges, Triple, add, note_set_up, set_up
+from topleft.methods.twins._picture import Pixel, corners_of, new_picture
+from topleft.methods.twins.edge_increment import Edges, Triple, add, set_up
 
 
 def is_behind(w: Triple, step_x: Triple, step_y: Triple | None, way: int) -> bool:
@@ -33,13 +33,7 @@ def start(e: Edges, corners: list[tuple[float, float]]) -> tuple[int, Triple]:
 
 
 def overdraw(
-    vertices: Any,
-    triangles: Any,
-    size: Pixel,
-    variant: str = "",
-    record: Record | None = None,
-    *,
-    subpixel_bits: int = 8,
+    vertices: Any, triangles: Any, size: Pixel, variant: str = "", *, subpixel_bits: int = 8
 ) -> NDArray[np.int32]:
     """Return how often each pixel is drawn: int32, shape (H, W)."""
     counts, _ = new_picture(size)
@@ -47,16 +41,12 @@ def overdraw(
         e = set_up(corners, size, variant, subpixel_bits)
         if e is None:
             continue
-        if record:
-            note_set_up(record, e)
         x, w = start(e, corners)
         way = 1
         for y in range(e.rows[0], e.rows[1] + 1):
             while True:
                 is_inside = min(w) >= 0
                 counts[y, x] += is_inside
-                if record:
-                    record("test", x, y, is_drawn=is_inside, E0=w[0], E1=w[1], E2=w[2], way=way)
                 if x == e.columns[way > 0] or is_behind(w, e.step_x, e.step_y, way):
                     break
                 x, w = x + way, add(w, e.step_x, way)

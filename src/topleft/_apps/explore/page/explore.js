@@ -932,7 +932,7 @@ function racePart(app, panel) {
     redraw();
   }
   function build() {
-    const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), redraw())});
+    const seed = make("input", {type: "number", min: 0, max: (known.n_seeds ?? 100) - 1, value: view.seed, onchange: () => (view.seed = Math.min(seed.max, Math.max(0, seed.valueAsNumber | 0)), redraw())});
     const families = Object.keys(known.families).map((name) => [name]);
     side.replaceChildren(group("Race", choose("family", families, view.family, take), what, sliders, row("seed", seed), make("div.legend", {}, ...keyOf(known.key))));
     take(view.family);

@@ -79,7 +79,7 @@ export class Kernels {
 
   window([x, y], [width, height], test = 0) {
     this.size = [width, height];
-    this.exports.web_window(x, y, width, height, test);
+    this.exports.web_window(BigInt(x), BigInt(y), width, height, test);
   }
 
   // A mask (Uint8Array), or counts, or ids (Int32Array), as one sample sees them: `at`, in sixteenths of a pixel.
@@ -106,8 +106,18 @@ export class Kernels {
     return this.within(() => {
       const n = width * height, pixels = this.room(4 * n);
       this.exports.web_classic(number, form, bits, this.put(points), n_components, this.put(triangles), triangles.length / 3,
-        sink, x, y, width, height, pixels);
+        sink, BigInt(x), BigInt(y), width, height, pixels);
       return this.get(Int32Array, pixels, n);
+    });
+  }
+
+  // The counts that a method draws, and its steps as words of int64 (steps.h of the classics); null for more than `most`.
+  trace({number, form}, {points, n_components, triangles}, bits, [x, y], [width, height], most) {
+    return this.within(() => {
+      const n = width * height, counts = this.room(4 * n), n_words = 24 * (most + triangles.length / 3), words = this.room(8 * n_words);
+      const found = this.exports.web_trace(number, form, bits, this.put(points), n_components, this.put(triangles),
+        triangles.length / 3, BigInt(x), BigInt(y), width, height, counts, words, n_words);
+      return found > most ? null : {n: found, counts: this.get(Int32Array, counts, n), words: this.get(BigInt64Array, words, n_words)};
     });
   }
 

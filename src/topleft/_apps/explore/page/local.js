@@ -4,6 +4,8 @@
 import * as mesh from "./mesh.js";
 import {drawAll, edit} from "./pixels.js";
 import {probe} from "./probe.js";
+import * as race from "./race.js";
+import {trace} from "./steps.js";
 
 const NAMES = new Map([[Uint8ClampedArray, "uint8"], [Uint8Array, "uint8"], [Int32Array, "int32"], [Float32Array, "float32"]]);
 
@@ -16,6 +18,10 @@ const HANDLERS = {
     if (!(name in data.states)) throw new Error(`scene must be one of ${data.hello.scenes.join(", ")}, got '${name}'`);
     return {header: {state: data.states[name]}};
   },
+  "steps.trace": trace,
+  "race.families": race.families,
+  "race.draw": race.draw,
+  "race.column": race.column,
   "mesh.open": mesh.open,
   "mesh.draw": mesh.draw,
   "mesh.pick": mesh.pick,
@@ -30,7 +36,8 @@ export class Answerer {
   async answer(question, parts = []) {
     const {id} = question;
     try {
-      if (`${question.do}`.startsWith("mesh.")) this.data.mesh.bytes ??= await this.load("mesh.bin");
+      const part = `${question.do}`.split(".")[0];
+      if (part === "mesh" || part === "race") this.data[part].bytes ??= await this.load(`${part}.bin`);
       if (!(question.do in HANDLERS)) throw new Error(`nothing is called '${question.do}' here`);
       const {header, arrays = {}} = HANDLERS[question.do](this.kernels, this.data, question, parts);
       const listed = Object.entries(arrays).map(([name, [array, shape]], part) => [name, {dtype: NAMES.get(array.constructor), shape, part}]);

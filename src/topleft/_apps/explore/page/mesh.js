@@ -5,19 +5,22 @@ import {readMesh} from "./files.js";
 import {SINK} from "./kernels.js";
 import {refuse} from "./pixels.js";
 
-let shown = null;  // {name, lacks, bounds, center, table, counts}
+let shown = null;  // {name, lacks, bounds, table, counts, given}
 
-function take(kernels, data, {vertices, triangles, polygons, isSplit, lacks}, name) {
-  const before = shown;
-  shown = null;
-  const corners = triangles ?? kernels.cut(polygons, vertices);
+function take(kernels, data, {polygons, ...file}, name) {
+  const given = {...file, triangles: file.triangles ?? kernels.cut(polygons, file.vertices)};
   try {
-    const cosine = isSplit ? -2 : cosineAndSine(data.mesh.crease)[0], bounds = kernels.takeMesh(vertices, corners, cosine);
-    shown = {name, lacks, bounds, counts: kernels.counts};
+    shown = taken(kernels, data, given, name);
   } catch (error) {
-    if (before) kernels.exports.web_release(kernels.start);  // neither mesh is there: the page opens its own again
+    if (shown) taken(kernels, data, shown.given, shown.name);  // of a mesh that memory does not hold: back to the one before
     throw error;
   }
+}
+
+// The kernels hold one mesh; what it was made of stays here.
+function taken(kernels, data, given, name) {
+  const cosine = given.isSplit ? -2 : cosineAndSine(data.mesh.crease)[0], bounds = kernels.takeMesh(given.vertices, given.triangles, cosine);
+  return {name, lacks: given.lacks, bounds, counts: kernels.counts, given};
 }
 
 function ensure(kernels, data) {

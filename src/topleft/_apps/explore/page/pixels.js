@@ -2,8 +2,9 @@
 // fractions. Tables and words come from Python (`data`, written by static.py); a test asks both sides the same questions.
 
 import {SINK, TEST} from "./kernels.js";
+import {wholeOf} from "./probe.js";
 
-const MAX_COORDINATE = 2 ** 52;
+const MAX_COORDINATE = 2 ** 52, MAX_EXACT_PX = 2 ** 48;
 
 // Python's words for a mistake: what a page gets is the sentence.
 export class Refusal extends Error {}
@@ -39,7 +40,7 @@ function chosen(name, value, words) {
 }
 
 // A method is one of the kernels' or of the literature.
-function checkMethod(name, {hello: {methods}}) {
+export function checkMethod(name, {hello: {methods}}) {
   const names = (isClassic) => methods.filter((one) => one.is_classic === isClassic).map((one) => one.name);
   if (methods.some((one) => one.name === name)) return;
   refuse(`method must be one of ${quoted(names(false))}, got ${repr(name)}; methods to compare with are ${quoted(names(true))}`);
@@ -93,8 +94,8 @@ const isCoverage = (state) => ["area", "outer", "inner"].includes(state.sampling
 
 // ---- what is drawn ---------------------------------------------------------------------------------------------
 
-// A pair of floats rounded as NumPy rounds: halves to even.
-function rint(x) {
+// Rounded as NumPy rounds: halves to even.
+export function rint(x) {
   const low = Math.floor(x), rest = x - low;
   return rest > 0.5 || (rest === 0.5 && low % 2 !== 0) ? low + 1 : low;
 }
@@ -127,21 +128,42 @@ export function checkReach(state, method, bits, data) {
   refuse(`vertices must lie within ${most} pixels of 0 for method '${method}', got [${state.vertices[i].map(asFloat).join(", ")}] in row ${i}`);
 }
 
+// Points and the origin of a window, moved to where samples are float64 for the exact picture.
+export function nearOrigin({points, origin}, n_components) {
+  if (origin.every((at) => Math.abs(at) < MAX_EXACT_PX / 2)) return {points, origin};
+  const [whole, pixel] = wholeOf(points), moved = Float64Array.from(points, (value, i) => {
+    const axis = i % n_components;
+    if (axis > 1) return value;
+    const n = whole[i] - BigInt(origin[axis]) * pixel, near = Number(n) / Number(pixel);
+    return BigInt(Number(n)) === n ? near : refuse("the exact picture of a window so far away is drawn by Python alone: topleft explore");
+  });
+  return {points: moved, origin: [0, 0]};
+}
+
+// Takes a scene of a state to the kernels, or refuses it as Python does.
+export function takeScene(kernels, {vertices, origin, size}, {bits, n_samples = 1, ...scene}) {
+  if (bits === "exact" && origin.some((at, k) => Math.max(Math.abs(at), Math.abs(Number(at) + size[k])) > MAX_EXACT_PX)) {
+    refuse(`origin and size must lie within ${MAX_EXACT_PX} pixels of 0 for 'exact', got (${origin.join(", ")})`);
+  }
+  const bad = kernels.takePixels({...scene, bits, n_samples}), grid = n_samples > 1 ? Math.max(4, bits) : bits;
+  if (bad >= 0) {
+    refuse(`vertices must lie within 2**${62 - grid} pixels of 0 with ${grid} sub-pixel bits, got `
+      + `[${vertices[bad].map(asFloat).join(", ")}] in row ${bad}`);
+  }
+}
+
 // What a method draws: owners and counts of each sample, (H W S), shares of pixels, and seconds.
 function drawn(kernels, state, method, data) {
-  const {size, origin, n_samples, look} = state, isExact = method === "exact";
+  const {size, n_samples, look} = state, isExact = method === "exact";
   const n = size[0] * size[1], classic = data.classics[method], notes = isExact ? [] : lacks(state, method, data);
   if (isExact && isCoverage(state)) refuse(`the exact picture of '${state.sampling}' is drawn by Python alone: topleft explore`);
   const bits = isExact ? "exact" : bitsOf(state, method, data);
-  const points = Float64Array.from(state.vertices.flat()), n_components = state.has_depth ? 3 : 2;
+  const n_components = state.has_depth ? 3 : 2, given = {points: Float64Array.from(state.vertices.flat()), origin: state.origin};
+  const {points, origin} = isExact ? nearOrigin(given, n_components) : given;
   const scene = {points, n_components, triangles: Int32Array.from(state.triangles.flat()), cull: state.cull,
     method: isExact ? "auto" : method};
   const take = (more) => {
-    const bad = kernels.takePixels({...scene, points: points.slice(), bits, n_samples, ...more}), grid = n_samples > 1 ? Math.max(4, bits) : bits;
-    if (bad >= 0) {
-      refuse(`vertices must lie within 2**${62 - grid} pixels of 0 with ${grid} sub-pixel bits, got `
-        + `[${state.vertices[bad].map(asFloat).join(", ")}] in row ${bad}`);
-    }
+    takeScene(kernels, {...state, origin}, {...scene, points: points.slice(), bits, n_samples, ...more});
     kernels.window(origin, size, TEST[state.sampling] ?? 0);
   };
   return kernels.within(() => {

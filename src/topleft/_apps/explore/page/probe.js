@@ -1,7 +1,7 @@
 // Why a pixel is whose, without Python: what probe.py answers, in whole numbers of any length.
 
 import {SINK} from "./kernels.js";
-import {bitsOf, checkReach, parseState, refuse, Refusal} from "./pixels.js";
+import {bitsOf, checkReach, parseState, refuse, Refusal, rint} from "./pixels.js";
 
 const MAX_ROWS = 6, MAX_DRAWN = 64;
 const abs = (n) => n < 0n ? -n : n;
@@ -12,6 +12,12 @@ function dyadic(x) {
   let k = 0;
   while (!Number.isInteger(x)) (x *= 2), k++;
   return [BigInt(x), k];
+}
+
+// Coordinates as whole numbers of a unit, and how many of it are a pixel: exact.
+export function wholeOf(points) {
+  const own = Array.from(points, dyadic), k = own.reduce((most, [, power]) => Math.max(most, power), 0);
+  return [own.map(([n, power]) => n << BigInt(k - power)), 1n << BigInt(k)];
 }
 
 // The float64 nearest to n / d, d > 0: 64 bits of the quotient, the last of them telling whether something is left.
@@ -39,18 +45,13 @@ function fraction(n, d) {
   return d / g === 1n ? `${n / g}` : `${n / g}/${d / g}`;
 }
 
-const cross = (a, b, p) => (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+export const cross = (a, b, p) => (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
 const isTopLeft = (a, b) => (a[1] === b[1] && b[0] > a[0]) || b[1] < a[1];
 const side = (a, b) => a[1] === b[1] ? (isTopLeft(a, b) ? "top" : "bottom") : isTopLeft(a, b) ? "left" : "right";
 
-function rintEven(x) {
-  const low = Math.floor(x), rest = x - low;
-  return rest > 0.5 || (rest === 0.5 && low % 2 !== 0) ? low + 1 : low;
-}
-
 // Each triangle with an area at a sample: edges with twice their areas in units of 4^-k px, and what that makes of it.
 function verdicts(state, pixel, sample, bits) {
-  const own = state.vertices.map(([x, y]) => [x, y].map((value) => bits === "exact" ? dyadic(value) : [BigInt(rintEven(value * 2 ** bits)), bits]));
+  const own = state.vertices.map(([x, y]) => [x, y].map((value) => bits === "exact" ? dyadic(value) : [BigInt(rint(value * 2 ** bits)), bits]));
   const k = Math.max(4, ...own.flat().map(([, power]) => power)), unit = 4 ** k;
   const points = own.map((row) => row.map(([n, power]) => n << BigInt(k - power)));
   const at = [0, 1].map((i) => BigInt(16 * (pixel[i] + state.origin[i]) + 8 + sample[i]) << BigInt(k - 4));

@@ -97,9 +97,9 @@ int web_take_pixels(double *points, int n_components, int n, const int32_t *tria
 }
 
 /* The part of the picture that is drawn, and which test covers a pixel. */
-WEB_EXPORT(web_window) void web_window(double x, double y, int width, int height, int test)
+WEB_EXPORT(web_window) void web_window(int64_t x, int64_t y, int width, int height, int test)
 {
-    scene.window.x_px = (int64_t)x, scene.window.y_px = (int64_t)y, scene.window.width = width;
+    scene.window.x_px = x, scene.window.y_px = y, scene.window.width = width;
     scene.window.height = height, scene.window.test = (tl_test)test;
 }
 
