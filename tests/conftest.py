@@ -102,6 +102,14 @@ def pytest_runtest_logreport(report):
 
 
 @pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Each process takes a range of tests: what neighbours share, exact pictures and records, is made in one alone."""
+    from xdist.scheduler import WorkStealingScheduling
+
+    return WorkStealingScheduling(config, log) if config.getvalue("dist") == "load" else None
+
+
+@pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node):
     output = getattr(node, "workeroutput", {})
     compared_elsewhere.append(output.get("n_pixels_compared", 0))

@@ -1,13 +1,10 @@
 """`topleft.compat.bop`: depth and colours that the renderers of bop_toolkit return, without it."""
 
-import sys
-
 import numpy as np
 import pytest
 
 import topleft as tl
 from topleft.compat import bop
-from topleft.compat.__main__ import main
 
 SIZE = (16, 12)
 K = (30.0, 31.0, 7.3, 6.1)
@@ -209,17 +206,3 @@ def test_points_are_no_object(tmp_path):
 def test_unknown_word_is_refused(name):
     with pytest.raises(ValueError, match=f"{name} must be one of .*, got 'other'"):
         bop.create_renderer(16, 12, **{name: "other"})
-
-
-def test_program_of_bop_toolkit_gets_the_module_for_its_renderer(tmp_path, monkeypatch):
-    program = tmp_path / "program.py"
-    program.write_text(
-        "import sys\nimport bop_toolkit_lib.rendering.renderer as renderer\nsys.found = renderer.create_renderer\n"
-    )
-    for name in ("bop_toolkit_lib", "bop_toolkit_lib.rendering", "bop_toolkit_lib.rendering.renderer"):
-        monkeypatch.setitem(sys.modules, name, type(sys)(name))
-    monkeypatch.setattr(sys, "path", sys.path.copy())
-    monkeypatch.setattr(sys, "argv", sys.argv)
-    monkeypatch.setattr(sys, "found", None, raising=False)
-    assert main(["bop", str(program)]) == 0
-    assert sys.found is bop.create_renderer

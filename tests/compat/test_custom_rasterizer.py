@@ -1,12 +1,9 @@
 """`topleft.compat.custom_rasterizer`: what the package of Hunyuan3D returns, without it."""
 
-import sys
-
 import numpy as np
 import pytest
 
 from topleft.compat import custom_rasterizer as cr
-from topleft.compat.__main__ import main
 
 SIZE = (6, 9)
 """Height and width."""
@@ -123,17 +120,6 @@ def test_interpolated_colours_are_sums_of_those_of_the_corners():
 def test_depth_prior_of_another_shape_is_refused():
     with pytest.raises(ValueError, match=r"clamp_depth must have shape \(6, 9\), got \(9, 6\)"):
         cr.rasterize([POS], TRI, SIZE, np.zeros((9, 6)), 1)
-
-
-def test_program_of_hunyuan3d_gets_the_module_for_its_rasterizer(tmp_path, monkeypatch):
-    program = tmp_path / "program.py"
-    program.write_text("import sys\nimport custom_rasterizer\nsys.found = custom_rasterizer.rasterize\n")
-    monkeypatch.setitem(sys.modules, "custom_rasterizer", None)
-    monkeypatch.setattr(sys, "path", sys.path.copy())
-    monkeypatch.setattr(sys, "argv", sys.argv)
-    monkeypatch.setattr(sys, "found", None, raising=False)
-    assert main(["custom_rasterizer", str(program)]) == 0
-    assert sys.found is cr.rasterize
 
 
 def test_tensors_give_tensors_with_gradients():

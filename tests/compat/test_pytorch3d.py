@@ -1,13 +1,11 @@
 """`topleft.compat.pytorch3d`: what PyTorch3D documents, without it; gradients where PyTorch is installed."""
 
-import sys
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from topleft.compat import pytorch3d as p3d
-from topleft.compat.__main__ import main
 
 SIZE = (9, 12)
 """Height and width: x goes from 4/3 to -4/3, y from 1 to -1."""
@@ -201,19 +199,6 @@ def test_rasterizer_without_cameras_is_refused():
 def test_what_is_not_drawn_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
         p3d.rasterize_meshes([random_mesh()], 8, **options)
-
-
-def test_program_of_pytorch3d_calls_topleft_wherever_it_imports_the_function_from(tmp_path, monkeypatch):
-    names = ["renderer", "renderer.mesh", "renderer.mesh.rasterize_meshes", "renderer.mesh.rasterizer"]
-    for name in ["pytorch3d", *(f"pytorch3d.{name}" for name in names)]:
-        monkeypatch.setitem(sys.modules, name, ModuleType(name))
-    program = tmp_path / "program.py"
-    program.write_text("from pytorch3d.renderer import rasterize_meshes\n")
-    monkeypatch.setattr(sys, "path", sys.path.copy())
-    monkeypatch.setattr(sys, "argv", sys.argv)
-    assert main(["pytorch3d", str(program)]) == 0
-    found = [getattr(sys.modules[f"pytorch3d.{name}"], "rasterize_meshes", None) for name in names]
-    assert [one is p3d.rasterize_meshes for one in found] == [True, False, True, True]
 
 
 @pytest.mark.parametrize("perspective", [False, True])

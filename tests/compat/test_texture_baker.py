@@ -1,11 +1,8 @@
 """`topleft.compat.texture_baker`: what the package of Stable Fast 3D returns, without it."""
 
-import sys
-
 import numpy as np
 import pytest
 
-from topleft.compat.__main__ import main
 from topleft.compat.texture_baker import TextureBaker
 
 N = 8
@@ -67,17 +64,6 @@ def test_baked_attributes_are_sums_of_those_of_the_corners(channels):
     assert np.allclose(found, expected, rtol=1e-6)
     assert not found[ids < 0].any()
     assert np.array_equal(baker(attr, UV, FACES, N), found)
-
-
-def test_program_of_stable_fast_3d_gets_the_module_for_its_baker(tmp_path, monkeypatch):
-    program = tmp_path / "program.py"
-    program.write_text("import sys\nfrom texture_baker import TextureBaker\nsys.found = TextureBaker\n")
-    monkeypatch.setitem(sys.modules, "texture_baker", None)
-    monkeypatch.setattr(sys, "path", sys.path.copy())
-    monkeypatch.setattr(sys, "argv", sys.argv)
-    monkeypatch.setattr(sys, "found", None, raising=False)
-    assert main(["texture_baker", str(program)]) == 0
-    assert sys.found is TextureBaker
 
 
 def test_tensors_give_tensors_with_gradients():

@@ -99,9 +99,30 @@ def check(ask, questions):
 
 def test_pixels_of_random_states_are_those_of_python(ask):
     questions = [{"do": "pixels.draw", "state": state} for state in random_states()]
-    drawable = [one for one in questions if not (one["state"]["exact"] and one["state"]["sampling"] in SAMPLINGS[5:])]
-    assert len(drawable) > 40
-    check(ask, drawable)
+    check(ask, questions)
+
+
+def small_states():
+    """States of areas and squares whose exact picture is not refused: corners on pixels' corners, and in pixels."""
+    rng = np.random.default_rng(8)
+    for i in range(18):
+        vertices = rng.uniform(-3, 13, (6, 2))
+        vertices = np.round(vertices) if i % 2 else vertices
+        yield {
+            "vertices": vertices.tolist(), "triangles": rng.integers(0, 6, (1 + i % 4, 3)).tolist(), "size": [10, 8],
+            "origin": [i % 3 - 1, 0], "exact": True, "sampling": SAMPLINGS[5 + i % 3],
+            "subpixel_bits": (8, "exact", 0, 4)[i % 4], "cull": ("none", "none", "back", "front", "none")[i % 5],
+        }  # fmt: skip
+
+
+def test_exact_areas_and_squares_are_those_of_python(ask):
+    check(
+        ask,
+        [
+            {"do": "pixels.draw", "state": state}
+            for state in [*small_states(), *(FAR | {"sampling": s, "exact": True} for s in SAMPLINGS[5:])]
+        ],
+    )
 
 
 def test_pixels_of_each_scene_are_those_of_python(ask):

@@ -17,7 +17,7 @@ from topleft.compat._arrays import F64, moved
 
 __all__ = ["Renderer", "create_renderer"]
 
-F32 = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.floating[Any]]
 Intrinsics = tuple[float, float, float, float]
 Box = tuple[int, int, int, int]
 
@@ -280,9 +280,9 @@ class Model:
         shading : str
             "flat": with the normals of the triangles, turned to the eye.
         """
-        values = frags.interpolate(self.per_vertex).reshape(-1, 9)[seen].astype(np.float64).T.copy()
-        normal = values[3:6]
-        color: npt.NDArray[np.floating[Any]] = values[6:]
+        values = frags.interpolate(self.per_vertex).reshape(-1, 9)[seen].T.copy()
+        normal: Floats = values[3:6]
+        color: Floats = values[6:]
         if self.texture is not None:
             texels = frags.sample(self.texture, self.mesh.uv, filter="nearest", wrap="clamp")
             color = texels.reshape(-1, texels.shape[2])[seen, :3].T
@@ -290,14 +290,14 @@ class Model:
             corners = self.mesh.vertices[self.mesh.triangles[frags.triangle.reshape(-1)[seen]]]
             normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).T
             normal = np.where(dot(normal, (eye - corners[:, 0]).T) < 0, -normal, normal)
-        to_light = light[:, None] - values[:3]
+        to_light = light.astype(np.float32)[:, None] - values[:3]
         lengths = np.sqrt(dot(to_light, to_light) * dot(normal, normal))
-        weight = ambient + np.maximum(dot(to_light, normal), 0) / np.maximum(lengths, np.finfo(np.float64).tiny)
+        weight = ambient + np.maximum(dot(to_light, normal), 0) / np.maximum(lengths, np.finfo(np.float32).tiny)
         shown: npt.NDArray[np.uint8] = np.rint(255 * np.minimum(weight, 1) * color).astype(np.uint8).T
         return shown
 
 
-def dot(a: F64, b: F64) -> F64:
+def dot(a: Floats, b: Floats) -> Floats:
     """The scalar products of the columns of (3, N) and (3, N)."""
-    products: F64 = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    products: Floats = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     return products

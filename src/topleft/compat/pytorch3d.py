@@ -100,7 +100,7 @@ class MeshRasterizer:
             perspective_correct = cameras.is_perspective()
         near = cameras.get_znear()
         if z_clip_value is None and perspective_correct and near is not None:
-            z_clip_value = float(getattr(near, "min", lambda: near)()) / 2
+            z_clip_value = float(detached(near).min()) / 2
         return Fragments(
             *rasterize_meshes(
                 verts,
@@ -188,7 +188,7 @@ def rasterize_meshes(
         raise ValueError(f"blur_radius must be 0, got {blur_radius}")
     if not 1 <= faces_per_pixel <= MOST_FACES:
         raise ValueError(f"faces_per_pixel must lie in 1 to {MOST_FACES}, got {faces_per_pixel}")
-    height, width = (image_size, image_size) if isinstance(image_size, int) else (int(n) for n in image_size)
+    height, width = np.broadcast_to(image_size, 2).tolist()
     half = np.array([max(width / height, 1.0), max(height / width, 1.0)])
     verts, faces, counts = packed(meshes)
     of = library_of(verts)

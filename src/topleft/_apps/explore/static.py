@@ -37,8 +37,8 @@ SETS = ("simd128", "scalar")
 """The instruction sets of the kernels; a page fetches one."""
 
 SCRIPTS = (
-    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "steps.js", "race.js", "mesh.js",
-    "camera.js", "files.js",
+    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js",
+    "race.js", "mesh.js", "camera.js", "files.js",
 )  # fmt: skip
 
 LIT = ("smooth", "flat", "unlit", "normals")
@@ -107,6 +107,7 @@ def data_of(content: Content) -> dict[str, Any]:
         "defaults": defaults,
         "limits": {
             "max_side_px": MAX_SIDE_PX, "max_triangles": MAX_TRIANGLES, "max_vertices": MAX_VERTICES,
+            "max_slow_tests": pixels.MAX_SLOW_TESTS,
             "words": {name: get_args(kind) for name, kind in words.items()},
         },
         "mesh": mesh_data(content),

@@ -1,6 +1,7 @@
 // The part Pixels without Python: what pixels.py, state.py and probe.py answer, by the kernels in WebAssembly and exact
 // fractions. Tables and words come from Python (`data`, written by static.py); a test asks both sides the same questions.
 
+import {exactCoverage} from "./exact.js";
 import {SINK, TEST} from "./kernels.js";
 import {wholeOf} from "./probe.js";
 
@@ -152,11 +153,21 @@ export function takeScene(kernels, {vertices, origin, size}, {bits, n_samples = 
   }
 }
 
+// The exact picture of areas and squares, by fractions.
+function drawnExactly(state, data) {
+  const start = performance.now(), {sampling, size, triangles, subpixel_bits: bits} = state;
+  if (size[0] * size[1] * Math.max(1, triangles.length) > data.limits.max_slow_tests) {
+    refuse(`the exact picture of '${sampling}' takes too long here: make the window smaller`);
+  }
+  const found = exactCoverage(state, sampling === "area" && bits === "exact" ? 8 : bits);
+  return {...found, n_samples: 1, seconds: (performance.now() - start) / 1000, notes: []};
+}
+
 // What a method draws: owners and counts of each sample, (H W S), shares of pixels, and seconds.
 function drawn(kernels, state, method, data) {
+  if (method === "exact" && isCoverage(state)) return drawnExactly(state, data);
   const {size, n_samples, look} = state, isExact = method === "exact";
   const n = size[0] * size[1], classic = data.classics[method], notes = isExact ? [] : lacks(state, method, data);
-  if (isExact && isCoverage(state)) refuse(`the exact picture of '${state.sampling}' is drawn by Python alone: topleft explore`);
   const bits = isExact ? "exact" : bitsOf(state, method, data);
   const n_components = state.has_depth ? 3 : 2, given = {points: Float64Array.from(state.vertices.flat()), origin: state.origin};
   const {points, origin} = isExact ? nearOrigin(given, n_components) : given;

@@ -21,7 +21,7 @@ export function wholeOf(points) {
 }
 
 // The float64 nearest to n / d, d > 0: 64 bits of the quotient, the last of them telling whether something is left.
-function quotient(n, d) {
+export function quotient(n, d) {
   const shift = 66 - (abs(n).toString(2).length - d.toString(2).length), by = BigInt(Math.abs(shift));
   const [a, b] = shift > 0 ? [abs(n) << by, d] : [abs(n), d << by];
   const whole = a / b, bits = whole * b === a ? whole : whole | 1n;
