@@ -1,4 +1,4 @@
-"""Coercion and checks: what the caller gives becomes contiguous native arrays, or an error that names the argument."""
+"""Coercion and checks: arguments become contiguous native arrays, or an error that names the argument."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INT32_MAX = 2**31 - 1
 
 SIZE_HINT = "; the shape of a picture begins with its height: image.shape[1::-1] is its size"
 
-#: Device types of DLPack whose memory the CPU reads: CPU, pinned for CUDA or ROCm, CUDA managed.
+#: Device types of DLPack with memory that the CPU reads: CPU, pinned for CUDA or ROCm, CUDA managed.
 CPU_DEVICES = frozenset({1, 3, 11, 13})
 DEVICES = {2: "CUDA device", 4: "OpenCL device", 7: "Vulkan device", 8: "Metal device", 10: "ROCm device",
            14: "oneAPI device", 15: "WebGPU device"}  # fmt: skip
@@ -79,7 +79,7 @@ def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
 
 
 def set_aligned(instance: object, state: dict[str, Any]) -> None:
-    """Give an object that is unpickled or copied what it consists of, its arrays aligned for the kernels.
+    """Set the state of an object that is unpickled or copied, its arrays aligned for the kernels.
 
     Arrays that are pickled out of band lie wherever their bytes were received.
     """
@@ -303,7 +303,7 @@ def as_places(rows: ArrayLike, cols: ArrayLike, shape: tuple[int, ...]) -> tuple
             raise TypeError(f"{name} must be integers, got {shown(values)}")
         if array.dtype.kind == "u":
             array = np.minimum(array, np.iinfo(np.intp).max)
-        array = array.astype(np.intp)  # a copy: what has been checked is what is used
+        array = array.astype(np.intp)  # a copy: nobody else changes it after the check
         if array.size and not (array.min() >= 0 and array.max() < n):
             raise IndexError(f"{name} must lie in [0, {n}), got {array.min()} to {array.max()}")
         found.append(array)

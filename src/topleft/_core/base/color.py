@@ -23,7 +23,7 @@ DEFAULT_COLOR = (224, 222, 217)
 """sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
 
 WHITE = (255, 255, 255, 255)
-"""sRGB and alpha of what is behind a picture."""
+"""sRGB and alpha of the background of a picture."""
 
 LINEAR_ONE = 1 << 16
 """Steps of the light from 0 to 1 where it is kept as a whole number."""

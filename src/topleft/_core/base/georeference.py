@@ -204,7 +204,7 @@ def numbers_without_data(raster: Any) -> list[float]:
 
 
 def data_array(array: Any, name: str | None, x: F64, y: F64, transform: Six, crs: str | None, nodata: Any) -> Any:
-    """An `xarray.DataArray` on the centres of pixels, of which rioxarray reads CRS, transform and no data.
+    """An `xarray.DataArray` on the centres of pixels; rioxarray reads its CRS, transform and no data.
 
     Raises
     ------

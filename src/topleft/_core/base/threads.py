@@ -132,7 +132,7 @@ def _start(take: Callable[[], None], n: int, jobs: list[Future[None]]) -> None:
 
 
 def _finish(jobs: list[Future[None]]) -> None:
-    """Wait for the jobs that have begun; raise what they raised."""
+    """Wait for the jobs that have begun; raise their errors."""
     for job in jobs:
         if not job.cancel():
             job.result()

@@ -29,7 +29,7 @@ from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.errors import MissingPackageError
 from topleft.typing import RuleOption
 
-#: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
+#: Entries allocated at a time, beyond those of the largest polygon; memory that is not written costs nothing.
 MAX_ENTRIES_AT_ONCE = 1 << 27
 
 #: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
@@ -54,7 +54,7 @@ class Overlap:
     size : (int, int)
         Width and height of the picture.
     nodata : number, optional
-        What rasters have in pixels without data, unless a method is told another one; that of the `Grid`.
+        The value of pixels without data in rasters, unless a method gets another one; that of the `Grid`.
 
     Examples
     --------
@@ -431,8 +431,8 @@ def list_range(
 ) -> None:
     """Write the entries of a range of polygons to the begin of `room`, and where each ends to `starts`.
 
-    One thread, with a row of `cells` each, writes them there. Several take blocks of polygons in turn; those whose
-    block is the next one write it there, the others copy theirs to where the blocks before it have ended.
+    One thread, with a row of `cells` each, writes them there. Several take blocks of polygons in turn: the
+    thread with the next block writes it there, the others copy theirs behind the blocks before it.
     """
     begin, last = polygons
     pixels, areas = room

@@ -32,7 +32,7 @@ FARTHEST_WINDOW_FX = 1 << 40
 
 
 class PointFragments(Fragments):
-    """The visibility buffer of points: what `points` returns, and `rasterize_mesh` of `Points`.
+    """The visibility buffer of points that `points` returns, and `rasterize_mesh` of `Points`.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ def points(
     point_size : float or (N,) array_like
         Pixels, positive, at most 16384: the diameter of a disc, the side of a square.
     shape : {"square", "disc"}
-        What a point covers.
+        The shape that a point covers.
     depth_test : {"less", "greater"}
         Which point is kept: the one with the smaller depth, or with the larger one; at equal depth that of lower index.
     **view
@@ -170,8 +170,8 @@ def points(
     disc if it is no farther from the centre than half its size; to a square if it lies in it, or on its left or upper
     side; and to any point if it lies in the square of one pixel round its centre, left and upper side included. So
     each point in the picture shows in the pixel that it lies in, on the edge of two in the left or upper one, unless
-    another hides it. All of a point has the depth of its centre; one whose centre is outside of the near or far plane
-    is not drawn.
+    another hides it. All of a point has the depth of its centre. A point with its centre outside of the near or far
+    plane is not drawn.
 
     Examples
     --------

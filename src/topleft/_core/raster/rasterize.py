@@ -1,6 +1,6 @@
 """Draws masks, counts and visibility buffers.
 
-Each verb checks what it is asked for, snaps the mesh (read, transform, snap, clip), chooses a route and draws.
+Each verb checks its arguments, snaps the mesh (read, transform, snap, clip), chooses a route and draws.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def canvas_of(
 ) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
     """Give the array to return and a contiguous aligned one to draw into; afterwards both are the same picture.
 
-    `keep`: what is in `out` shows through where nothing is drawn.
+    `keep`: pixels of `out` stay where nothing is drawn.
     """
     result, canvas = open_canvas(memory, name, out, shape, dtype)
     if keep and canvas is not result:
@@ -208,7 +208,7 @@ def draw_all_samples(
     pixels: NDArray[np.int32],
     depth: NDArray[np.float32] | None,
 ) -> None:
-    """Clear (S, H, W) planes and draw what each sample sees."""
+    """Clear (S, H, W) planes and draw the view of each sample."""
     if 0 in view.size:
         return
     if draw_planes(own, sink, pixels, depth, is_near=snapped.n_triangles > 0 and choices.can_slice(view)):
@@ -340,7 +340,7 @@ ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_de
 def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, options: FragmentOptions) -> Fragments | None:
     """Draw a mesh that has clusters, or that the plan has in clusters.
 
-    None where there are no clusters, where drawing them does not pay, or where only the mesh can tell what is wrong.
+    None without clusters, where drawing them does not pay, or where only the mesh can name the error.
     """
     sink = choices.fragment_sink(options.test, has_depth=True)
     clusters = None

@@ -71,7 +71,7 @@ class Snapped:
     def refuse(self) -> NoReturn:
         """Raise an error for the first triangle with an index or a vertex that cannot be drawn, as one was not."""
         self.given.check_indices()
-        if self.mesh.exact is not None:  # whose vertices were not looked at before
+        if self.mesh.exact is not None:  # no vertex was checked before
             check_finite(self.given.points, self.given.triangles, with_depth=False)
         refuse_changed()
 
@@ -158,7 +158,7 @@ def n_to_draw(given: MeshArrays, view: View) -> int:
 
 
 def snap_input(memory: Memory, given: MeshArrays, view: View, *, with_depth: bool, must_check: bool) -> Snapped:
-    """Take what was read through snap and clip, as `snap_mesh` does."""
+    """Snap and clip arrays that have been read, as `snap_mesh` does."""
     points, source, indices = given.points, given.source, given.triangles
     n = n_to_draw(given, view)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
@@ -366,7 +366,7 @@ def check_projected(points: NDArray[Any], projected: NDArray[np.float64], triang
 
 
 def check_finite(points: NDArray[Any], triangles: NDArray[np.int32], *, with_depth: bool) -> None:
-    """Raise an error for the first vertex whose numbers cannot be drawn as they are, if a triangle uses it."""
+    """Raise an error for the first used vertex with numbers that cannot be drawn unsnapped."""
     limit = 2.0**53 if points.dtype.kind == "i" else np.inf
     is_far = np.any(~(abs(points[:, :2].astype(float)) <= limit), axis=1)
     is_bad = is_far | ~np.isfinite(points).all(axis=1)

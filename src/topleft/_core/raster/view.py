@@ -31,7 +31,7 @@ class Planned(Protocol):
     """The part of `topleft.Plan` that verbs use."""
 
     def fitted(self, view: View) -> View:
-        """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
+        """Return the view with its choices, or raise an error where the plan is for another one."""
         return replace(view, plan=self)
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
@@ -71,7 +71,7 @@ class WindowOptions(TypedDict, total=False):
 
 
 class ViewOptions(WindowOptions, total=False):
-    """The options that all verbs share; `docs/design/rules.md` tells what each does."""
+    """The options that all verbs share; `docs/design/rules.md` defines them."""
 
     transform: ArrayLike | None
     sampling: SamplingOption
@@ -147,7 +147,7 @@ class View:
             self.plan.mark(stage)
 
     def refuse_classic(self, what: str) -> None:
-        """Raise an error when a classic was asked for what only the engine does."""
+        """Raise an error when a classic gets an option of the engine alone."""
         if self.classic is not None:
             raise ValueError(f"method {self.classic.name!r} has no {what}; use 'auto', 'edge' or 'scanline'")
 

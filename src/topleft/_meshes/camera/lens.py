@@ -29,7 +29,7 @@ FINEST_TOLERANCE_PX = 2.0**-8
 
 
 class Lens(Protocol):
-    """What a camera asks of its lens."""
+    """The methods of a lens that a camera needs."""
 
     #: Beyond it, in radians from the axis, the lens is not asked.
     max_angle: ClassVar[float]
@@ -48,14 +48,14 @@ class Lens(Protocol):
         """Places (N, 2) in the image plane of points (N, 3) in front of the lens."""
 
     def range_along(self, points: F64) -> F64:
-        """What stands for the distance of points (N, 3) in depth, world units."""
+        """The distances of points (N, 3) that depth stands for, world units."""
 
     def bend(self, points_eye: F64) -> F64:
         """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
 
     @property
     def terms(self) -> Terms:
-        """What kernels know of the lens."""
+        """The coefficients that kernels read."""
 
 
 class Terms(NamedTuple):
@@ -149,7 +149,7 @@ class OpenCVLens:
 
     @property
     def terms(self) -> Terms:
-        """What kernels know of the lens."""
+        """The coefficients that kernels read."""
         radial = self.k1, self.k2, self.k3, self.k4, self.k5, self.k6
         tilts = (engine.cosine_and_sine(math.degrees(angle)) for angle in (self.tau_x, self.tau_y))
         prism = self.s1, self.s2, self.s3, self.s4
@@ -226,7 +226,7 @@ class FisheyeLens:
 
     @property
     def terms(self) -> Terms:
-        """What kernels know of the lens."""
+        """The coefficients that kernels read."""
         return Terms((self.k1, self.k2, self.k3, self.k4, 0.0, 0.0))
 
     def range_along(self, points: F64) -> F64:

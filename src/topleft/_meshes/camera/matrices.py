@@ -1,4 +1,4 @@
-"""Makes the 4x4 matrices of cameras: where they stand, how they project, what has a subject in the frame.
+"""Makes the 4x4 matrices of cameras: poses, projections, and both of them for a subject in the frame.
 
 Spaces: world; eye (OpenGL: x right, y up, the view along -z); clip (-w <= x, y, z <= w inside).
 
@@ -27,14 +27,14 @@ from topleft.typing import UpOption
 Framed: TypeAlias = Mesh | Scene | Points | F64
 
 FRAMING_MARGIN = 1.05
-"""What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
+"""A subject that fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
 
 SILHOUETTE_MARGIN = 0.05
 """The share of the frame that `fit="silhouette"` leaves free at each end of the side that is filled."""
 
 
 def as_framed(subject: MeshLike | Scene | npt.ArrayLike) -> Framed:
-    """What is to be framed: a mesh, a scene, or points, by themselves or in a cloud."""
+    """The subject to frame: a mesh, a scene, or points, by themselves or in a cloud."""
     if isinstance(subject, Scene | Points) or is_mesh_like(subject):
         return as_subject(subject)
     return as_real("subject", subject)
@@ -153,8 +153,7 @@ def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = Fals
     points : (N, 3) float64
         In eye axes: z towards the viewer.
     tan_x, tan_y : float
-        Tangents of half the fields of view; without perspective half the sides of the frame, of which only the shape
-        counts.
+        Tangents of half the fields of view; without perspective half the sides of the frame; only their ratio counts.
 
     Returns
     -------

@@ -311,7 +311,7 @@ def _indices(body: U8) -> I64:
             values = numbers_of_text(numbers.tobytes(), np.int64)
         else:
             lengths = np.diff(np.append(starts, len(body)))
-            # what stands before the first word is left out
+            # bytes before the first word are left out
             values = numbers_of_text(numbers[starts[0] :][np.repeat(own, lengths)].tobytes(), np.int64)
         if len(values) != len(columns) * int(own.sum()):
             corners[own] = [_corner(body, start) for start in starts[own].tolist()]

@@ -454,7 +454,7 @@ def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, source: InputF
         return Mesh(positions, names, normals, colors, uv)
     else:
         uv = None if uv is None else uv[names.ravel()]
-    # vertices of their own for each triangle: what a face says ends at its edges
+    # vertices of their own for each triangle: the values of a face end at its edges
     source.budget.spend("max_vertices", 3 * len(triangles))
     if color_of_face is not None and colors is None:
         colors = np.repeat(color_of_face[faces], 3, axis=0)

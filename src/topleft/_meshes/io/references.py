@@ -1,7 +1,7 @@
 """Reads the files that a mesh file names: material libraries, buffers, pictures; from its own folder and nowhere else.
 
 Input: names out of a file that nobody has checked. Output: bytes, or the pixels of a picture; None, and a note, for
-what is not there, lies outside of the folder or cannot be read.
+files that are missing, lie outside of the folder or cannot be read.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Cloud(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """Which time of which animation of a file is read."""
+    """The animation of a file and the time of it to read."""
 
     time: float
     """Seconds."""
@@ -67,7 +67,7 @@ class InputFile:
     path : Path
         The mesh file.
     budget : Budget
-        What it may make.
+        The limits of its contents.
     archive : InputFile, optional
         The archive that it was unpacked from, which gets its notes and its points.
     home : Path, optional
@@ -121,7 +121,7 @@ class InputFile:
     def find(self, name: str, what: str, folder: Path | None = None) -> Path | None:
         """Where such a file is: in the folder of the mesh, or below.
 
-        What is named by a path that leads elsewhere, as other machines have them, is looked for in the folder itself.
+        A file with a path that leads elsewhere, as other machines have them, is looked for in the folder itself.
         """
         key = self._folder if folder is None else folder, name
         if key not in self._found:
@@ -244,7 +244,7 @@ def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
 
 @contextmanager
 def opened(content: bytes) -> Iterator[Image.Image]:
-    """A picture whose pixels have not been decoded.
+    """A picture before its pixels are decoded.
 
     Raises
     ------

@@ -8,7 +8,7 @@ With u = x / w, rows l of the linear part of the matrix and a viewport W wide, e
     px(q) - px(p) = W/2 (l_x - u l_w) . d / w(q),      and so for y with v and H.
 
 So no p moves by more than bound * s / w_min: s the largest singular value of the matrix of both rows, which is convex
-in (u, v) and so largest in a corner of what the mesh can show in, w_min the least w on both surfaces. Stretched
+in (u, v) and so largest in a corner of the rectangle that shows the mesh, w_min the least w on both surfaces. Stretched
 pixels, shear, the edge of the frame and instances that are scaled are in the matrix.
 """
 
@@ -44,13 +44,13 @@ class Detail:
     level : int
         0: the mesh itself.
     mesh : Mesh
-        What is drawn: the `.triangle` of its visibility buffer are rows of its triangles.
+        The mesh that is drawn: the `.triangle` of its visibility buffer are rows of its triangles.
     bound : float
         How far its surface may lie from the mesh, object units.
     bound_px : float
         How far a point that shows may lie from where it belongs, pixels.
     tolerance : float
-        What was asked for, pixels.
+        The limit that was given, pixels.
     n_triangles : int
         Triangles of the mesh itself.
     why : str
@@ -87,7 +87,7 @@ def choose_detail(
     viewport: tuple[int, int] | None = None,
     origin: tuple[int, int] = (0, 0),
 ) -> Detail:
-    """The coarsest level of a mesh whose points lie within a tolerance of where they belong in a picture.
+    """The coarsest level of a mesh with all points within a tolerance of where they belong in a picture.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def choose_detail(
 
 
 class Sight(NamedTuple):
-    """What a view says of how far points may be off."""
+    """The scale of errors in a view: from object units to pixels."""
 
     clip_from_world: F64
     viewport: tuple[int, int]
@@ -185,7 +185,7 @@ class Sight(NamedTuple):
 
 
 def sight_of(camera: Camera, size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> Sight:
-    """What a view says of how far points may be off."""
+    """The scale of errors in a view: from object units to pixels."""
     return Sight(camera.clip_from_world(viewport or size), viewport or size, window_of(size, viewport, origin))
 
 
@@ -232,7 +232,7 @@ def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, origina
         Clip from object.
     viewport : (width, height), pixels
     window : (4,) float64
-        What `window_of` gives.
+        The result of `window_of`.
     original, level : Level
     """
     scale = engine.pixels_per_unit(matrix, viewport, window, np.stack([original.extent, level.extent]))

@@ -92,12 +92,11 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     The bound is one on the two-sided Hausdorff distance of the surfaces as they are drawn, float32 or float64, in units
     of object space: it holds for each point of both, borders included, whatever the collapser did.
 
-    Vertices that stand at one place with equal attributes count as one, and those that no triangle uses as none. What
-    the mesh has of normals, colours and texture coordinates a vertex of a level takes from the point of the level
-    before that is nearest to it, among the triangles round the vertices that went into it. Open borders stay as they
-    are, vertex by vertex, and so do the seams where attributes jump or materials meet: nothing bleeds across and
-    nothing cracks, but no level is coarser than its borders and seams. A mesh without normals
-    has levels without, which crease at the same angle.
+    Vertices that stand at one place with equal attributes count as one, and those that no triangle uses as none. A
+    vertex of a level takes its normal, colour and texture coordinates from the nearest point of the level before,
+    among the triangles round the vertices that went into it. Open borders stay as they are, vertex by vertex, and so do
+    the seams where attributes jump or materials meet: nothing bleeds across and nothing cracks, but no level is coarser
+    than its borders and seams. A mesh without normals has levels without, which crease at the same angle.
 
     Examples
     --------

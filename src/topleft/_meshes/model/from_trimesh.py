@@ -32,7 +32,7 @@ def placed(geometry: Any, transform: npt.NDArray[np.float64], known: Textures | 
     `known` keeps the textures of a scene, which its geometries share.
     """
     vertices, triangles = np.asarray(geometry.vertices), np.asarray(geometry.faces)
-    # trimesh computes normals when asked for them; what a file gave waits in the cache.
+    # trimesh computes normals when asked for them; those of a file wait in the cache.
     normals = np.asarray(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
     colors = uv = None
     materials: tuple[Material, ...] = ()
@@ -67,7 +67,7 @@ def material_of(source: Any, known: Textures) -> Material | None:
 
 
 def _metallic_rough(source: Any, known: Textures) -> Material:
-    """What trimesh keeps of a material of glTF."""
+    """The material of glTF that trimesh keeps."""
     factor = source.baseColorFactor
     linear = np.ones(4)
     if factor is not None:

@@ -65,7 +65,7 @@ def render(
     Parameters
     ----------
     mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
-        What to draw: a path, or a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+        The subject: a path, or a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
         Points have no edges, sides to cull, materials and levels; they are lit where they have normals.
     camera : Camera or (4, 4) array, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up. A matrix is clip from world, see
@@ -73,8 +73,8 @@ def render(
     size : (width, height), or one number for a square; pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade` describes each. The first three composite what shows through, materials
-        with `alpha_mode="blend"` and colours with alpha, in linear light; the others show it as if it were opaque.
+        The meaning of colours; `topleft.shade` describes each. The first three composite blended surfaces, of
+        `alpha_mode="blend"` or colours with alpha, in linear light; the others show these as if they were opaque.
     color : str, (3,) integers of 0 to 255 or (3,) floats of 0 to 1
         sRGB colour of a mesh without colours: "red", "#f00", (255, 0, 0) and (1.0, 0.0, 0.0) are the same.
     background : str, (3,) or (4,) integers of 0 to 255 or floats of 0 to 1
@@ -96,7 +96,7 @@ def render(
     threads : int, optional
         How many threads draw; never changes a bit.
     rasterizer : Rasterizer, optional
-        Of this size: what is needed on the way lies in the memory that it keeps.
+        Of this size: intermediate buffers lie in the memory that it keeps.
     **look
         `lights`, `ambient`, `material`, `matcap`, `fog` and `environment` of `topleft.shade`.
 

@@ -39,7 +39,7 @@ def silhouette(
     Parameters
     ----------
     mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
-        What to look at.
+        The subject.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
@@ -69,7 +69,7 @@ def silhouette(
 
     Notes
     -----
-    What is covered by samples is the union of the triangles. By area it is the sum of their areas, at most 1: the union
+    By samples the cover is the union of the triangles. By area it is the sum of their areas, at most 1: the union
     where triangles do not overlap within a pixel. They do not along the outline of a closed mesh with ``cull="back"``
     that each line of sight enters once; where one part of it hides another, a pixel of the inner outline is full.
     Without culling the far side counts as well, and a pixel on the outline gets up to twice its share. Areas of the

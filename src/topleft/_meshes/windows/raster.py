@@ -1,6 +1,6 @@
-"""A raster of any size, of which windows are drawn when they are needed.
+"""A raster of any size: its windows are drawn when they are needed.
 
-Input: a mesh or polygons, a grid or a size in pixels, and what pixels hold. Output: `WindowedRaster`: any window, any
+Input: a mesh or polygons, a grid or a size in pixels, and the kind of pixels. Output: `WindowedRaster`: any window, any
 part by slicing, all windows in order, jobs for other processes. Every pixel equals that of the whole raster, however it
 is cut.
 """
@@ -32,8 +32,8 @@ from topleft.typing import RasterKindOption, YOption
 
 Path = str | os.PathLike[str]
 
-#: Pixels a side of a window. 80 px a triangle, two cores: 166 Mpx/s with 1024, 203 with 2048, 152 with 4096; what is
-#: written once more, ids of triangles as names, is then still in the cache.
+#: Pixels a side of a window. 80 px a triangle, two cores: 166 Mpx/s with 1024, 203 with 2048, 152 with 4096; pixels
+#: that are written once more, ids of triangles as names, are then still in the cache.
 WINDOW = 2048
 
 INDEX_BYTES = 256 << 20
@@ -51,7 +51,7 @@ class Window:
     x, y : int
         Its first pixel in the raster.
     pixels : ndarray (H, W) or (H, W, C)
-        What it shows.
+        Its picture.
     n_triangles : int
         How many triangles may touch it; 0: it is blank.
 
@@ -241,7 +241,7 @@ class WindowedRaster:
         return self.painter.window(payload, origin, size, self.threads if threads is None else threads, out)
 
     def job(self, row: int, column: int) -> Callable[[], Array]:
-        """Return what draws a window in another process: it carries the triangles that touch it, or where they are."""
+        """Return a job that draws a window in another process: it carries the window's triangles, or where they are."""
         origin, size = self.place(row, column)
         which = self.index.of_window(row, column)
         if self.is_mapped:
@@ -330,7 +330,7 @@ class WindowedRaster:
         return part[(*own, *keys[2:])]
 
     def explain(self) -> str:
-        """Return what drawing it takes: windows, triangles listed, memory, in lines; makes the index."""
+        """Return the costs of drawing it: windows, triangles listed, memory, in lines; makes the index."""
         index, (w, h) = self.index, self.window_size
         n_bytes = w * h * self.dtype.itemsize * int(np.prod(self.painter.channels, dtype=int))
         most = int(index.counts.max(initial=0))

@@ -1,7 +1,7 @@
 """The nodes of a glTF file at a time of its animations.
 
-Input: the JSON, unchecked, and a moment. Output: the JSON with nodes whose translations, rotations, scales and weights
-are those of the moment.
+Input: the JSON, unchecked, and a moment. Output: the JSON with the nodes' translations, rotations, scales and
+weights of the moment.
 
 Based on: Khronos Group, "glTF 2.0 Specification", 2021, 3.11 and appendix C.
 """

@@ -170,7 +170,7 @@ def _row_bytes(rest: DracoBytes, bytes_of_decoder: int) -> int:
     for _ in range(n_decoders):
         n = rest.number()
         for _ in range(n):
-            rest.byte()  # what it is for
+            rest.byte()  # its attribute
             total += BYTES_OF_TYPE[rest.byte()] * rest.byte()
             rest.byte()  # whether it is normalized
             rest.number()
@@ -179,7 +179,7 @@ def _row_bytes(rest: DracoBytes, bytes_of_decoder: int) -> int:
 
 
 def declared_by_draco(content: bytes) -> DracoSize:
-    """What a mesh declares: a file that says so is no promise that it holds it.
+    """The sizes that a mesh declares, which it need not hold.
 
     Raises
     ------
