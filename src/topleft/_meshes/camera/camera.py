@@ -627,8 +627,7 @@ class Camera:
         Parameters
         ----------
         subject : mesh, Scene, or (N, 3) array_like
-            Whatever `as_mesh` takes, or a scene: its vertices in use count; or points: the two corners of a
-            box, say.
+            Whatever `as_mesh` takes, or a scene: its vertices in use count; or points: two corners of a box, say.
         azimuth_deg : float
             0 looks at the front of the subject (+z with y up, -y with z up), 90 at its right (+x). Degrees.
         elevation_deg : float
@@ -663,7 +662,7 @@ class Camera:
 
 
 def planes_for(away: float, near: float | None, far: float | None) -> tuple[float, float]:
-    """The planes given, or those for a camera as far as that from the world's origin."""
+    """The planes given, or default ones for a camera at this distance from the world's origin."""
     near = 1e-3 * (away or 1.0) if near is None else near
     far = max(1e3 * max(away or 1.0, 1.0), 1e3 * near) if far is None else far
     check_planes(near, far)

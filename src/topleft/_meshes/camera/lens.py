@@ -21,7 +21,7 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_number, as_real
 
 FLIP = np.array([1.0, -1.0, -1.0])
-"""Between the axes of OpenCV and those of OpenGL, in both directions."""
+"""Turns axes of OpenCV into those of OpenGL, and back."""
 
 DEFAULT_TOLERANCE_PX = 0.125
 FINEST_TOLERANCE_PX = 2.0**-8
@@ -31,7 +31,7 @@ FINEST_TOLERANCE_PX = 2.0**-8
 class Lens(Protocol):
     """The methods of a lens that a camera needs."""
 
-    #: Beyond it, in radians from the axis, the lens is not asked.
+    #: Radians from the axis; beyond it the lens is not evaluated.
     max_angle: ClassVar[float]
 
     #: Whether `range_along` is the distance along the axis, which a straight projection shows as it is.
@@ -42,7 +42,7 @@ class Lens(Protocol):
 
     @property
     def tolerance_px(self) -> float:
-        """How far, in pixels, a straight piece of a bent edge may lie from where it belongs."""
+        """The largest error of a straight piece of a bent edge, in pixels."""
 
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3) in front of the lens."""
@@ -84,7 +84,7 @@ class OpenCVLens:
     tau_x, tau_y : float
         The tilt of the sensor, radians, each below 90 degrees.
     tolerance_px : float
-        How far, in pixels, a straight piece of a bent edge may lie from where it belongs.
+        The largest error of a straight piece of a bent edge, in pixels.
 
     Raises
     ------
@@ -182,7 +182,7 @@ class FisheyeLens:
     k1, k2, k3, k4 : float
         Terms of the angle.
     tolerance_px : float
-        How far, in pixels, a straight piece of a bent edge may lie from where it belongs.
+        The largest error of a straight piece of a bent edge, in pixels.
 
     Raises
     ------
@@ -192,7 +192,7 @@ class FisheyeLens:
     Notes
     -----
     A point at the angle t from the axis is seen at the distance t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) from the
-    centre. Depth is that of the distance from the lens, not of Z, which is nothing at 90 degrees.
+    centre. Depth is that of the distance from the lens, not of Z, which is 0 at 90 degrees.
 
     Examples
     --------

@@ -87,7 +87,7 @@ def box_corners(ends: F64) -> F64:
 
 
 def distance_to_fit(points: F64, tan_x: float, tan_y: float) -> float:
-    """How far in front of the origin a camera has to stand to have all points just inside its frame.
+    """The distance in front of the origin at which a camera has all points just inside its frame.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
 
 
 def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = False) -> F64:
-    """Where a camera has to stand so that the box round the picture of all points fills its frame, in the middle of it.
+    """The place of a camera that fits the box round the picture of all points into the middle of its frame.
 
     In the middle also along the axis that it does not fill, to within 1e-6 of its width.
 
@@ -174,12 +174,12 @@ def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = Fals
 
 
 def _planes_of(axis: F64, z: F64, tan: float) -> tuple[float, float]:
-    """How far out the two planes lie that a frame of this half angle touches the points with: low and high."""
+    """The offsets of the two planes of this half angle that touch the points: low and high."""
     return float((tan * z - axis).max()), float((tan * z + axis).max())
 
 
 def _middle(axis: F64, z: F64, tan: float, distance: float) -> float:
-    """The place along an axis from which the picture of the points, from this distance, has its middle on the axis."""
+    """The place along an axis that centres the picture of the points, from this distance."""
     depth = distance - z
     for _ in range(20):
         low, high = _planes_of(axis, z, tan)

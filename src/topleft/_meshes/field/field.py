@@ -31,7 +31,7 @@ from topleft.typing import PerOption, SurfaceOption, YOption
 #: Pixels a triangle. With fewer it pays to compute all planes first: 200,000 triangles at 1080p.
 MAX_PIXELS_TO_LIST = 48
 
-#: They take 64 bytes each, which the thread's scratch memory keeps.
+#: Planes take 64 bytes each in the thread's scratch memory.
 MAX_LISTED_PLANES = 1_000_000
 
 
@@ -64,7 +64,7 @@ def field(
     origin : (column, row), pixels
         The pixel of the grid that is row 0, column 0 of the result, which is the crop of the whole bit for bit.
     window : (width, height), optional
-        How large the result is; from `origin` to the end of the grid unless given.
+        The size of the result; from `origin` to the end of the grid unless given.
     nodata : number, optional
         The value where the mesh is not; unless given the `nodata` of the `Grid`, or NaN. With it integers of faces
         stay integers.

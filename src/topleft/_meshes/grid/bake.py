@@ -36,7 +36,7 @@ from topleft.typing import BakeOption, BakeRuleOption, TakenOption
 
 MOST_GUTTER = 1024
 OUTSIDE = 2.0**-20
-"""How far texture coordinates may leave [0, 1] before that is told: rounding."""
+"""How far texture coordinates may leave [0, 1] without a warning: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +96,15 @@ def bake(
     size : int or (width, height)
         Texels.
     rule : {"center", "touched", "area"}
-        Which triangles a texel has. "center": the one that owns its middle, by the top-left rule on vertices as they
+        The triangles of a texel. "center": the one that owns its middle, by the top-left rule on vertices as they
         are. "touched": where none does, the nearest to the middle of those that meet it, at its point nearest to the
-        middle. "area": the mean over all that triangles cover of it.
+        middle. "area": the mean over the area that triangles cover.
     gutter : int, 0 to 1024
         Texels round charts that get the value of the nearest texel (by Euclid, the upper left of several), so that a
         filter that reaches beyond a chart finds no background.
     source : Mesh, optional
         Another mesh in the same place, a finer one, say: values, normals and colours are those of its point that is
-        nearest to the mesh. Triangles are its own, too.
+        nearest to the mesh. Ids of triangles are its own, too.
     max_distance : float, optional
         Of that point; farther ones give no value.
     cameras : sequence of Camera, optional
@@ -230,7 +230,7 @@ def chart_of(mesh: Mesh, size: tuple[int, int], rule: str, n_threads: int) -> Ch
 
 
 def values_to_bake(mesh: Mesh, what: object) -> F32:
-    """The values of vertices (V, K) or corners (T, 3, K) that a word or an array asks for."""
+    """The values of vertices (V, K) or corners (T, 3, K) that a word names or an array holds."""
     if not isinstance(what, str):
         return as_values(cast(Any, what), len(mesh.vertices), len(mesh.triangles))
     if what == "color":

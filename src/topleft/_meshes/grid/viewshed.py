@@ -25,7 +25,7 @@ from topleft._meshes.field.field import extent_of, height_map
 from topleft._meshes.scene.adapt import as_polygons
 
 EARTH_RADIUS = 6_370_997.0
-"""Metres: that of the sphere that GDAL's curvature coefficient is told for."""
+"""Metres: that of the sphere of GDAL's curvature coefficient."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Viewshed:
     visible : (H, W) bool
         Whether something `target_height` above the ground is seen.
     above : (H, W) float64
-        How high above the ground something is seen, 0 where the ground is; NaN where there is no ground, or too far.
+        The least height above the ground that is seen, 0 where the ground is; NaN where there is no ground, or too far.
     grid : Grid
         Where the cells are.
 
@@ -89,7 +89,7 @@ def viewshed(
     eye_height : float, optional
         How high the eye is above the ground at (x, y), instead of z; 0 unless given.
     target_height : float
-        How high above the ground is looked for.
+        The height above the ground of points to be seen.
     max_distance : float, optional
         Cells farther away in the plane are not looked at.
     curvature : float

@@ -150,7 +150,7 @@ def voxelize(
     -----
     Seen along z, each column belongs to the triangles that own its middle by the top-left rule, on vertices that are
     rounded to 1/256 voxel (or sample) along x and y. So a closed mesh has an even number of crossings in every column,
-    whatever touches whatever. Where a crossing lies is known to 2**-22 of the depth of the grid. "touched" is
+    wherever parts touch. Where a crossing lies is known to 2**-22 of the depth of the grid. "touched" is
     conservative: no voxel is missing that a triangle of the float64 vertices meets.
 
     Examples
@@ -182,7 +182,7 @@ def voxelize(
         run_parts(
             lambda first, end: engine.count_columns(bits, sample_bits, shares, first, end), len(shares), n_threads
         )
-        return told(grid, shares, n_odd)
+        return with_warning(grid, shares, n_odd)
     check_fits(grid.shape, np.bool_)
     found: npt.NDArray[np.bool_] = FRESH.empty("voxels", grid.shape, np.bool_)
     filled, n_odd = found.view(np.uint8), 0
@@ -198,10 +198,10 @@ def voxelize(
             engine.touch_voxels(points, triangles, 0, len(triangles), filled)
         elif not solid:
             mark_surface(points, triangles, filled, n_threads)
-    return told(grid, found, n_odd)
+    return with_warning(grid, found, n_odd)
 
 
-def told(grid: VoxelGrid, values: npt.NDArray[Any], n_odd: int) -> Voxels:
+def with_warning(grid: VoxelGrid, values: npt.NDArray[Any], n_odd: int) -> Voxels:
     """The result, with a warning where the mesh is not closed."""
     if n_odd:
         line = f"the mesh is not closed: {n_odd} columns of voxels cross it an odd number of times"

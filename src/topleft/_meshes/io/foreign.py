@@ -150,7 +150,7 @@ def _refuse_unreadable(source: InputFile, suffix: str) -> None:
 
 @contextmanager
 def broken_archives() -> Iterator[None]:
-    """Raise an error of ours for members that do not unpack."""
+    """Raise a `MeshError` for members that do not unpack."""
     try:
         yield
     except (zipfile.BadZipFile, RuntimeError, zlib.error, EOFError, OSError) as error:
@@ -245,9 +245,9 @@ class Model3MF:
 
 
 def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | None]:
-    """The meshes that trimesh reads of a file, and whether all materials have two sides, or None: each says so itself.
+    """The meshes that trimesh reads of a file, and whether all materials have two sides; None if each says so itself.
 
-    COLLADA is read after its polygons have been cut; of the sides of its materials trimesh reads nothing.
+    COLLADA is read after its polygons have been cut; trimesh does not read the sides of its materials.
     """
     content = source.content()
     if suffix != ".dae":
@@ -322,7 +322,7 @@ def counted_vtu(budget: Budget) -> Iterator[None]:
 
 
 def _note_missing_pictures(content: bytes, source: InputFile) -> None:
-    """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out without a word."""
+    """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out silently."""
     names = re.findall(rb"<init_from>\s*(?:<ref>)?\s*([^<\s][^<]*\.[A-Za-z]{3,4})\s*<", content)
     for name in names:
         source.find(unquote(name.decode("utf-8", errors="replace")).removeprefix("file://"), "textures")
@@ -406,7 +406,7 @@ def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, boo
 
 
 def _has_two_sides(root: Element, space: str, notes: Notes) -> bool:
-    """Whether materials are drawn from both sides, as without a word of theirs: no effect says 0, or not all do."""
+    """Whether materials are drawn from both sides: unless all effects say 0."""
     effects = list(root.iter(f"{space}effect"))
     n_single = sum(row.findtext(f".//{space}double_sided", "").strip() == "0" for row in effects)
     if 0 < n_single < len(effects):

@@ -104,7 +104,7 @@ def load(
     Warns
     -----
     MeshWarning
-        Once for each kind of thing that the mesh lacks: textures that are not there, say.
+        Once for each kind of contents that could not be read: missing textures, say.
 
     Notes
     -----

@@ -112,7 +112,7 @@ def _found(content: bytes, order: str, elements: list[_Element], start: int, sou
     if error is None and not numbers.n_left:
         return found
     lines = [line for line in content[start:].splitlines() if line.strip()]
-    if len(lines) == sum(element.n for element in elements):  # a row a line: the header says too little of each
+    if len(lines) == sum(element.n for element in elements):  # each row has its line: longer than the header says
         ends = np.cumsum([element.n for element in elements]).tolist()
         for element, end in zip(elements, ends, strict=True):
             rows = [_row(line, element) for line in lines[end - element.n : end]]
@@ -124,7 +124,7 @@ def _found(content: bytes, order: str, elements: list[_Element], start: int, sou
 
 
 def _row(line: bytes, element: _Element) -> bytes:
-    """The numbers of a line that the header tells of."""
+    """The numbers of a line that the header declares."""
     words, n = line.split(), 0
     for own in element.properties:
         if own.count_dtype is not None and n < len(words):

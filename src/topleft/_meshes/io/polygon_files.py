@@ -103,7 +103,7 @@ def load_polygons(
 
 def _vector_content(path: Path, layer: str | None) -> dict[str, Any]:
     """A layer of a vector file in the form of GeoJSON."""
-    path.stat()  # that it is missing is told as of other files
+    path.stat()  # raises the same error for a missing file as other formats
     try:
         import pyogrio
         import shapely
@@ -221,7 +221,7 @@ def _pairs(flat: list[float]) -> list[tuple[float, float]]:
 
 
 def _joined(polygons: list[list[list[tuple[float, float]]]], what: str) -> ObjectRings:
-    """Return polygons, of each its rings."""
+    """Return polygons from the rings of each."""
     rings = list(chain.from_iterable(polygons))
     points = np.array(list(chain.from_iterable(rings)), np.float64).reshape(-1, 2)
     if not np.isfinite(points).all():

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from topleft._core.base.tiff import LIMIT_CLASSIC, Tags, directory, directory_bytes, header
 
 STRIP_BYTES = 1 << 18
-"""Of rows that are compressed together: readers take memory for one strip."""
+"""Bytes of rows that are compressed together: readers take memory for one strip."""
 
 
 def pieces(picture: npt.NDArray[Any], more: Tags | None = None) -> Iterator[bytes]:

@@ -51,7 +51,7 @@ _lock = threading.Lock()
 class Collapsed(NamedTuple):
     """The collapsed mesh: points (N, 3) float64, triangles (K, 3) int32, and the row (V,) that each point went into.
 
-    -1 where a point vanished with all its triangles; None where nobody asked.
+    -1 where a point vanished with all its triangles; None unless `with_pairs`.
     """
 
     points: F64
@@ -77,7 +77,7 @@ def collapser() -> Any:
 
 
 def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
-    """How many triangles the next level is to have; 0: there is to be none.
+    """The number of triangles of the next level; 0: there is none.
 
     Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
     nothing but its borders. (Very large meshes are looked at when they have become smaller.)
@@ -97,7 +97,7 @@ def collapse(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool = T
     triangles : (T, 3) int32
     n_wanted : int
     with_pairs : bool
-        Whether it is to be told which points became one, which takes memory.
+        Whether to find which points became one, which takes memory.
 
     Notes
     -----
@@ -205,7 +205,7 @@ def border_points(triangles: I32) -> npt.NDArray[np.int64]:
 
 
 def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, with_pairs: bool) -> Collapsed:
-    """Fewer triangles, with the thresholds of the rounds so fine."""
+    """Fewer triangles, with thresholds of the rounds by `fineness`."""
     package = collapser()
     low, high = points.min(axis=0), points.max(axis=0)
     center, size = low / 2 + high / 2, float((high - low).max()) or 1.0

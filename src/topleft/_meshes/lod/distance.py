@@ -1,4 +1,4 @@
-"""How far two surfaces lie apart: bounds on the two-sided Hausdorff distance, that hold for every point of both.
+"""Bounds the two-sided Hausdorff distance of two surfaces, for every point of both.
 
 In: points and triangles of two surfaces. Out: `DistanceBounds`: a distance that is met, and one that is not passed.
 
@@ -41,7 +41,7 @@ PLACE_BITS = 11
 
 
 class DistanceBounds(NamedTuple):
-    """How far two surfaces lie apart, in their own unit: `known <= distance <= bound`, but for rounding on the left."""
+    """Bounds on the distance of surfaces, in their unit: `known <= distance <= bound`, up to rounding on the left."""
 
     known: float
     bound: float
@@ -129,7 +129,7 @@ def measure(one: TriangleTree, other: TriangleTree) -> DistanceBounds:
 
 
 def reach(source: TriangleTree, target: TriangleTree, known: float, least: float) -> Reach:
-    """How far the points of one surface are from another, and the roundings that are in it."""
+    """The distances of the triangles of one surface from another, and the most pieces of one."""
     n, tree = len(source.triangles), target.tree
 
     def find(first: int, end: int) -> Reach:

@@ -1,6 +1,6 @@
-"""Levels of detail: a mesh and coarser ones in its stead, each with a bound on how far it lies from the mesh.
+"""Levels of detail: a mesh and coarser ones in its stead, each with a bound on its distance from the mesh.
 
-In: a mesh. Out: `Levels`, which are kept with the mesh, and in a file where that is asked for.
+In: a mesh. Out: `Levels`, which are kept with the mesh, and in a file on request.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ class Levels(Sequence[Level]):
         ----------
         path : path
         mesh : Mesh
-            The mesh of the levels: its arrays must be those of then, to the bit.
+            The mesh of the levels: its arrays must equal those that were saved, to the bit.
         max_unpacked_bytes : int, optional
             Of all arrays of the levels: a file with more is refused. Unless given 33,554,432, or 8 for each byte of it.
 

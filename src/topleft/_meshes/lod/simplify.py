@@ -29,8 +29,8 @@ from topleft._meshes.model.normals import unit_or_zero
 #: is added: it is small beside those of coarser levels, and the time that comparisons take goes with the triangles.
 MOST_TO_COMPARE = 300_000
 
-#: A level ends the levels, and is none of them, if it has 1/n of the triangles of the one before and more than n to
-#: this power times its bound: something is lost. Bounds go with the area of triangles on smooth surfaces, with n.
+#: The levels end before one that has 1/n of the triangles of the one before and more than n to
+#: this power times its bound: it has lost a part. Bounds go with the area of triangles on smooth surfaces, with n.
 MOST_POWER = 2.0
 
 #: The attributes of vertices, by their names in a mesh.
@@ -41,7 +41,7 @@ _lock = threading.RLock()
 
 
 class Corners(NamedTuple):
-    """Points that are one only where all that is known of them is equal.
+    """Points that are one only where all their attributes are equal.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Corners(NamedTuple):
 
 
 def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
-    """The mesh and coarser levels of it, each with a bound on how far it lies from the mesh; kept with the mesh.
+    """The mesh and coarser levels of it, each with a bound on its distance from the mesh; kept with the mesh.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     ratio : float
         Triangles of a level as a share of those of the level before, 0.05 to 0.75.
     smallest : int
-        There is no level with fewer triangles than about so many, at least 4.
+        No level has fewer triangles than about this number, at least 4.
 
     Returns
     -------

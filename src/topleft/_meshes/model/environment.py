@@ -42,7 +42,7 @@ N_DIRECTIONS = 64
 SIZE_OF_MATT = 32
 
 LEAST_SUMMED, SIZE_OF_SUMS = 0.3, 64
-"""From which roughness on all texels of a halving are added up, and its side: 3 degrees, where facets blur by 10."""
+"""The least roughness that sums all texels of a halving, and its side: 3 degrees, where facets blur by 10."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -171,5 +171,5 @@ class Material:
 
     @property
     def is_metallic_rough(self) -> bool:
-        """Whether light is that of a metallic-rough surface of glTF."""
+        """Whether it is lit as a metallic-rough surface of glTF."""
         return self.metallic is not None or self.roughness is not None

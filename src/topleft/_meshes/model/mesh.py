@@ -250,7 +250,7 @@ class Mesh:
 
     @cached_property
     def clusters(self) -> Clusters:
-        """The triangles sorted into clusters, which a view needs only some of; made when it is first asked for.
+        """The triangles sorted into clusters, of which a view draws some; made at the first use.
 
         That takes about as long as drawing the mesh some twenty times, and keeps a copy of it of about 30 bytes a
         triangle. Meshes that are drawn more than once ask for it themselves:
@@ -488,7 +488,7 @@ def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def has_holes(material: Material, mesh: Mesh) -> bool:
-    """Whether the material leaves something out of the triangles that have it."""
+    """Whether the material cuts holes into its triangles."""
     return material.alpha_mode == "mask" and bool(material.alpha_cutoff) and has_opacity(material, mesh)
 
 

@@ -62,7 +62,7 @@ def creased_normals(
     crease_deg : float
         Degrees, 0 to 180.
     places : (first, group), optional
-        The result of `coincident` for the vertices: those of a group count as one. Unless given all are told apart.
+        The result of `coincident` for the vertices: those of a group count as one. Unless given all are distinct.
     threads : int, optional
         Never changes a bit.
 
@@ -244,7 +244,7 @@ def moved(points: FloatArray, matrix: F64) -> F64:
 
 
 def turn_of_normals(view: F64) -> F64:
-    """The matrix (3, 3) that takes rows of normals to eye space, but for their lengths: the inverse of that of points.
+    """The matrix (3, 3) that takes rows of normals to eye space, up to their lengths: the inverse of that of points.
 
     Its numbers are sums of products, the same on every machine.
     """

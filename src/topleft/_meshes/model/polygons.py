@@ -14,7 +14,7 @@ from topleft._core.base.array_types import F64, I64, Array
 from topleft._core.base.arrays import INT32_MAX
 
 MAX_STEPS = 1 << 30
-"""Of all polygons of a call: some seconds. One of 100,000 corners takes up to 200,000,000."""
+"""Steps for all polygons of a call: some seconds. One of 100,000 corners takes up to 200,000,000."""
 
 
 def triangulate(points: Array, corners: Array, n_corners: Array) -> tuple[I64, I64]:

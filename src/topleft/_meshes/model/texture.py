@@ -25,7 +25,7 @@ from topleft._core.base.texels import FILTER_CODES, MOST_KEPT_BYTES, ValueLevels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MAX_TEXTURE_SIZE = 1 << 15
-"""Of a side: 16 levels."""
+"""Texels of a side: 16 levels."""
 
 
 class Filter(StrEnum):
@@ -54,7 +54,7 @@ N_COVERAGE_POINTS = 1 << 12
 """Points at which the share of a texture that an alpha test lets through is counted; a thousandth of them may miss."""
 
 LEAST_SCALE, MOST_SCALE = 1 / 16, 256.0
-"""Of the opacity of a halving; at the most every texel is opaque that is not clear."""
+"""Factors of the opacity of a halving; by the most every texel that is not clear is opaque."""
 
 BLOCK_TEXELS = 1 << 17
 """Texels that are halved together: 4 MB of float64, which stay in a cache."""

@@ -43,7 +43,7 @@ N_TRIED = 1 << 10
 """So many of more triangles are split alone, to tell how many parts all will have."""
 
 N_ANGLES, N_AZIMUTHS = 513, 128
-"""Rings of directions that are asked where they lie in the picture."""
+"""Rings of directions to find in the picture."""
 
 FRAME_MARGIN = 1.05
 """Points beyond so many times the frame's half sides are out of the picture."""

@@ -50,7 +50,7 @@ COLORED = Material(alpha_mode="blend")
 
 
 def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
-    """The triangles (T,) that something shows through, by the materials of the mesh or this one; None if none does."""
+    """The blended triangles (T,), by the materials of the mesh or this one; None if there are none."""
     given = mesh.materials if material is None else (material,)
     materials = given or (COLORED,)
     are_blended = [one.alpha_mode is AlphaMode.BLEND and has_opacity(one, mesh) for one in materials]
@@ -64,13 +64,13 @@ def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
 
 
 def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
-    """Whether the colours of the vertices alone make something show through."""
+    """Whether the material is opaque where the colours of the vertices are."""
     texture = material.texture if is_laid(material.texture, mesh) else None
     return material.opacity == 1 and not (texture is not None and texture.has_alpha)
 
 
 def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | None:
-    """The blended triangles of each instance; None where there are none, or a picture does not tell them apart."""
+    """The blended triangles of each instance; None where there are none, or the shading ignores them."""
     if options.mode not in BLENDING:
         return None
     masks = [
@@ -79,7 +79,7 @@ def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | 
     return None if all(mask is None for mask in masks) else masks
 
 
-def glass_of(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) -> Glass | None:
+def transparent_pass(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) -> TransparentPass | None:
     """The pass of a picture's blended triangles; None where all of it is opaque."""
     masks = blended_masks(shot.scene, options)
     if masks is None:
@@ -88,10 +88,10 @@ def glass_of(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) 
     placed, view = place(shot, view_options, material=options.material)
     if placed.bent is not None:  # the parts that a lens makes of the triangles
         masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
-    return Glass(placed, view, masks, shot.camera, options)
+    return TransparentPass(placed, view, masks, shot.camera, options)
 
 
-class Glass:
+class TransparentPass:
     """A scene with blended triangles: the opaque ones are drawn first, then these are laid over them."""
 
     def __init__(

@@ -26,7 +26,7 @@ from topleft._meshes.model.points import Points, PointUnit
 from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_each, shade_numbers
 
 NOWHERE_PX = 1e12
-"""Where points stand that a lens does not see: no window shows it."""
+"""The place of points that a lens does not see: outside of every window."""
 
 
 def draw_cloud(

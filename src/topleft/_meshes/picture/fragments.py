@@ -134,7 +134,7 @@ class InstanceIds:
 class SceneFragments(InstanceIds, Fragments):
     """The visibility buffer of a `Scene`, from `rasterize_mesh`.
 
-    An instance is snapped again when an attribute of it is asked for.
+    An instance is snapped again when an attribute of it is needed.
 
     Attributes
     ----------

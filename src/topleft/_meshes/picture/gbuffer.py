@@ -1,4 +1,4 @@
-"""Evaluates where in space each visible pixel of a mesh, scene or cloud lies, when a layer asks for it.
+"""Evaluates the points in space of the visible pixels of a mesh, scene or cloud, for layers.
 
 Input: `Shot`. Output: `GBuffer`, from which `layers` are taken.
 """
@@ -78,7 +78,7 @@ def points_of(part: VisiblePart) -> F64:
 
 @dataclass(frozen=True, eq=False)
 class GBuffer:
-    """A mesh, scene or cloud and who looks at it.
+    """A mesh, scene or cloud and its camera.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class GBuffer:
 
     @property
     def camera(self) -> Camera:
-        """Who looks."""
+        """The camera of the shot."""
         return self.shot.camera
 
     @property
@@ -135,7 +135,7 @@ class GBuffer:
 
     @cached_property
     def has_holes(self) -> bool:
-        """Whether materials cut something out."""
+        """Whether materials cut holes."""
         return self.shot.cloud is None and any(cuts_of(self.scene, self.look.get("material")))
 
     @cached_property

@@ -54,7 +54,7 @@ class Cut:
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
 
-class Holed(NamedTuple):
+class MaskedInstance(NamedTuple):
     """An instance with holes: its index, its mesh as it is drawn, the camera in its space, and its cut materials."""
 
     i: int
@@ -114,19 +114,19 @@ def draw_solid(
 
 def holed_instances(
     scene: Scene, cuts: Sequence[Cut | None], camera: Camera, bent: Sequence[BentMesh] | None = None
-) -> list[Holed]:
-    """The instances that something is cut out of, and how they are drawn."""
+) -> list[MaskedInstance]:
+    """The instances with holes, and how they are drawn."""
     found = []
     for i, (instance, cut) in enumerate(zip(scene, cuts, strict=True)):
         mesh = instance.mesh
         if cut is not None:
             if bent is not None:
                 cut, mesh = cut.of_parts(bent[i].source), bent[i].mesh_of(mesh)
-            found.append(Holed(i, mesh, camera.straightened().placed(instance.transform), cut))
+            found.append(MaskedInstance(i, mesh, camera.straightened().placed(instance.transform), cut))
     return found
 
 
-def solid_scene(scene: Scene, holed: Sequence[Holed], masks: Sequence[Mask | None] | None = None) -> Scene:
+def solid_scene(scene: Scene, holed: Sequence[MaskedInstance], masks: Sequence[Mask | None] | None = None) -> Scene:
     """The scene without the triangles that have holes, nor those of masks; ids stay."""
     gone: list[Mask | None] = [None] * len(scene) if masks is None else list(masks)
     for i, _, _, cut in holed:
@@ -147,7 +147,7 @@ def inputs_of(scene: engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple
 
 def draw_holed(
     placed: PlacedScene,
-    holed: Sequence[Holed],
+    holed: Sequence[MaskedInstance],
     ids: I32,
     depth: F32,
     *,

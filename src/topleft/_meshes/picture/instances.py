@@ -82,7 +82,7 @@ def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_
 
 
 class PlacedScene:
-    """A scene as a camera sees it: its instances are snapped when they are asked for.
+    """A scene as a camera sees it: its instances are snapped when they are needed.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class PlacedScene:
         self._kept: dict[int, engine.SnappedMesh] = {}
         self._n_kept = 0  # vertices of these
         self._sides_of_looks: dict[tuple[int, int], tuple[int, NDArray[np.uint8] | None]] = {}
-        self._last: tuple[int, View] | None = None  # the instance that was last asked for: often thrice in turn
+        self._last: tuple[int, View] | None = None  # the last instance that was needed: often thrice in turn
 
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes views of instances itself."""
@@ -141,7 +141,7 @@ class PlacedScene:
         return (MeshFragments if self._is_mesh else SceneFragments)(ids, depth, self, positions)
 
     def fragments_of(self, drawn: Fragments, view: View) -> SceneFragments:
-        """Return the same of the one instance that there is, which was drawn alone."""
+        """Return the same of the only instance, which was drawn alone."""
         frags = self.fragments(drawn.id[None], drawn.depth[None], self.positions(view))
         frags._one = drawn
         return frags
@@ -152,7 +152,7 @@ class PlacedScene:
         return list(map(tuple, sample_positions(view.sampling.n_samples, view.grid_bits).tolist()))
 
     def whole_ids(self, ids: Ids) -> Ids:
-        """Return ids in terms of the whole scene: as they are, but for a lens."""
+        """Return ids in terms of the whole scene: as they are without a lens."""
         if self.bent is None or all(one.parts is None for one in self.bent):
             return ids
         firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
@@ -165,7 +165,7 @@ class PlacedScene:
         return self._snap(i, i + 1)[0] if kept is None else kept
 
     def _snap(self, first: int, end: int) -> list[engine.SnappedMesh]:
-        """Return instances [first, end) in the same way: those in one call that need no closer look."""
+        """Return instances [first, end) in the same way: in one call, except those that are snapped alone."""
         view, n = self._view, end - first
         firsts = self._first_vertices[first : end + 1] - self._first_vertices[first]
         found: list[engine.SnappedMesh | None] = [None] * n
@@ -449,7 +449,7 @@ def draw_one(
     *,
     is_split: bool = False,
 ) -> Fragments:
-    """Return the visibility buffer of the one instance that there is; `is_split` as in `View`."""
+    """Return the visibility buffer of the only instance; `is_split` as in `View`."""
     mesh, view = placed.scene[0].mesh, placed.view_of(0)
     view = view.but(is_split=True) if is_split and view.sampling.n_samples > 1 else view
     return draw_fragments(memory, mesh.vertices, mesh.triangles, view, depth_test, background_depth, out)

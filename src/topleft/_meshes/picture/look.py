@@ -54,7 +54,7 @@ class CameraRays:
     ray : (4, 3) float64
         The ray of pixel position (0, 0), and its steps per column, per row and, without perspective, along the depth.
     eye_from, origin : (3, 3) and (3,) float64
-        Eye space from shading space: `eye_from @ p + origin` but for a scale.
+        Eye space from shading space: `eye_from @ p + origin` up to a scale.
     scale : float
         How many units of eye space one of the shading space is.
     distance_start, distance_scale : float

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: Instances surveyed for the share that a picture shows, and clusters of each: less than a tenth of a millisecond.
 SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
 
-#: Instances that are drawn before it is looked which others they hide.
+#: Instances that are drawn before others are tested against their depths.
 FIRST_ROUND = 16
 
 #: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
@@ -37,7 +37,7 @@ CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.
 
 
 def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
-    """Tell whether a scene whose meshes may be drawn in clusters is, and note that they are drawn."""
+    """Tell whether drawing a scene's meshes in clusters pays, and note that they are drawn."""
     scene = placed.scene
     n, n_instances = scene.n_triangles, len(scene)
     wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]

@@ -231,7 +231,7 @@ def shade_instances(shown: Sequence[ShownInstance], seen: SeenSamples, camera: C
 
 
 def rename(shown: Sequence[ShownInstance], seen: SeenSamples) -> tuple[list[ShownInstance], SeenSamples] | None:
-    """Call triangles by numbers that int32 holds, of those instances alone that are seen; None where it does not.
+    """Number the triangles of the instances that are seen in int32; None where it does not hold them.
 
     A row of pixels is not halved.
     """

@@ -49,7 +49,7 @@ def silhouette(
     cull : {"none", "back", "front"}, optional
         As for `render`: the side to leave out, whatever materials say.
     tolerance : float
-        As for `render`: how far the outline may lie from where it belongs, pixels.
+        As for `render`: the largest error of the outline, pixels.
     threads : int, optional
         How many threads draw; never changes a bit.
     out : ndarray of bool (float32 for "area"), shape (H, W), optional

@@ -143,7 +143,7 @@ def visible_layers(
     size: int | tuple[int, int] = DEFAULT_SIZE,
     **options: Unpack[PeelOptions],
 ) -> DepthLayers:
-    """The nearest layers of every pixel of a mesh or scene, whatever its materials cut out; options as for `peel`.
+    """The nearest layers of every pixel of a mesh or scene, with holes of materials filled; options as for `peel`.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ GLASS_LOOKS = frozenset({"shading", "color", "background", "opacity", "layers", 
 
 
 class ViewLayers(Mapping[str, Array]):
-    """Named arrays of one view, in the order asked for: the result of `render_layers`.
+    """Named arrays of one view, in the given order: the result of `render_layers`.
 
     Examples
     --------
@@ -158,9 +158,9 @@ def render_layers(
         Further layers: values of the vertices (V, K) or (V,), or of the corners (T, 3, K); of a scene a sequence of
         such arrays, one of each instance.
     camera_to : Camera, optional
-        For "flow": who looks when it ends; the same camera unless given.
+        For "flow": the camera at its end; the same one unless given.
     transforms_to : (N, 4, 4) array_like, optional
-        For "flow": where the instances of the scene are when it ends, world from object; (4, 4) for a mesh. Unless
+        For "flow": where the instances of the scene are at its end, world from object; (4, 4) for a mesh. Unless
         given they stay.
     cull, subpixel_bits, tolerance, threads
         As for `render`, of every layer. With a tolerance, "triangle" counts those of the level of detail, and there are
@@ -174,12 +174,12 @@ def render_layers(
     Returns
     -------
     ViewLayers
-        Arrays by name, in the order asked for, the attributes last:
+        Arrays by name, in the given order, the attributes last:
 
         ============== ============== ========== =================================================================
         name           shape, dtype   background content
         ============== ============== ========== =================================================================
-        color          (H, W, 4) u8   as asked   the picture of `render`
+        color          (H, W, 4) u8   as given   the picture of `render`
         alpha          (H, W) u8      0          how much of the pixel is covered, of 255
         silhouette     (H, W) bool    False      where the mesh is; with several samples their share, float32
         depth          (H, W) f32     +inf       window depth, 0 near to 1 far
@@ -192,7 +192,7 @@ def render_layers(
         world_normal   (H, W, 3) f32  0          unit, interpolated from the vertices, on the side that is seen
         camera_normal  (H, W, 3) f32  0          the same in eye space: x right, y up, z to the viewer
         uv             (H, W, 2) f32  NaN        texture coordinates, of meshes that have them
-        flow           (H, W, 2) f32  NaN        where the point moves to, pixels (dx, dy), y down; NaN too for
+        flow           (H, W, 2) f32  NaN        where the point moves to, pixels (dx, dy), y down; NaN too
                                                  if it ends behind the camera
         attributes     as given, f32  NaN        interpolated
         ============== ============== ========== =================================================================
@@ -203,7 +203,7 @@ def render_layers(
         If there is no such layer, an attribute has its name or does not fit, "flow" has no end, "uv" finds no texture
         coordinates, an option of `render` is wrong, or there are attributes and a tolerance.
     TypeError
-        If an option is unknown, or of colours and no colours are asked for.
+        If an option is unknown, or of colours and "color" is no layer.
 
     Notes
     -----

@@ -61,12 +61,12 @@ def calibrate(*, n_rounds: int = 5) -> Costs:
     Parameters
     ----------
     n_rounds : int
-        Each number is the least of so many measurements.
+        Each number is the least of this many measurements.
 
     Returns
     -------
     Costs
-        With today's date, and how far off they are for scenes that were not fitted.
+        With today's date, and their errors for scenes that were not fitted.
     """
     fits: dict[str, Any] = {}
     ratios = []
@@ -309,7 +309,7 @@ TUNED = (
 #: Factors that rows are multiplied by, to find the best for a machine.
 FACTORS = (1.0, 0.25, 0.5, 0.71, 1.41, 2.0, 4.0)
 
-#: How much less time must be lost, of scenes that were not looked at when the costs were chosen.
+#: The least share of time that tuned costs must save on scenes that they were not chosen by.
 LEAST_GAIN = 0.01
 
 
@@ -332,7 +332,7 @@ def tune(own: Costs, n_rounds: int) -> Costs:
     return replace(own, tuned=(*np.exp(lost / n_scenes).tolist(), n_scenes))
 
 
-#: Rows that `calibrate` measures, by the choice that follows from them: kept only where that does.
+#: Rows that `calibrate` measures, by the choice that they decide: kept only if `tune` prefers them.
 MEASURED = {"pays_without_depth": ("flat_pixel",), "is_direct": ("paint",), "threads_to_draw": ("wake",)}
 
 

@@ -34,7 +34,7 @@ CLASSES = (
 
 MOST_SHOWS = "most of the mesh shows, and drawing that cluster by cluster takes longer"
 
-#: Of closed meshes: 89 triangles a meshlet.
+#: Measured on closed meshes: 89 triangles a meshlet.
 TRIANGLE_BYTES_OF_MESHLETS = 19.2
 
 
@@ -98,7 +98,7 @@ class Facts:
     n_clipped: int  # vertices outside of a clip plane
     n_cut: int  # triangles that a plane cuts and that are drawn as pieces
     n_pieces: int
-    common_depth: float | None  # of all vertices, whatever is made of it
+    common_depth: float | None  # of all vertices
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
     is_large_shapes: bool  # large triangles, whose picture is written row by row
     work_ms: float  # of one thread, as guessed before the draw

@@ -283,7 +283,7 @@ def plan(
     """Return the plan of a draw: at each stage the choice, its reason, rejected alternatives, and the estimated time.
 
     Vertices are transformed, cut and snapped as the verb does it, and triangles are counted in the code that draws
-    them: the plan says what happens, it does not guess. It costs about as much as a draw. With
+    them: the plan counts, it does not guess. It costs about as much as a draw. With
     ``subpixel_bits="exact"`` the scene is drawn once, so that the plan tells how many samples were in doubt and how
     they were decided; its classes are those of the same triangles on 2**-8 px.
 
@@ -297,7 +297,7 @@ def plan(
     depth_test : "less", "greater" or None
         As in `rasterize`.
     tolerance : float
-        Of a mesh and a camera: how far outlines may be off, pixels, as in `render`. The plan is that of the level of
+        Of a mesh and a camera: the largest error of outlines, pixels, as in `render`. The plan is that of the level of
         detail that is drawn, and has a stage "detail" that tells which, and why.
 
     Returns

@@ -45,7 +45,7 @@ def wrap(text: str, width: int) -> list[str]:
 
 
 def paragraph(head: str, text: str) -> list[str]:
-    """Return a text with a head that hangs out."""
+    """Return a text with a hanging head."""
     first, *others = wrap(text, WIDTH - len(INDENT) - len(head))
     return [INDENT + head + first, *(INDENT + " " * len(head) + line for line in others)]
 

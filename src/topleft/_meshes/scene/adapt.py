@@ -1,4 +1,4 @@
-"""Adapters: a path, or the mesh of another library, told by its attributes, as a `Mesh`.
+"""Adapters: a path, or the mesh of another library, recognized by its attributes, as a `Mesh`.
 
 Input: a path, `trimesh.Trimesh` and `trimesh.Scene`, `meshio.Mesh`, `pyvista.PolyData` and `pyvista.UnstructuredGrid`,
 `matplotlib.tri.Triangulation`, anything with `vertices` and `triangles` (or `faces`), or a pair of arrays. Output:

@@ -1,6 +1,6 @@
 """Scenes: meshes that stand in one world, each placed by a matrix, as often as wanted.
 
-Input: meshes and matrices; or whatever a caller gives to be drawn, a path, say. Output: a `Scene`, or the `Mesh`,
+Input: meshes and matrices; or another subject, a path, say. Output: a `Scene`, or the `Mesh`,
 `Scene` or `Points` that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
 """
 
@@ -128,7 +128,7 @@ class Instance:
 
 
 IN_PLACE = Instance(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)))
-"""Nothing, where its vertices are."""
+"""An empty mesh in place, which `with_mesh` copies."""
 vars(IN_PLACE)["is_mirrored"] = False  # as copies know
 
 

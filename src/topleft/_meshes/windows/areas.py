@@ -28,7 +28,7 @@ MOST_SPANS = 1 << 28
 
 
 def are_polygons(subject: Any) -> bool:
-    """Whether something is geometries and no mesh: shapely's, GeoJSON, ring offsets of polygons, lists of polygons."""
+    """Whether a subject is geometries and no mesh: shapely's, GeoJSON, ring offsets of polygons, lists of polygons."""
     if isinstance(subject, RingSet) or hasattr(subject, "__geo_interface__") or hasattr(subject, "geom_type"):
         return True
     if isinstance(subject, Mapping):

@@ -42,7 +42,7 @@ INDICES = (np.int32, np.int64)
 
 
 class Triangles(Protocol):
-    """Triangles that are asked for by their indices."""
+    """Triangles that are read by their indices."""
 
     n: int
     n_components: int

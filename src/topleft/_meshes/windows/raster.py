@@ -164,7 +164,7 @@ class WindowedRaster:
 
     @property
     def has_means(self) -> bool:
-        """Whether the mean of neighbouring pixels says something: not of labels, masks and counts."""
+        """Whether the mean of neighbouring pixels has a meaning: not for labels, masks and counts."""
         if self.is_of_polygons and not self.painter.channels:  # values of polygons may be names
             return self.dtype.kind == "f"
         return self.dtype.kind == "f" or (self.kind == "fill" and self.painter.options.get("dtype") is None)
@@ -184,7 +184,7 @@ class WindowedRaster:
 
     @property
     def index(self) -> WindowIndex | AreaIndex:
-        """Which triangles each window needs; made when it is first asked for."""
+        """Which triangles each window needs; made at the first use."""
         if self._index is None and isinstance(self.triangles, Areas):
             self._index = AreaIndex(self.triangles, self.tiling)
         elif self._index is None:
@@ -253,7 +253,7 @@ class WindowedRaster:
         return self.windows()
 
     def windows(self, *, reuse: bool = False) -> Iterator[Window]:
-        """Yield all windows, row by row; each thread draws one, a few ahead of the one that is asked for.
+        """Yield all windows, row by row; each thread draws one, a few ahead of the caller.
 
         Parameters
         ----------

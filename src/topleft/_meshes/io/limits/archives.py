@@ -22,14 +22,14 @@ from topleft.errors import MeshError
 MESH_SUFFIXES = (
     ".gltf", ".glb", ".vrm", ".obj", ".ply", ".stl", ".stl_ascii", ".off", ".dae", ".3mf",
 )  # fmt: skip
-"""Of members that are read as meshes; the others may be named by them."""
+"""Suffixes of members that are read as meshes; these may name the others."""
 
 PIECE_BYTES = 1 << 20
 NODES_OF_MEMBER = 6
 """Nodes of glTF that take as long as a member that is written and read: 0.3 ms."""
 
 MOST_FOLDERS = 32
-"""Of the name of a member."""
+"""Folders in the name of a member."""
 
 BROKEN = (zipfile.BadZipFile, tarfile.TarError, EOFError, NotImplementedError, RuntimeError, zlib.error)
 

@@ -16,7 +16,7 @@ from topleft.errors import MeshError
 
 
 class Limit(NamedTuple):
-    """How much of a kind a file may have if no option says so."""
+    """The limit of a file, for contents of one kind, without an option."""
 
     what: str
     least: int
