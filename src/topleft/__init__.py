@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from topleft._meshes.picture.view_layers import ViewLayers, render_layers
     from topleft._meshes.windows.raster import Window
 
-# What most programs do without is imported when it is asked for: a third of the time that the package takes.
+# Names that most programs do without, imported at first use: a third of the package's import time.
 _LATE = {
     "Baked": "topleft._meshes.grid.bake",
     "Explorer": "topleft._apps.explore.open",
@@ -195,7 +195,7 @@ def __getattr__(name: str) -> Any:
     if name not in _LATE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import_module(_LATE[name])
-    for late, file in _LATE.items():  # what came along says so, too
+    for late, file in _LATE.items():  # others that this import has loaded are published, too
         if hasattr(sys.modules.get(file), late):
             globals()[late] = _publish(getattr(sys.modules[file], late))
     return globals()[name]

@@ -1,6 +1,6 @@
-"""The exceptions of the front door: what goes wrong between a file and an array, told in one line.
+"""The exceptions for meshes, files and optional packages, each with a message of one line.
 
-The core raises `ValueError`, `TypeError` and `IndexError`; what is here is for meshes, files and optional packages.
+The core raises `ValueError`, `TypeError` and `IndexError`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class MeshError(TopleftError, ValueError):
 
 
 class ImageError(TopleftError, ValueError):
-    """A picture that cannot be written in the format that the name of the file asks for.
+    """A picture that does not fit the format of its file's name.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Small scenes on which methods fail: what a picture must hold, and what they draw instead.
+"""Small scenes on which methods fail, with the right picture and those that the methods draw.
 
 They stand in failure_scenes.json. `python -m benchmarks atlas --scenes` shrank them from the first failure of each
 method along the families of the atlas (docs/measured/atlas.md); `tests/methods/test_failure_scenes.py` draws them
@@ -22,7 +22,7 @@ __all__ = ["FAILURE_SCENES", "FailureScene", "Got"]
 
 @dataclass(frozen=True, slots=True)
 class Got:
-    """What a method draws of a scene.
+    """The picture of a scene by one method.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class FailureScene:
     ----------
     name : str
     family, value : str
-        Where in the atlas it comes from: the family of scenes, and the first value at which the methods fail.
+        Its place in the atlas: the family of scenes, and the first value at which the methods fail.
     kind : str
         "gap" and "overdraw" (pixels drawn less or more often than they should be), or "wrong" (another triangle shows).
     points : tuple of (float, float)
@@ -55,7 +55,7 @@ class FailureScene:
     size, origin : (int, int)
         The window, as in `topleft.coverage`.
     subpixel_bits : int
-        With so many the production methods draw what is expected; fewer may move a vertex.
+        With so many the production methods draw the expected picture; fewer may move a vertex.
     expected : str
         Rows of the exact picture of the vertices as they are, from the top, with "/" between them. A sign a pixel: how
         often it is drawn, or, for "wrong", the index of the triangle that shows; "." is none.

@@ -1,7 +1,7 @@
 """Run a program for nvdiffrast on the CPU as it is: `python -m topleft.nvdiffrast PROGRAM ...`.
 
-`import nvdiffrast.torch` gives it `topleft.torch`, and what it asks of a device "cuda" is done on the CPU: tensors that
-it makes there or moves there, `.cuda()`, and the calls of `torch.cuda` that wait, seed or empty. It says so once.
+`import nvdiffrast.torch` gives it `topleft.torch`. The CPU takes the place of a device "cuda": for tensors that are
+made or moved there, `.cuda()`, and the calls of `torch.cuda` that wait, seed or empty. One line on stderr says so.
 """
 
 from __future__ import annotations

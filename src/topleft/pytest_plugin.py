@@ -1,7 +1,7 @@
-"""A plugin of pytest: what tests draw, beside PNG files that are kept with them.
+"""A plugin of pytest: compares pictures of tests with PNG files that are kept beside them.
 
-In: meshes and pictures of tests. Out: nothing, or an `AssertionError` that can be read, and pictures of what was drawn
-and of the difference. A project takes it by ``pytest_plugins = ["topleft.pytest_plugin"]`` in its first conftest.py.
+In: meshes and pictures of tests. Out: nothing, or an `AssertionError` in plain words, and files of the picture and of
+the difference. A project takes it by ``pytest_plugins = ["topleft.pytest_plugin"]`` in its first conftest.py.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["assert_picture", "pytest_addoption"]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add ``--update-pictures``: what tests draw becomes what they expect."""
+    """Add ``--update-pictures``, which replaces the kept pictures by those of the tests."""
     parser.getgroup("topleft").addoption(
         "--update-pictures",
         action="store_true",
@@ -35,13 +35,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @dataclass(frozen=True)
 class KeptPictures:
-    """The pictures of a folder, to which those of tests are compared."""
+    """A folder of pictures to compare those of tests with."""
 
     folder: Path
     is_updating: bool
 
     def check(self, what: Any, name: str, *arguments: Any, tolerance: float = 0, **options: Any) -> None:
-        """Raise an error that says where a picture differs from the one that is kept, if it does."""
+        """Raise an error with the places of the differences if a picture differs from the one that is kept."""
         __tracebackhide__ = True  # pytest shows the line of the caller
         if not (isinstance(name, str) and re.fullmatch(r"[\w-]+(\.[\w-]+)*", name)):
             raise ValueError(f"name must be letters, digits, '_', '-' and '.', got {shown(name)}")
@@ -77,8 +77,8 @@ def assert_picture(request: pytest.FixtureRequest) -> Callable[..., None]:
 
     ``assert_picture(mesh, "name", camera, size, tolerance=0, **options)`` draws by `topleft.render`; a picture, (H, W),
     (H, W, 3) or (H, W, 4) uint8, (H, W) uint16 or bool, is taken as it is. Its PNG file stands in the folder `pictures`
-    beside the file of the test. What differs raises an `AssertionError` with the number of pixels and the first of
-    them; name.got.png and name.off.png beside it show what was drawn, and the difference.
+    beside the file of the test. A difference raises an `AssertionError` with the number of pixels and the first of
+    them; name.got.png and name.off.png beside it show the new picture and the difference.
     """
     folder = request.path.parent / "pictures"
     return KeptPictures(folder, request.config.getoption("--update-pictures")).check

@@ -2,8 +2,8 @@
 
 Input: shapely polygons, and the affine of a grid. Output: arrays of numbers or masks, in memory or for blocks of Dask.
 
-These are the functions that `rasterix.rasterize` 0.2 takes from the module of an engine. It has no list that an engine
-could join: its `_get_rasterize_funcs` and `_get_mask_funcs` name their modules, and need a line for this one.
+These are the functions that `rasterix.rasterize` 0.2 takes from the module of an engine. It has no registry of engines:
+its `_get_rasterize_funcs` and `_get_mask_funcs` name their modules, and need a line for this one.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ def rasterize_geometries(
     subpixel_bits: int = 16,
     **_: Any,
 ) -> npt.NDArray[Any]:
-    """Return the number of the polygon that each pixel lies in, the later over the earlier.
+    """Return the number of the last polygon that each pixel lies in.
 
     Parameters
     ----------
     geometries : sequence of shapely polygons
         In the CRS of the grid.
     dtype, fill
-        Of the result; what pixels get that lie in no polygon.
+        The dtype of the result; the value of pixels in no polygon.
     shape : (rows, columns)
     affine : affine.Affine, or six numbers
         As `Grid.from_transform` takes it.

@@ -1,4 +1,4 @@
-"""Families of scenes that the atlas walks: one or two parameters each, from what every method draws to what few do.
+"""Families of scenes for the atlas: one or two parameters each, from scenes that all methods draw to those that few do.
 
 Every scene of a family is a mesh without gaps that covers its frame, so a method has to draw each pixel once. Corners
 come from a seeded generator and the four operations and roots of IEEE arithmetic alone: the same bits on every machine.
@@ -19,7 +19,7 @@ I32 = NDArray[np.int32]
 
 FRAME_PX = 64
 MIDDLE_PX = 512.0
-"""Of the frame, unless the family says where it lies: no coordinate is negative, where truncation turns round."""
+"""The default middle of the frame: no coordinate is negative, because truncation changes direction at 0."""
 
 
 class PixelScene(NamedTuple):
@@ -81,7 +81,7 @@ def direction(rng: np.random.Generator) -> F64:
 
 
 def far(distance_px: float, seed: int) -> PixelScene:
-    """Return a jittered grid whose middle lies that far from the origin, as fine as float64 allows there."""
+    """Return a jittered grid around a point that far from the origin, as fine as float64 allows there."""
     rng = np.random.default_rng(seed)
     spacing = float(np.spacing(distance_px))
     middle = distance_px + (33 if spacing <= 1 else 0)
@@ -164,7 +164,7 @@ HUBS: dict[str, tuple[float, float]] = {
     "2^-8 off": (0.5 + 2**-8, 0.5), "2^-9 off": (0.5 + 2**-9, 0.5), "2^-20 off": (0.5 + 2**-20, 0.5),
     "48 px": (-48.0, 0.0), "1e3 px": (-1e3, 0.0), "1e6 px": (-1e6, 0.0),
 }  # fmt: skip
-"""Where the hub lies, from a pixel's corner in the middle of the frame; distances: left of it, outside."""
+"""Places of the hub, from a pixel's corner in the middle of the frame; distances: left of it, outside."""
 
 
 def fan(n: int, hub: tuple[float, float], seed: int) -> PixelScene:
@@ -192,7 +192,7 @@ STEPS = [(1, 0), (0, 1), (1, 1), (-1, 1), (3, 1), (2, 5), (-5, 2), (-7, 3), (1, 
 
 
 def edge(distance_px: float, seed: int) -> PixelScene:
-    """Return two triangles whose common edge passes pixel centres at that distance."""
+    """Return two triangles with a common edge that passes pixel centres at that distance."""
     rng = np.random.default_rng(seed)
     step = np.array(STEPS[seed % len(STEPS)], float)
     norm = np.sqrt((step**2).sum())

@@ -41,7 +41,7 @@ def large_triangle(width: int = 3840, height: int = 2160) -> Shape:
 def random_triangles(
     n: int, size_px: float, width: int = 1920, height: int = 1080, seed: int = 1
 ) -> tuple[F64, I32, U8]:
-    """Separate triangles strewn over the frame, each at a depth and in a colour of its own.
+    """Separate triangles strewn over the frame, each with its depth and colour.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ TUTORIAL_SCENES: Mapping[str, Callable[[], Shape]] = MappingProxyType(
         "tight-fan-sideways": partial(tight_fan, sideways=True),
     }
 )
-"""What tutorials test their triangles with, by name: functions that return vertices, on whole pixels, and triangles.
+"""The test scenes of tutorials by name: functions that return vertices, on whole pixels, and triangles.
 
-`docs/guide/methods.md` has what each method makes of them, in pixels.
+`docs/guide/methods.md` has the errors of each method on them, in pixels.
 """
 
 
@@ -211,7 +211,7 @@ def blob(n_triangles: int, seed: int = 3) -> Shape:  # noqa: ARG001
 
 
 def _smooth_blob(n_triangles: int = 20_000) -> Shape:
-    """The blob with one vertex at either pole and no empty triangles, which is what shading wants."""
+    """The blob with one vertex at either pole and no empty triangles, for shading."""
     vertices, triangles = blob(n_triangles)
     columns = int(triangles[0, 2])  # the second row starts below vertex 0
     remap = np.arange(len(vertices))
@@ -244,7 +244,7 @@ def torus_knot(p: int = 2, q: int = 3, tube_radius: float = 0.32, segments: int 
 
 
 def icosphere(subdivisions: int = 2) -> Shape:
-    """The unit sphere, as an icosahedron whose triangles were quartered `subdivisions` times."""
+    """The unit sphere: an icosahedron with its triangles quartered `subdivisions` times."""
     vertices, triangles = _ICOSAHEDRON
     vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     for _ in range(subdivisions):
@@ -360,7 +360,7 @@ def shape(name: str, **parameters: Any) -> Shape:
     name : str
         One of `SHAPES`.
     **parameters
-        What the function of that name takes, `segments=` for the torus, say.
+        Parameters of the function of that name, `segments=` for the torus, say.
 
     Returns
     -------

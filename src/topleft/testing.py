@@ -1,8 +1,8 @@
-"""For the tests of programs that draw: a comparison of pictures that says where they differ, and scenes that are hard.
+"""For tests of programs that draw: a comparison of pictures that lists their differences, and hard scenes.
 
-In: arrays that were drawn and arrays that were expected.  Out: nothing, or an `AssertionError` that can be read, and a
-picture of the difference.  The scenes are those on which the library's own golden hashes stand; `topleft doctor` draws
-them with each instruction set.
+In: arrays that were drawn and arrays that were expected.  Out: nothing, or an `AssertionError` in plain words, and a
+picture of the difference.  The library's golden hashes are of the same scenes; `topleft doctor` draws them with each
+instruction set.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ HARD_SCENES: Mapping[str, str] = MappingProxyType({
     "shared": "few float32 vertices that many triangles share",
     "slivers": "triangles of a hundredth of a pixel in width",
 })  # fmt: skip
-"""What `hard_scenes` yields, and what is hard about it."""
+"""The kinds of `hard_scenes`, and the difficulty of each."""
 
 # The hashes of `check_instruction_sets`, made by the scalar kernels.
 GOLDEN = (
@@ -65,17 +65,17 @@ GOLDEN = (
 def assert_same_picture(
     got: ArrayLike, expected: ArrayLike, *, tolerance: float = 0, path: str | os.PathLike[str] | None = None
 ) -> None:
-    """Raise an error that says where two pictures differ, if they do.
+    """Raise an error with the places of the differences, if two pictures differ.
 
     Parameters
     ----------
     got, expected : array_like, shape (H, W) or (H, W, C)
         Numbers or truth values of one dtype. NaN is equal to NaN.
     tolerance : float, optional
-        By how much each channel may be off. 0: not at all.
+        The largest allowed difference of a channel. 0: none.
     path : str or path-like, optional
-        Where a picture of the difference is written if there is one: black where pixels are equal, brighter the more
-        they differ, the largest difference white.
+        File for a picture of the differences, if there are any: black where pixels are equal, brighter the more they
+        differ, the largest difference white.
 
     Raises
     ------
@@ -172,12 +172,12 @@ def hard_scenes(kind: str) -> Iterator[tuple[NDArray[Any], NDArray[np.int64]]]:
 
 
 def check_instruction_sets() -> dict[str, str]:
-    """Return what each instruction set that this machine can run makes of `hard_scenes`, in words.
+    """Draw `hard_scenes` with each instruction set of this machine; return the verdicts.
 
     Returns
     -------
     dict
-        The name of the instruction set and "right", or which buffers it draws differently from the hashes in this file.
+        By instruction set "right", or the buffers that differ from the hashes in this file.
         Takes about a second. Not for several threads at a time: the instruction set in use changes meanwhile.
     """
     before, found = isa_in_use(), {}
@@ -194,7 +194,7 @@ def check_instruction_sets() -> dict[str, str]:
 
 
 def words_of(buffer: NDArray[Any]) -> bytes:
-    """Return dtype, shape and contents of an array to be hashed; all NaN as one, for their bits are the CPU's."""
+    """Return dtype, shape and contents of an array to be hashed; all NaN alike, as their bits depend on the CPU."""
     buffer = as_array("buffer", buffer)
     if buffer.dtype.hasobject:
         raise TypeError(f"buffer must hold numbers, got {shown(buffer)} of {buffer.dtype}")
@@ -224,7 +224,7 @@ def _hash_of_all(threads: int) -> dict[str, str]:
 
 
 def _differences(one: NDArray[Any], other: NDArray[Any]) -> NDArray[np.float64]:
-    """Return how far each number is off, inf where that is no number."""
+    """Return the difference of each number, inf where it is not a number."""
     same = one == other
     if one.dtype.kind == "f":
         same |= np.isnan(one) & np.isnan(other)

@@ -1,4 +1,4 @@
-"""Talks to a Dask cluster: whether its workers can draw, what came of a task, and sending it again when it was lost.
+"""Talks to a Dask cluster: checks its workers, returns results of tasks, sends lost tasks again.
 
 Input: a `dask.distributed.Client`, which is the caller's and is not imported for its name. Output: results and errors.
 """
@@ -17,14 +17,14 @@ from topleft import build_info
 from topleft.errors import MissingPackageError, TopleftError
 
 MOST_RESTARTS = 5
-"""How often a task is sent again that was cancelled or lost with the scheduler."""
+"""Most times that a task is sent that was cancelled or lost with the scheduler."""
 
 WAIT_S = 0.05
-"""How often a client that has lost its scheduler is looked at."""
+"""Seconds between two looks at a client that has lost its scheduler."""
 
 
 def is_client(executor: object) -> bool:
-    """Whether it is a client of Dask, which is not imported for that."""
+    """Whether an executor is a client of Dask; does not import Dask."""
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(executor).__mro__]
     return ("distributed", "Client") in kinds
 
@@ -78,7 +78,7 @@ def result_of(task: Any) -> tuple[Any, BaseException | None]:
 
 
 def wait_for_scheduler(client: Any, is_over: Callable[[], bool]) -> None:
-    """Wait while a client has lost its scheduler, unless it is over: until then it forgets what it is given."""
+    """Wait while a client has lost its scheduler, unless all is over: such a client forgets tasks that it is given."""
     while client.status == "connecting" and not is_over():
         time.sleep(WAIT_S)
 
@@ -100,6 +100,6 @@ def send_again(client: Any, send: Callable[[], None], promise: Future[Any], is_o
     threading.Thread(target=again, daemon=True).start()
 
 
-def lost(what: str, n_sent: int) -> TopleftError:
+def lost(task: str, n_sent: int) -> TopleftError:
     """The error of a task that was lost too often."""
-    return TopleftError(f"the cluster has lost {what} {n_sent} times")
+    return TopleftError(f"the cluster has lost {task} {n_sent} times")

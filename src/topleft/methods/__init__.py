@@ -1,10 +1,10 @@
-"""The registry: the only list of the ways to fill that the library has, and what each of them claims.
+"""The registry: the only list of the library's methods of filling, with the claims of each.
 
 `METHODS` are the production ones: exact, identical buffers. `CLASSICS` are those of the literature, as published, to be
-compared; a variant's name stands after a slash. Their kernels are imported when one is first asked for.
+compared; a variant's name stands after a slash. Their kernels are imported on first use.
 
 classics/    draws triangles as the literature does: a compiled kernel for each classic
-reference/   draws triangles exactly and slowly, in integers and fractions: what all others are held against
+reference/   draws triangles exactly and slowly, in integers and fractions: the reference of all others
 twins/       draws as the classics do, in Python
 """
 
@@ -40,7 +40,7 @@ class Kernel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Claims:
-    """What a method promises; `tests/methods/test_claims.py` proves each answer, the "no" as well as the "yes".
+    """The claims of a method; `tests/methods/test_claims.py` proves each answer, the "no" as well as the "yes".
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Claims:
         Every sample is decided without rounding under the method's own fill rule, for the vertices that it works on.
     watertight : bool
         Triangles that share edges leave no sample between them out; where a method calculates in float32, with
-        corners within 2**22 px (`failure_scenes.py` has what happens far beyond).
+        corners within 2**22 px (`failure_scenes.py` shows failures far beyond).
     top_left : bool
         A sample on an edge is drawn when the edge is top or left, and not otherwise.
     sub_pixel : bool
@@ -72,12 +72,12 @@ class Claims:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One way to fill, and what it claims.
+    """One way to fill, and its claims.
 
     Attributes
     ----------
     name : str
-        What ``method=`` calls it; of a classic, the file of its kernel and, after a slash, the variant.
+        The value of ``method=``; of a classic, the file of its kernel and, after a slash, the variant.
     summary : str
         How it finds the covered samples.
     source : str

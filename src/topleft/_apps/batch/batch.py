@@ -31,14 +31,14 @@ Progress = Callable[["Result"], object]
 
 
 class OnError(StrEnum):
-    """Whether an error of a job is raised or collected."""
+    """How a batch treats an error of a job: raises it, or collects it."""
 
     RAISE = "raise"
     COLLECT = "collect"
 
 
 class Order(StrEnum):
-    """In which order results come."""
+    """The order of results."""
 
     JOBS = "jobs"
     COMPLETED = "completed"
@@ -46,27 +46,27 @@ class Order(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of a job.
+    """The outcome of a job.
 
     Attributes
     ----------
     index : int
-        Which job it was, from 0.
+        The number of the job, from 0.
     job : Job
     made : ndarray, dict of str to ndarray, or None
-        What the job gave: its picture, or its layers by name; None where they went to files, or were not made.
+        The picture, or the layers by name; None if they went to files or were not made.
     picture : ndarray (H, W, 4) uint8, or None
-        The picture; of a job with layers the one of "color", if that is among them.
+        The picture; for a job with layers its layer "color", if it has one.
     layers : dict of str to ndarray
         The layers by name; empty for a job without any.
     error : Exception or None
-        Why it failed.
+        The error of a job that failed.
     is_skipped : bool
-        Whether its files were there and it was left out (`resume`).
+        Whether the job was left out because its files were there (`resume`).
     warnings : tuple of str
-        What the mesh lacks of its file, a line each: textures that are not there, say.
+        The parts of the file that the mesh lacks, a line each: missing textures, say.
     seconds : float
-        How long the job took where it was drawn; of a mesh that several jobs share, the first has the reading.
+        The time of the job on its worker; the first job of a shared mesh includes the reading.
     """
 
     index: int
@@ -88,23 +88,23 @@ class Result:
         return self.made if isinstance(self.made, dict) else {}
 
     def __repr__(self) -> str:
-        """One line: which job it was, and what came of it."""
+        """One line: the job and its outcome."""
         if self.error is not None:
-            what = f"{type(self.error).__name__}: {self.error}"
+            outcome = f"{type(self.error).__name__}: {self.error}"
         elif self.is_skipped:
-            what = "skipped"
+            outcome = "skipped"
         elif self.layers:
-            what = ", ".join(f"{name} {array.shape} {array.dtype}" for name, array in self.layers.items())
+            outcome = ", ".join(f"{name} {array.shape} {array.dtype}" for name, array in self.layers.items())
         elif self.picture is not None:
-            what = f"picture {self.picture.shape} {self.picture.dtype}"
+            outcome = f"picture {self.picture.shape} {self.picture.dtype}"
         else:
-            what = "written"
-        return f"Result({self.index}, {self.job.name}: {what})"
+            outcome = "written"
+        return f"Result({self.index}, {self.job.name}: {outcome})"
 
 
 @dataclass(frozen=True)
 class Summary:
-    """How many pictures were made, how many were left out, and the results of the jobs that failed."""
+    """The numbers of pictures that were made and left out, and the results of failed jobs."""
 
     n_made: int
     n_skipped: int
@@ -123,17 +123,17 @@ def render_batch(
     window: int | None = None,
     time_limit: float | None = None,
 ) -> Batch:
-    """Return the results of many jobs, to be iterated over: a picture is drawn when its turn comes, not before.
+    """Return an iterator over the results of many jobs; a picture is drawn when its turn comes, not before.
 
     Parameters
     ----------
     jobs : iterable of Job, or of tuples (scene, camera, size, options, destination, layers), shorter ones too
         May be a generator without an end: no more than `window` times `chunk` pictures are on the way at any time.
     executor : None, int, concurrent.futures.Executor or dask.distributed.Client
-        None: the calling thread. A number: so many threads, which end with the batch. An executor is left running; what
-        a `ProcessPoolExecutor` draws is pickled, except that a mesh is handed to its processes through a file, once
-        for all jobs that share it. Other executors get whole jobs. The client of a Dask cluster sends a mesh once, and
-        a worker that dies loses nothing; files go to a folder that all workers see. Never changes a bit.
+        None: the calling thread. A number: so many threads, which end with the batch. An executor is left running. A
+        `ProcessPoolExecutor` gets jobs pickled, and each mesh through a file, once for all jobs that share it. Other
+        executors get whole jobs. The client of a Dask cluster sends a mesh once, and a worker that dies loses nothing;
+        files go to a folder that all workers see. Never changes a bit.
     progress : function of a Result, or True, optional
         Called after each job. True shows a bar with rate and remaining time (tqdm).
     on_error : {"raise", "collect"}
@@ -141,8 +141,8 @@ def render_batch(
     order : {"jobs", "completed"}
         Whether results come in the order of the jobs, or as soon as they are there.
     resume : bool
-        Leave out jobs whose files are all there. A file is whole or not there, also after an interrupt. Of files behind
-        URLs each is asked for.
+        Leave out a job if all its files are there. A file is whole or not there, also after an interrupt. Each file
+        behind a URL costs a request.
     chunk : int, optional
         How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture. Unless
         given 1; on threads up to 4 of a list of jobs, fewer towards its end, of pictures of a megapixel at most; on a
@@ -157,7 +157,7 @@ def render_batch(
     -------
     Batch
         An iterator of `Result`; `finish()` goes through all of them and counts. Use it in a `with` block, or close it,
-        if you leave early: nothing new is begun then, and what is being written is finished.
+        if you leave early: nothing new is begun then, and files that are being written are finished.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def render_batch(
     Warns
     -----
     MeshWarning
-        Of what meshes lack of their files, once a batch.
+        For each part of a file that a mesh lacks, once a batch.
 
     Notes
     -----
@@ -208,7 +208,7 @@ def render_batch(
 
 
 def workers_on(executor: object, time_limit: float | None) -> Workers | None:
-    """Return the workers that draw: of a Dask cluster, or those of `workers_of`.
+    """Return the workers of a Dask cluster, or those of `workers_of`.
 
     Raises
     ------
@@ -311,17 +311,17 @@ class _Task:
     has_arrived: bool = False
 
     def end(self, future: Future[list[Outcome]]) -> None:
-        """Keep what came of it; called where it ends, so that the calling thread needs none of the future's locks."""
+        """Keep the outcome; called where the task ends, so that the calling thread needs none of the future's locks."""
         try:
             self.came = future.result()
         except BaseException as error:  # told by `results`
             self.came = error
 
     def results(self) -> list[Result]:
-        """What came of them."""
+        """The results of the jobs."""
         if self.came is None:
             return [Result(index, job, is_skipped=True) for index, job in self.jobs]
-        if isinstance(self.came, Exception):  # what a worker could not even send back
+        if isinstance(self.came, Exception):  # a worker could not even send the outcomes
             return [Result(index, job, error=self.came) for index, job in self.jobs]
         if isinstance(self.came, BaseException):
             raise self.came
@@ -333,7 +333,7 @@ def _chunks(
 ) -> Iterator[tuple[list[tuple[int, Job]], bool]]:
     """Yield neighbouring jobs of one scene, and whether their files are there.
 
-    `most` tells how many together, of the first of them and its index.
+    `most` returns how many go together, from the first job and its index.
     """
     together: list[tuple[int, Job]] = []
     n = 1
@@ -367,8 +367,7 @@ class _InFlight:
     """Tasks that are on the way, a bounded number of them.
 
     Futures and executors are touched while signals are put off: a handler that raises would leave their locks taken,
-    and workers would wait for ever. What is done arrives through a queue, at which the calling thread can be
-    interrupted.
+    and workers would wait for ever. Finished tasks arrive through a queue; waiting there can be interrupted.
     """
 
     def __init__(self, workers: Workers, window: int, as_completed: bool) -> None:
@@ -380,11 +379,11 @@ class _InFlight:
         self._pid = os.getpid()
 
     def results(self, chunks: Iterator[tuple[list[tuple[int, Job]], bool]]) -> Iterator[Result]:
-        """Yield the results of all."""
+        """Yield the results of all jobs."""
         self._workers.start()
         try:
             while self._fill(chunks):
-                if self._workers.restart_after_fork():  # a fork took the workers away: what was on the way begins again
+                if self._workers.restart_after_fork():  # a fork took the workers away: tasks on the way begin again
                     self._pid, self._done = os.getpid(), SimpleQueue()
                     for task in self._tasks:
                         if task.future is not None and task.came is None:
@@ -421,7 +420,7 @@ class _InFlight:
         return bool(self._tasks)
 
     def _submit(self, task: _Task) -> None:
-        """Submit a task; to workers of which one was killed as one that has failed for that."""
+        """Submit a task; it has failed already if one of the workers was killed."""
         sent, done = self._workers.prepare(task.jobs), self._done
 
         def end(future: Future[list[Outcome]]) -> None:
@@ -448,7 +447,7 @@ class _InFlight:
 
 
 def _is_done(job: Job) -> bool:
-    """Tell whether all files of a job are there, and not empty; what is wrong with a job is found when it is drawn."""
+    """Return whether all files of a job are there and not empty; errors of a job appear when it is drawn."""
     try:
         files = job.files
     except ValueError:

@@ -3,9 +3,9 @@
 Input: a `dask.distributed.Client`, and jobs. Output: futures of outcomes. A mesh is a task of its own: the client sends
 it to the scheduler once, each worker that draws it gets it once, and when a worker dies another one makes it again.
 
-What may happen to a task is answered here: Dask tries it again when its worker dies; jobs that were together when
-workers died over them are tried one by one, so that one of them that kills workers is told alone; tasks that were lost
-with the scheduler, or cancelled by a restart of the cluster, are sent again.
+Dask repeats a task when its worker dies. Jobs that were together when workers died over them are tried one by one, so
+that the error names only the job that kills workers. Tasks that were lost with the scheduler, or cancelled by a restart
+of the cluster, are sent again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from topleft._meshes.lod.levels import keep_levels
 from topleft.errors import MissingPackageError
 
 MESH_KEY = "topleft-mesh"
-"""How the keys of tasks begin that hold a mesh."""
+"""The beginning of the keys of tasks that hold a mesh."""
 
 GONE = ("cancelled", "lost", "error")
 """States of the future of a mesh that is gone."""
@@ -37,10 +37,10 @@ TASK_MS = 200.0
 
 MOST_TOGETHER = 64
 UNKNOWN_TOGETHER = 4
-"""Jobs of a task whose mesh only the worker reads."""
+"""Jobs of a task if only the worker reads the mesh."""
 
 MOST_TRIALS = 2
-"""How often a job that workers died over is tried by itself."""
+"""Trials of a single job after workers died over it."""
 
 GRACE_S = 5.0
 """How long a job may take to end once its time is over, before its process is ended."""
@@ -104,7 +104,7 @@ class ClusterWorkers(Workers):
         check_workers(self._client)
 
     def prepare(self, jobs: Jobs) -> Jobs:
-        """Return jobs, once the levels of detail are made that their mesh is sent with."""
+        """Return jobs, after making the levels of detail that are sent with their mesh."""
         if needs_levels(jobs[0][1]):
             coarser_levels_of(jobs[0][1].scene)
         return jobs
@@ -149,7 +149,7 @@ class ClusterWorkers(Workers):
     def _end(
         self, task: Any, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int, n_trials: int
     ) -> None:
-        """Hand on what a task came to, or try again."""
+        """Hand on the outcome of a task, or try again."""
         if n_trials:
             self._is_trying = False
         if promise.done():
@@ -188,7 +188,7 @@ class ClusterWorkers(Workers):
             self._suspects.append((job, part, n_trials))
 
     def _try_next(self) -> None:
-        """Send a job that workers died over, if none of these is on the way."""
+        """Send the next job that workers died over, if no other one is on the way."""
         with self._lock:
             if self._is_trying or not self._suspects or self._ends:
                 return
@@ -197,7 +197,7 @@ class ClusterWorkers(Workers):
         self._send([job], promise, n_trials=n_trials)
 
     def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
-        """How many jobs of a scene make a task: by what the plan of the first one says."""
+        """The number of jobs of a scene in a task, from the plan of the first one."""
         key = id(job.scene)
         if key not in self._together:
             self._together[key] = jobs_of_task(job)
@@ -240,7 +240,7 @@ class ClusterWorkers(Workers):
                 kept.n_users -= 1
 
     def cancel(self, futures: Sequence[Future[Any]]) -> None:
-        """Drop what has not begun; what is lost from now on is not sent again."""
+        """Drop tasks that have not begun; tasks that are lost from now on are not sent again."""
         self._ends = True
         super().cancel(futures)
 
@@ -271,7 +271,7 @@ def jobs_of_task(job: Job) -> int:
         return UNKNOWN_TOGETHER
     try:
         estimated = plan(job.scene, job.camera, job.size, outputs="triangle", threads=1).estimated_ms
-    except Exception:  # what is wrong with a job is told when it is drawn
+    except Exception:  # errors of a job appear when it is drawn
         return 1
     # ids and depth are a part of a picture: light, background and the file take as long again or more
     return max(1, min(MOST_TOGETHER, int(TASK_MS / max(0.1, 3 * estimated))))
@@ -283,7 +283,7 @@ _runner: tuple[str, JobRunner] | None = None
 def draw_on_worker(
     token: str, jobs: list[tuple[int, Job]], held: HeldScene | None, time_limit: float | None
 ) -> list[Outcome]:
-    """Draw jobs on a worker, which keeps what it has read for the rest of the batch."""
+    """Draw jobs on a worker, which keeps the meshes that it has read for the rest of the batch."""
     global _runner
     known = _runner
     if known is None or known[0] != token:
@@ -295,11 +295,11 @@ def draw_on_worker(
 
 
 class _TimeIsOver(BaseException):
-    """Raised in a thread whose job takes too long."""
+    """Raised in a thread when its job takes too long."""
 
 
 def draw_in_time(runner: JobRunner, job: tuple[int, Job], time_limit: float) -> list[Outcome]:
-    """Draw a job, or give it up after so many seconds; end the process if it does not let itself be given up."""
+    """Draw a job, or interrupt it after so many seconds; end the process if the job cannot be interrupted."""
     import ctypes
 
     thread, lock = threading.get_ident(), threading.Lock()

@@ -36,9 +36,9 @@ class Job:
     Parameters
     ----------
     scene : Mesh, Scene, Points, whatever `as_mesh` takes, path, or function without arguments that returns one of them
-        A file is read where it is drawn, once for jobs that follow each other. The same goes for what a function makes
-        where functions are equal; for worker processes it must be picklable. A mesh of another library is made ours
-        once, and must not change between its jobs.
+        A file is read where it is drawn, once for jobs that follow each other. Equal functions are likewise called
+        once; for worker processes a function must be picklable. A mesh of another library is converted once, and must
+        not change between its jobs.
     camera : Camera, or function of the mesh (or scene) and the size that returns one, optional
         As for `render`.
     size : (width, height), pixels
@@ -49,9 +49,9 @@ class Job:
         The file to be written; its folder is made. A URL is whatever fsspec can write to where the job is drawn.
         `{layer}` in the name stands for the name of a layer. None: the picture is returned.
     layers : sequence of str
-        What is wanted besides, or instead of, the picture: names that `render_layers` knows. None: the picture alone.
+        Names that `render_layers` knows, made instead of the picture; "color" is the picture. Empty: the picture alone.
     scale : float
-        Of a scene that is a path: what its coordinates are multiplied by; 0.001 makes metres of millimetres.
+        Factor of the coordinates if the scene is a path; 0.001 makes metres of millimetres.
 
     Examples
     --------
@@ -81,7 +81,7 @@ class Job:
             raise TypeError(f"scale is of a scene that is a path, got {shown(self.scene)}: load(path, scale=) has one")
 
     def __repr__(self) -> str:
-        """One line: what is drawn, how large, where to."""
+        """One line: the scene, the size and the destination."""
         scene = os.fspath(self.scene) if isinstance(self.scene, str | os.PathLike) else type(self.scene).__name__
         words = [str(scene), f"size={self.size}"]
         words += [f"layers={tuple(self.layers)}"] if self.layers else []
@@ -91,7 +91,7 @@ class Job:
 
     @property
     def files(self) -> tuple[Location, ...]:
-        """The files that it writes.
+        """The files that the job writes.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class MeshFile:
 
 
 class ForeignMesh:
-    """A mesh of another library, to be made ours; equal where it is the same object."""
+    """A mesh of another library, to be converted; equal if it is the same object."""
 
     def __init__(self, subject: MeshLike) -> None:
         self.subject = subject
@@ -179,7 +179,7 @@ class MeshCache:
         self._lock = threading.Lock()
 
     def get(self, make: Callable[[], Any]) -> Any:
-        """Return what an equal function has made, or make it."""
+        """Return the result of an equal function, or call this one."""
         found = self._made.get(make)
         if found is None:
             with self._lock:
@@ -205,12 +205,12 @@ class MeshCache:
 
 
 class JobRunner:
-    """Draws jobs: each thread on one thread and in memory of its own, which it keeps from picture to picture.
+    """Draws jobs; each thread draws by itself, in memory that it keeps from picture to picture.
 
     Parameters
     ----------
     n_meshes : int
-        How many meshes that were read are kept for jobs to come.
+        The number of meshes that are kept for jobs to come.
     """
 
     def __init__(self, n_meshes: int = 4) -> None:
@@ -218,7 +218,7 @@ class JobRunner:
         self._threads = threading.local()
 
     def draw(self, jobs: Sequence[tuple[int, Job]]) -> list[Outcome]:
-        """Return what came of each job; an error of one does not stop the next."""
+        """Return the outcome of each job; an error of one does not stop the next."""
         outcomes = []
         for index, job in jobs:
             start, picture, failure = time.perf_counter(), None, None
@@ -235,7 +235,7 @@ class JobRunner:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
         layers = check_layers(job.layers)
         path = None if job.destination is None else location_of(job.destination)
-        files = job.files  # before any work: a format that is none
+        files = job.files  # before any work: raises for an unknown format
         for file in files:
             if isinstance(file, Path) and not file.parent.is_dir():
                 file.parent.mkdir(parents=True, exist_ok=True)
@@ -278,7 +278,7 @@ class JobRunner:
 
 
 def _clear_frames(error: BaseException | None) -> None:
-    """Free what the frames of an error hold, pictures among it: results carry errors for long."""
+    """Free the local variables in an error's frames, pictures among them: results carry errors for long."""
     import traceback
 
     while error is not None:

@@ -25,13 +25,13 @@ from topleft.typing import CullOption
 
 @dataclass(frozen=True, eq=False)
 class VisibleFaces:
-    """What `visible_faces` returns: a row for each camera and triangle that it sees, cameras in their order.
+    """The triangles that cameras see: a row for each camera and visible triangle, in the order of the cameras.
 
     Attributes
     ----------
     camera, face, pixels : (N,) int32
-        Which camera, which triangle, and in how many pixels it shows. Triangles of all instances of a scene are counted
-        in their order.
+        The camera, the triangle and the number of its pixels. Triangles of all instances of a scene are numbered in
+        their order.
     shape : (number of cameras, number of triangles)
 
     Examples
@@ -49,7 +49,7 @@ class VisibleFaces:
     pixels: I32
     shape: tuple[int, int]
     triangles: I32
-    """(T, 3): the vertices of all triangles, those of all instances counted in their order."""
+    """(T, 3): the vertices of all triangles, numbered through all instances in their order."""
 
     def __repr__(self) -> str:
         n_cameras, n_faces = self.shape
@@ -57,11 +57,11 @@ class VisibleFaces:
 
     @property
     def seen_by(self) -> npt.NDArray[np.int64]:
-        """How many cameras see each triangle, (T,)."""
+        """The number of cameras that see each triangle, (T,)."""
         return np.bincount(self.face, minlength=self.shape[1])
 
     def vertices(self) -> VisibleFaces:
-        """The same table of vertices: each has the pixels of all triangles round it."""
+        """The table by vertices: each has the pixels of all triangles round it."""
         n = int(self.triangles.max(initial=-1)) + 1
         key = (self.camera[:, None].astype(np.int64) * n + self.triangles[self.face]).ravel()
         found, where = np.unique(key, return_inverse=True)
@@ -91,7 +91,7 @@ def visible_faces(
     cull: CullOption | None = None,
     executor: Executor | int | Any = None,
 ) -> VisibleFaces:
-    """Which triangles each of many cameras sees, and in how many pixels.
+    """Return the triangles that each of many cameras sees, and the number of their pixels.
 
     Parameters
     ----------
@@ -99,13 +99,13 @@ def visible_faces(
     cameras : iterable of Camera
         May be a generator.
     size : int or (width, height), pixels
-        Of the pictures that are counted: a triangle that owns the middle of none of their pixels is not seen.
+        Of the pictures in which triangles are counted; a triangle that owns no pixel's centre is not seen.
     min_pixels : int
-        In how many pixels a triangle must show.
+        The fewest pixels of a triangle that counts as visible.
     cull : {"none", "back", "front"}, optional
         As for `render`.
     executor : None, int, concurrent.futures.Executor or dask.distributed.Client
-        Who draws, as for `render_batch`. Never changes a number.
+        The workers, as for `render_batch`. Never changes a number.
 
     Returns
     -------

@@ -26,10 +26,10 @@ from topleft.errors import MissingPackageError
 Jobs = Sequence[tuple[int, Job]]
 
 MOST_OF_A_THREAD, SMALL_PX = 4, 1 << 20
-"""How many jobs a thread gets together, and of how large pictures."""
+"""Most jobs that a thread gets together, and the size of picture up to which it does."""
 
 N_SPOOLED = 8
-"""Meshes whose files are kept for jobs to come, besides those that a job on the way needs."""
+"""Files of meshes that are kept for jobs to come, besides those that a job on the way needs."""
 
 
 @contextmanager
@@ -62,7 +62,7 @@ def _put_off(number: signal.Signals) -> Iterator[None]:
 
 
 def workers_of(executor: object) -> Workers | None:
-    """Return the workers that draw: None for the calling thread.
+    """Return the workers of an executor; None for the calling thread.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class Workers:
         """Get ready; called before the first job."""
 
     def prepare(self, jobs: Jobs) -> Jobs:
-        """Return jobs as they are submitted; what takes long is done here, where signals are heard."""
+        """Return jobs as they are submitted; slow work is done here, where signals are handled."""
         return jobs
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
@@ -105,23 +105,23 @@ class Workers:
         raise NotImplementedError
 
     def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
-        """How many jobs of a scene are handed over together unless the caller says; of `n_left`, if that is known."""
+        """The default number of jobs of a scene that are handed over together; of `n_left`, if that is known."""
         return 1
 
     def release(self, jobs: Jobs) -> None:
-        """Free what jobs needed that are done."""
+        """Free the resources of finished jobs."""
 
     def restart_after_fork(self) -> bool:
         """Return whether a fork had ended the workers, which have been started again."""
         return False
 
     def cancel(self, futures: Sequence[Future[Any]]) -> None:
-        """Drop what has not begun."""
+        """Drop jobs that have not begun."""
         for future in futures:
             future.cancel()
 
     def stop(self) -> None:
-        """Free what the batch has kept; called when all that had begun is finished."""
+        """Free the resources of the batch; called when all jobs that had begun are finished."""
 
 
 class BorrowedThreads(Workers):
@@ -136,19 +136,19 @@ class BorrowedThreads(Workers):
         return self._executor.submit(self._runner.draw, jobs)
 
     def together(self, job: Job, n_left: int | None) -> int:
-        """Several small pictures of many that are listed: each time the caller is woken workers wait for the GIL.
+        """Several if pictures are small and many: each time the caller is woken, workers wait for the GIL.
 
-        Of few one by one, so that no thread draws the last four while the others have nothing to do.
+        Few jobs go one by one, so that no thread draws the last four while the others have nothing to do.
         """
         try:
             width, height = as_size(job.size)
-        except (TypeError, ValueError):  # what is wrong with a job is told when it is drawn
+        except (TypeError, ValueError):  # errors of a job appear when it is drawn
             return 1
         return max(1, min(MOST_OF_A_THREAD, (n_left or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
 
 
 class OwnThreads(BorrowedThreads):
-    """Threads of the batch's own, which end with it."""
+    """Threads that the batch starts and ends."""
 
     def __init__(self, n_workers: int) -> None:
         self.n_workers = n_workers
@@ -190,7 +190,7 @@ class LocalProcesses(Workers):
         self._spool = Spool()
 
     def prepare(self, jobs: Jobs) -> Jobs:
-        """Return jobs with their meshes replaced by where to find them."""
+        """Return jobs with their meshes replaced by files."""
         return [(index, replace(job, scene=self._spool.hold(job.scene, needs_levels(job)))) for index, job in jobs]
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
@@ -248,7 +248,7 @@ class Spool:
         return self._folder
 
     def hold(self, scene: Any, with_levels: bool = False) -> Any:
-        """Return what stands for a mesh, which stays in its file until it is released; names stay as they are.
+        """Return the spooled mesh, which stays in its file until it is released; names stay as they are.
 
         Levels of detail are made here where they are needed, once, and not in each worker.
         """
@@ -271,7 +271,7 @@ class Spool:
         return entry.at
 
     def release(self, scene: Any, with_levels: bool = False) -> None:
-        """One job less needs it."""
+        """Count one user of the mesh less."""
         entry = self._entries.get((id(scene), with_levels))
         if entry is not None:
             entry.n_users -= 1
@@ -290,7 +290,7 @@ class Spool:
 
 
 def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...]]]:
-    """The meshes of a scene, each with its coarser levels; none where they cannot be made, which the job will tell."""
+    """The meshes of a scene, each with its coarser levels; none where they cannot be made: the job then raises."""
     if not isinstance(scene, Mesh | Scene):
         return []
     meshes = [scene] if isinstance(scene, Mesh) else [instance.mesh for instance in scene]
@@ -301,7 +301,7 @@ def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...]]]:
 
 
 def needs_levels(job: Job) -> bool:
-    """Tell whether a job may be drawn with levels of detail."""
+    """Return whether a job may be drawn with levels of detail."""
     return bool(job.options.get("tolerance", 0))
 
 
@@ -309,7 +309,7 @@ _runner: tuple[str, JobRunner] | None = None
 
 
 def draw_in_process(token: str, jobs: Jobs) -> list[Outcome]:
-    """Draw jobs in a worker process, which keeps what it has read for the rest of the batch."""
+    """Draw jobs in a worker process, which keeps the meshes that it has read for the rest of the batch."""
     global _runner
     if _runner is None or _runner[0] != token:
         _runner = token, JobRunner()

@@ -1,7 +1,7 @@
 """The command line: `render`, `mask`, `bop`, `bake`, `raster`, `explore`, `explain`, `calibrate`, `doctor`, `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
---strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
+--strict, a mesh lacks something of its file; 2, nothing was written, for a reason in one line on stderr.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     try:
         with warnings.catch_warnings(), listening() as lacks, hearing_sigterm():
-            warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy, for numbers that overflow: lines of its own
+            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's, for numbers that overflow: they span lines
             status: int = options.run(options)
         complain_of_lacks(lacks)
     except TOLD as error:
@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain("terminated")
         return 143
     except RuntimeError as error:
-        if type(error).__name__ != "BrokenProcessPool":  # whose module is not imported for one mesh
+        if type(error).__name__ != "BrokenProcessPool":  # by name: its module is not imported for one mesh
             raise
         complain("a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume")
         return FAILED
@@ -59,12 +59,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class Terminated(BaseException):
-    """SIGTERM: like Ctrl-C it ends what goes on, and processes and temporary files with it."""
+    """SIGTERM: like Ctrl-C it ends the command, with its processes and temporary files."""
 
 
 @contextmanager
 def hearing_sigterm() -> Iterator[None]:
-    """Raise `Terminated` on SIGTERM meanwhile, in the main thread, which alone may say so."""
+    """Raise `Terminated` on SIGTERM meanwhile, in the main thread: only it may set handlers."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 VIDEO_SUFFIXES = (".mp4", ".mkv", ".mov", ".webm")
 ANIMATION_SUFFIXES = (".gif", ".webp", ".apng", *VIDEO_SUFFIXES)
-"""What `save_animation` writes, by the end of the name."""
+"""The formats of `save_animation`, by the end of the name."""
 
 PILLOW_OPTIONS: Mapping[str, Mapping[str, Any]] = {
     ".gif": {"format": "GIF", "disposal": 2},
@@ -54,7 +54,7 @@ def check_animation(path: Path) -> None:
 def save_animation(
     path: Path, files: Sequence[Path], *, fps: float = 20.0, background: tuple[int, int, int] = (255, 255, 255)
 ) -> None:
-    """Write pictures as an animation that goes round without an end, or as a video.
+    """Write pictures as an animation in a loop, or as a video.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def save_animation(
     fps : float
         Pictures a second.
     background : (3,) of 0 to 255
-        What shows through in a video, which has no alpha.
+        The colour behind transparent pixels in a video, which has no alpha.
 
     Raises
     ------
@@ -94,9 +94,9 @@ def save_animation(
 
 
 def _in_palette(frames: Sequence[Picture]) -> list[Picture]:
-    """Pictures in the 255 colours that suit them best together, and one for what is transparent.
+    """Return pictures with one palette: the 255 colours that suit them best together, and transparent.
 
-    One palette for all: with one of its own for each, plain surfaces flicker.
+    With a palette for each picture, plain surfaces flicker.
     """
     from PIL import Image
 

@@ -1,4 +1,4 @@
-"""What `topleft render` takes: its arguments, as words of the command line or as keys of a job file."""
+"""The arguments of `topleft render`, as words of the command line or as keys of a job file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ LAYERS_OF_ONE_VIEW = tuple(name for name in LAYER_NAMES if name != "flow")
 """Flow needs a second camera, or a second place."""
 
 RENDER_HELP = f"""\
-MESH is a file (OBJ, PLY, glTF, GLB, STL, OFF, and what else trimesh reads) or the name of a built-in shape:
+MESH is a file (OBJ, PLY, glTF, GLB, STL, OFF, and others that trimesh reads) or the name of a built-in shape:
 {", ".join(SHAPES)}.
 
 OUT is a file or a folder:
@@ -56,16 +56,16 @@ nothing is). In a PNG they are 16-bit numbers, 0 where nothing is: ids plus 1, d
 to 65535; normals and barycentrics are 8-bit. Text chunks say it: number = topleft:offset + topleft:scale * value.
 --shading ids, depth or normals makes pictures of them to look at, and .npy files with the numbers behind.
 
---jobs-file: TOML or JSON. Keys are the long options without dashes in front, and mesh; each job may have its own, and
-what stands outside of jobs, or on the command line, holds where a job does not say otherwise:
+--jobs-file: TOML or JSON. Keys are the long options without dashes in front, and mesh; each job may have its own. Keys
+outside of jobs, and options of the command line, hold unless a job has its own:
   size = [512, 512]                          {{"size": [512, 512],
   [[job]]                                     "job": [
   mesh = ["bunny.obj", "spot.obj"]              {{"mesh": ["bunny.obj", "spot.obj"],
   out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
   views = 12                                     "views": 12}}]}}
 
-The picture fills the frame but for 5 %; those of --views keep one distance, so that the size does not change. What a
-mesh lacks of its file (textures that are not there, say) is told in one line at the end.
+The mesh fills 95 % of the frame; those of --views keep one distance, so that the size does not change. One line at the
+end lists the parts of files that meshes lack, missing textures, say.
 
 Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written, or --strict and a
 mesh lacks something; 2, nothing was written.
@@ -100,7 +100,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def meant(word: str, known: Iterable[str]) -> str:
-    """The known word that is nearest to an unknown one, as the end of a message."""
+    """Return the known word that is nearest to an unknown one, as the end of a message."""
     from difflib import get_close_matches  # 3 ms that only errors need
 
     found = get_close_matches(word, list(known), 1)
@@ -108,7 +108,7 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 
 def add_render_arguments(parser: Parser) -> None:
-    """Add all that `topleft render` takes."""
+    """Add all arguments of `topleft render`."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = RENDER_HELP
     parser.add_argument("meshes", nargs="*", metavar="MESH", help="a file or a built-in shape")
@@ -117,15 +117,15 @@ def add_render_arguments(parser: Parser) -> None:
     add = many.add_argument
     add("--jobs", type=positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
     add("--dask", metavar="local|ADDRESS", help="draw on a Dask cluster: tcp://HOST:PORT, or --jobs processes here")
-    add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
-    add("--resume", action="store_true", help="leave out pictures whose files are there")
+    add("--jobs-file", metavar="FILE", help="jobs to render, as TOML or JSON; see below")
+    add("--resume", action="store_true", help="leave out pictures that have files already")
     add("--strict", action="store_true", help="exit with 1 if a mesh lacks something of its file: a texture, say")
-    add("--report", metavar="FILE", help="what came of each picture, as JSON; see below")
+    add("--report", metavar="FILE", help="the result of each picture, as JSON; see below")
     add(
         "--warnings",
         choices=["short", "all"],
         default="short",
-        help="what meshes lack of their files: the first few in one line (default), or all, a line each",
+        help="parts of files that meshes lack: the first few in one line (default), or all, a line each",
     )
     add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
     add(
@@ -137,14 +137,14 @@ def add_render_arguments(parser: Parser) -> None:
 
 
 def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what a job of a job file may say, too."""
+    """Add the arguments that a job of a job file may have, too."""
     azimuth, elevation = THREE_QUARTER_DEG
     width, height = DEFAULT_SIZE
     add = parser.add_argument
     add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
     add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
     add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
-    add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
+    add("--layers", type=_layers, default=(), metavar="NAME,...", help="layers to write; see below (default color)")
     add(
         "--time",
         type=_seconds,
@@ -204,7 +204,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SKY,GROUND",
         help="light from all around: a colour, one above and one below, or a picture of all directions",
     )
-    add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
+    add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: like glass; each layer hides X")
     add(
         "--tolerance",
         type=tolerance,
@@ -247,7 +247,7 @@ def add_scale(parser: argparse.ArgumentParser) -> None:
         type=_scale,
         default=1.0,
         metavar="X",
-        help="what coordinates of a file are multiplied by: 0.001 makes metres of millimetres (default 1)",
+        help="factor of the coordinates of a file: 0.001 makes metres of millimetres (default 1)",
     )
 
 
@@ -347,7 +347,7 @@ def _rate(text: str) -> float:
         rate = float(text)
     except ValueError:
         rate = 0.0
-    if not 0.1 <= rate <= 100:  # what the hundredths of a second of a GIF, or patience, can tell apart
+    if not 0.1 <= rate <= 100:  # a GIF counts hundredths of a second; slower than 10 s a frame is a mistake
         raise argparse.ArgumentTypeError(f"must be a number from 0.1 to 100, got {text!r}")
     return rate
 

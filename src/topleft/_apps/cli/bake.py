@@ -18,7 +18,7 @@ from topleft.errors import MeshError
 from topleft.typing import BakeOption, BakeRuleOption
 
 BAKE_HELP = """\
-MESH and --source are mesh files; MESH has texture coordinates. OUT holds what a texel of them has: .npy as it is; PNG
+MESH and --source are mesh files; MESH has texture coordinates. OUT holds a value for each texel: .npy every kind; PNG
 normals as normal maps do, colours, and triangles up to 65535, 65535 where there is none; TIFF positions, too.
 
 examples:
@@ -71,7 +71,7 @@ def add_bake_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
     parser = commands.add_parser(
         "bake",
-        help="write what a mesh has at the texels of its texture coordinates",
+        help="write the normals, colours, positions or triangles of a mesh into its texture",
         description=run_bake.__doc__,
         epilog=BAKE_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -79,14 +79,14 @@ def add_bake_command(commands: Any) -> None:
     parser.add_argument("mesh", metavar="MESH", help="mesh file with texture coordinates")
     parser.add_argument("-o", "--out", metavar="OUT", required=True, help="file to be written")
     parser.add_argument(
-        "--what", choices=get_args(BakeOption), default="normal", help="what is baked (default: normal)"
+        "--what", choices=get_args(BakeOption), default="normal", help="the values to bake (default: normal)"
     )
     parser.add_argument("--size", type=size, default=(1024, 1024), metavar="WxH", help="texels (default: 1024x1024)")
     parser.add_argument(
         "--rule", choices=get_args(BakeRuleOption), default="center", help="which triangles a texel has"
     )
     parser.add_argument("--gutter", type=int, default=8, metavar="N", help="texels round charts (default: 8)")
-    parser.add_argument("--source", metavar="FILE", help="another mesh, whose nearest points give the values")
+    parser.add_argument("--source", metavar="FILE", help="another mesh: its nearest points give the values")
     parser.add_argument("--max-distance", type=float, metavar="D", help="of those points, units of the mesh")
     parser.add_argument("--threads", type=positive, metavar="N", help="threads that draw")
     parser.set_defaults(run=run_bake)

@@ -1,4 +1,4 @@
-"""`topleft bop`: what BOP tells of the objects of its images, from poses and models."""
+"""`topleft bop`: boxes, visible shares and masks of BOP's objects, from poses and models."""
 
 from __future__ import annotations
 

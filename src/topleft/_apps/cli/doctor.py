@@ -20,7 +20,7 @@ OWN_EXTRAS = frozenset({"all", "bench", "dev", "docs", "test"})
 
 
 def run_doctor(_: argparse.Namespace) -> int:
-    """Print what a report of a bug needs, and check the installation: about three seconds.
+    """Print the facts for a bug report, and check the installation: about three seconds.
 
     The exit status is 1 when an instruction set draws other pixels than it should.
     """

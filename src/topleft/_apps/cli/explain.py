@@ -1,4 +1,4 @@
-"""`topleft explain`: how a view of a mesh is drawn, and why. `topleft calibrate`: what this machine takes for it."""
+"""`topleft explain`: how a view of a mesh is drawn, and why. `topleft calibrate`: this machine's costs of drawing."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def run_explain(options: argparse.Namespace) -> int:
 
 
 def run_calibrate(_: argparse.Namespace) -> int:
-    """Measure this machine for half a minute and keep its costs, which choices and estimates follow from."""
+    """Measure this machine for half a minute and keep its costs, for choices and estimates."""
     from topleft._meshes.plan.calibrate import calibrate
 
     costs = calibrate()
@@ -83,7 +83,7 @@ def add_plan_commands(commands: Any) -> None:
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
     add("--threads", type=positive, default=None, metavar="N", help="(default: as many as pay)")
-    add("--measure", action="store_true", help="draw it, and show what the stages took")
+    add("--measure", action="store_true", help="draw it, and show the times of the stages")
     add("--json", action="store_true", help="numbers and sentences as JSON")
     calibrate = commands.add_parser("calibrate", help="measure this machine", description=run_calibrate.__doc__)
     calibrate.set_defaults(run=run_calibrate)

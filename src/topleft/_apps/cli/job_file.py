@@ -31,7 +31,7 @@ def read_jobs(path: Path, options: argparse.Namespace) -> list[argparse.Namespac
     Raises
     ------
     UsageError
-        If the file is broken, or a job says what makes no sense.
+        If the file is broken, or a job has wrong arguments.
     OSError
         If the file cannot be read.
     """
@@ -60,7 +60,7 @@ def _parsed(path: Path) -> dict[str, Any]:
         document = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
     except RecursionError:
         raise UsageError(f"cannot read {str(path)!r}: it is nested too deeply") from None
-    except ValueError as error:  # what both readers, and decoding, raise
+    except ValueError as error:  # raised by both readers, and by decoding
         raise UsageError(f"cannot read {str(path)!r}: {error}") from None
     if not isinstance(document, dict):
         raise UsageError(f"{str(path)!r} must hold an object, got {type(document).__name__}")
@@ -84,7 +84,7 @@ def _arguments(
         raise UsageError(f"mesh must be a name or a list of names, got {job.get('mesh')!r}")
     given = copy.copy(options)
     given.meshes = meshes
-    return parser.parse_args(words, given)  # what is in `given` stays where no word says otherwise
+    return parser.parse_args(words, given)  # `given` holds unless a word replaces it
 
 
 def _words(action: argparse.Action, key: str, value: object) -> list[str]:

@@ -135,7 +135,7 @@ Frame = tuple[int, int] | Grid
 
 
 def draw(picture: PolygonPicture, options: argparse.Namespace) -> tuple[npt.NDArray[Any], Frame, dict[int, str]]:
-    """Return the mask or the labels of a picture, where it lies, and what labels stand for."""
+    """Return the mask or the labels of a picture, its frame, and the words behind labels."""
     rings, frame = frame_of(picture, options)
     how: dict[str, Any] = {"rule": options.rule, "sampling": options.sampling, "threads": options.threads}
     how["max_crossings"] = options.max_crossings
@@ -157,7 +157,7 @@ def draw(picture: PolygonPicture, options: argparse.Namespace) -> tuple[npt.NDAr
 
 
 def labels_of(picture: PolygonPicture, name: str) -> tuple[npt.NDArray[np.int32], dict[int, str]]:
-    """Return the number of each object, and what numbers of words stand for."""
+    """Return the number of each object, and the word of each number."""
     if name == "index":
         return np.arange(1, len(picture.objects) + 1, dtype=np.int32), {}
     values = [said.get(name) for said in picture.objects]
@@ -201,7 +201,7 @@ def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[Any,
 
 
 def grid_over(points: npt.NDArray[np.float64], options: argparse.Namespace) -> Grid:
-    """Return the grid of so many pixels over points, or over the extent that is asked for."""
+    """Return the grid of the options over points, or over --extent."""
     if options.extent is None and not len(points):
         raise UsageError(f"{options.file} has no polygons: --extent must say what is shown")
     if options.extent is None:
@@ -232,15 +232,15 @@ def add_mask_command(commands: Any) -> None:
     mask.add_argument("file", metavar="FILE", help="GeoJSON, a vector file, or annotations of COCO")
     mask.add_argument("-o", "--out", required=True, metavar="OUT", help="where the picture goes; see below")
     mask.add_argument("--labels", metavar="NAME", help="write numbers: index, or a property")
-    mask.add_argument("--rule", choices=get_args(RuleOption), default="evenodd", help="what is inside (evenodd)")
+    mask.add_argument("--rule", choices=get_args(RuleOption), default="evenodd", help="the fill rule (evenodd)")
     mask.add_argument("--sampling", choices=[str(s) for s in Sampling], default="center", help="how pixels are sampled")
     mask.add_argument("--size", type=size, metavar="WxH", help=f"of the picture (the longer side {DEFAULT_SIDE})")
     mask.add_argument(
-        "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="what is shown (all)"
+        "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="the window to draw (all)"
     )
-    mask.add_argument("--crs", metavar="CRS", help="what the picture is in, EPSG:25832 say: the polygons go there")
+    mask.add_argument("--crs", metavar="CRS", help="the CRS of the picture, EPSG:25832 say: polygons are transformed")
     mask.add_argument("--like", metavar="RASTER", help="take size, extent, CRS and nodata of a raster")
-    mask.add_argument("--nodata", type=int, metavar="N", help="what --labels have where nothing is (0)")
+    mask.add_argument("--nodata", type=int, metavar="N", help="the background of --labels (0)")
     mask.add_argument("--layer", metavar="NAME", help="of a vector file (the first one)")
     mask.add_argument("--no-crowds", action="store_true", help="leave out annotations of COCO that are crowds")
     mask.add_argument("--image", metavar="NAME", help="the one of several images, its file name without the end")

@@ -34,9 +34,9 @@ triangles and .npy are mapped and need not fit memory. x and y are the plane, z 
 a mask. --crs transforms them.
 
 OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder, or a URL that fsspec reaches) or .dzi (Deep Zoom). Heights
-of the upper surface are written unless --labels, --values or --kind asks for something else. What is there is left
-alone: --resume goes on with what an interrupted run has left of the same raster, and draws no window again that is
-whole; --overwrite replaces what topleft has written.
+of the upper surface are written unless --labels, --values or --kind asks for something else. An existing OUT is an
+error: --resume continues an interrupted run of the same raster, and draws no whole window again; --overwrite replaces
+an OUT that topleft has written.
 
 examples:
   topleft raster terrain.ply -o heights.tif --pixel-size 1 --crs EPSG:25832
@@ -82,8 +82,8 @@ def run_raster(options: argparse.Namespace) -> int:
             f"{written.n_kept} kept, {written.n_blank} blank"
         )
     if not (written.n_drawn or written.n_kept):
-        what = "polygon" if raster.is_of_polygons else "triangle"
-        complain(f"no {what} of {options.mesh} lies within {options.out}: all of it is blank")
+        shape = "polygon" if raster.is_of_polygons else "triangle"
+        complain(f"no {shape} of {options.mesh} lies within {options.out}: all of it is blank")
     return 0
 
 
@@ -145,7 +145,7 @@ def raster_of_polygons(options: argparse.Namespace) -> Tiles:
 
 
 def raster_of(options: argparse.Namespace) -> Tiles:
-    """Return the raster that is asked for."""
+    """Return the raster of the options."""
     if (options.pixel_size is None) == (options.size is None):
         raise UsageError("either --pixel-size or --size must say how large the raster is")
     if Path(options.mesh).suffix.lower() in (*VECTOR_SUFFIXES, ".geojson", ".json"):
@@ -200,20 +200,20 @@ def add_raster_command(commands: Any) -> None:
     )
     raster.add_argument("--size", type=size, metavar="WxH", help="how many pixels, instead")
     raster.add_argument(
-        "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="what is shown (all)"
+        "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="the window to draw (all)"
     )
-    raster.add_argument("--crs", metavar="CRS", help="what x and y are: EPSG:25832, say")
+    raster.add_argument("--crs", metavar="CRS", help="the CRS of x and y: EPSG:25832, say")
     raster.add_argument("--labels", action="store_true", help="write which triangle shows, -1 for none")
     raster.add_argument("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
-    raster.add_argument("--kind", choices=DIRECT_KINDS, help="what is drawn")
-    raster.add_argument("--surface", choices=("upper", "lower"), help="whose height counts (upper)")
+    raster.add_argument("--kind", choices=DIRECT_KINDS, help="the content of pixels")
+    raster.add_argument("--surface", choices=("upper", "lower"), help="the surface that gives heights (upper)")
     raster.add_argument("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
-    raster.add_argument("--nodata", type=float, metavar="N", help="what stands where nothing is, in values and .tif")
+    raster.add_argument("--nodata", type=float, metavar="N", help="the background, in values and .tif")
     raster.add_argument("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
     raster.add_argument("--uncompressed", action="store_true", help="store pixels as they are")
     raster.add_argument("--window", type=positive, default=WINDOW, metavar="N", help=f"side of a window ({WINDOW})")
-    raster.add_argument("--resume", action="store_true", help="go on with what an interrupted run has left")
-    raster.add_argument("--overwrite", action="store_true", help="replace what is there, if topleft wrote it")
+    raster.add_argument("--resume", action="store_true", help="continue an interrupted run")
+    raster.add_argument("--overwrite", action="store_true", help="replace OUT, if topleft wrote it")
     raster.add_argument("--folder", metavar="DIR", help="where temporary files go")
     raster.add_argument("--threads", type=positive, metavar="N", help="how many at most")
     raster.add_argument(

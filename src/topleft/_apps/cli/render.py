@@ -33,11 +33,11 @@ from topleft._core.base.remote import is_url
 from topleft.errors import MeshWarning, MissingPackageError
 
 MOST_VIEWS_TOGETHER = 16
-"""Views of a mesh that a process draws before it gives word: it reads the mesh once for them."""
+"""Views of a mesh that a process draws before it reports: it reads the mesh once for them."""
 
 
 CONNECT_S = 20
-"""How long a scheduler has to answer."""
+"""Seconds that a scheduler has to answer."""
 
 
 def run_render(options: argparse.Namespace) -> int:
@@ -83,7 +83,7 @@ def run_render(options: argparse.Namespace) -> int:
 
 
 def _reasons(groups: Sequence[MeshJobs], results: Sequence[Result]) -> list[str]:
-    """Why each mesh failed, as its first job that failed says; empty for those that did not."""
+    """The error of each mesh, from its first failed job; empty for meshes without a failure."""
     left, reasons = iter(results), []
     for group in groups:
         errors = [error for error in (next(left).error for _ in group.jobs) if error is not None]
@@ -94,7 +94,7 @@ def _reasons(groups: Sequence[MeshJobs], results: Sequence[Result]) -> list[str]
 
 
 def _raise_unknown(results: Sequence[Result]) -> None:
-    """Raise an error that is a fault of the library's own: its trace helps whoever reports it."""
+    """Raise an error that is a bug of the library: its trace belongs in the report."""
     for result in results:
         if result.error is not None and not isinstance(result.error, TOLD):
             raise result.error
@@ -121,7 +121,7 @@ def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
 
 
 def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[Result]:
-    """Render all, whatever fails; what came of each job, in their order."""
+    """Render all, whatever fails; return the results in the order of the jobs."""
     jobs = [job for group in groups for job in group.jobs]
     if options.dask is not None:
         jobs = [_elsewhere(job) for job in jobs]
@@ -143,14 +143,14 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[Res
         )  # fmt: skip
         results = []
         for result in batch:
-            if isinstance(result.error, BrokenExecutor):  # all that are left would say the same
+            if isinstance(result.error, BrokenExecutor):  # all later ones fail alike
                 raise result.error
             results.append(result)
     return sorted(results, key=lambda result: result.index)
 
 
 def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor | int | None:
-    """Who draws: processes for several meshes, since readers are Python and so one thread's work; else threads."""
+    """Return processes for several meshes, since readers are Python and hold the GIL; else threads."""
     if n == 1 or len(groups) == 1:
         return n if n > 1 else None
     from concurrent.futures import ProcessPoolExecutor
@@ -168,7 +168,7 @@ def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor 
 
 
 def _elsewhere(job: Job) -> Job:
-    """A job with the whole names of its files: workers may run in other folders."""
+    """Return a job with absolute paths: workers may run in other folders."""
     scene, path = job.scene, job.destination
     if isinstance(scene, str | os.PathLike):
         scene = Path(scene).absolute()
@@ -178,7 +178,7 @@ def _elsewhere(job: Job) -> Job:
 
 
 def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
-    """A client of the Dask cluster that is asked for, or of one of this machine that ends with the command."""
+    """Return a client of the cluster at an address, or of one on this machine that ends with the command."""
     try:
         import dask
         from distributed import Client, LocalCluster
@@ -213,7 +213,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _depend_on_parent() -> None:
-    """Leave Ctrl-C to the parent, which lets the pictures on the way be finished, and end when it has ended."""
+    """Leave Ctrl-C to the parent, which waits for pictures on the way; end when the parent has ended."""
     warnings.simplefilter("ignore", RuntimeWarning)  # as in `main`
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

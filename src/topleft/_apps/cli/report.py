@@ -1,4 +1,4 @@
-"""Tells what came of the work: lines on stderr, and a report of `topleft render` as JSON.
+"""Reports results and errors: lines on stderr, and the report of `topleft render` as JSON.
 
 Input: messages, results of jobs. Output: lines, a file.
 """
@@ -23,7 +23,7 @@ MOST_LACKS = 8
 """Warnings in one line, without --warnings all."""
 
 TOLD = (TopleftError, OSError, ValueError, MemoryError)
-"""Errors whose message says enough; of others a line has the name of their kind, too."""
+"""Errors with a sufficient message; for others the line begins with their type."""
 
 
 def complain(message: str) -> None:
@@ -32,7 +32,7 @@ def complain(message: str) -> None:
 
 
 def complain_of_lacks(lines: Sequence[str], *, is_each_told: bool = False) -> None:
-    """Print what meshes lack of their files: the first few in one line, or each in one of its own."""
+    """Print the parts of files that meshes lack: the first few in one line, or each in a separate line."""
     if is_each_told:
         for line in lines:
             complain(line)
@@ -58,7 +58,7 @@ def check_report(path: str) -> None:
 
 
 def write_report(path: Path, sources: Iterable[str], results: Sequence[Result]) -> None:
-    """Write what came of each picture; `sources` has the mesh of each."""
+    """Write the result of each picture; `sources` has the mesh of each."""
     rows = [_row(source, result) for source, result in zip(sources, results, strict=True)]
     document = {**Counter(written=0, skipped=0, failed=0), **Counter(row["status"] for row in rows), "pictures": rows}
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Finds which picture goes to which file, before anything is drawn: from arguments to jobs.
+"""Assigns a file to each picture before anything is drawn: from arguments to jobs.
 
 Input: parsed arguments. Output: a list of `MeshJobs`.
 """
@@ -33,7 +33,7 @@ SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth",
 """Shadings that are a layer made visible: .npy holds the layer."""
 
 MAX_FOLDERS = 200
-"""Most folders of a path of a picture, one in the other."""
+"""Most nested folders in the path of a picture."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def read_texture(path: str) -> Texture:
 
 
 def read_environment(text: str, up: str) -> Environment:
-    """The light from all around that a colour, two of them, or the picture of a file tells.
+    """The light from all around of a colour, two colours, or the picture of a file.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def read_environment(text: str, up: str) -> Environment:
 
 @dataclass(frozen=True)
 class Orbit:
-    """The camera of `Camera.framing`, for whatever mesh; `fits`: its picture fills the frame."""
+    """The camera of `Camera.framing` for any mesh; `fits`: the mesh fills the frame."""
 
     azimuth_deg: float
     elevation_deg: float
@@ -127,14 +127,14 @@ class Orbit:
 
 
 WHITE, BACKDROP = (255, 255, 255, 255), (196, 212, 232, 255)
-"""Backgrounds of a mesh, and of a white one: not grey, as white faces are under white light."""
+"""Backgrounds of a mesh, and of a white one: not grey, because white faces are grey under white light."""
 
 NEARLY_WHITE = 240
 
 
 @dataclass(frozen=True)
 class Backdrop:
-    """The background of a mesh for which none is asked: white, unless the mesh is white and would fade into it."""
+    """The default background of a mesh: white, unless the mesh is white and would fade into it."""
 
     def __call__(self, mesh: Mesh | Points) -> tuple[int, int, int, int]:
         """Return it."""
@@ -142,7 +142,7 @@ class Backdrop:
 
 
 def mean_color(mesh: Mesh | Points) -> tuple[float, float, float]:
-    """The mean sRGB of what a mesh is made of: materials by their triangles, textures, colours of vertices."""
+    """The mean sRGB of a mesh: materials weighted by their triangles, textures, colours of vertices."""
     given = DEFAULT_COLOR if mesh.colors is None else mesh.colors[:, :3].mean(axis=0)
     if isinstance(mesh, Points) or not mesh.materials:
         red, green, blue = np.asarray(given, np.float64).tolist()
@@ -232,9 +232,9 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
 
 
 def names_of(sources: Sequence[str], *, with_numbers: bool = True, with_folders: bool = False) -> list[str]:
-    """What {name} stands for: the file without its suffix, or with it where another file differs in nothing else.
+    """The {name} of each mesh: the file without its suffix, or with it where another file differs in nothing else.
 
-    Further files of one name get numbers, unless what OUT says besides tells them apart.
+    Further files of one name get numbers, unless other words of OUT tell them apart.
     """
     stems = [source if source in SHAPES else Path(source).stem for source in sources]
     suffixes = [Path(source).suffix.casefold().removeprefix(".") for source in sources]
@@ -260,7 +260,7 @@ def names_of(sources: Sequence[str], *, with_numbers: bool = True, with_folders:
 
 
 def folders_of(sources: Sequence[str]) -> list[str]:
-    """What {folder} stands for: the folder of a mesh below the one that all lie in; "." there, and of shapes."""
+    """The {folder} of each mesh: its folder below the one that all lie in; "." there, and for shapes."""
     folders = [None if source in SHAPES else Path(source).absolute().parent for source in sources]
     there = [folder for folder in folders if folder is not None]
     home = os.path.commonpath(there) if there else ""
@@ -339,9 +339,9 @@ def check_words(what: str, path: Location, known: Sequence[str]) -> None:
 
 
 def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> None:
-    """Raise an error if what is to be written cannot be, as far as that shows before anything is.
+    """Raise an error before any work if a file cannot be written, as far as that shows beforehand.
 
-    `others` are files that are written besides: sheets and animations.
+    `others` are further files: sheets and animations.
 
     Raises
     ------
@@ -376,7 +376,7 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
 
 
 def _check_writable(folder: Path) -> None:
-    """Find out before any work whether pictures can be put into a folder, made or yet to be made."""
+    """Raise an error before any work if pictures cannot be put into a folder, made or yet to be made."""
     if len(folder.parts) > MAX_FOLDERS:
         raise UsageError(f"OUT must lie in at most {MAX_FOLDERS} folders, got {len(folder.parts)}")
     existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
@@ -387,10 +387,10 @@ def _check_writable(folder: Path) -> None:
 
 
 def _check_reached(folder: RemotePath) -> None:
-    """Find out before any work whether fsspec reaches what a URL names."""
+    """Raise an error before any work if fsspec does not reach a URL."""
     try:
         folder.exists()
     except MissingPackageError:
         raise
-    except Exception as error:  # of whatever package reaches it
+    except Exception as error:  # any type: each package behind fsspec has its own
         raise UsageError(f"cannot write to {folder}: {' '.join(str(error).split()) or type(error).__name__}") from None

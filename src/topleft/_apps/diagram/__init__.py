@@ -1,1 +1,1 @@
-"""Diagrams: pictures of what a rasterizer decides."""
+"""Diagrams: pictures of a rasterizer's decisions."""

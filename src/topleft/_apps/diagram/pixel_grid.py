@@ -1,4 +1,4 @@
-"""Draws magnified pixels with the triangles on them: what a rasterizer decides, to be looked at.
+"""Draws magnified pixels with the triangles on them: a rasterizer's decisions, to be looked at.
 
 In: values of pixels, triangles in pixels. Out: SVG, or PNG by Pillow.
 """
@@ -57,19 +57,19 @@ def pixel_grid(
     edge_color: ColorLike = "#d1495b",
     path: str | os.PathLike[str] | None = None,
 ) -> str:
-    """Return a picture, as SVG, of magnified pixels: their values, the triangles over them, and where they are sampled.
+    """Return a picture of magnified pixels, as SVG: their values, the triangles over them, and their samples.
 
     Parameters
     ----------
     values : array_like, optional
         (H, W) of bool, counts, ids (-1 stays empty) or numbers, from pale to dark; or (H, W, 3) or (H, W, 4) uint8,
-        colours. What `coverage`, `overdraw`, `rasterize` and `fill` return.
+        colours. Results of `coverage`, `overdraw`, `rasterize` and `fill` fit.
     vertices, triangles : array_like, shape (V, 2 or more) and (T, 3), optional
         In pixels: their edges are drawn.
     size : (width, height), optional
         How many pixels; needed without `values`.
     sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}, optional
-        Whose samples are marked with dots; none unless given.
+        The samples to mark with dots; none unless given.
     numbers : bool
         Whether values are written into the pixels.
     cell : int
@@ -158,7 +158,7 @@ def colors_of(cells: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def draw_cells(cells: NDArray[Any] | None, width: int, height: int, scale: int, *, numbers: bool) -> Iterator[Shape]:
-    """The squares of the pixels, what is written in them, and the lines between them."""
+    """The squares of the pixels, the text in them, and the lines between them."""
     edge = MARGIN_PX * scale
     if cells is not None:
         for (row, column), color in zip(np.ndindex(height, width), colors_of(cells).reshape(-1, 3), strict=True):

@@ -1,7 +1,7 @@
 """Writes windows of a raster on the workers of a Dask cluster, to a folder that all of them see, or a store.
 
-Input: a client, and windows as jobs that carry what they need. Output: the chunks, and a future of each window. A
-window whose worker dies is drawn elsewhere; what was on the way when a scheduler died is sent again.
+Input: a client, and windows as jobs that carry their triangles. Output: the chunks, and a future of each window. A
+window is drawn elsewhere if its worker dies; jobs that a dead scheduler has lost are sent again.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class ClusterWriters:
         check_workers(client)
         self._client = client
         self.n_most = 2 * max(1, sum(client.nthreads().values())) + 2
-        """How many windows are on the way at a time."""
+        """The number of windows on the way at a time."""
 
     def submit(self, job: WriteJob) -> Future[None]:
         """Return the future of a window.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WindowJob:
-    """A window to be drawn elsewhere: what it needs is taken out of the mesh when it is sent."""
+    """A window to be drawn elsewhere: its triangles are taken out of the mesh when it is sent."""
 
     raster: Tiles
     row: int
@@ -37,7 +37,7 @@ class WindowJob:
 
 
 def received(job: Callable[[], Array]) -> Callable[[], Array]:
-    """Return what a `WindowJob` is in another process."""
+    """Return the job that a `WindowJob` becomes in another process."""
     return job
 
 

@@ -46,7 +46,7 @@ class DeepZoomStore(TileStore):
         from PIL import Image
 
         with Image.open(io.BytesIO(content)) as image:
-            image.verify()  # the sums of its chunks, which reading does not look at
+            image.verify()  # the checksums of its chunks, which reading ignores
         with Image.open(io.BytesIO(content)) as image:
             return np.asarray(image)
 
@@ -126,12 +126,12 @@ def fill_blanks(raster: Tiles, store: DeepZoomStore, ground: U8) -> None:
 
 
 def painting(raster: Tiles) -> Callable[[Array], U8]:
-    """How the pixels of a kind become colours.
+    """Return the function that makes colours of the pixels of a kind.
 
     Raises
     ------
     ValueError
-        If there is no way that goes without saying.
+        If the kind has no default colours.
     """
     if raster.kind == "labels":
         return label_colors
@@ -158,7 +158,7 @@ def greys(values: Array, empty: Any, low: float, high: float) -> U8:
 
 
 def halved_colors(pixels: U8) -> U8:
-    """Return colours of half the size: the mean of four, as much of each as it is opaque."""
+    """Return colours of half the size: the mean of four, weighted by alpha."""
     if pixels.shape[2:] not in ((2,), (4,)):
         return halved(pixels, None, is_mean=True)
     height, width = pixels.shape[:2]
@@ -182,7 +182,7 @@ def label_colors(labels: Array) -> U8:
 
 
 def checked(pixels: Any, size: tuple[int, ...]) -> U8:
-    """Return what a function has made of pixels, if it is a picture."""
+    """Return the result of a user's `colors` function, if it is a picture."""
     array = np.asarray(pixels)
     if array.dtype != np.uint8 or array.shape[:2] != size or array.shape[2:] not in ((), (1,), (2,), (3,), (4,)):
         raise ValueError(f"colors must give uint8 {(*size, 3)}, say, got {array.dtype} {array.shape}")

@@ -1,7 +1,7 @@
 """Chunks in a folder or behind a URL: each is whole or not there, and one process at a time writes a folder.
 
-Input: names with slashes, bytes. On disk a chunk is written under another name and renamed, and files that no raster
-has are never removed.
+Input: names with slashes, bytes. On disk a chunk is written under another name and renamed. Only files with the name of
+a chunk are removed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from topleft._core.base.remote import Location, RemotePath, as_location
 from topleft._core.base.whole_file import is_whole, write_whole
 
 MANIFEST = "topleft.txt"
-"""The chunk that tells whose a folder is."""
+"""The chunk that marks a folder as written by topleft."""
 
 OWN_NAME = re.compile(rf"{re.escape(MANIFEST)}|\d+/\d+_\d+(\.png)?|(\d+/)?(zarr\.json|c/\d+/\d+(/0)*)")
 """The names of chunks: of parts of a TIFF, of Deep Zoom, of Zarr."""
@@ -35,7 +35,7 @@ MARK = re.compile(rb"topleft: ([^;]*);")
 """The mark of a file of topleft."""
 
 MARK_BYTES = 4096
-"""How far from its beginning at most."""
+"""The mark lies within so many bytes of the beginning."""
 
 NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
 """Errors of file systems without locks."""
@@ -129,7 +129,7 @@ class DiskFolder(Folder):
         return str(self.path / name)
 
     def exists(self) -> bool:
-        """Whether anything is there but what a killed process had not renamed yet."""
+        """Whether anything is there except files that a killed process had not renamed yet."""
         if not self.path.is_dir():
             return self.path.exists()
         return any(not name.startswith(".") for name in os.listdir(self.path))
@@ -158,18 +158,18 @@ class DiskFolder(Folder):
                 os.rmdir(folder)
 
     def sweep(self) -> None:
-        """Remove what a killed process had not renamed yet."""
+        """Remove the files that a killed process had not renamed yet."""
         for name in self.names():
             if PART.fullmatch(name.rpartition("/")[2]) and is_own(name):
                 self.delete(name)
 
 
 class RemoteFolder(Folder):
-    """What fsspec reaches."""
+    """A folder behind a URL, reached by fsspec."""
 
     def __init__(self, path: RemotePath) -> None:
         self._path = path
-        path.exists()  # what is wrong with the URL is told before anything is drawn
+        path.exists()  # raises for a wrong URL before anything is drawn
 
     def put(self, name: str, content: bytes) -> None:
         """Write a chunk."""
@@ -208,7 +208,7 @@ class RemoteFolder(Folder):
 
 
 def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> DiskFolder | RemoteFolder:
-    """Return where chunks of a path or URL are kept."""
+    """Return the folder of chunks at a path or URL."""
     if not (storage is None or isinstance(storage, dict)):
         raise TypeError(f"storage must be a dict or None, got {shown(storage)}")
     place = as_location("path", path)
@@ -219,9 +219,9 @@ def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = Non
 
 @contextmanager
 def only_writer(path: Location) -> Iterator[None]:
-    """Hold the lock of what is written: a file beside it, locked by the system as long as this process lives.
+    """Hold the lock of a file or folder: a file beside it, locked by the system as long as this process lives.
 
-    URLs have none: who writes the same raster there writes the same bytes.
+    URLs have none: two writers of the same raster write the same bytes.
 
     Raises
     ------
@@ -257,7 +257,7 @@ def _locked(name: Path, path: Path) -> int:
                 raise BlockingIOError(f"{path} is being written by another call: wait for it, or write elsewhere")
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(file), os.stat(name)):
-                    return file  # and not one that its owner has removed meanwhile
+                    return file  # its owner has not removed it meanwhile
         except BaseException:
             os.close(file)
             raise
@@ -265,7 +265,7 @@ def _locked(name: Path, path: Path) -> int:
 
 
 def _take(file: int) -> bool:
-    """Lock an open file, and tell whether that went; where the file system has no locks it goes."""
+    """Lock an open file; return whether it is locked, True on file systems without locks."""
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -292,12 +292,12 @@ def fingerprints_at(folder: DiskFolder, file: Path) -> list[tuple[object, str | 
 
 
 def write_own(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file, unless one of somebody else has come there meanwhile.
+    """Write a file.
 
     Raises
     ------
     FileExistsError
-        If so.
+        If another program has written a file there meanwhile.
     """
     if is_whole(path) and _mark_of(path) is None:
         raise FileExistsError(f"{path} was not written by topleft: move it, or write elsewhere")

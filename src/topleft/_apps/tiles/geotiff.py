@@ -148,7 +148,7 @@ def write_geotiff(
     with only_writer(file):
         there = fingerprints_at(folder, file)
         goes_on = begin(raster, store, there, fingerprint, resume=resume, overwrite=overwrite, n_copies=2)
-        if goes_on and there[0][0] == file:  # and no part of another
+        if goes_on and there[0][0] == file:  # the file is finished, no part is left
             n_windows = int((raster.index.counts > 0).sum())
             return Written(0, n_windows, raster.n_windows - n_windows)
         folder.put(MANIFEST, fingerprint.encode())
@@ -207,7 +207,7 @@ def assemble(raster: Tiles, store: TiffStore, out: IO[bytes], nodata: float | No
 
 
 def lengths_of(store: TiffStore, level: int, blocks: npt.NDArray[np.bool_], n_blank: int) -> LevelTiles:
-    """The lengths of the tiles of a level, as the parts tell."""
+    """The lengths of the tiles of a level, from the sizes of their parts."""
     (n_columns, n_rows), (columns, rows) = store.n_tiles_of_block(), store.n_tiles(level)
     is_blank = ~blocks.repeat(n_rows, axis=0).repeat(n_columns, axis=1)[:rows, :columns]
     lengths = np.full((rows, columns), n_blank, np.int64)
@@ -221,8 +221,8 @@ def lengths_of(store: TiffStore, level: int, blocks: npt.NDArray[np.bool_], n_bl
 
 
 def place_tiles(own: LevelTiles, n_blank: int, at: int) -> int:
-    """Set where the tiles of a level lie, from a place in the file on; return where they end."""
-    own.offsets[own.is_blank] = at  # all of them are one
+    """Set the offsets of the tiles of a level, from a place in the file on; return their end."""
+    own.offsets[own.is_blank] = at  # blank tiles share one
     lengths = own.lengths[~own.is_blank]
     ends = at + (n_blank if own.is_blank.any() else 0) + np.cumsum(lengths)
     own.offsets[~own.is_blank] = ends - lengths

@@ -1,8 +1,8 @@
 """Writes all windows of a raster, and levels of half the size, each window once.
 
-Input: a raster, and a store: where its blocks of pixels go. Output: the chunks. A block is a window at level 0,
-and as many pixels at the coarser levels; those are made of the blocks below them, as they were written. Which blocks
-are there is read off the chunks themselves, so a run that was killed goes on where it stopped.
+Input: a raster, and a store for its blocks of pixels. Output: the chunks. A block is a window at level 0,
+and as many pixels at the coarser levels; those are made of the blocks below them, as they were written. The chunks
+themselves show which blocks are there, so a run that was killed goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ Progress = Callable[[Step], object]
 
 @dataclass(frozen=True)
 class Written:
-    """How many windows were drawn, kept and left blank.
+    """The numbers of windows that were drawn, kept and left blank.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def halved(pixels: Array, nodata: float | None, *, is_mean: bool) -> Array:
 
 
 def blocks_with_pixels(raster: Tiles, n_levels: int) -> list[npt.NDArray[np.bool_]]:
-    """For each level which of its blocks hold more than background (rows, columns): these are written."""
+    """Return a mask (rows, columns) for each level: the blocks that hold more than background, to be written."""
     there = [raster.index.counts > 0]
     for _ in range(1, n_levels):
         below = there[-1]
@@ -124,9 +124,9 @@ def write_levels(
     halve : function of an array
         Makes the level above.
     prepare : function of an array, optional
-        Makes what is written of the pixels of a window.
+        Converts the pixels of a window to those of the file.
     executor : dask.distributed.Client, optional
-        Whose workers draw and write the windows; levels are made of these here.
+        Its workers draw and write the windows; the levels are made of these here.
     """
     there = blocks_with_pixels(raster, store.n_levels)
     n_blocks = int(sum(level.sum() for level in there))
@@ -209,7 +209,7 @@ def check_whole(store: TileStore, there: list[npt.NDArray[np.bool_]]) -> None:
 
 
 def check_executor(executor: Any) -> None:
-    """Raise an error for what is no client of Dask."""
+    """Raise an error unless the executor is None or a client of Dask."""
     if not (executor is None or is_client(executor)):
         raise TypeError(f"executor must be a dask.distributed.Client or None, got {shown(executor)}")
 
@@ -264,11 +264,11 @@ class _LevelBar:
         self._bar = bar
 
     def begin(self, n_done: int) -> None:
-        """Count what an earlier run has done."""
+        """Count the blocks of an earlier run."""
         self._bar.update(n_done - self._bar.n)
 
     def tell(self, step: Step) -> None:
-        """Go on by one."""
+        """Advance by one."""
         self._bar.update(step.n_done - self._bar.n)
 
     def close(self) -> None:

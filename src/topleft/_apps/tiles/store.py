@@ -1,7 +1,7 @@
-"""Blocks of pixels as tiles, each a chunk of its own: what GeoTIFF, Zarr and Deep Zoom share while they are written.
+"""Blocks of pixels as tiles, each a separate chunk: the common part of writing GeoTIFF, Zarr and Deep Zoom.
 
 Input: a block, which is a window at level 0 and as many pixels at the coarser levels. Output: its tiles, as the format
-encodes them. The chunks themselves tell what an earlier run has left: a tile is there and can be read, or it is not.
+encodes them. The chunks themselves show the tiles of an earlier run: a tile is there and can be read, or it is not.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ DAMAGES = (ValueError, OSError, RuntimeError, SyntaxError, EOFError, zlib.error,
 """Errors of zlib, NumPy, numcodecs and Pillow for a damaged tile."""
 
 LARGE_BYTES = 1 << 28
-"""Rasters below are taken for as large as their pixels; of others tiles of a window are compressed to see."""
+"""Smaller rasters count as large as their pixels; for larger ones tiles of a window are compressed to estimate."""
 
 MOST_SAMPLES = 16
-"""How many of them."""
+"""The number of those tiles."""
 
 
 def n_levels_to(size: tuple[int, int], side: int) -> int:
-    """How many levels there are down to one that fits a square."""
+    """The number of levels down to one that fits a square."""
     n = 1
     while max(size) > side << (n - 1):
         n += 1
@@ -58,7 +58,7 @@ class TileStore(ABC):
     dtype : dtype
         As stored.
     empty : number or ndarray
-        What stands where no triangle is.
+        The value of pixels without a triangle.
     n_levels : int
     """
 
@@ -201,23 +201,23 @@ def begin(
     n_copies: int = 1,
     prepare: Callable[[Array], Array] = np.asarray,
 ) -> bool:
-    """Go on with what is there, or make room for the raster; tell whether it goes on.
+    """Resume the raster that is there, or make room for a new one; return whether it resumes.
 
     Parameters
     ----------
     there : list of (place, fingerprint)
-        What is there, the fingerprint None where it is not of topleft.
+        Files and folders at the place of the raster; the fingerprint is None if topleft did not write them.
     n_copies : int
-        How often all tiles are on the disk at a time.
+        The number of copies of all tiles on the disk at a time.
     prepare : function of an array
-        Makes what is written of the pixels of a window.
+        Converts the pixels of a window to those of the file.
 
     Raises
     ------
     ValueError
-        If it is to go on with another raster, or to do both.
+        If `resume` finds another raster, or both options are set.
     FileExistsError
-        If something is there and it is to do neither, or what is there is not of topleft.
+        If something is there and neither option is set, or topleft did not write it.
     OSError
         If the disk has no room.
     """
@@ -250,7 +250,7 @@ def begin(
 
 
 def bytes_of(raster: Tiles, store: TileStore, prepare: Callable[[Array], Array]) -> int:
-    """How many bytes a raster takes at most on disk; of a large one the fullest window tells by how much it shrinks."""
+    """The most bytes of a raster on disk; for a large one the fullest window gives the rate of compression."""
     counts = raster.index.counts
     w, h = raster.window_size
     n = int((counts > 0).sum()) * w * h * store.dtype.itemsize * int(np.prod(store.channels, dtype=int))

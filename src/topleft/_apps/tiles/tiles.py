@@ -1,6 +1,6 @@
 """Huge rasters that are handed on to Dask and xarray, or written to Zarr, GeoTIFF and Deep Zoom.
 
-Input: a mesh of any size, a `Grid` or a size in pixels, what is drawn. Output: `Tiles`.
+Input: a mesh of any size, a `Grid` or a size in pixels, a kind of pixel. Output: `Tiles`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def tiles(
     folder: Path | None = None,
     **options: Any,
 ) -> Tiles:
-    """Return a raster of any size, of which windows are drawn when they are asked for.
+    """Return a raster of any size; each window is drawn when it is read.
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ def tiles(
         Of the whole raster, up to 2**31 - 1 a side. With a `Grid`, or with `extent` or `pixel_size`, vertices are in
         data units; otherwise in pixels, unless `kind` is "field" or "height_map".
     kind : {"labels", "depth", "coverage", "overdraw", "fill", "field", "height_map"}
-        What pixels hold. "labels": the index of the triangle that shows, int32, -1 for none, as `rasterize` has it;
-        "depth" likewise. The others: what the verb of that name returns. Of polygons "labels", their numbers,
-        "coverage", a mask, and "fill", the `values` of each: what `polygons` returns.
+        The content of pixels. "labels": the index of the triangle that shows, int32, -1 for none, as `rasterize` has
+        it; "depth" likewise. The others: the result of the verb of that name. Of polygons, as `polygons` returns them:
+        "labels", their numbers; "coverage", a mask; "fill", the `values` of each.
     values : array_like or str, optional
         For "fill" the colours, of triangles or of vertices; for "field" the values, of vertices or faces. Also the name
         of a .npy file, which is mapped, or of a property of the mesh's binary PLY file.
@@ -66,7 +66,7 @@ def tiles(
     threads : int, optional
         How many at most. Never changes a bit.
     memory : int, bytes
-        What the index of triangles by windows takes of memory; beyond that it goes to a file.
+        Limit for the index of triangles by windows; a larger index goes to a file.
     folder : path, optional
         Where temporary files go; that of the system unless given.
     **options
@@ -83,8 +83,8 @@ def tiles(
     Raises
     ------
     ValueError
-        If a window has no pixels, an option does not fit, or the mesh is not what the verb needs. What is wrong with
-        single triangles comes when the index is made, and names the block of the mesh.
+        If a window has no pixels, an option does not fit, or the verb cannot draw the mesh. Errors of single triangles
+        come when the index is made, and name the block of the mesh.
     TypeError
         If there is no such option, or something is no mesh.
 
@@ -125,7 +125,7 @@ def tiles(
 
 
 class Tiles(WindowedRaster):
-    """A raster that is drawn window by window: what `tiles` returns.
+    """A raster that is drawn window by window, made by `tiles`.
 
     Attributes
     ----------
@@ -148,8 +148,8 @@ class Tiles(WindowedRaster):
     def to_dask(self) -> Any:
         """Return a `dask.array.Array` of the raster, a chunk a window, none of it drawn yet.
 
-        Slicing it computes the chunks that are asked for; a chunk carries the triangles that touch its window to where
-        it is drawn, or their indices where the mesh lies in files.
+        Slicing it computes the chunks of the slice. A chunk carries the triangles that touch its window to its worker,
+        or their indices if the mesh lies in files.
 
         Raises
         ------
@@ -185,7 +185,7 @@ class Tiles(WindowedRaster):
         executor: Any = None,
         storage: dict[str, Any] | None = None,
     ) -> Written:
-        """Write the raster as a Zarr array (version 3), or as a group of levels; return what was done.
+        """Write the raster as a Zarr array (version 3), or as a group of levels; return the numbers of windows.
 
         Parameters
         ----------
@@ -199,17 +199,17 @@ class Tiles(WindowedRaster):
             How many resolutions, each half of the one before: from 2 on a group in the manner of OME-Zarr 0.5, with the
             arrays "0", "1", ...
         resume : bool
-            Go on with what an interrupted run has left, and draw no window again that is whole: a tile on a disk that
-            is missing or cannot be read is drawn again.
+            Continue an interrupted run: whole windows are kept; one with a tile that is missing, or on a disk cannot be
+            read, is drawn again.
         overwrite : bool
-            Replace what is there, if topleft wrote it.
+            Replace the old file or folder, if topleft wrote it.
         progress : function of a `Step`, or True, optional
             Called after each window; True shows a bar (tqdm).
         executor : dask.distributed.Client, optional
-            Whose workers draw and write the windows; all of them see the folder, or reach the URL. A worker or a
+            Its workers draw and write the windows; all of them see the folder, or reach the URL. A worker or a
             scheduler that dies loses nothing.
         storage : dict, optional
-            What fsspec needs for a URL.
+            Options of fsspec for a URL.
 
         Raises
         ------
@@ -219,7 +219,7 @@ class Tiles(WindowedRaster):
         BlockingIOError
             If another call writes it, in this process or another one.
         ValueError
-            If what is there is of another run: of another mesh, other options or another size of windows.
+            If `resume` finds the raster of another mesh, other options or another size of windows.
         OSError
             If it would not fit the disk, told before a byte is written; if it cannot be written; if a tile has gone or
             is damaged when it is read again, with its name.
@@ -242,17 +242,16 @@ class Tiles(WindowedRaster):
         progress: Progress | bool | None = None,
         executor: Any = None,
     ) -> Written:
-        """Write the raster as a cloud-optimised GeoTIFF, BigTIFF where it is large; return what was done.
+        """Write the raster as a cloud-optimised GeoTIFF, BigTIFF if it is large; return the numbers of windows.
 
         Parameters
         ----------
         path : path
-            The file. While it is written, its tiles wait in a folder beside it, "NAME.parts", which `resume` goes on
-            with.
+            The file. While it is written, its tiles wait in a folder beside it, "NAME.parts", for `resume` to continue.
         crs : str or int, optional
-            What the grid's units are: "EPSG:25832", or anything of which pyproj knows the EPSG code.
+            The CRS of the grid: "EPSG:25832", or any other that has an EPSG code in pyproj.
         nodata : number, optional
-            What the file calls no data; -1 for labels and NaN or `nodata` for fields and heights unless given.
+            The no-data value of the file; -1 for labels and NaN or `nodata` for fields and heights unless given.
         compression : {"deflate", "none"}
             How tiles are stored; with a predictor.
         tile : int
@@ -286,7 +285,7 @@ class Tiles(WindowedRaster):
         progress: Progress | bool | None = None,
         executor: Any = None,
     ) -> Written:
-        """Write the raster as a pyramid of Deep Zoom, for viewers such as OpenSeadragon; return what was done.
+        """Write the raster as a Deep Zoom pyramid, for viewers such as OpenSeadragon; return the numbers of windows.
 
         Parameters
         ----------
@@ -297,7 +296,7 @@ class Tiles(WindowedRaster):
         colors : function of an array (H, W), optional
             Returns uint8 (H, W), (H, W, 3) or (H, W, 4). Unless given, labels get a colour each, masks become black and
             white, counts greys up to 255, depths, heights and values greys from the lowest to the highest, and uint8
-            colours stay what they are; other colours need it.
+            colours stay as they are; other colours need it.
         resume, overwrite, progress, executor
             As in `to_zarr`.
 

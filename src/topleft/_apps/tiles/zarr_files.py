@@ -97,7 +97,7 @@ def write_zarr(
 
 
 def codec_of(compression: str) -> tuple[Callable[[bytes], bytes], Callable[[bytes], bytes], list[dict[str, Any]]]:
-    """How chunks are compressed and read, and what metadata says of it."""
+    """Return the functions that compress and decompress chunks, and the codecs of the metadata."""
     check_choice("compression", compression, COMPRESSIONS)
     if compression == "none":
         return bytes, bytes, []
@@ -177,7 +177,7 @@ def write_metadata(raster: Tiles, store: ZarrStore, codec: list[dict[str, Any]],
         arrays[0]["attributes"] = {"topleft": own}
         store.folder.put("zarr.json", _json(arrays[0]))
         return
-    # First what tells whose this is: a run that is killed here goes on.
+    # The fingerprint first: after a kill here `resume` knows the raster.
     attributes = {"topleft": own, "ome": _multiscales(raster, store)}
     store.folder.put("zarr.json", _json({"zarr_format": 3, "node_type": "group", "attributes": attributes}))
     for level, array in enumerate(arrays):

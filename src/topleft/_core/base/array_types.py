@@ -1,4 +1,4 @@
-"""Names of types of arrays, and of what becomes a mesh, for annotations."""
+"""Type aliases of arrays and of mesh-like values, for annotations."""
 
 from typing import Any, TypeAlias
 
@@ -14,4 +14,4 @@ U8: TypeAlias = npt.NDArray[np.uint8]
 U16: TypeAlias = npt.NDArray[np.uint16]
 
 MeshLike: TypeAlias = Any
-"""What `as_mesh` takes."""
+"""Any value that `as_mesh` takes."""

@@ -1,4 +1,4 @@
-"""Coercion and checks: what the caller gives becomes contiguous native arrays, or an error that names the argument."""
+"""Coercion and checks: arguments become contiguous native arrays, or an error that names the argument."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INT32_MAX = 2**31 - 1
 
 SIZE_HINT = "; the shape of a picture begins with its height: image.shape[1::-1] is its size"
 
-#: Device types of DLPack whose memory the CPU reads: CPU, pinned for CUDA or ROCm, CUDA managed.
+#: Device types of DLPack with memory that the CPU reads: CPU, pinned for CUDA or ROCm, CUDA managed.
 CPU_DEVICES = frozenset({1, 3, 11, 13})
 DEVICES = {2: "CUDA device", 4: "OpenCL device", 7: "Vulkan device", 8: "Metal device", 10: "ROCm device",
            14: "oneAPI device", 15: "WebGPU device"}  # fmt: skip
@@ -60,7 +60,7 @@ def apart_from(out: object, name: str, values: ArrayLike) -> ArrayLike:
 
 
 def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
-    """Return the memory of another library's array: of PyTorch, JAX, or whatever speaks DLPack or the array API."""
+    """Return the memory of another library's array: of PyTorch, JAX, or any with DLPack or the array API."""
     kind = f"{type(tensor).__module__.partition('.')[0]}.{type(tensor).__name__}"
     if hasattr(tensor, "__dlpack_device__"):
         try:
@@ -79,7 +79,7 @@ def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
 
 
 def set_aligned(instance: object, state: dict[str, Any]) -> None:
-    """Give an object that is unpickled or copied what it consists of, its arrays aligned for the kernels.
+    """Set the state of an object that is unpickled or copied, its arrays aligned for the kernels.
 
     Arrays that are pickled out of band lie wherever their bytes were received.
     """
@@ -124,7 +124,7 @@ def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
 
 
 def as_triangles(values: ArrayLike) -> NDArray[np.signedinteger[Any]]:
-    """Return (T, 3) triangles as a contiguous int32 or int64 array; indices are not looked at.
+    """Return (T, 3) triangles as a contiguous int32 or int64 array; indices are not checked.
 
     Unsigned indices beyond the signed range come out negative, which no index may be.
     """
@@ -303,7 +303,7 @@ def as_places(rows: ArrayLike, cols: ArrayLike, shape: tuple[int, ...]) -> tuple
             raise TypeError(f"{name} must be integers, got {shown(values)}")
         if array.dtype.kind == "u":
             array = np.minimum(array, np.iinfo(np.intp).max)
-        array = array.astype(np.intp)  # a copy: what has been checked is what is used
+        array = array.astype(np.intp)  # a copy: nobody else changes it after the check
         if array.size and not (array.min() >= 0 and array.max() < n):
             raise IndexError(f"{name} must lie in [0, {n}), got {array.min()} to {array.max()}")
         found.append(array)

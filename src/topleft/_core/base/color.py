@@ -23,7 +23,7 @@ DEFAULT_COLOR = (224, 222, 217)
 """sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
 
 WHITE = (255, 255, 255, 255)
-"""sRGB and alpha of what is behind a picture."""
+"""sRGB and alpha of the background of a picture."""
 
 LINEAR_ONE = 1 << 16
 """Steps of the light from 0 to 1 where it is kept as a whole number."""
@@ -63,7 +63,7 @@ def spread_colors(colors: U8, are_light: bool, spread: Callable[[Array], F64]) -
 
 
 def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
-    """The colour as whole numbers of 0 to 255; RGB becomes opaque where RGBA is asked for.
+    """The colour as whole numbers of 0 to 255; RGB becomes opaque RGBA if that is wanted.
 
     Parameters
     ----------

@@ -22,4 +22,4 @@ MAX_CROSSINGS = 50_000_000
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 BUFFER_SUFFIXES = (".npy", ".npz")
 SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES
-"""What `save_image` writes, by the end of the name."""
+"""Formats that `save_image` writes, by the end of the name."""

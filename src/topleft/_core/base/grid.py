@@ -1,6 +1,6 @@
 """Regular grids over data: which part of the plane a picture shows, in units of the data.
 
-Input: an extent and a size, or what the grid is to be laid round. Output: `Grid`.
+Input: an extent and a size, or data to lay the grid round. Output: `Grid`.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Grid:
         The coordinate reference system of the extent: "EPSG:25832", 25832, WKT, or that of pyproj, rasterio or
         geopandas; kept as text. Files and xarray get it; polygons that say another one are refused.
     nodata : number, optional
-        What stands where nothing is: the default of `nodata=` of `field`, `tiles` and `Overlap.means`, of `background=`
-        of `polygons` with values, and what files say.
+        The value of empty pixels: the default of `nodata=` of `field`, `tiles` and `Overlap.means`, of `background=`
+        of `polygons` with values, and of files.
 
     Raises
     ------
@@ -63,7 +63,7 @@ class Grid:
     crs: str | None = None
     nodata: float | None = None
 
-    if TYPE_CHECKING:  # what is given may be any four numbers; what is kept is as above
+    if TYPE_CHECKING:  # an argument may be any four numbers; the attribute is as above
 
         def __init__(
             self,
@@ -92,7 +92,7 @@ class Grid:
             object.__setattr__(self, "nodata", np.asarray(self.nodata).item())  # a whole number stays one
 
     def __repr__(self) -> str:
-        """The constructor's call, without what is not set."""
+        """The constructor's call, without unset options."""
         more = "".join(
             f", {name}={value!r}" for name in ("crs", "nodata") if (value := getattr(self, name)) is not None
         )

@@ -15,20 +15,20 @@ from topleft._core import engine
 HUGE_PAGE = 2 << 20
 CACHE_LINE = 64
 
-#: Arrays below it are NumPy's own: what the system keeps for them costs no page faults.
+#: Arrays below it are NumPy's own: the system keeps memory for them, without page faults.
 MIN_BLOCK_BYTES = 4 << 10
 
-#: Several arrays of so many bytes together are asked for at once before the first of them is touched.
+#: Several arrays of so many bytes together are allocated at once before the first of them is written.
 MIN_CHECKED_BYTES = 1 << 30
 
-#: Most bytes of arrays that have died which the process keeps for arrays to come: ids and depth of four samples a pixel
+#: Most bytes of freed arrays that the process keeps for new ones: ids and depth of four samples a pixel
 #: in a picture of 4096x4096.
 MAX_WAITING_BYTES = 512 << 20
 
 #: Most bytes that one name of a thread's scratch keeps between module-level calls; `SCRATCH_NAMES` are all.
 MAX_SCRATCH_BYTES = 64 << 20
 
-#: What no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
+#: Scratch that no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
 SCRATCH_NAMES = frozenset(
     {
         "bands",
@@ -56,7 +56,7 @@ class Memory(Protocol):
         """Return an uninitialised array."""
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
-        """Return n int32 that are all `value`; who changes them puts that back."""
+        """Return n int32 that are all `value`; the caller restores it before it returns."""
 
 
 class FreshMemory:
@@ -74,7 +74,7 @@ class FreshMemory:
 
 
 class KeptMemory:
-    """One block of memory per name, which only grows: the next call overwrites what this one returned."""
+    """One block of memory per name, which only grows: the next call overwrites the last result."""
 
     def __init__(self) -> None:
         self._blocks: dict[str, NDArray[np.uint8]] = {}
@@ -89,7 +89,7 @@ class KeptMemory:
         return block[:n_bytes].view(dtype).reshape(shape)
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
-        """Return n int32 that are all `value`: filled once, put back by whoever changed them."""
+        """Return n int32 that are all `value`: filled once, restored by callers."""
         block = self._constants.get(name)
         if block is None or block.size < n:
             block = self._constants[name] = FRESH.constant(name, n, value)
@@ -148,23 +148,23 @@ engine.keep_blocks(MAX_WAITING_BYTES)
 
 
 def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return an uninitialised array, in memory of one that has died where there is some of about that size.
+    """Return an uninitialised array, in memory of a freed one of about that size if there is some.
 
-    Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The memory is nobody else's until
-    the array and all its views have died; then it waits for another array, `MAX_WAITING_BYTES` at most.
+    Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The array and all its views own
+    the memory until they are freed; then it waits for another array, `MAX_WAITING_BYTES` at most.
     """
     n_bytes = _size(shape, dtype)
     if n_bytes < MIN_BLOCK_BYTES:
         return np.empty(shape, dtype)
     if n_bytes > sys.maxsize:
-        allocate(n_bytes)  # whose error says how much it is
+        allocate(n_bytes)  # its error names the size
     return np.ndarray(shape, dtype, engine.lease_block(n_bytes, allocate))
 
 
 def fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> bool:
     """Whether the system has memory for arrays of a shape together.
 
-    One by one it may promise what it has not: Linux refuses a single array larger than all memory, but gives two of
+    A check of one array at a time is too weak: Linux refuses a single array larger than all memory, but gives two of
     half that size and ends the process when they are written.
     """
     n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
@@ -211,20 +211,20 @@ def release_memory() -> None:
 def allocate(n_bytes: int) -> NDArray[np.uint8]:
     """Return uninitialised memory that begins at a cache line, and that whole huge pages can back where it is large.
 
-    NumPy asks the system for huge pages from 4 MiB on, but the system uses them only for what is aligned to them.
+    NumPy asks the system for huge pages from 4 MiB on, but the system uses them only for aligned memory.
     """
     step = CACHE_LINE if n_bytes < 2 * HUGE_PAGE else HUGE_PAGE
     n_whole = -(-n_bytes // step) * step
     try:
         block = _fresh_bytes(n_whole + step)
-    except (MemoryError, ValueError):  # ValueError: beyond what addresses can tell
+    except (MemoryError, ValueError):  # ValueError: beyond the range of addresses
         raise MemoryError(f"no memory for an array of {n_bytes:,} bytes, which this size or scene needs") from None
     skip = -block.ctypes.data % step
     return block[skip : skip + n_whole]
 
 
 def _fresh_bytes(n_bytes: int) -> NDArray[np.uint8]:
-    """Return fresh memory; where there is none, what waits for an array goes back to the system first."""
+    """Return fresh memory; if there is none, unused blocks go back to the system first."""
     try:
         return np.empty(n_bytes, np.uint8)
     except MemoryError:

@@ -1,4 +1,4 @@
-"""Notes of what a mesh file says and its mesh lacks, one line a kind; told as warnings, or to who listens.
+"""Notes of parts of a mesh file that could not be read, one line a kind; given as warnings, or to a listener.
 
 Input: kinds and names, from the readers. Output: `MeshWarning`, or lines.
 """
@@ -19,7 +19,7 @@ _listener: ContextVar[list[str] | None] = ContextVar("topleft_notes", default=No
 
 
 class Notes:
-    """What a mesh will lack, by kind."""
+    """Parts of a file that its mesh lacks, by kind."""
 
     def __init__(self, path: str) -> None:
         self._path = path
@@ -49,7 +49,7 @@ def _list_of(names: list[str]) -> str:
 
 
 def tell(lines: Iterable[str], stacklevel: int) -> None:
-    """Warn of each line, as if where the caller was called; who listens gets them instead."""
+    """Warn of each line, at the place of the caller's call; a listener gets them instead."""
     heard = _listener.get()
     if heard is not None:
         heard.extend(lines)

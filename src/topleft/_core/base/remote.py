@@ -1,6 +1,6 @@
 """Files behind URLs that fsspec reaches: whole or not there, as those of a disk.
 
-Input: a URL. Output: what `pathlib.Path` says and does of a file, as far as writing needs it. A URL that begins with
+Input: a URL. Output: the methods of `pathlib.Path` that writing needs. A URL that begins with
 file:// is a path of this machine.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 from topleft._core.base.arrays import shown
 from topleft.errors import MissingPackageError
 
-#: File systems on which what is being written shows before it is whole: there it gets another name first. Stores of
+#: File systems that show a file before it is whole: there it gets another name first. Stores of
 #: objects show an object when all of it is there.
 SHOWS_PARTS = frozenset({"arrow_hdfs", "dbfs", "ftp", "hdfs", "sftp", "smb", "ssh", "webhdfs"})
 
@@ -29,7 +29,7 @@ def is_url(value: object) -> bool:
 
 
 def location_of(value: str | os.PathLike[str]) -> Path | RemotePath:
-    """Return where a file is: a path, or what fsspec reaches by a URL."""
+    """Return where a file is: a path, or a location that fsspec reaches by a URL."""
     if isinstance(value, RemotePath):
         return value
     text = os.fspath(value)
@@ -43,7 +43,7 @@ def location_of(value: str | os.PathLike[str]) -> Path | RemotePath:
 
 
 def as_location(name: str, value: object) -> Location:
-    """Return where a file is, of what a caller gave."""
+    """Return where the file of a caller's argument is."""
     if not isinstance(value, str | os.PathLike):
         raise TypeError(f"{name} must be a path or a URL, got {shown(value)}")
     return location_of(value)
@@ -54,7 +54,7 @@ class RemotePath:
     """A file or a folder behind a URL."""
 
     url: str
-    storage: tuple[tuple[str, Any], ...] = ()  # what fsspec needs besides
+    storage: tuple[tuple[str, Any], ...] = ()  # further options of fsspec
 
     def __str__(self) -> str:
         return self.url
@@ -151,7 +151,7 @@ class RemotePath:
         fs, name = self._reached
         try:
             self._send(fs, name, content)
-        except (NotImplementedError, ValueError) as error:  # what there is for that kind of URL reads only
+        except (NotImplementedError, ValueError) as error:  # fsspec only reads that kind of URL
             raise ValueError(f"cannot write to {self.url}: {error}") from None
 
     def _send(self, fs: Any, name: str, content: bytes) -> None:

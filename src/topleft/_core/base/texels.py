@@ -50,7 +50,7 @@ class ValueLevels(NamedTuple):
             -1 where the value is the background.
         uv : (P, 2) float32
         slopes : (P, 2, 2) float32, or None
-            What u and v, the first axis, change by from pixel to pixel along x and y; None unless there are halvings.
+            Slopes of u and v, the first axis, from pixel to pixel along x and y; None unless there are halvings.
         background : float
         """
         out = np.empty((len(ids), self.n_channels), np.float32)

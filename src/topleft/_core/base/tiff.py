@@ -25,7 +25,7 @@ NUMPY = {"H": "u2", "I": "u4", "Q": "u8", "d": "f8"}
 
 
 def header(is_big: bool) -> bytes:
-    """The first bytes of a file whose first directory follows them."""
+    """The first bytes of a file, right before its first directory."""
     return struct.pack("<2sHHHQ", b"II", 43, 8, 0, 16) if is_big else struct.pack("<2sHI", b"II", 42, 8)
 
 
@@ -35,7 +35,7 @@ def value_bytes(letter: str, values: Any) -> bytes:
 
 
 def directory_bytes(tags: Tags, is_big: bool) -> int:
-    """How many bytes a directory takes, with what does not fit into it."""
+    """How many bytes a directory takes, with the values that do not fit into it."""
     entry, inline, ends = (20, 8, 16) if is_big else (12, 4, 6)
     sizes = [TYPES[letter][1] * len(values) for letter, values in tags.values()]
     return ends + entry * len(tags) + sum(-(-size // 8) * 8 for size in sizes if size > inline)

@@ -19,7 +19,7 @@ STALE_S = 3600
 def write_whole(path: Location, write: Callable[[IO[bytes]], object]) -> None:
     """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file.
 
-    What goes to a URL is sent in one piece.
+    A file at a URL is sent in one piece.
     """
     if isinstance(path, RemotePath):
         content = io.BytesIO()
@@ -51,7 +51,7 @@ def is_whole(path: Location) -> bool:
 
 
 def remove_stale_parts(paths: Iterable[Path]) -> None:
-    """Remove what processes that were killed have left of these files an hour ago or earlier."""
+    """Remove partial files that killed processes have left here an hour ago or earlier."""
     names: dict[Path, set[str]] = {}
     for path in paths:
         names.setdefault(path.parent, set()).add(path.name[:100])

@@ -51,7 +51,7 @@ cdef void keep_block(Block block) noexcept:
 
 
 cdef void drop_blocks(int64_t n_bytes) noexcept:
-    """Give back what waits beyond so many bytes; the caller has the list for itself."""
+    """Give back waiting blocks beyond so many bytes; the caller has the list for itself."""
     global waiting_bytes
     while waiting_bytes > n_bytes or len(waiting_blocks) > MAX_BLOCKS:
         waiting_bytes -= (<Block>waiting_blocks[0]).n_bytes
@@ -92,7 +92,7 @@ def lease_block(int64_t n_bytes, allocate: Callable[[int], U8]) -> memoryview:
 
 
 def keep_blocks(int64_t n_bytes):
-    """Keep at most so many bytes that no array has; what is beyond them goes back to the system now."""
+    """Keep at most so many bytes that no array has; the rest goes back to the system now."""
     global most_waiting_bytes
     with cython.critical_section(waiting_blocks):
         most_waiting_bytes = n_bytes

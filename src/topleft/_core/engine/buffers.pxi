@@ -1,4 +1,4 @@
-# Describes what a pass reads and writes: viewport, vertices, buffers of pixels, indices, clipped pieces.
+# Describes the input and output of a pass: viewport, vertices, buffers of pixels, indices, clipped pieces.
 
 cdef enum:
     VERTEX_BLOCK_BITS = 4
@@ -120,7 +120,7 @@ cdef class Source:
 
 
 cdef class Target:
-    """The contiguous buffers of a picture, neither side of it 0, and what becomes of a covered sample."""
+    """The contiguous buffers of a picture, neither side of it 0, and the sink of its covered samples."""
 
     cdef readonly int sink
     cdef int64_t width, height
@@ -196,7 +196,7 @@ def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_
 
 def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, int64_t n_rows, bint earlier_wins,
                    float depth, float background):
-    """Write the depth of rows of a picture whose triangles all lie at one; ids as `Target` has them drawn become ids."""
+    """Write one depth for all triangles in rows of a picture; labels, as drawn to a `Target`, become ids."""
     cdef int64_t n = n_rows * ids.shape[1]
     if n:
         with nogil:

@@ -1,4 +1,4 @@
-# Meshes that are sorted into clusters, and passes that draw what a view needs of them.
+# Meshes that are sorted into clusters, and passes that draw the clusters in view.
 
 CLUSTER = TL_CLUSTER
 CLUSTER_GROUP = TL_CLUSTER_GROUP
@@ -87,9 +87,9 @@ cdef class ClusterView:
 
     def __init__(self, Source source, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width,
                  double margin_px, double error, tl_sink sink):
-        """`source`: whose matrix is clip from object; `mesh`: how it is seen; beyond `margin_px` around the window nothing shows.
+        """`source`: clip from object; `mesh`: viewport, sample and culling; nothing beyond `margin_px` round the window shows.
 
-        `error`: of the vertex stage, as a share of the terms that it adds up; `sink`: what becomes of a covered sample.
+        `error`: of the vertex stage, as a share of the terms that it adds up; `sink`: that of covered samples.
         """
         cdef tl_cluster_view *v = &self.view
         cdef const tl_view *how = &mesh.viewport.view
@@ -122,8 +122,8 @@ def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, c
                Target target, bint is_drawn, uint8_t[::1] shown):
     """Tell of boxes (N, 6), each under a matrix of its own (N, 4, 4), whether they may show in a picture.
 
-    They do not where they lie outside of it, between samples or, if it `is_drawn`, behind what it shows. `view`: with any
-    matrix; `mesh`: how it is seen.
+    They do not where they lie outside of it, between samples or, if it `is_drawn`, behind its surfaces. `view`: with any
+    matrix; `mesh`: viewport, sample and culling.
     """
     cdef tl_window window = mesh.window(0, target.height, target.width)
     cdef tl_target rows = target.rows(0)
@@ -133,7 +133,7 @@ def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, c
 
 
 cdef class Clustered:
-    """A mesh in object space, sorted into clusters; keeps what it points to alive."""
+    """A mesh in object space, sorted into clusters; keeps its arrays alive."""
 
     cdef tl_clustered mesh
     cdef object arrays
@@ -170,9 +170,9 @@ cdef class Clustered:
     def draw(self, SnappedMesh mesh, Source source, ClusterView seen, bint may_be_hidden, Target target,
              int64_t first_row, int64_t n_rows, int32_t[::1] room, int32_t[::1] others, bint is_first,
              bint is_last) -> tuple[int, int, int]:
-        """Draw what the rows of a picture show.
+        """Draw the clusters that rows of a picture show.
 
-        `mesh`: how, and what triangle 0 is called; its own triangles are not read. `room`: three numbers a cluster, and one.
+        `mesh`: viewport, culling, id of triangle 0; its own triangles are not read. `room`: three numbers a cluster, and one.
         `others`, a number for each triangle, gets those that a clip plane may cut, or that 64 bits cannot hold. Returns how
         many of these there are, how many clusters the window may show, and how many of them were not hidden.
         """

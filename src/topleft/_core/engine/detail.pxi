@@ -1,4 +1,4 @@
-# How many pixels a point that shows moves at most where it moves by one unit: what levels of detail are chosen by. The
+# The most pixels that a visible point moves by when it moves by one unit: levels of detail are chosen by it. The
 # rules stand at the head of _meshes/lod/detail.py.
 
 cdef int EXTENT = 10  # numbers of a row: lowest and highest x, y, z; centre and radius of the sphere round it
@@ -91,7 +91,7 @@ cdef double pixels_a_unit(const double *m, double width, double height, const do
     for i in range(2):
         for k in range(2):
             most = larger(most, stretch(moves[0][i], moves[1][k]))
-    return most / nearest * (1 + 1e-9)  # a billionth more for what float64 rounds here
+    return most / nearest * (1 + 1e-9)  # a billionth more for rounding in float64
 
 
 def pixels_per_unit(const double[:, ::1] matrix, size: tuple[int, int], const double[::1] window,

@@ -1,4 +1,4 @@
-# Vertices that are not snapped, and what clip planes leave of their triangles.
+# Vertices that are not snapped, and the pieces of their clipped triangles.
 
 
 cdef class ExactPieces:

@@ -17,7 +17,7 @@ cdef const void *first_of(array: object):
 
 
 cdef class GradientView:
-    """A picture, and what is drawn in it: `tl_grad_view`."""
+    """A picture and the mesh in it: `tl_grad_view`."""
 
     cdef tl_grad_view view
     cdef object arrays
@@ -73,7 +73,7 @@ cdef class GradientView:
                GradientSums faces or None, GradientSums sums or None, int64_t first, int64_t end) -> int:
         """Write rows of attributes (V, K); with sums, of their gradients. Returns as `points_vjp` does.
 
-        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for what is not there. `faces`, with
+        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for absent ones. `faces`, with
         sums: scratch by triangle, SUMS_OF_VALUES columns, for FEW_COLUMNS at most.
         """
         cdef tl_grad_view view = self.rows(first, end)
@@ -98,8 +98,8 @@ cdef class GradientView:
                GradientSums sums or None, int64_t first, int64_t end):
         """Write rows of a texture, levels (., H, W, C); with sums, of its gradients.
 
-        `codes`: of the filter and of what lies beyond the edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out,
-        and with sums g_uv, g_uv_da, g_bias; None for what is not there.
+        `codes`: of the filter and of the texture beyond its edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out,
+        and with sums g_uv, g_uv_da, g_bias; None for absent ones.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_texture t
@@ -124,7 +124,7 @@ cdef class GradientView:
             K.grad_texels_vjp(&view, &t, &sums.sums)
 
     def outline(self, const int32_t[:, ::1] across, double[:, ::1] places, int32_t[::1] outline):
-        """Write places of vertices (V, 2) in pixels, and what edges of triangles (T) are, for `edges`."""
+        """Write places of vertices (V, 2) in pixels, and the silhouette edges of triangles (T), for `edges`."""
         if across.shape[0]:
             with nogil:
                 K.grad_outline(&self.view, &across[0, 0], &places[0, 0] if places.shape[0] else NULL, &outline[0])
@@ -158,10 +158,10 @@ cdef class GradientView:
     def loss(self, ids: tuple[Array, bool, int], attr: Array, mesh: tuple[Array, Array, Array], codes: tuple[int, float],
              target: Array, scratch: tuple[Array, Array], sums: tuple[GradientSums, ...], int64_t first,
              int64_t end) -> float:
-        """Return the sum of squares of what rows of a picture of `attr` (V, K) are off `target`; adds gradients to sums.
+        """Return the sum of squared differences of rows of a picture of `attr` (V, K) from `target`; adds gradients to sums.
 
-        `ids`: those of the picture, whether row 0 is on top, what is added to them. `mesh` and `scratch[0]` are those
-        of `edges`, `codes` the rule and what squares count by; `scratch[1]` holds LOSS_WINDOW rows of 8 + 4 K numbers a
+        `ids`: those of the picture, whether row 0 is on top, the number added to them. `mesh` and `scratch[0]` are those
+        of `edges`, `codes` the rule and the weight of squares; `scratch[1]` holds LOSS_WINDOW rows of 8 + 4 K numbers a
         pixel. `sums`: by triangle, columns as `points_vjp` and `values` take them; by vertex, of points and of edges; by
         row of `attr`.
         """

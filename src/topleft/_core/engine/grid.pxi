@@ -51,7 +51,7 @@ def expand_columns(const uint64_t[:, :, ::1] bits, uint8_t[:, :, ::1] out, int64
 
 
 def count_columns(const uint64_t[:, :, ::1] bits, int sample_bits, float[:, :, ::1] out, int64_t first, int64_t end):
-    """Write the filled share of each voxel of rows [first, end), of which each axis has 2**sample_bits samples."""
+    """Write the filled share of each voxel of rows [first, end), from 2**sample_bits samples along each axis."""
     cdef int64_t row
     if out.shape[1] and out.shape[2]:
         with nogil:
@@ -137,7 +137,7 @@ def add_taken(const int32_t[:, ::1] seen, const float[:, ::1] depth, const float
               const double[:, ::1] clip_from_object, const double[::1] eye, bint keeps_best,
               const float[:, ::1] positions, const float[:, ::1] normals, const int32_t[::1] ids, int64_t first,
               int64_t end, float[:, ::1] sums, float[::1] weights):
-    """Add what a picture shows of texels [first, end) to their sums and weights: `tl_taken`."""
+    """Add a picture's colours of texels [first, end) to their sums and weights: `tl_taken`."""
     cdef tl_taken taken
     cdef int k
     taken.height, taken.width, taken.n_channels = light.shape[0], light.shape[1], light.shape[2]

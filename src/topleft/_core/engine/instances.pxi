@@ -10,7 +10,7 @@ def project_instances(meshes: Sequence[tuple[Array, I32]], const double[:, :, ::
     That is one with a vertex that is bad, wide or clipped, without triangles, or with a matrix beyond float32.
 
     `meshes`: vertices (V, 3) float32 or float64 and checked triangles of each. `matrices`: clip from object of each.
-    `culls`, `numbers`: the `tl_cull` of each, and what its triangle 0 is called. `how`: that of a view. `room`: records
+    `culls`, `numbers`: the `tl_cull` of each, and the id of its triangle 0. `how`: that of a view. `room`: records
     of all vertices, uint8, or points (V, PLACED) float64, which are not snapped; from vertex firsts[i] on for instance i.
     """
     cdef int64_t i, n = end - first

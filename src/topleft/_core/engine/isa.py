@@ -1,4 +1,4 @@
-"""Choose the kernels once, at import: the widest that this machine can run, or what ``TOPLEFT_ISA`` says."""
+"""Choose the kernels once, at import: the widest that this machine can run, or those that ``TOPLEFT_ISA`` names."""
 
 import os
 from typing import Any
@@ -37,7 +37,7 @@ def select() -> str:
 
 
 def build_info() -> dict[str, Any]:
-    """Return how this copy of topleft was built and what it runs on.
+    """Return how this copy of topleft was built, and its kernels and processor.
 
     Returns
     -------

@@ -10,9 +10,9 @@ from libc.string cimport memcpy, memset
 
 import numpy as np
 
-include "contract.pxi"  # what the headers of csrc declare: packaging/bindings.py makes it
+include "contract.pxi"  # the declarations of csrc's headers: packaging/bindings.py makes it
 
-# The kernels in use. Scalar until `isa.py` has chosen: never NULL. What draws meshlets beside them may be NULL; to ask
+# The kernels in use. Scalar until `isa.py` has chosen: never NULL. The meshlet kernels beside them may be NULL; to ask
 # the CPU again takes up to 0.1 ms on a virtual machine.
 cdef const tl_kernels *K = tl_kernels_for(b"scalar")
 cdef const tl_meshlet_kernels *BESIDE = NULL
@@ -46,7 +46,7 @@ def isa_available() -> list[str]:
 
 
 def compiler_info() -> dict[str, object]:
-    """Return what this binary was made from and how: version, compiler, flags of each unit."""
+    """Return how this binary was made: version, compiler, flags of each unit."""
     return {
         "version": tl_version().decode(),
         "compiler": tl_compiler().decode().strip(),
@@ -60,7 +60,7 @@ cdef enum:
 # Not so parts of a work, which threads do side by side.
 cdef enum:
     HELD_VERTICES = 1 << 15
-    HELD_PX = 1 << 14  # whose light is found
+    HELD_PX = 1 << 14  # that are shaded
     HELD_DRAWN_PX = 1 << 24  # if each triangle covered the whole window
 
 VERTEX_BYTES = sizeof(tl_vertex)

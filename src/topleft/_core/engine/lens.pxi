@@ -1,4 +1,4 @@
-# Meshes behind a lens: vertices as it shows them, and triangles in parts whose sides are straight in its picture.
+# Meshes behind a lens: vertices as it shows them, and triangles in parts with straight sides in its picture.
 
 
 cdef class LensTable:

@@ -1,5 +1,5 @@
-# Small matrices, sines and roots, the same on every machine: sums in one order, no fused multiply-add, no library whose
-# last bit depends on the processor.
+# Small matrices, sines and roots, the same on every machine: sums in one order, no fused multiply-add, no library with
+# a last bit that depends on the processor.
 
 from libc.math cimport fabs, floor, fmod, frexp, ldexp, rint
 
@@ -114,8 +114,8 @@ def determinant(a: ArrayLike) -> float:
 def is_pose(a: Array) -> bool:
     """Return whether a float64 matrix, (4, 4), is finite, has the last row of a pose, and is certain to be regular.
 
-    The least singular value of three rows is at least 2 |det| / |m|^2, in Frobenius' norm; a matrix of which it is
-    below 1e-9 |m| is left to a closer look.
+    The least singular value of three rows is at least 2 |det| / |m|^2, in Frobenius' norm; where that is
+    below 1e-9 |m|, the caller looks closer.
     """
     cdef const double[:, :] m = a
     cdef Py_ssize_t i, j
@@ -139,7 +139,7 @@ cdef struct Rays:
 @cython.cdivision(True)  # IEEE: no number where there is none
 cdef int find_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width, double height,
                    Rays *out) except -1:
-    """Find how a camera sees a space whose origin is at `center`; `view`: (4, 4), to eye space."""
+    """Find how a camera sees a space with its origin at `center`; `view`: (4, 4), to eye space."""
     cdef double[4][4] clip
     cdef double[3] offset
     cdef double[4][8] rows
@@ -191,7 +191,7 @@ cdef int find_rays(const double[:, :] clip_from_eye, const double[:, :] view, co
 
 def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width,
                 double height) -> tuple[bool, F64, float]:
-    """Return how a camera sees a space whose origin is at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
+    """Return how a camera sees a space with its origin at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
 
     `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale.
     """

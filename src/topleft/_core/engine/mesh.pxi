@@ -27,7 +27,7 @@ def face_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, 
 
 def find_turned(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, const float[:, ::1] normals,
                 const int32_t[:, ::1] row_of_corner, uint8_t[::1] is_turned) -> int:
-    """Write 1 for the triangles of [first, end) whose corners have normals that point to the other side, else 0."""
+    """Write 1 for the triangles of [first, end) with corner normals that point to the other side, else 0."""
     cdef int64_t bad = -1
     if end > first:
         if not normals.shape[0]:

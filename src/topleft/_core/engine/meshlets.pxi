@@ -1,4 +1,4 @@
-# Meshes that are grown into meshlets, and passes that draw what a view may show of them.
+# Meshes that are grown into meshlets, and passes that draw the meshlets in view.
 
 MESHLET_BYTES = sizeof(tl_meshlet)
 MESHLET_TRIANGLES = TL_MESHLET_GROWN
@@ -38,7 +38,7 @@ def grow_meshlets(Source source, const int32_t[:, ::1] triangles, const int32_t[
 
 
 cdef class Grown:
-    """A mesh in object space whose coordinates are float32 numbers, grown into meshlets; keeps what it points to alive."""
+    """A mesh in object space with float32 coordinates, grown into meshlets; keeps its arrays alive."""
 
     cdef tl_meshlets mesh
     cdef object arrays
@@ -59,7 +59,7 @@ cdef class Grown:
 
 
 cdef class MeshletPass:
-    """A picture of meshlets: finds what it may show, then draws rows of that, which several threads may do at a time."""
+    """A picture of meshlets: lists those that it may show, then draws rows of them, in several threads if wanted."""
 
     cdef Grown meshlets
     cdef SnappedMesh mesh
@@ -68,7 +68,7 @@ cdef class MeshletPass:
     cdef Target target
 
     def __init__(self, Grown meshlets, SnappedMesh mesh, Source source, ClusterView seen, Target target):
-        """`mesh`: how it is seen, and what triangle 0 is called; its own triangles are not read. `source`: the matrix."""
+        """`mesh`: viewport, culling and the id of triangle 0; its own triangles are not read. `source`: the matrix."""
         self.meshlets, self.mesh, self.source, self.seen, self.target = meshlets, mesh, source, seen, target
 
     def find(self, int64_t first, int64_t end, int32_t[::1] found, int32_t[::1] odd) -> tuple[int, int]:
@@ -108,7 +108,7 @@ cdef class MeshletPass:
 
     def draw(self, const int32_t[::1] found, int64_t n, const int32_t[::1] odd, int64_t n_odd, int64_t first_row,
              int64_t end_row, bint is_first, int32_t[::1] room, int32_t[::1] others) -> int:
-        """Draw rows [first_row, end_row) of what is listed, cleared before if `is_first`. `room`: as long as `found`.
+        """Draw the listed meshlets in rows [first_row, end_row), cleared before if `is_first`. `room`: as long as `found`.
 
         `others`, a number for each triangle, gets those that a clip plane may cut, or that 64 bits cannot hold; returns how
         many.

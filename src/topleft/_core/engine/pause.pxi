@@ -1,4 +1,4 @@
-# Ctrl-C while a kernel draws, and how a thread ends what others draw for it. Included by kernels.pyx.
+# Ctrl-C while a kernel draws, and how a thread stops the others that draw for it. Included by kernels.pyx.
 
 cdef extern from *:
     """

@@ -119,7 +119,7 @@ def mean_colors(painted: Array, pixels: Array, int64_t first_row, int64_t n_rows
 def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_row, int64_t n_rows,
               const uint8_t[::1] colors, bint is_flat, bint is_u8, int n_channels, const float[::1] background or None,
               uint8_t[::1] pixels):
-    """Write what is seen through layers, planes (K, H, W), in rows [first_row, first_row + n_rows) of a picture.
+    """Composite layers, planes (K, H, W), into rows [first_row, first_row + n_rows) of a picture.
 
     `colors`: of the triangles, or of the layers of these rows, (K, n_rows, W, n_channels) float32. `background` may be None.
     """
@@ -139,9 +139,9 @@ def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_r
 def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32_t[::1] slot,
                 const double[:, :, ::1] steps, const int32_t[:, ::1] rows, const float[:, ::1] values,
                 float[:, :, ::1] out):
-    """Write what values change by along x and y at pixels (N,), (N, K, 2).
+    """Write the slopes of values along x and y at pixels (N,), (N, K, 2).
 
-    `slot`: of each triangle its place among those that show, whose corners have `steps` (M, 3, 3) and `rows` (M, 3).
+    `slot`: of each triangle its place among the visible ones; their corners have `steps` (M, 3, 3) and `rows` (M, 3).
     """
     cdef tl_sloped sloped
     cdef int64_t n = ids.shape[0]
@@ -206,7 +206,7 @@ cdef class PixelPoints:
                 self.points.rows[i][k] = rows[i, k]
 
     def fill(self, SnappedMesh mesh, const int32_t[:, ::1] ids, out: Array, int64_t first_row, int64_t n_rows):
-        """Write rows of what is told of the pixels of a visibility buffer, (H, W) or (H, W, C)."""
+        """Write rows of the value of each pixel's point, a `tl_point_kind`, (H, W) or (H, W, C)."""
         cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
         cdef uint8_t[::1] flat
         if n_rows and ids.shape[1]:

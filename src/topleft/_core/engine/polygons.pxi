@@ -41,7 +41,7 @@ cdef class PieceScratch:
 
 
 cdef class SnappedPolygons:
-    """Snapped polygons in a window: what they are made of, and how they are drawn."""
+    """Snapped polygons in a window: their rings, and how they are drawn."""
 
     cdef tl_polygons set
     cdef uint8_t[::1] is_wide, is_simple
@@ -86,7 +86,7 @@ cdef class SnappedPolygons:
         return most
 
     def make_weights(self, int64_t max_crossings):
-        """Make room for what `certify` finds; rings may cross so often where areas are exact."""
+        """Make room for the weights of rings that `certify` finds; where areas are exact, rings may cross so often."""
         self.crossings_left = self.max_crossings = max_crossings
         self.set.crossings_left = &self.crossings_left
         self.weights, self.is_simple = np.zeros(self.n_rings + 1, np.int8), np.zeros(self.n_polygons + 1, np.uint8)
@@ -180,7 +180,7 @@ cdef class SnappedPolygons:
                    int32_t[::1] cells, PieceScratch pieces or None, bint is_alone):
         """Add the shares of polygons to bands of rows, to at most 1; with colours (P, C) mix these in by them.
 
-        `is_alone`: the only polygon is drawn over what there is.
+        `is_alone`: the only polygon is drawn over the picture.
         """
         cdef tl_polygons set = self.asking()
         cdef tl_share_job job

@@ -92,8 +92,8 @@ cdef class ShadingTable:
         s.matcap = NULL
 
     def set_materials(self, materials: Sequence[tuple[Any, ...]]):
-        """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None, None or what makes
-        it full: (is_metallic, metallic, roughness, occlusion, normal_scale, emission, four textures or None))."""
+        """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None, and None or
+        the full material: (is_metallic, metallic, roughness, occlusion, normal_scale, emission, four textures or None))."""
         cdef tl_material *m
         cdef int k
         self.materials = np.zeros(max(1, len(materials)) * sizeof(tl_material), np.uint8)
@@ -115,7 +115,7 @@ cdef class ShadingTable:
 
     def seen(self, const float[:, ::1] normals or None, bint finds_inverse_w, const double[:, :] clip_from_eye,
              const double[:, :] view, const double[:] center, double width, double height) -> ShadingTable:
-        """Return the same, seen by a camera in a whole picture of this size, in a space whose origin is at `center`.
+        """Return the same, seen by a camera in a whole picture of this size, in a space with its origin at `center`.
 
         `view`: (4, 4), to eye space. `normals`: those of the vertices with 1/w, or None.
         """
@@ -142,7 +142,7 @@ cdef class ShadingTable:
         return self.rays.has_perspective, np.array([[self.rays.rows[i][k] for k in range(3)] for i in range(9)]), self.rays.scale
 
     def set_headlight(self, to_light: Any, float color, float ambient):
-        """Take one light in a direction of eye space, which wraps round what it lights, and light from all sides."""
+        """Take one light in a direction of eye space, which wraps round surfaces, and light from all sides."""
         cdef double[3] at = to_light
         cdef double total
         cdef int i, k
@@ -180,7 +180,7 @@ cdef class ShadingTable:
         self.shading.wants_opacity = True
 
     def set_picture(self, int show, Mipmap matcap or None, background: Sequence[float], background_bytes: Sequence[int]):
-        """Take what the picture tells, and what is behind it."""
+        """Take the quantity that the picture shows, and its background."""
         cdef tl_shading *s = &self.shading
         cdef int k
         s.show = <tl_show>show
@@ -228,7 +228,7 @@ def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out)
 
 
 cdef class ShadedScene:
-    """The instances of a picture as kernels shade them; keeps what they point to alive."""
+    """The instances of a picture as kernels shade them; keeps their arrays alive."""
 
     cdef tl_shaded_scene scene
     cdef SnappedMesh mesh  # the first: all have its window
@@ -236,7 +236,7 @@ cdef class ShadedScene:
     cdef object arrays
 
     def __init__(self, meshes: Sequence[SnappedMesh], tables: Sequence[ShadingTable], first_ids: Sequence[int]):
-        """Take at least one mesh and as many shading tables, and what triangle 0 of each is called in the ids."""
+        """Take at least one mesh, as many shading tables, and the id of triangle 0 of each."""
         cdef int64_t i, n = len(meshes)
         cdef SnappedMesh mesh
         cdef ShadingTable table
@@ -269,7 +269,7 @@ cdef class ShadedScene:
                       uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
         """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
 
-        `ids` and `depth`: (S, H, W), or with `split` (1, H, W), what the first sample sees.
+        `ids` and `depth`: (S, H, W), or with `split` (1, H, W), those of the first sample.
         """
         cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[2])
         cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
@@ -294,7 +294,7 @@ cdef class ShadedScene:
 
 def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids,
             float[:, :, ::1] depth, bint is_peeled, int64_t first_row, int64_t n_rows):
-    """Draw triangles, but for what their materials cut out, over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
+    """Draw alpha-tested triangles over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
     cdef int64_t height = ids.shape[1], width = ids.shape[2]
     cdef tl_window window = mesh.window(first_row, n_rows, width)
     cdef tl_target target

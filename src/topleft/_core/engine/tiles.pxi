@@ -5,7 +5,7 @@ def list_spans(tiling: tuple[int, int, int, int, int], const double[:, :, ::1] c
                int32_t[:, ::1] boxes, int64_t[::1] starts, int32_t[:, ::1] spans or None) -> int:
     """Count the spans of each row of windows into starts[row + 1], or write them where spans is not None.
 
-    `boxes`, (N, 4): what the first call leaves for the second.
+    `boxes`, (N, 4): written by the first call, read by the second.
 
     `tiling`: width and height of the raster, those of a window, sub-pixel bits. Returns the first triangle that cannot
     be snapped, or -1.

@@ -16,7 +16,7 @@ cdef inline tl_exact_counts no_counts() noexcept nogil:
 
 
 cdef class SnappedMesh:
-    """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
+    """Snapped vertices and triangles, ready to be drawn or resolved; keeps its arrays alive."""
 
     cdef tl_snapped snapped
     cdef int64_t x_px, y_px
@@ -248,7 +248,7 @@ cdef class SnappedMesh:
                    int32_t[::1] outside) -> tuple[int, int]:
         """Clear rows of a picture and draw there the triangles from `first` on for which `outside` has room, 16 numbers left.
 
-        What of them lies in other rows is listed in `outside`; returns the first bad row or -1, and how many those are.
+        Triangles that reach other rows are listed in `outside`; returns the first bad row or -1, and their number.
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
@@ -264,7 +264,7 @@ cdef class SnappedMesh:
         return bad_row, slice.n_outside
 
     def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
-        """Draw the triangles listed over what the rows hold."""
+        """Draw the listed triangles over the rows."""
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
         cdef tl_slice slice = no_slice()
@@ -341,7 +341,7 @@ cdef class SnappedMesh:
     def is_large_shapes(self, int64_t width, int64_t height, int n_samples, int most) -> bool:
         """Tell whether a picture of the mesh is to be written row by row: large triangles, which are snapped.
 
-        `most`: SHAPES_OF_BITS, SHAPES_STORED or SHAPES_LABELLED, by what is done otherwise.
+        `most`: SHAPES_OF_BITS, SHAPES_STORED or SHAPES_LABELLED, by the other way to draw it.
         """
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
         return self.snapped.mesh.exact == NULL and tl_is_large_shapes(n, n_samples, width, height, <tl_shape_limit>most)
@@ -466,7 +466,7 @@ def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], Bins bi
 
 
 cdef class Split:
-    """Pixels whose samples see several triangles, row by row: their columns, and what their samples but the first see."""
+    """Pixels that show several triangles, row by row: their columns, and ids and depths of all samples but the first."""
 
     cdef readonly object rows  #: I64
     cdef readonly object columns, ids  #: I32
@@ -501,9 +501,9 @@ cdef class Split:
 
 def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1] ids, float[:, ::1] depth, Split split,
                      Bins bins, int64_t first_band, int64_t end_band):
-    """Clear and draw bands of the picture that the first sample sees, and list the pixels of which others see more.
+    """Clear and draw bands of the first sample's picture, and list the pixels where other samples see more triangles.
 
-    `meshes`: as each sample sees it; `ids` and `depth`: memory for what the others see in a band, (S - 1, rows * (W + 16)).
+    `meshes`: as each sample sees it; `ids` and `depth`: memory for the others in a band, (S - 1, rows * (W + 16)).
     """
     cdef tl_snapped seen[16]
     cdef SnappedMesh mesh
@@ -546,7 +546,7 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
     """Write the nearest layers of all meshes together, as planes (K, H, W), in bands of 2**band_bits rows.
 
     `bins`: those of each mesh, or None, where a band is to look at all triangles. `is_first`: clear the planes before;
-    otherwise what is there are layers, too. Returns as `SnappedMesh.draw` does.
+    otherwise they hold layers already. Returns as `SnappedMesh.draw` does.
     """
     cdef tl_peeled peeled
     cdef tl_target target

@@ -1,1 +1,1 @@
-"""Tensors of pixels, and what vertices, attributes and texels would do to them: vector-Jacobian products."""
+"""Tensors of pixels, and their vector-Jacobian products with vertices, attributes and texels."""

@@ -1,6 +1,6 @@
-"""Pictures in bands of rows, which threads take, and sums that do not depend on who took which.
+"""Pictures in bands of rows for threads, with sums that do not depend on the threads.
 
-A band sums up what its pixels give, in their order, in float64; bands are added in theirs. Where bands end depends on
+A band sums up its pixels, in their order, in float64; bands are added in theirs. The bands depend on
 the size of a picture alone, so every number of threads gives the same bits.
 """
 
@@ -21,7 +21,7 @@ from topleft._core.base.threads import available_threads, parse_threads, run_par
 #: Pixels of a band, which has whole rows: a call of the engine costs 30 us more than its pixels.
 BAND_PX = 1 << 16
 
-#: Pixels that are worth a thread, and bands of a thread whose sums wait for those before them.
+#: Pixels that are worth a thread, and sums of bands that a thread holds until those before them are added.
 MIN_PX_PER_THREAD = 1 << 15
 WAITING_BANDS = 4
 
@@ -59,9 +59,9 @@ class Bands:
         return max((bad for part in parts for bad in part if bad is not None), default=-1)
 
     def add_up(self, work: Callable[[Band, engine.GradientSums], int | None], out: Array, rows_per_px: int) -> int:
-        """Add what `work` sums up in each band to `out` (B or 1, N, K), whose rows it numbers; returns as `run` does.
+        """Add the sums of `work` in each band to `out` (B or 1, N, K), by row of `out`; returns as `run` does.
 
-        rows_per_px: how many rows a pixel has a share in at most.
+        rows_per_px: the most rows that a pixel has a share in.
         """
 
         def with_sums(band: Band) -> tuple[list[engine.GradientSums], int | None]:
@@ -74,7 +74,7 @@ class Bands:
     def add_up_all(
         self, work: Callable[[Band], tuple[Sequence[engine.GradientSums], Found]], outs: Sequence[Array]
     ) -> list[Found]:
-        """Add the sums that `work` returns of each band to `outs`; returns what it returns besides."""
+        """Add the sums that `work` returns for each band to `outs`; returns its other results."""
         results: list[Found] = []
         at_a_time = self.threads * WAITING_BANDS if self.threads > 1 else 1
         for start in range(0, len(self.all), at_a_time):
@@ -88,7 +88,7 @@ class Bands:
 
 
 def work_on(work: Callable[[Band], Done], bands: Sequence[Band], first: int, end: int) -> list[Done]:
-    """Return what `work` makes of bands [first, end)."""
+    """Return the results of `work` for bands [first, end)."""
     return [work(band) for band in bands[first:end]]
 
 

@@ -1,8 +1,8 @@
 """Tensors of a visibility buffer: attributes and textures of its pixels, smooth silhouettes; and backward.
 
-Arrays are contiguous, float32 or float64, all of a call the same; shapes are checked by who calls. B pictures; an array
+Arrays are contiguous, float32 or float64, all of a call the same; the caller checks shapes. B pictures; an array
 of vertices, attributes or texels may have one for all of them. A function with `_vjp` returns the products of a
-gradient of the results with the Jacobian: gradients of what was given, float32 or float64 as that was.
+gradient of the results with the Jacobian: gradients of the arguments, in their dtype.
 
 Based on: Laine, S., Hellsten, J., Karras, T., Seol, Y., Lehtinen, J., Aila, T., "Modular Primitives for
 High-Performance Differentiable Rendering", ACM Transactions on Graphics, 2020.
@@ -53,7 +53,7 @@ class EdgeRule(IntEnum):
 
 @dataclass(frozen=True)
 class PixelGrid:
-    """Pictures (B, H, W) of triangles (T, 3), int32, whose vertices and attributes have rows below `n_rows`."""
+    """Pictures (B, H, W) of triangles (T, 3), int32; vertices and attributes have fewer than `n_rows` rows."""
 
     tri: NDArray[np.int32]
     n_pictures: int
@@ -72,7 +72,7 @@ class PixelGrid:
         return Bands(self.n_pictures, self.height, self.width, self.threads)
 
     def view(self, pos: Array) -> engine.GradientView:
-        """Return what the engine needs to know of a picture with these vertices (V, 4)."""
+        """Return the engine's view of a picture with these vertices (V, 4)."""
         size = self.width, self.height
         scale, shift = ((0.5, 0.5), (0.0, 0.0)) if self.in_pixels else ((1 / self.width, 1 / self.height), (-1.0, -1.0))
         return engine.GradientView(pos, self.tri, size, scale, shift, np.inf if self.in_pixels else 1.0)
@@ -82,7 +82,7 @@ class PixelGrid:
         return (self.n_pictures, self.height, self.width, *columns)
 
     def refuse(self, bad: int) -> None:
-        """Raise an error for the number of a triangle that does not exist."""
+        """Raise an error for the id of a triangle that does not exist."""
         if bad >= 0:
             raise IndexError(f"rast must hold ids of the {len(self.tri)} triangles of tri plus 1, got {bad + 1}")
 
@@ -103,7 +103,7 @@ def points(
 ) -> tuple[Array, Array]:
     """Return `rast` (B, H, W, 4): weights of the first two corners, z/w and the id plus 1; and `rast_db`.
 
-    `pos` (B or 1, V, 4). `ids`: of each picture (H, W), and what is added to them; with row 0 on top where they are
+    `pos` (B or 1, V, 4). `ids`: of each picture (H, W), and the number added to them; row 0 is on top if they are
     flipped. `rast_db` (B, H, W, 4) is du/dX, du/dY, dv/dX, dv/dY, or has no columns.
     """
     rast, rast_db = empty(grid.shape(4), pos.dtype), empty(grid.shape(4 if with_db else 0), pos.dtype)
@@ -118,7 +118,7 @@ def points(
 
 
 def faces_of(grid: PixelGrid, band: Band, n_columns: int, n_values: int) -> engine.GradientSums:
-    """Return room for sums by triangle: so many columns, and where there are few values those of them."""
+    """Return room for sums by triangle: so many columns, plus those of values if these are few."""
     more = engine.SUMS_OF_VALUES if 0 < n_values <= engine.FEW_COLUMNS else 0
     return sums_of(len(grid.tri), n_columns + more, band, grid.width, "faces")
 
@@ -140,7 +140,7 @@ def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Ar
 def values(
     grid: PixelGrid, attr: Array, rast: Array, rast_db: Array | None = None, wanted: Sequence[int] = ()
 ) -> tuple[Array, Array]:
-    """Return attributes (B or 1, V, K) at pixels (B, H, W, K), and what those `wanted` change by, (B, H, W, 2 N)."""
+    """Return attributes (B or 1, V, K) at pixels (B, H, W, K), and the slopes of those `wanted`, (B, H, W, 2 N)."""
     check_counted("attr", attr.shape[1:])
     out = empty(grid.shape(attr.shape[2]), attr.dtype)
     out_da = empty(grid.shape(2 * len(wanted)), attr.dtype)
@@ -246,19 +246,19 @@ def texels_vjp(look: TexelLook, g_out: Array) -> tuple[list[Array], Array, Array
 
 @dataclass(frozen=True)
 class Outline:
-    """What edges are in some pictures: `across` (T, 3), `places` (B or 1, V, 2), `edges` (B or 1, T): `outline_of`."""
+    """Silhouette edges in pictures, of `outline_of`: `across` (T, 3), `places` (B or 1, V, 2), `edges` (B or 1, T)."""
 
     across: NDArray[np.int32]
     places: NDArray[np.float64]
     edges: NDArray[np.int32]
 
     def of_picture(self, picture: int) -> tuple[Array, Array, Array]:
-        """Return what the engine takes of a picture."""
+        """Return the outline's arrays for one picture."""
         return self.across, of(self.places, picture), of(self.edges, picture)
 
 
 def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outline:
-    """Return which edges of triangles are silhouettes, and where vertices are; `across` is that of `halves_across`."""
+    """Return the silhouette edges of triangles and the places of vertices; `across` is that of `halves_across`."""
     places, edges = empty((*pos.shape[:2], 2), np.float64), empty((len(pos), len(grid.tri)), np.int32)
 
     def write(first: int, end: int) -> None:
@@ -310,7 +310,7 @@ def squares(
 ) -> tuple[float, Array, Array]:
     """Return the mean squared difference of pictures of attributes from others, and the gradients of `pos` and `attr`.
 
-    What `points`, `values`, `smooth` and their products give, a few rows at a time: no picture is made.
+    Equal to `points`, `values`, `smooth` and their products, a few rows at a time: no picture is made.
     """
     of_points, of_edges, g_attr = (np.zeros(one.shape, one.dtype) for one in (pos, pos, attr))
     n_vertices, n_rows, n = pos.shape[1], attr.shape[1], attr.shape[2]
@@ -339,7 +339,7 @@ def squares(
 
 
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return of each edge 3 * the triangle across it + the corner there that it is opposite to, int32 (T, 3); -1: none.
+    """Return for each edge 3 * the triangle across it + its opposite corner there, int32 (T, 3); -1: none.
 
     Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next; there, and
     where two triangles are wound differently, it is -2 less that.

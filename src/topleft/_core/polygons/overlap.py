@@ -29,7 +29,7 @@ from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.errors import MissingPackageError
 from topleft.typing import RuleOption
 
-#: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
+#: Entries allocated at a time, beyond those of the largest polygon; memory that is not written costs nothing.
 MAX_ENTRIES_AT_ONCE = 1 << 27
 
 #: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
@@ -54,7 +54,7 @@ class Overlap:
     size : (int, int)
         Width and height of the picture.
     nodata : number, optional
-        What rasters have in pixels without data, unless a method is told another one; that of the `Grid`.
+        The value of pixels without data in rasters, unless a method gets another one; that of the `Grid`.
 
     Examples
     --------
@@ -162,7 +162,7 @@ class Overlap:
         return self._reduced(np.fmax, self._values_of(raster, nodata))
 
     def stdevs(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
-        """Return the standard deviation (P,) of a raster (H, W) over each polygon, of all it holds; NaN without data.
+        """Return the population standard deviation (P,) of a raster (H, W) over each polygon; NaN without data.
 
         It is the root of the mean of the squares of the differences to the mean, each weighted by its share.
         """
@@ -223,7 +223,7 @@ class Overlap:
         return self._added(self.areas)
 
     def spread(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return a raster (H, W): the values (P,) of polygons, each pixel with as much of them as it shares.
+        """Return a raster (H, W): the values (P,) of polygons, weighted by the area shared with each pixel.
 
         Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
         """
@@ -399,7 +399,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
 
     rooms: list[Chunk] = []
     done, n_listed, entries = 0, 0, []
-    while done < n:  # as many polygons as there is room for, all of them but for huge tables
+    while done < n:  # as many polygons as there is room for: all, except in huge tables
         end = end_of_room(before, done, MAX_ENTRIES_AT_ONCE)
         n_room = int(before[end] - before[done])
         check_fits((n_listed + n_room,), dtype, np.float32)
@@ -416,7 +416,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
 
 
 def end_of_room(before: npt.NDArray[np.int64], first: int, n_entries: int) -> int:
-    """Return up to which polygon from `first` on so many entries have room; at least one."""
+    """Return the end of the polygons from `first` on that so many entries have room for; at least one."""
     end = int(np.searchsorted(before, before[first] + n_entries, "right")) - 1
     return min(len(before) - 1, max(end, first + 1))
 
@@ -431,8 +431,8 @@ def list_range(
 ) -> None:
     """Write the entries of a range of polygons to the begin of `room`, and where each ends to `starts`.
 
-    One thread, with a row of `cells` each, writes them there. Several take blocks of polygons in turn; those whose
-    block is the next one write it there, the others copy theirs to where the blocks before it have ended.
+    One thread, with a row of `cells` each, writes them there. Several take blocks of polygons in turn: the
+    thread with the next block writes it there, the others copy theirs behind the blocks before it.
     """
     begin, last = polygons
     pixels, areas = room
@@ -478,7 +478,7 @@ def list_range(
                 if not is_next:
                     pixels[at : at + n_entries], areas[at : at + n_entries] = own[0][:n_entries], own[1][:n_entries]
         except BaseException:
-            with turn:  # who waits for this block waits no longer
+            with turn:  # wake the threads that wait for this block
                 is_lost = True
                 turn.notify_all()
             raise

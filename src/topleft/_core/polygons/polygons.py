@@ -67,7 +67,7 @@ def polygons(
         One ring of points; a list of rings, holes among them, which is one polygon; a list of such lists, which are
         several. Or ``(coordinates, ring_offsets)``, one polygon, or ``(coordinates, ring_offsets, polygon_offsets)``,
         several, as in GeoArrow. Flat rings of COCO, ``[x, y, x, y, ...]``, stand for rings. Or shapely polygons, one or
-        a sequence or a GeoSeries; what `shapely.to_ragged_array` returns; GeoJSON; anything with `__geo_interface__`.
+        a sequence or a GeoSeries; the result of `shapely.to_ragged_array`; GeoJSON; anything with `__geo_interface__`.
         Rings close themselves, may run either way, and may cross and touch themselves and each other. Pixels, x right
         and y down, unless `size` is a `Grid`.
     size : (int, int) or Grid
@@ -75,11 +75,11 @@ def polygons(
     rule : "evenodd" or "nonzero"
         Whether a point is inside that the rings wind round an odd number of times, or any number but 0.
     values : "index", number, or array_like (P,) or (P, C), optional
-        What a pixel gets of the polygon that it lies in: its number, as int32; a number, or its own, of any dtype; its
-        colour. Without it the result is a mask.
+        The value of a pixel in a polygon: "index" its number, as int32; one number for all, or one for each, of any
+        dtype; or a colour for each. Without it the result is a mask.
     background : number or array_like (C,), optional
-        What pixels get that lie in none: unless given -1 with ``values="index"``, with other values the `nodata` of the
-        `Grid`, or 0.
+        The value of a pixel in no polygon. The default is -1 with ``values="index"``, with other values the `nodata` of
+        the `Grid`, or 0.
     crs : str, int or CRS, optional
         That of the points, which go to that of the `Grid` by pyproj. Unless given they are in the grid's, and a
         GeoSeries or GeoDataFrame that says another one is refused.
@@ -94,8 +94,8 @@ def polygons(
         Points snap to ``2**-subpixel_bits`` pixels.
     assume_valid : bool
         For "area", "outer" and "inner": the rings of a polygon neither cross nor touch, its first one is its border and
-        all others are holes in it; they may run either way. Saves the search for crossings. What is drawn of polygons
-        of which this is not true is undefined.
+        all others are holes in it; they may run either way. Saves the search for crossings. Pictures of other
+        polygons are undefined.
     max_crossings : int
         For "area", "outer" and "inner": how often rings may cross or touch within the picture; fifty million
         take some 4 s. Where more than 64 edges pass a pixel side by side, it counts as well.
@@ -117,7 +117,7 @@ def polygons(
         that is not finite or lies beyond ``2**60`` sub-pixels, rings that cross more than `max_crossings` times, or
         another CRS than that of the grid.
     TypeError
-        For what is no polygon, and a wrong dtype.
+        If an item is no polygon, or a dtype is wrong.
 
     Notes
     -----
@@ -260,7 +260,7 @@ def draw_binary(
 def mean_of_samples(
     prepared: Prepared, out: npt.NDArray[np.float32], paint: Paint | None, how: Sampling, *, is_nonzero: bool
 ) -> None:
-    """Write the mean of what the samples of each pixel see: 0 or 1, or colours."""
+    """Write the mean over the samples of each pixel: of 0 or 1, or of colours."""
     height, width = out.shape[:2]
     positions = sample_positions(how.n_samples, prepared.frame.grid_bits).tolist()
     mask = empty((height, width), np.uint8) if paint is None else None

@@ -59,7 +59,7 @@ class Prepared:
         run_parts(certify_part, n, min(self.n_threads, n))
 
     def pieces_shape(self) -> tuple[int, int, int] | None:
-        """Return how many parts of edges of polygons whose rings meet there can be, and the sides of their boxes."""
+        """Return the most parts of edges of polygons with rings that meet, and the sides of their boxes."""
         is_simple = self.compiled.which_are_simple()
         if is_simple.all():
             return None
@@ -76,7 +76,7 @@ class Prepared:
         return times_that_fit(self.n_threads, (n_words,), np.int64)
 
     def piece_scratch(self) -> engine.PieceScratch | None:
-        """Return memory for polygons whose rings meet, None when there are none."""
+        """Return memory for polygons with rings that meet, None when there are none."""
         shape = self.pieces_shape()
         return None if shape is None else engine.PieceScratch(*shape)
 

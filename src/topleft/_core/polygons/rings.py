@@ -35,7 +35,7 @@ class RingSet:
         return RingSet(self.points[rings[0] : rings[-1]], rings - rings[0], polygons - polygons[0])
 
     def apart_from(self, out: object) -> RingSet:
-        """Return it with copies of what `out` may share memory with."""
+        """Return it with copies of the arrays that `out` may share memory with."""
         overlap = np.may_share_memory
         if out is None or (
             isinstance(out, np.ndarray)
@@ -56,7 +56,7 @@ def as_rings(values: Any) -> RingSet:
     ValueError
         For shapes that are none of these, offsets that do not fit, and rings of fewer than three points.
     TypeError
-        For what is no polygon, and coordinates that are no real numbers.
+        If an item is no polygon, or coordinates are no real numbers.
     """
     if isinstance(values, RingSet):
         return values
@@ -117,7 +117,7 @@ def _has_tensors(values: Any) -> bool:
 
 
 def _from_offsets(values: Any) -> RingSet | None:
-    """Return (coordinates, ring_offsets[, polygon_offsets]), or what `shapely.to_ragged_array` gives; else None."""
+    """Return the rings of (coordinates, ring_offsets[, polygon_offsets]) or `shapely.to_ragged_array`; else None."""
     if not isinstance(values, tuple) or not 2 <= len(values) <= 3:
         return None
     if len(values) == 3 and isinstance(values[2], tuple) and not isinstance(values[0], (list, np.ndarray)):
@@ -137,7 +137,7 @@ def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
         raise TypeError(f"{name} must be integers, got dtype {offsets.dtype}")
     if offsets.ndim != 1 or len(offsets) < 1:
         raise ValueError(f"{name} must have shape (n + 1,), got {offsets.shape}")
-    offsets = np.array(offsets, np.int64)  # a copy: what has been checked is what is used
+    offsets = np.array(offsets, np.int64)  # a copy: nobody else changes it after the check
     steps = offsets[1:] - offsets[:-1]
     least = np.minimum.reduce(steps, initial=3)
     if offsets[0] != 0 or offsets[-1] != n or least < 0:

@@ -1,4 +1,4 @@
-"""From a visibility buffer back to what it was drawn from: gradients of vertices and of attributes, in float64."""
+"""From a visibility buffer back to its mesh: gradients of vertices and of attributes, in float64."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class Backward:
         return g_color.reshape(given.shape), self.to_vertices(g_pos)
 
     def outline(self) -> tensors.Outline:
-        """Return what the edges of the mesh are."""
+        """Return the outline of the mesh: its silhouette and inner edges."""
         return tensors.outline_of(self.grid, self.pos, tensors.halves_across(self.grid.tri))
 
     def as_picture(self, picture: ArrayLike) -> tuple[NDArray[Any], Floats]:
@@ -193,9 +193,9 @@ def area_vjp(
     size : (int, int), or int for a square
         Width and height of the picture in pixels.
     grad : array_like, shape (H, W), or (H, W, C) with `colors`
-        What some number changes by with ``overdraw(sampling="area")``, the sum of the areas of a pixel. Of `coverage`
-        the same where less than 1 is covered, and 0 elsewhere. With `colors` what it changes by with the sum of areas
-        times colours, which is `fill` over black where no triangles overlap.
+        Gradient of some number with respect to ``overdraw(sampling="area")``, the sum of the areas of a pixel. For
+        `coverage` it is the same where less than 1 is covered, and 0 elsewhere. With `colors`: with respect to the sum
+        of areas times colours, which is `fill` over black where no triangles overlap.
     colors : array_like, shape (T, C), optional
         Of each triangle.
     threads : int, optional
@@ -204,8 +204,8 @@ def area_vjp(
     Returns
     -------
     ndarray of float64, shape of `vertices`
-        What it changes by with the vertices; 0 for triangles without area. It is exact for the triangles as they
-        stand, before the snap.
+        Its gradient with respect to the vertices; 0 for triangles without area. It is exact for the triangles
+        before the snap.
 
     Raises
     ------

@@ -49,7 +49,7 @@ class ClusterRoute(Enum):
 
 
 class MeshletLimits(NamedTuple):
-    """Limits from which a mesh is drawn in clusters: `triangles`, or the share outside and those in view a pixel."""
+    """Limits above which a mesh is drawn from meshlets: `triangles`, or the share outside and those in view a pixel."""
 
     triangles: float
     outside: float
@@ -110,7 +110,7 @@ def is_affine(matrix: NDArray[Any] | None) -> bool:
 
 
 def must_cut(n_outside: int) -> bool:
-    """Tell whether triangles are looked through for those that a clip plane cuts: no vertex outside, none cut."""
+    """Tell whether to search for triangles that a clip plane cuts: no vertex outside, none cut."""
     return n_outside > 0
 
 
@@ -131,7 +131,7 @@ def pays_to_share(n_items: int) -> bool:
 
 
 def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
-    """Return how many threads draw, in bands of rows: as many as are asked for, or as many as the work is worth."""
+    """Return how many threads draw, in bands of rows: `threads=`, or as many as the work is worth."""
     n_threads = view.threads
     if n_threads is None:
         n_threads = available_threads()
@@ -141,7 +141,7 @@ def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
 
 
 def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
-    """Return about how long one thread draws, from a guess of what is seen."""
+    """Return an estimate of how long one thread draws, from a guess of the visible area."""
     costs = cost_table()
     kind = "area" if view.sampling is Sampling.AREA else WORK_OF.get(sink, "ids")
     row_ns, sample_ns, pixel_ns = getattr(costs, f"work_{kind}")
@@ -160,7 +160,7 @@ def can_slice(view: View) -> bool:
 
 
 def takes_lanes(view: View) -> bool:
-    """Tell whether int32 can count the pixels of a picture, of which nobody has said how it is drawn."""
+    """Tell whether int32 can count the pixels of a picture, and no `method` was chosen for it."""
     width, height = view.size
     is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
     return is_near and view.method == METHODS["auto"].code
@@ -182,7 +182,7 @@ def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
 
 
 def pays_float_lanes(view: View) -> bool:
-    """Tell whether float lanes draw what integer ones of 32 bits are too short for: coverage alone, on a fine grid.
+    """Tell whether float lanes draw where 32-bit integers are too short: coverage alone, on a fine grid.
 
     1,000,000 triangles of 1 px at 16 bits: 42 and 8 ms; 100,000 of 10 px at 12 bits: 12.7 and 4 ms.
     """
@@ -194,7 +194,7 @@ def pays_float_lanes(view: View) -> bool:
 def can_cluster(view: View, sink: Sink) -> bool:
     """Tell whether the clusters of a mesh may be drawn one by one, in any order: where that decides nothing."""
     is_on_grid = view.grid_bits == view.subpixel_bits and (sink is not Sink.SAMPLES or view.grid_bits <= 8)
-    if view.single_sided is not None:  # clusters do not know which triangles are
+    if view.single_sided is not None:  # clusters do not know single-sided triangles
         return False
     return sink in ORDER_FREE and is_on_grid and 0 not in view.size and can_slice(view)
 
@@ -211,7 +211,7 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
 def cluster_route(
     view: View, sink: Sink, clusters: Clusters, survey: Survey, find_beyond: Callable[[], float]
 ) -> ClusterRoute:
-    """Return how a view of a mesh in clusters is drawn; `survey`: what becomes of them in it.
+    """Return how a view of a mesh in clusters is drawn; `survey`: their visibility in it.
 
     `find_beyond`: the share of the vertices beyond the near or far plane.
     """
@@ -256,7 +256,7 @@ def pays_to_draw_samples(
 
 
 def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
-    """Tell whether a view of a mesh in clusters is drawn from these; `survey`: what becomes of them in it."""
+    """Tell whether a view of a mesh in clusters is drawn from these; `survey`: their visibility in it."""
     costs, is_culled = cost_table(), view.cull != CULL_CODES[Cull.NONE]
     limits = costs.cluster_small, costs.cluster_middle, (math.inf, 0.0, 0.0)
     least = next(shares[is_culled] for below, *shares in limits if n_triangles < below)
@@ -266,8 +266,7 @@ def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
 def can_draw_meshlets(view: View, sink: Sink, *, is_float32: bool) -> bool:
     """Tell whether a view of a mesh in clusters may be drawn from meshlets, where there is code for these.
 
-    They hold coordinates that are float32 numbers, whatever their dtype, and draw triangles in 16 bits, of what lies
-    between near and far.
+    Their coordinates are float32 numbers, whatever the dtype. They draw triangles of 16 bits between near and far.
     """
     if not (engine.has_meshlets() and sink in (Sink.NEAREST, Sink.FARTHEST) and is_float32):
         return False
@@ -280,14 +279,14 @@ def can_draw_meshlets(view: View, sink: Sink, *, is_float32: bool) -> bool:
 def pays_to_grow(n_pictures: int, n_triangles: int, n_clusters: int) -> bool:
     """Tell whether a mesh in clusters has been drawn often enough to grow it into meshlets.
 
-    Triangles that share no vertices, of which few are in a cluster, never are.
+    A mesh without shared vertices never is: its clusters hold few triangles.
     """
     costs = cost_table()
     return n_pictures >= costs.grown_pictures and n_triangles >= costs.grown_cluster * n_clusters
 
 
 def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: float) -> bool:
-    """Tell whether a view of a mesh is drawn from meshlets; `survey`: what becomes of its clusters.
+    """Tell whether a view of a mesh is drawn from meshlets; `survey`: the visibility of its clusters.
 
     `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom.
     """
@@ -322,7 +321,7 @@ def pays_to_draw_instances(
 
 
 def instance_ns(view: View, n_triangles: int, share: float) -> float:
-    """Return about how long an instance takes whose box covers a share of the picture."""
+    """Return about how long an instance takes if its box covers a share of the picture."""
     costs, n_pixels = cost_table(), share * view.size[0] * view.size[1]
     row_ns, sample_ns, _ = costs.work_ids
     n_rows = n_triangles * max(1.0, math.sqrt(2 * n_pixels / n_triangles))
@@ -363,7 +362,7 @@ def first_depth(points: NDArray[Any], *, has_depth: bool) -> float:
     """Return the depth of the first vertex as a depth buffer holds it."""
     if not has_depth:
         return 0.0
-    with np.errstate(over="ignore"):  # what float32 cannot hold has been refused if a triangle uses it
+    with np.errstate(over="ignore"):  # a used vertex beyond float32 has been refused before
         return float(np.float32(points[0, 2])) + 0.0  # -0 becomes 0, as it does in every depth buffer
 
 
@@ -391,7 +390,7 @@ class Drawing(NamedTuple):
     sink: Sink
     n_threads: int
     is_sliced: bool  # each thread takes a slice of the triangles; otherwise all of them, in its own rows
-    is_bounded: bool  # large triangles leave out what lies behind what has been drawn
+    is_bounded: bool  # large triangles skip parts of the picture that hide them
     in_bands: bool  # triangles are sorted into bands of rows, and band after band is drawn
 
 
@@ -485,7 +484,7 @@ def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: 
 
 
 def can_split(view: View, n_triangles: int) -> bool:
-    """Tell whether what samples see may be kept once for the pixels that show one triangle."""
+    """Tell whether pixels that show one triangle may keep its id and depth once, not by sample."""
     return view.is_split and view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_slice(view)
 
 

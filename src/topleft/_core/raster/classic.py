@@ -1,6 +1,6 @@
 """The classics behind the public verbs: checks, one kernel call, the same buffers.
 
-In: what `coverage`, `overdraw` and `fill` take, with a ``method=`` of `CLASSICS`.  Out: their results.  Vertices are
+In: arguments of `coverage`, `overdraw` or `fill`, with a ``method=`` of `CLASSICS`.  Out: their results.  Vertices are
 pixels; there is no transform, clipping, culling or depth.  A count is the number of times that a pixel was drawn, so a
 method that draws a row twice shows it.
 """
@@ -29,7 +29,7 @@ def bresenham_line(x0: int, y0: int, x1: int, y1: int) -> NDArray[np.int64]:
     Parameters
     ----------
     x0, y0, x1, y1 : int
-        Columns and rows of the ends, both of which are drawn. A horizontal line runs from the first to the second.
+        Columns and rows of the ends; both are drawn. A horizontal line runs from the first to the second.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def as_scene(
     points = as_vertices(vertices, has_transform=False)
     if points.shape[1] == 4:
         raise ValueError(f"method {method.name!r} takes vertices in pixels, (V, 2) or (V, 3), got shape {points.shape}")
-    points = np.array(points, np.float64, order="C")  # a copy: what has been checked is what is used
+    points = np.array(points, np.float64, order="C")  # a copy: nobody else changes it after the check
     corners = as_checked_triangles(triangles, len(points))
     # Without sub-pixel bits a kernel takes one, so that a pixel centre is an integer.
     limit = method.limit / 2 ** max(1, view.subpixel_bits) if method.has_subpixel_bits else method.limit

@@ -1,6 +1,6 @@
-"""Draws clusters: takes what a view shows of a mesh from vertices to pixels, cluster by cluster.
+"""Draws clusters: takes the visible part of a mesh from vertices to pixels, cluster by cluster.
 
-In: `Clusters`, a view, a target. Out: the picture that the whole mesh gives, and what attributes need, snapped.
+In: `Clusters`, a view, a target. Out: the picture of the whole mesh, and its snapped triangles for attributes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}
 #: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
 MARGIN_PX = 1.0
 
-#: Clusters that tell what a view shows of all: 5 microseconds.
+#: Clusters that are looked at to estimate the visibility of all: 5 microseconds.
 SURVEYED = 50
 
 #: Clusters that tell the same of a picture of several samples, which depends on how many triangles lie in view a pixel,
@@ -44,13 +44,13 @@ NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
 
 class Survey(NamedTuple):
-    """Shares of the clusters of a mesh by what a view does with them, hidden or not."""
+    """Shares of the clusters of a mesh by their visibility in a view, hidden or not."""
 
     outside: float
     turned: float
     """Certain to be culled."""
     back: float
-    """Showing their backs: what is closed and not culled hides them."""
+    """Showing their backs: a closed mesh that is not culled hides them."""
     front: float
 
 
@@ -80,7 +80,7 @@ class ClusteredMesh:
         return float(is_beyond.mean()) if len(some) else 0.0
 
     def route(self, sink: Sink) -> ClusterRoute:
-        """Return how a picture of the mesh is drawn, which counts as one."""
+        """Return how a picture of the mesh is drawn, and count that picture."""
         clusters = self.clusters
         survey = self.survey(SURVEYED_OF_SAMPLES if self._view.sampling.n_samples > 1 else SURVEYED)
         found = choices.cluster_route(self._view, sink, clusters, survey, self.find_beyond)
@@ -104,7 +104,7 @@ class ClusteredMesh:
         return draw_clustered(memories, tops, lambda *_: [0], lambda _: self, target, sample)
 
     def note_hidden(self, target: engine.Target) -> None:
-        """Note how much of the mesh lies behind what a target holds, which decides how the next picture is drawn."""
+        """Note the share of the mesh that a target hides; it decides how the next picture is drawn."""
         can_draw_meshlets = choices.can_draw_meshlets(
             self._view, Sink(target.sink), is_float32=self.clusters.is_float32
         )
@@ -152,7 +152,7 @@ class ClusteredMesh:
         return self.draw_rows(FRESH, target, 0, height)[1]
 
     def hidden_share(self, target: engine.Target, n_most: int = SURVEYED_BEHIND) -> float:
-        """Return the share of the clusters that the picture may show which lie behind what a target holds, by some."""
+        """Return the share of the clusters in view that a target hides, from a sample of them."""
         seen, step = self._seen(target.sink), max(1, round(len(self.clusters) / n_most))
         n, n_hidden = self.clusters.engine.count_hidden(self._empty, seen, target, step)
         return n_hidden / max(1, n)
@@ -170,7 +170,7 @@ class ClusteredMesh:
         return draw_others(memory, self, np.unique(np.concatenate(parts)), target, equal_bands(height, n_parts), sample)
 
     def part(self, *triangles: NDArray[np.int32]) -> engine.SnappedMesh:
-        """Return the mesh with what some triangles use snapped, maybe more; -1 is no triangle."""
+        """Return the mesh with the vertices of some triangles snapped, maybe more; -1 is no triangle."""
         points, own, view = self.clusters.points, self.clusters.triangles, self._view
         mesh = None
         if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
@@ -186,7 +186,7 @@ class ClusteredMesh:
     ) -> list[Callable[..., engine.SnappedMesh]]:
         """Return a maker of the mesh as each sample sees it; those that (S, H, W) ids show are snapped once.
 
-        Where other triangles are asked for, too, all are snapped.
+        Where other triangles are needed, too, all are snapped.
         """
         common = cache(lambda: self.part(ids))
         whole = cache(lambda: self.part(np.arange(self.clusters.n_triangles, dtype=np.int32)))
@@ -197,7 +197,7 @@ class ClusteredMesh:
         return [part_at(*sample) for sample in samples]
 
     def try_part(self, triangles: Sequence[NDArray[np.int32]] | None, memory: Memory) -> engine.SnappedMesh | None:
-        """Return the mesh with what some triangles use snapped; None where a vertex does not fit or is not finite.
+        """Return the mesh with the vertices of some triangles snapped; None if one does not fit or is not finite.
 
         Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
         """
@@ -244,7 +244,7 @@ class ClusteredMesh:
 def draw_pass(
     memory: Memory, drawn: engine.MeshletPass, n: int, n_triangles: int, height: int, n_parts: int
 ) -> list[NDArray[np.int32]]:
-    """Draw what a pass over n meshlets shows, in as many bands of rows; returns what is still to be drawn."""
+    """Draw the visible ones of n meshlets in `n_parts` bands of rows; returns the triangles still to be drawn."""
     words = engine.SEEN_BYTES // 4
     found: NDArray[np.int32] = memory.empty("meshlets found", (words * (n + 16),), np.int32)
     odd: NDArray[np.int32] = memory.empty("meshlets odd", (n + 16,), np.int32)
@@ -321,7 +321,7 @@ def draw_others(
     tops: Sequence[int],
     sample: tuple[int, int],
 ) -> bool:
-    """Draw some triangles of a mesh over what is there; returns as `draw_clustered` does.
+    """Draw some triangles of a mesh over the picture; returns as `draw_clustered` does.
 
     `tops`: the first rows of the bands that the others were drawn in, and the height: a mask has its bits band by band.
     """

@@ -1,4 +1,4 @@
-"""Clusters: a mesh sorted once, so that a view leaves out what cannot show in it.
+"""Clusters: a mesh sorted once, so that a view leaves out triangles that cannot show in it.
 
 In: the vertices and triangles of a mesh in object space. Out: copies of them in clusters and in meshlets.
 """
@@ -25,7 +25,7 @@ PICTURES_A_LOOK = 4
 
 
 class Backoff:
-    """Exponential back-off: how long a mesh is drawn whole before its clusters are asked again whether they pay.
+    """Exponential back-off: how long a mesh is drawn whole before its clusters are tried again.
 
     After a picture for which they did not, that is not found out for the next two, then four, then eight pictures:
     cameras move little between pictures, and finding out takes 5 % of a small one.
@@ -35,12 +35,12 @@ class Backoff:
         self._n_left = self._n_refused = 0
 
     def is_over(self) -> bool:
-        """Tell whether to find out, for one picture more."""
+        """Tell whether to try the clusters with this picture."""
         self._n_left -= 1
         return self._n_left < 0
 
     def note(self, *, pays: bool) -> None:
-        """Note what was found out."""
+        """Note whether the clusters paid."""
         self._n_refused = 0 if pays else min(3, self._n_refused + 1)
         self._n_left = 2**self._n_refused if self._n_refused else 0
 
@@ -53,7 +53,7 @@ class Clusters:
     points : ndarray, shape (V, 3), contiguous float32 or float64
         The vertices of the mesh.
     triangles : ndarray of int32, shape (T, 3)
-        Its triangles, whose indices have been checked.
+        Its triangles, their indices checked.
     n_pictures : int
         How many pictures of the mesh there have been that might have been drawn in clusters.
     hidden : float
@@ -102,7 +102,7 @@ class Clusters:
 
     @cached_property
     def meshlets(self) -> Meshlets:
-        """The same triangles in meshlets, made when they are first asked for (`pays_to_grow` in `choices.py`)."""
+        """The same triangles in meshlets, made on first access (`pays_to_grow` in `choices.py`)."""
         return Meshlets(self)
 
     @property
@@ -114,7 +114,7 @@ class Clusters:
         return len(self.engine)
 
     def is_look_due(self) -> bool:
-        """Tell whether it is to be found out how much this picture hides, and note that it is."""
+        """Tell whether to measure how much this picture hides, and note that it is measured."""
         is_due = self.n_pictures - self.hidden_at >= PICTURES_A_LOOK
         if is_due:
             self.hidden_at = self.n_pictures
@@ -141,7 +141,7 @@ class Meshlets:
     blocks : (N * MESHLET_BYTES,) uint8
         `tl_meshlet` of ``csrc/meshlets.h``: vertices, corners, and which triangle of the mesh each is.
     bounds : (MESHLET_BOUNDS, N + MESHLET_TAIL) float32
-        What is known of each.
+        The bounds of each.
     counts : (N + MESHLET_TAIL,) uint8
         Their triangles, with the empty ones.
     n_bytes : int

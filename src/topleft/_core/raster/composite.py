@@ -35,12 +35,12 @@ def composite(
     out: NDArray[Any] | None = None,
     threads: int | None = None,
 ) -> NDArray[Any]:
-    """Return what is seen of layers that let light through, whatever the order of the triangles.
+    """Return the picture of transparent layers, the same for every order of the triangles.
 
     Parameters
     ----------
     layers : DepthLayers
-        What `peel` returns.
+        The result of `peel`.
     colors : array_like of uint8 or float32
         Of the triangles (T, C), of the vertices (V, C), or of each layer of each pixel (H, W, K, C): straight colours,
         the last channel alpha, C 2 or 4; with `opacity` C is 1 or 3. uint8 runs to 255, float32 to 1. Of a scene T
@@ -48,9 +48,9 @@ def composite(
     opacity : float, 0 to 1, optional
         Alpha of all colours, which then have no channel for it; with uint8 rounded to one of its 255 steps.
     per : "auto", "triangle", "vertex" or "pixel"
-        Whose colours they are; "auto" tells by the shape, which must not fit two.
+        The owners of the colours; "auto" decides by the shape, which must not fit two.
     background : array_like, shape (C,), optional
-        What lies behind all layers, in the range of the colours, with alpha; nothing unless given.
+        The colour behind all layers, in the range of the colours, with alpha; nothing unless given.
     out : ndarray, shape (H, W, C), optional
         Where the result goes.
     threads : int, optional
@@ -72,8 +72,8 @@ def composite(
     -----
     Layer k counts ``w[k] = a[k] * (1 - a[0]) * ... * (1 - a[k-1])``; the colour is the mean of the colours by w, the
     alpha their sum: "over", from front to back. This is computed in float64 and rounded once: uint8 to nearest, ties
-    to even. Colours of vertices are perspective-correct, alpha too, and rounded to float32 before. What lies behind
-    the last layer that was peeled is not seen.
+    to even. Colours of vertices are perspective-correct, alpha too, and rounded to float32 before. Surfaces behind
+    the last peeled layer are not seen.
 
     References
     ----------

@@ -1,7 +1,7 @@
-"""The table of costs: a field of `Costs` is a row, with its value, its unit, what it prices and where it was measured.
+"""The table of costs: a field of `Costs` is a row, with its value, its unit, its meaning and where it was measured.
 
-Choices follow from it (`choices.py`), and so do the estimates of plans; no bit of a picture does. In: what ships, or
-what `topleft calibrate` has written to the user's cache folder. `docs/design/choices.md` tells how rows were found.
+Choices follow from it (`choices.py`), and so do the estimates of plans; no bit of a picture does. In: shipped numbers,
+or those that `topleft calibrate` has written to the user's cache folder. `docs/design/choices.md` derives the rows.
 """
 
 # ruff: noqa: RUF009 (a row is a field with a value that cannot change)
@@ -31,7 +31,7 @@ DTYPES = ("float32", "float64", "int64")
 #: A fitted cost, or a difference, may be 0: no choice is made from it.
 FITTED = ("clip", "beyond", "draw_mask", "draw_count", "draw_depth", "draw_samples", "draw_area")
 
-#: A file may say so many times more or less than what ships: beyond, it is damaged.
+#: A file's numbers are at most so many times above or below the shipped ones: beyond, it is damaged.
 MOST_TIMES = 100.0
 
 Census = Sequence[tuple[int, float, float]]
@@ -177,7 +177,7 @@ class Costs:
 
     @property
     def thread_ns(self) -> float:
-        """The least work of a thread: so many times as much as waking it."""
+        """The least work of a thread, a multiple of the time to wake it."""
         return self.thread_wakes * self.wake
 
     def vertex_ns(self, kind: str, dtype: str) -> float:
@@ -221,7 +221,7 @@ _table: Costs | None = None
 
 
 def cost_table() -> Costs:
-    """Return the costs in use: of this machine where they have been measured, read once; else those that ship."""
+    """Return the costs in use, read once: those measured on this machine, else the shipped ones."""
     return use_costs(load_costs()) if _table is None else _table
 
 
@@ -239,11 +239,11 @@ def cache_file() -> Path:
 
 
 def load_costs() -> Costs:
-    """Return the costs of this machine, or those that ship if none, or none that can be used, have been measured."""
+    """Return the measured costs of this machine, or the shipped ones if there are none that can be used."""
     try:
         if not cache_file().is_file():
             return Costs()
-        import json  # what few programs need is not imported with topleft
+        import json  # few programs need it
 
         own = json.loads(cache_file().read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError, RuntimeError):  # RuntimeError: nobody's home folder
@@ -258,7 +258,7 @@ def load_costs() -> Costs:
 
 
 def is_like(value: Any, shipped: Any, *, can_be_zero: bool) -> bool:
-    """Tell whether a file's value has the type and length of what ships, and is not far from it."""
+    """Tell whether a file's value has the type and length of the shipped one, and is not far from it."""
     if isinstance(shipped, str):
         return isinstance(value, str)
     if isinstance(shipped, tuple):

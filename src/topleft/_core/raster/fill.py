@@ -1,7 +1,7 @@
 """Fills a picture with the colours of triangles: of the one that shows in a pixel, or blended one after the other.
 
-Several samples are resolved: what they see is averaged, values or the light that these stand for. With straight alpha
-colours count as much as they are opaque: the mean of premultiplied colours, made straight again.
+Several samples are resolved: their colours are averaged, as values or in linear light. With straight alpha
+colours are weighted by it: the mean of premultiplied colours, made straight again.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Blending:
 
     @property
     def is_needed(self) -> bool:
-        """False when a triangle simply replaces what its samples held."""
+        """False when a triangle simply replaces the colour of its samples."""
         return self.by_area or self.mode is not Blend.REPLACE
 
     @property
@@ -339,7 +339,7 @@ def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_strai
     Raises
     ------
     ValueError
-        If the option is unknown, or light is asked for and the colours are no uint8.
+        If the option is unknown, or it is light and the colours are no uint8.
     """
     is_linear = parse(Resolve, "resolve", resolve) is Resolve.LINEAR
     if is_linear and colors.dtype != np.uint8:

@@ -55,7 +55,7 @@ class GivenCorners(NamedTuple):
         return np.stack([(w + x) * (width / 2), (w - y) * (height / 2), w], axis=-1)
 
     def steps(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
-        """What l of each corner changes by along x and y, and its w: (N, 3, 3) float64.
+        """Return the slopes of each corner's l along x and y, and its w: (N, 3, 3) float64.
 
         The weights of a pixel are l / (l0 + l1 + l2), and l = M^-1 (x, y, 1), where the columns of M are the corners.
         """
@@ -84,7 +84,7 @@ class SeenSamples(NamedTuple):
         return cls(as_read(ids, ids.dtype), as_read(depth, np.float32), split, n or len(ids))
 
     def split_pixels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[Any], NDArray[np.float32]]:
-        """Return rows and columns (P,) of pixels whose samples see several triangles, and ids and depths (S, P)."""
+        """Return rows and columns (P,) of pixels that show several triangles, and ids and depths (S, P)."""
         ids, depth, split = self.ids, self.depth, self.split
         if split is None:
             is_split = np.zeros(ids.shape[1:], np.bool_)
@@ -101,14 +101,14 @@ class SeenSamples(NamedTuple):
 
 
 def as_read(planes: NDArray[Any], kind: npt.DTypeLike) -> NDArray[Any]:
-    """Planes as kernels read them: as they are, if that is so."""
+    """Planes as kernels read them: copied only if need be."""
     return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
 
 
 class Fragments:
-    """What `rasterize` returns.
+    """The visibility buffer that `rasterize` returns.
 
-    Attributes, and samples but the first, are computed when they are asked for, from the `triangles` that were passed
+    Attributes, and all samples but the first, are computed on first access, from the `triangles` that were passed
     in, and for clip space from the `vertices` too: do not change those arrays before.
 
     Attributes
@@ -143,7 +143,7 @@ class Fragments:
     _split: SplitSamples | None = None
     #: The mesh that it was drawn from; None where that is not kept.
     corners: GivenCorners | None = None
-    #: What attributes are given for: "Mesh", "Scene" (for each instance) or "Points".
+    #: The subject that attributes belong to: "Mesh", "Scene" (one for each instance) or "Points".
     _subject_kind = "Mesh"
     #: Ids and depth of these, (S, H, W).
     _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
@@ -163,7 +163,7 @@ class Fragments:
         self._n_triangles = n_triangles
 
     def drawn_from(self, corners: GivenCorners) -> Self:
-        """Keep what it was drawn from, for derivatives and distances; returns itself."""
+        """Keep the mesh that it was drawn from, for derivatives and distances; returns itself."""
         self.corners = corners
         for sample in self._samples:
             sample.corners = corners
@@ -188,11 +188,11 @@ class Fragments:
             self.drawn_from(self.corners)
 
     def _whole(self, ids: NDArray[Any]) -> NDArray[Any]:
-        """Return what `.id` calls triangles that were drawn: the same, but for parts that a lens makes of them."""
+        """Return the ids of drawn triangles as `.id` has them: the same, unless a lens cuts triangles into parts."""
         return ids
 
     def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
-        """Return each mesh that some sample sees, as the first does: its index, and what its triangle 0 is called."""
+        """Return each visible mesh as the first sample sees it: its index, the mesh, the id of its triangle 0."""
         return [(0, self._snapped, 0)]
 
     def _counts(self) -> list[tuple[int, int]]:
@@ -200,7 +200,7 @@ class Fragments:
         return [(self._n_vertices, self._n_triangles)]
 
     def _parts_of(self, i: int, mesh: Any) -> Any:  # noqa: ARG002
-        """Return mesh `i` as it was drawn: itself, but for a lens."""
+        """Return mesh `i` as it was drawn: itself, unless a lens cuts it."""
         return mesh
 
     def _seen(self) -> SeenSamples:
@@ -246,7 +246,7 @@ class Fragments:
 
     @property
     def samples_id(self) -> NDArray[Any]:
-        """What `id` is, by sample, (H, W, S)."""
+        """The ids of `id` at each sample, (H, W, S)."""
         return self.samples_triangle
 
     @property
@@ -276,7 +276,7 @@ class Fragments:
 
     @classmethod
     def of_split(cls, split: SplitSamples, n_vertices: int, n_triangles: int) -> Fragments:
-        """Return the fragments of several samples whose planes are drawn when they are asked for."""
+        """Return the fragments of several samples; their planes are drawn on first access."""
         frags = cls(split.ids, split.depth, split.drawn.meshes[0], n_vertices, n_triangles)
         frags._split = split
         return frags
@@ -309,18 +309,18 @@ class Fragments:
         Parameters
         ----------
         texture : Texture, or array_like of real numbers, shape (H, W) or (H, W, C); or int
-            Any number of channels. Row 0 is the top, where v = 1; bytes are taken as 0 to 1. A `Texture` says itself
-            what follows. A number without `uv`: ids, depth and attributes at that sample, with several a pixel.
+            Any number of channels. Row 0 is the top, where v = 1; bytes are taken as 0 to 1. A `Texture` has
+            its own filter, wrap and encoding. A number without `uv`: the fragments of that sample of several.
         uv : array_like, shape (V, 2) per vertex or (T, 3, 2) per corner; of a scene one for each instance
             Where the vertices lie in the texture: u from left to right, v from the bottom up, 0 to 1.
         filter : {"trilinear", "bilinear", "nearest", "pixelated"}
             "trilinear": between texels, and between the two halvings next to the longer side of the pixel's footprint,
             which is that of the analytic derivatives of `uv`.
         wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
-            What lies beyond 0 and 1.
+            The texture beyond 0 and 1.
         encoding : {"linear", "srgb"}, optional
-            "linear", unless given: values are taken as they are. "srgb": the first three channels are decoded, and
-            what is returned is light.
+            "linear", unless given: values are taken as they are. "srgb": the first three channels are decoded
+            to linear light.
         background : float
             Value where there is no triangle.
 
@@ -368,7 +368,7 @@ class Fragments:
         return samples[as_sample(i, len(samples))]
 
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
-        """Return the distance along the view of what each pixel shows ("metric z"), in units of the world.
+        """Return the distance of each visible pixel along the view ("metric z"), in units of the world.
 
         Parameters
         ----------
@@ -410,16 +410,16 @@ class Fragments:
         values : array_like
             As in `interpolate`.
         grad : array_like, shape (H, W, K), or (H, W) for values of shape (V,)
-            What some number changes by with what `interpolate` returns.
+            Gradient of some number with respect to the values that `interpolate` returns.
         grad_derivatives : array_like, shape (H, W, K, 2), or (H, W, 2), optional
-            What it changes by with the derivatives.
+            Its gradient with respect to the derivatives.
 
         Returns
         -------
         (ndarray of float64, ndarray of float64)
-            What it changes by with the values, in their shape, and with the vertices, in theirs, triangles staying
-            where they show: what edges do is in `antialias_vjp`. 0 for what shows nowhere, and for triangles without
-            area.
+            Its gradients with respect to the values and to the vertices, in their shapes. The triangle of each pixel
+            is constant here: `antialias_vjp` has the gradients of edges. 0 where a value or vertex shows nowhere, and
+            for triangles without area.
 
         Raises
         ------
@@ -467,7 +467,7 @@ class Fragments:
         return Backward.of(self).depth(grad)
 
     def antialias(self, picture: ArrayLike, *, edges: EdgesOption = "area") -> NDArray[Any]:
-        """Return a picture of what shows with smooth silhouettes.
+        """Return the picture with smooth silhouettes.
 
         Parameters
         ----------
@@ -506,12 +506,12 @@ class Fragments:
         picture, edges
             As in `antialias`.
         grad : array_like, shape of `picture`
-            What some number changes by with what `antialias` returns.
+            Gradient of some number with respect to the picture that `antialias` returns.
 
         Returns
         -------
         (ndarray of float64, ndarray of float64)
-            What it changes by with the picture and with the vertices, in their shapes.
+            Its gradients with respect to the picture and to the vertices, in their shapes.
 
         Raises
         ------
@@ -577,7 +577,7 @@ class Fragments:
     def interpolate(
         self, values: Any, *, background: float = 0.0, derivatives: bool = False
     ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return an attribute of the vertices at each visible pixel, and what it changes by from pixel to pixel.
+        """Return an attribute of the vertices at each visible pixel, and its derivatives if asked for.
 
         Parameters
         ----------
@@ -633,7 +633,7 @@ class Fragments:
             raise ValueError("derivatives are those of rasterize and rasterize_mesh, not of layers")
         channels = array.shape[-1] if array.ndim > 1 else 1
         out = np.empty((*self.triangle.shape, channels, 2), np.float32)
-        ids = np.maximum(self._ids().reshape(-1), -1)  # a copy: what has been checked is what is used
+        ids = np.maximum(self._ids().reshape(-1), -1)  # a copy: nobody else changes it after the check
         is_seen = np.zeros(self._n_triangles + 1, np.bool_)
         if ids.size and ids.max() >= self._n_triangles:  # the caller has written into them
             raise IndexError(f"triangle must hold ids below {self._n_triangles}, got {ids.max()}")
@@ -668,7 +668,7 @@ class Fragments:
 
 
 def as_sample(i: object, n: int) -> int:
-    """Return which of n samples a number means, the last for -1."""
+    """Return the index of a sample, of n; -1 is the last."""
     if not isinstance(i, int | np.integer):
         raise TypeError(f"sample takes the number of a sample, or a texture and uv, got {shown(i)} alone")
     if not -n <= i < n:

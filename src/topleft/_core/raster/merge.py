@@ -33,7 +33,7 @@ def merge(
     depth_test: DepthTestOption | None = "less",
     threads: int | None = None,
 ) -> tuple[I32, F32]:
-    """Return the visibility buffer of all triangles, of those that shares of them were drawn to.
+    """Return the visibility buffer of all triangles from the buffers of shares of them.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def merge(
     -------
     ids : ndarray of int32
     depth : ndarray of float32
-        What `rasterize` gives of all triangles, bit for bit: the nearest one, the lower index at equal depth.
+        Equal to `rasterize` of all triangles, bit for bit: the nearest one, the lower index at equal depth.
 
     Raises
     ------
@@ -93,7 +93,7 @@ def merge(
         if shares is not None:
             if i >= len(shares):
                 raise ValueError(f"triangles must have an item for each buffer, got {len(shares)}")
-            own_ids = own_ids.copy()  # what has been checked is what is named
+            own_ids = own_ids.copy()  # nobody else changes it after the check
             names = _as_names(shares[i], own_ids, i)
         if ids is None or depth is None:
             ids = np.full(own_ids.shape, -1, np.int32)

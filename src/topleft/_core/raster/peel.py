@@ -29,7 +29,7 @@ BAND_BYTES = 1 << 20
 
 
 class DepthLayers:
-    """What `peel` returns: of every pixel the triangles that cover its centre, the nearest first.
+    """The depth layers that `peel` returns: the triangles that cover a pixel's centre, the nearest first.
 
     Attributes
     ----------
@@ -136,8 +136,8 @@ def peel(
     Notes
     -----
     The layers of a pixel are the triangles that cover its centre, by their depth, at equal depth by their index; each
-    has the id and the depth that `rasterize` gives it when it is drawn alone. So layer 0 is what `rasterize` returns,
-    and layer k what it would return if what the layers before show were gone. Vertices (V, 2) lie at depth 0: their
+    has the id and the depth that `rasterize` gives it when it is drawn alone. So layer 0 equals `rasterize`, and
+    layer k equals it without the surfaces of the layers before. Vertices (V, 2) lie at depth 0: their
     layers are the triangles in the order of their indices.
 
     References
@@ -162,7 +162,7 @@ def draw_layers_of(
 ) -> DepthLayers:
     """Return the layers of `peel` by checked options."""
     n, is_farthest = check_peel(view, layers, depth_test)
-    # Layers refer to what they were drawn from, so nothing of it can be reused.
+    # Layers refer to the arrays that they were drawn from, so none of these can be reused.
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=True, out=None)
     ids, depth = peel_meshes(SCRATCH, [[snapped.mesh]], view, n, is_farthest=is_farthest, refuse=snapped.refuse)
     return DepthLayers(ids, depth, snapped)

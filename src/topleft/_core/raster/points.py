@@ -32,7 +32,7 @@ FARTHEST_WINDOW_FX = 1 << 40
 
 
 class PointFragments(Fragments):
-    """The visibility buffer of points: what `points` returns, and `rasterize_mesh` of `Points`.
+    """The visibility buffer of points that `points` returns, and `rasterize_mesh` of `Points`.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class PointFragments(Fragments):
         Raises
         ------
         ValueError
-            If the number of rows is not that of the points, or derivatives are asked for.
+            If the number of rows is not that of the points, or with `derivatives`.
         """
         if derivatives:
             raise ValueError("derivatives are those of triangles: a point has one value")
@@ -145,7 +145,7 @@ def points(
     point_size : float or (N,) array_like
         Pixels, positive, at most 16384: the diameter of a disc, the side of a square.
     shape : {"square", "disc"}
-        What a point covers.
+        The shape that a point covers.
     depth_test : {"less", "greater"}
         Which point is kept: the one with the smaller depth, or with the larger one; at equal depth that of lower index.
     **view
@@ -170,8 +170,8 @@ def points(
     disc if it is no farther from the centre than half its size; to a square if it lies in it, or on its left or upper
     side; and to any point if it lies in the square of one pixel round its centre, left and upper side included. So
     each point in the picture shows in the pixel that it lies in, on the edge of two in the left or upper one, unless
-    another hides it. All of a point has the depth of its centre; one whose centre is outside of the near or far plane
-    is not drawn.
+    another hides it. All of a point has the depth of its centre. A point with its centre outside of the near or far
+    plane is not drawn.
 
     Examples
     --------
@@ -205,7 +205,7 @@ def draw_points(
     *,
     is_farthest: bool = False,
 ) -> PointFragments:
-    """`points`, of checked options, on the memory given; larger sizes than there can be are the largest."""
+    """`points`, of checked options, on the memory given; larger sizes are cut to the largest."""
     (width, height), n_samples = view.size, view.sampling.n_samples
     check_fits((n_samples, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n_samples, height, width), np.int32)

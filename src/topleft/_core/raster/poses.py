@@ -22,7 +22,7 @@ from topleft.typing import DepthTestOption, EncodingOption, FilterOption, WrapOp
 
 
 class FragmentsBatch(Sequence[Fragments]):
-    """What `rasterize` returns of a batch: a visibility buffer for each of B poses, behind each other.
+    """The result of `rasterize` for a batch: a visibility buffer for each of B poses, behind each other.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class FragmentsBatch(Sequence[Fragments]):
     @overload
     def __getitem__(self, i: slice) -> Sequence[Fragments]: ...
     def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
-        """Return one of them, whose arrays are views."""
+        """Return one of them; its arrays are views."""
         return self._frags[i]
 
     @property
@@ -74,7 +74,7 @@ class FragmentsBatch(Sequence[Fragments]):
 
     @classmethod
     def stacked(cls, frags: Sequence[Fragments], size: tuple[int, int]) -> FragmentsBatch:
-        """Return the batch of visibility buffers (H, W), each of which keeps its arrays."""
+        """Return the batch of visibility buffers (H, W); each keeps its arrays."""
         shape = (0, *size[::-1])
         triangle = np.stack([one.triangle for one in frags]) if frags else empty(shape, np.int32)
         depth = np.stack([one.depth for one in frags]) if frags else empty(shape, np.float32)
@@ -255,7 +255,7 @@ def draw_batch(
 
 
 class PlanOfPoses(Planned):
-    """A plan whose triangles many poses use at once: it notes no times, and draws no clusters."""
+    """A plan that many poses use at once: it notes no times, and draws no clusters."""
 
     def __init__(self, plan: Planned) -> None:
         self._plan = plan

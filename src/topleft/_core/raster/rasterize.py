@@ -1,6 +1,6 @@
 """Draws masks, counts and visibility buffers.
 
-Each verb checks what it is asked for, snaps the mesh (read, transform, snap, clip), chooses a route and draws.
+Each verb checks its arguments, snaps the mesh (read, transform, snap, clip), chooses a route and draws.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def draw(
 
 
 def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height: int, n_parts: int) -> list[int]:
-    """Draw as `draw` does: each part a slice of the triangles into its rows, then those that others list for it."""
+    """Draw as `draw` does: each thread a slice of the triangles into its rows, then those that others list for it."""
     mesh, n = snapped.mesh, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
     starts = [n * i // n_parts for i in range(n_parts + 1)]
@@ -104,7 +104,7 @@ def canvas_of(
 ) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
     """Give the array to return and a contiguous aligned one to draw into; afterwards both are the same picture.
 
-    `keep`: what is in `out` shows through where nothing is drawn.
+    `keep`: pixels of `out` stay where nothing is drawn.
     """
     result, canvas = open_canvas(memory, name, out, shape, dtype)
     if keep and canvas is not result:
@@ -135,7 +135,7 @@ def draw_area(
 
 
 def refuse_many(view: View, verb: str) -> None:
-    """Raise an error where a pixel needs one triangle, and areas or squares are of many."""
+    """Raise an error for areas or squares where a pixel needs one triangle."""
     if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
         raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center' and 'msaa2' to 'msaa16'")
 
@@ -208,7 +208,7 @@ def draw_all_samples(
     pixels: NDArray[np.int32],
     depth: NDArray[np.float32] | None,
 ) -> None:
-    """Clear (S, H, W) planes and draw what each sample sees."""
+    """Clear (S, H, W) planes and draw the view of each sample."""
     if 0 in view.size:
         return
     if draw_planes(own, sink, pixels, depth, is_near=snapped.n_triangles > 0 and choices.can_slice(view)):
@@ -256,7 +256,7 @@ def draw_fragments(
     frags = draw_clusters(memory, vertices, view, options)
     if frags is not None:
         return frags.drawn_from(corners)
-    if view.sampling.n_samples > 1:  # which are drawn from the snapped mesh when they are asked for
+    if view.sampling.n_samples > 1:  # samples are drawn from the snapped mesh on first access
         memory = MemoryOf(memory, "samples")
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     if names is not None:
@@ -269,7 +269,7 @@ Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
 
 
 def draw_labels(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
-    """Draw ids of triangles at depth 0, which is written when it is asked for."""
+    """Draw ids of triangles at depth 0; depth is written on first access."""
     with canvas_of(memory, "triangle", options.ids_out, view.size[::-1], np.int32) as (ids, canvas):
         draw(memory, snapped, view, drawing, canvas)
     return Fragments(ids, options.background, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
@@ -340,7 +340,7 @@ ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_de
 def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, options: FragmentOptions) -> Fragments | None:
     """Draw a mesh that has clusters, or that the plan has in clusters.
 
-    None where there are no clusters, where drawing them does not pay, or where only the mesh can tell what is wrong.
+    None without clusters, where drawing them does not pay, or where only the mesh can name the error.
     """
     sink = choices.fragment_sink(options.test, has_depth=True)
     clusters = None

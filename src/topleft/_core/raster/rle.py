@@ -48,7 +48,7 @@ class RunTable:
     ) -> None:
         """Append the runs of pictures (N, H, W): of masks, bytes of 0 and 1, by their number from `key` on; of int32.
 
-        `box`: left, top, right and bottom of what is looked at; `at`: where pixel (0, 0) lies in the frame, x and y.
+        `box`: left, top, right and bottom of the part to read; `at`: x and y of pixel (0, 0) in the frame.
         """
         n_pictures, height, width = pixels.shape
         corner = *at, self.size[1]

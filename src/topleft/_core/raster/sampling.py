@@ -134,7 +134,7 @@ class SplitSamples:
 
 
 def draw_split(own: SamplePass, sink: Sink, shape: tuple[int, int], background: float) -> SplitSamples | None:
-    """Draw what the first sample sees, and list the pixels of which others see more; None as `draw_planes` tells.
+    """Draw the first sample, and list the pixels whose others see more triangles; None as `draw_planes` tells.
 
     The mesh is near, neither side of the picture is 0. Planes of the other samples live no longer than a band of rows,
     and only in the columns that its triangles may reach.
@@ -184,7 +184,7 @@ def split_ranges(rows: NDArray[np.int64]) -> list[slice]:
 def split_bytes(
     n_triangles: int, shape: tuple[int, int], n_samples: int, n_threads: int
 ) -> tuple[dict[str, int], dict[str, int]]:
-    """Return the most bytes that `draw_split` needs: of scratch and of what it returns, by name."""
+    """Return the most bytes that `draw_split` needs, by name: of scratch, and of its result."""
     (height, width), n_others = shape, n_samples - 1
     band_bits = bits_of_bands(shape, int(cost_table().split_bytes) // 8, n_threads)
     n_bands = -(-height >> band_bits)

@@ -71,13 +71,13 @@ class Snapped:
     def refuse(self) -> NoReturn:
         """Raise an error for the first triangle with an index or a vertex that cannot be drawn, as one was not."""
         self.given.check_indices()
-        if self.mesh.exact is not None:  # whose vertices were not looked at before
+        if self.mesh.exact is not None:  # no vertex was checked before
             check_finite(self.given.points, self.given.triangles, with_depth=False)
         refuse_changed()
 
 
 def refuse_changed() -> NoReturn:
-    """Raise the error for an index that was none of a vertex while it was drawn, and now is."""
+    """Raise the error for an index that was out of range while it was drawn, and now is not."""
     raise IndexError(
         "triangles must hold indices of vertices while they are drawn, got some that did not, and now do: nobody may "
         "write to them during a call"
@@ -116,7 +116,7 @@ def snap_mesh(
 
 
 def snap_to_cover(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, out: object) -> Snapped:
-    """Take arrays as `snap_mesh` does, for a picture that asks nothing but which samples are covered.
+    """Take arrays as `snap_mesh` does, for a picture of coverage alone.
 
     On a fine grid float lanes draw the snapped vertices as they do vertices that are not snapped: the same picture.
     """
@@ -158,7 +158,7 @@ def n_to_draw(given: MeshArrays, view: View) -> int:
 
 
 def snap_input(memory: Memory, given: MeshArrays, view: View, *, with_depth: bool, must_check: bool) -> Snapped:
-    """Take what was read through snap and clip, as `snap_mesh` does."""
+    """Snap and clip arrays that have been read, as `snap_mesh` does."""
     points, source, indices = given.points, given.source, given.triangles
     n = n_to_draw(given, view)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
@@ -257,7 +257,7 @@ def exact_mesh(
 
 
 def take_points(memory: Memory, given: MeshArrays, n: int, *, must_check: bool) -> tuple[NDArray[np.float64], int]:
-    """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was looked at."""
+    """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was checked."""
     points, source = given.points, given.source
     is_same = points.dtype == np.float64
     if not n or (is_same and not must_check):
@@ -366,7 +366,7 @@ def check_projected(points: NDArray[Any], projected: NDArray[np.float64], triang
 
 
 def check_finite(points: NDArray[Any], triangles: NDArray[np.int32], *, with_depth: bool) -> None:
-    """Raise an error for the first vertex whose numbers cannot be drawn as they are, if a triangle uses it."""
+    """Raise an error for the first used vertex with numbers that cannot be drawn unsnapped."""
     limit = 2.0**53 if points.dtype.kind == "i" else np.inf
     is_far = np.any(~(abs(points[:, :2].astype(float)) <= limit), axis=1)
     is_bad = is_far | ~np.isfinite(points).all(axis=1)

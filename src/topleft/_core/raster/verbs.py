@@ -31,7 +31,7 @@ def coverage(
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
-    """Return the mask of the pixels whose centre a triangle covers, or how much of each pixel triangles cover.
+    """Return the mask of the pixels with a covered centre, or how much of each pixel triangles cover.
 
     Parameters
     ----------
@@ -162,12 +162,12 @@ def fill(
         uint8 (any integers in 0..255) or float32 (any floats). Per triangle: flat. Per vertex: interpolated linearly
         on the screen.
     per : "auto", "triangle" or "vertex"
-        What a row of `colors` belongs to; "auto" tells by the number of rows.
+        The owner of a row of `colors`; "auto" decides by the number of rows.
     background : number or array_like, shape (C,), optional
         Fills the picture first; 0 when neither `background` nor `out` is given.
     blend : "replace", "over", "add", "multiply", "max" or "min"
-        What the colour of a triangle does to what is there, one triangle after the other. "over" lets it through by the
-        alpha of the colour, the last of 2 or 4 channels. The others act on each channel alike, alpha included; uint8
+        How a colour is combined with the picture, one triangle after the other. "over" keeps 1 - alpha of the picture;
+        alpha is the last of 2 or 4 channels. The others act on each channel alike, alpha included; uint8
         sums stop at 255, and 255 is 1 in products. With ``sampling="area"`` the share of the pixel that the triangle
         covers multiplies alpha, or is the share of the way from the old colour to the new. With several samples a pixel
         each sample is blended by itself.
@@ -242,7 +242,7 @@ def rasterize(
         Depth where nothing is; +inf, or -inf with "greater", unless given.
     out : (ndarray of int32, ndarray of float32), each of shape (H, W), (H, W, S), (B, H, W) or (B, H, W, S), optional
         Where ids and depth go, of S samples and B poses; either may be None. Without an array for it, the depth of
-        vertices (V, 2) is made when it is asked for: ids alone take half the time.
+        vertices (V, 2) is made on first access: ids alone take half the time.
 
     Returns
     -------
@@ -251,7 +251,7 @@ def rasterize(
         ``.barycentric()``, ``.interpolate(values)``. With several samples a pixel also ``.samples_triangle`` and
         ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
         ``.sample(i)`` gives the same of another. Of a batch `FragmentsBatch`: ``.triangle`` and ``.depth`` (B, H, W),
-        ``[i]`` is the `Fragments` of a pose, and each is what it is when it is drawn alone. A `plan` of one pose
+        ``[i]`` is the `Fragments` of a pose, equal to those of that pose drawn alone. A `plan` of one pose
         saves the others the check of the triangles.
 
     Raises
@@ -284,8 +284,8 @@ def rasterize(
     n = n_poses(vertices, view.get("transform"))
     if n is not None:
         batch = draw_batch(n, vertices, triangles, size, view, depth_test, background_depth, out)
-        return cast("Fragments", batch)  # the rare case: whoever passes a batch knows what comes back
-    # fragments refer to what they were drawn from, so nothing of it can be reused
+        return cast("Fragments", batch)  # the rare case: whoever passes a batch knows the result
+    # fragments refer to the arrays that they were drawn from, so none of these can be reused
     return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 
 
@@ -309,12 +309,12 @@ def wireframe(
         As in `coverage`; `method` makes no difference. `cull` leaves out the edges that only culled triangles have,
         and degenerate triangles.
     depth : Fragments or ndarray of float32, shape (H, W), optional
-        What hides lines: a pixel of a line is drawn where its depth is at most `depth_bias` behind the buffer's.
+        Hides lines: a pixel of a line is drawn where its depth is at most `depth_bias` behind the buffer's.
     depth_test : "less" or "greater"
         Which depth is the nearer one.
     depth_bias : float
         In units of depth. An edge lies on the surface that hides it, which falls away from the edge within the pixel:
-        take what the depth changes by from pixel to pixel. The default suits window depth, 0 to 1 over the whole view.
+        take the change of depth from pixel to pixel. The default suits window depth, 0 to 1 over the whole view.
     antialias : bool
         False: Bresenham lines between the pixels that hold the ends. True: coverage of lines one pixel wide between
         the ends themselves.
@@ -375,7 +375,7 @@ class OneCallAtATime:
 class Rasterizer:
     """The five verbs for one size, on memory that is kept from call to call.
 
-    What a verb returns is overwritten by the next call of the same verb; copy what must last. Not for use from several
+    The next call of a verb overwrites its last result; copy what must last. Not for use from several
     threads at once: give each its own. A copy, and one that has been pickled, has memory of its own.
 
     Parameters

@@ -31,7 +31,7 @@ class Planned(Protocol):
     """The part of `topleft.Plan` that verbs use."""
 
     def fitted(self, view: View) -> View:
-        """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
+        """Return the view with its choices, or raise an error where the plan is for another one."""
         return replace(view, plan=self)
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
@@ -54,7 +54,7 @@ class Static(Protocol):
         """Its triangles (T, 3)."""
 
     def find_clusters(self) -> Clusters | None:
-        """Return its clusters, where it is drawn often enough to have them; this is one time more."""
+        """Return its clusters, if it is drawn often enough to have them, and count this draw."""
 
 
 class WindowOptions(TypedDict, total=False):
@@ -71,7 +71,7 @@ class WindowOptions(TypedDict, total=False):
 
 
 class ViewOptions(WindowOptions, total=False):
-    """The options that all verbs share; `docs/design/rules.md` tells what each does."""
+    """The options that all verbs share; `docs/design/rules.md` defines them."""
 
     transform: ArrayLike | None
     sampling: SamplingOption
@@ -121,7 +121,7 @@ class View:
     sides_by_material: bool = True
     """Whether materials say which sides are drawn: no `cull` was given."""
     is_split: bool = False
-    """Whether samples are kept once where a pixel shows one triangle, for shading: all else is drawn when asked for."""
+    """Whether a pixel of one triangle keeps its samples once, for shading; other samples are drawn on first access."""
     is_exact: bool = False
     """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 
@@ -147,7 +147,7 @@ class View:
             self.plan.mark(stage)
 
     def refuse_classic(self, what: str) -> None:
-        """Raise an error when a classic was asked for what only the engine does."""
+        """Raise an error when a classic gets an option of the engine alone."""
         if self.classic is not None:
             raise ValueError(f"method {self.classic.name!r} has no {what}; use 'auto', 'edge' or 'scanline'")
 
@@ -214,7 +214,7 @@ class View:
 
 @lru_cache(maxsize=256, typed=True)
 def kept_view(size: tuple[int, int], why_snapped: str | None, **options: Any) -> View:
-    """A view whose options were checked before, a tenth of a small picture's time."""
+    """A view with options that were checked before; a check takes a tenth of a small picture's time."""
     return View._parse(size, cast(ViewOptions, options), why_snapped)
 
 

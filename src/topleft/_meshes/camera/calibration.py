@@ -52,7 +52,7 @@ NERFSTUDIO_MODELS: Mapping[str, str] = {
 
 
 class Calibration(NamedTuple):
-    """What `Camera.from_intrinsics` takes."""
+    """The arguments of `Camera.from_intrinsics`."""
 
     intrinsics: F64
     camera_from_world: F64
@@ -164,7 +164,7 @@ def of_nerfstudio(transforms: Any, i: int, size: object) -> Calibration:
 
 
 def read_json(path: Path) -> Any:
-    """What a JSON file holds."""
+    """The value that a JSON file holds."""
     import json  # which only files need
 
     if not path.is_file():
@@ -220,7 +220,7 @@ def of_pytorch3d(cameras: Any, i: int, size: object) -> Calibration:
 
 
 def rows_of(cameras: Any, name: str, shape: tuple[int, ...] | None, i: int) -> F64:
-    """What camera i of a batch has by a name; one for all counts for each."""
+    """The value of camera i of a batch by a name; one for all counts for each."""
     value = as_real(name, read(cameras, "cameras", name))
     if value.ndim == 0 or len(value) == 1:
         value = value.reshape(value.shape[1:])

@@ -1,7 +1,7 @@
 """Cameras: from world to clip space, as two 4x4 matrices made from words (eye, target, field of view, intrinsics).
 
 Spaces: world; eye (OpenGL: x right, y up, the view along -z); clip (OpenGL: -w <= x, y, z <= w inside).
-Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends what the view sees before that.
+Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends eye space between the two.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Camera:
     aspect: float | None = None
     lens: Lens | None = None
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is float64
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; float64 is kept
 
         def __init__(
             self, view: npt.ArrayLike, projection: npt.ArrayLike, aspect: float | None = None, lens: Lens | None = None
@@ -150,7 +150,7 @@ class Camera:
         return engine.product(self.clip_from_eye(size), self.view)
 
     def clip_from_eye(self, size: int | tuple[int, int]) -> F64:
-        """The projection (4, 4) float64 for a picture of this size; with a lens it acts on what the lens has bent."""
+        """The projection (4, 4) float64 for a picture of this size; with a lens it acts on bent points."""
         width, height = as_size(size)
         projection = self.projection.copy()
         if self.aspect is not None and width > 0 and height > 0:
@@ -163,7 +163,7 @@ class Camera:
         return self if self.lens is None else replace(self, lens=None)
 
     def placed(self, transform: F64) -> Camera:
-        """The same camera in the object space of what stands at `transform` (4, 4), world from object."""
+        """The same camera in the object space of an instance at `transform` (4, 4), world from object."""
         return replace(self, view=engine.product(self.view, transform))
 
     def project(self, points: npt.ArrayLike, size: int | tuple[int, int]) -> F64:
@@ -199,7 +199,7 @@ class Camera:
 
     @classmethod
     def from_matrix(cls, clip_from_world: npt.ArrayLike) -> Camera:
-        """The camera of one matrix, a projection times a view: what OpenGL and nvdiffrast call the mvp.
+        """The camera of one matrix, a projection times a view: the mvp of OpenGL and nvdiffrast.
 
         Parameters
         ----------
@@ -210,7 +210,7 @@ class Camera:
         Returns
         -------
         Camera
-            Whose `clip_from_world` is the matrix, up to its scale and the rounding of float64, for pictures of every
+            Its `clip_from_world` is the matrix, up to its scale and the rounding of float64, for pictures of every
             size: a picture of another shape is stretched. Without perspective the eye is put into the near plane.
 
         Raises
@@ -538,7 +538,7 @@ class Camera:
         Returns
         -------
         Camera
-            In the world of the file: what a data parser of nerfstudio turns, moves and scales besides is not applied.
+            In the world of the file: turns, moves and scales by a data parser of nerfstudio are not applied.
 
         Raises
         ------
@@ -627,8 +627,7 @@ class Camera:
         Parameters
         ----------
         subject : mesh, Scene, or (N, 3) array_like
-            Whatever `as_mesh` takes, or a scene, of which the vertices in use count; or points: the two corners of a
-            box, say.
+            Whatever `as_mesh` takes, or a scene: its vertices in use count; or points: two corners of a box, say.
         azimuth_deg : float
             0 looks at the front of the subject (+z with y up, -y with z up), 90 at its right (+x). Degrees.
         elevation_deg : float
@@ -642,10 +641,10 @@ class Camera:
         aspect : float
             Width / height of the picture to be made.
         fit : {"sphere", "box", "points", "silhouette"}
-            What just fits: the sphere round the subject, which keeps its size from every side; its box; or all of its
-            points, which comes nearest; each with the middle of the box in the middle of the picture. "silhouette": the
-            box round the picture of all points is in the middle and fills the frame but for a margin of 5 % at each
-            end of its longer side.
+            The shape that just fits: the sphere round the subject, which keeps its size from every side; its box; or
+            all of its points, which comes nearest; each with the middle of the box in the middle of the picture.
+            "silhouette": the box round the picture of all points is in the middle and fills the frame, with a margin
+            of 5 % at each end of its longer side.
 
         Raises
         ------
@@ -663,7 +662,7 @@ class Camera:
 
 
 def planes_for(away: float, near: float | None, far: float | None) -> tuple[float, float]:
-    """The planes given, or those for a camera as far as that from the world's origin."""
+    """The planes given, or default ones for a camera at this distance from the world's origin."""
     near = 1e-3 * (away or 1.0) if near is None else near
     far = max(1e3 * max(away or 1.0, 1.0), 1e3 * near) if far is None else far
     check_planes(near, far)
@@ -671,7 +670,7 @@ def planes_for(away: float, near: float | None, far: float | None) -> tuple[floa
 
 
 def pixels_of(points_eye: F64, projection: F64, size: tuple[int, int]) -> F64:
-    """What `Camera.project` returns of points in eye space, as the lens has bent them."""
+    """The pixels of points in eye space that a lens has bent, as in `Camera.project`."""
     width, height = size
     clip = engine.product(points_eye, projection[:, :3].T) + projection[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -680,7 +679,7 @@ def pixels_of(points_eye: F64, projection: F64, size: tuple[int, int]) -> F64:
 
 
 CameraLike: TypeAlias = Camera | npt.NDArray[Any]
-"""What takes a camera takes its matrix (4, 4), clip from world, too: see `Camera.from_matrix`."""
+"""Functions that take a camera take its matrix (4, 4), clip from world, too: see `Camera.from_matrix`."""
 
 
 def as_camera(camera: object, name: str = "camera") -> Camera:

@@ -21,7 +21,7 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_number, as_real
 
 FLIP = np.array([1.0, -1.0, -1.0])
-"""Between the axes of OpenCV and those of OpenGL, in both directions."""
+"""Turns axes of OpenCV into those of OpenGL, and back."""
 
 DEFAULT_TOLERANCE_PX = 0.125
 FINEST_TOLERANCE_PX = 2.0**-8
@@ -29,9 +29,9 @@ FINEST_TOLERANCE_PX = 2.0**-8
 
 
 class Lens(Protocol):
-    """What a camera asks of its lens."""
+    """The methods of a lens that a camera needs."""
 
-    #: Beyond it, in radians from the axis, the lens is not asked.
+    #: Radians from the axis; beyond it the lens is not evaluated.
     max_angle: ClassVar[float]
 
     #: Whether `range_along` is the distance along the axis, which a straight projection shows as it is.
@@ -42,20 +42,20 @@ class Lens(Protocol):
 
     @property
     def tolerance_px(self) -> float:
-        """How far, in pixels, a straight piece of a bent edge may lie from where it belongs."""
+        """The largest error of a straight piece of a bent edge, in pixels."""
 
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3) in front of the lens."""
 
     def range_along(self, points: F64) -> F64:
-        """What stands for the distance of points (N, 3) in depth, world units."""
+        """The distances of points (N, 3) that depth stands for, world units."""
 
     def bend(self, points_eye: F64) -> F64:
         """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
 
     @property
     def terms(self) -> Terms:
-        """What kernels know of the lens."""
+        """The coefficients that kernels read."""
 
 
 class Terms(NamedTuple):
@@ -84,7 +84,7 @@ class OpenCVLens:
     tau_x, tau_y : float
         The tilt of the sensor, radians, each below 90 degrees.
     tolerance_px : float
-        How far, in pixels, a straight piece of a bent edge may lie from where it belongs.
+        The largest error of a straight piece of a bent edge, in pixels.
 
     Raises
     ------
@@ -149,7 +149,7 @@ class OpenCVLens:
 
     @property
     def terms(self) -> Terms:
-        """What kernels know of the lens."""
+        """The coefficients that kernels read."""
         radial = self.k1, self.k2, self.k3, self.k4, self.k5, self.k6
         tilts = (engine.cosine_and_sine(math.degrees(angle)) for angle in (self.tau_x, self.tau_y))
         prism = self.s1, self.s2, self.s3, self.s4
@@ -182,7 +182,7 @@ class FisheyeLens:
     k1, k2, k3, k4 : float
         Terms of the angle.
     tolerance_px : float
-        How far, in pixels, a straight piece of a bent edge may lie from where it belongs.
+        The largest error of a straight piece of a bent edge, in pixels.
 
     Raises
     ------
@@ -192,7 +192,7 @@ class FisheyeLens:
     Notes
     -----
     A point at the angle t from the axis is seen at the distance t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) from the
-    centre. Depth is that of the distance from the lens, not of Z, which is nothing at 90 degrees.
+    centre. Depth is that of the distance from the lens, not of Z, which is 0 at 90 degrees.
 
     Examples
     --------
@@ -226,7 +226,7 @@ class FisheyeLens:
 
     @property
     def terms(self) -> Terms:
-        """What kernels know of the lens."""
+        """The coefficients that kernels read."""
         return Terms((self.k1, self.k2, self.k3, self.k4, 0.0, 0.0))
 
     def range_along(self, points: F64) -> F64:

@@ -1,4 +1,4 @@
-"""Makes the 4x4 matrices of cameras: where they stand, how they project, what has a subject in the frame.
+"""Makes the 4x4 matrices of cameras: poses, projections, and both of them for a subject in the frame.
 
 Spaces: world; eye (OpenGL: x right, y up, the view along -z); clip (-w <= x, y, z <= w inside).
 
@@ -27,14 +27,14 @@ from topleft.typing import UpOption
 Framed: TypeAlias = Mesh | Scene | Points | F64
 
 FRAMING_MARGIN = 1.05
-"""What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
+"""A subject that fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
 
 SILHOUETTE_MARGIN = 0.05
 """The share of the frame that `fit="silhouette"` leaves free at each end of the side that is filled."""
 
 
 def as_framed(subject: MeshLike | Scene | npt.ArrayLike) -> Framed:
-    """What is to be framed: a mesh, a scene, or points, by themselves or in a cloud."""
+    """The subject to frame: a mesh, a scene, or points, by themselves or in a cloud."""
     if isinstance(subject, Scene | Points) or is_mesh_like(subject):
         return as_subject(subject)
     return as_real("subject", subject)
@@ -87,7 +87,7 @@ def box_corners(ends: F64) -> F64:
 
 
 def distance_to_fit(points: F64, tan_x: float, tan_y: float) -> float:
-    """How far in front of the origin a camera has to stand to have all points just inside its frame.
+    """The distance in front of the origin at which a camera has all points just inside its frame.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
 
 
 def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = False) -> F64:
-    """Where a camera has to stand so that the box round the picture of all points fills its frame, in the middle of it.
+    """The place of a camera that fits the box round the picture of all points into the middle of its frame.
 
     In the middle also along the axis that it does not fill, to within 1e-6 of its width.
 
@@ -153,8 +153,7 @@ def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = Fals
     points : (N, 3) float64
         In eye axes: z towards the viewer.
     tan_x, tan_y : float
-        Tangents of half the fields of view; without perspective half the sides of the frame, of which only the shape
-        counts.
+        Tangents of half the fields of view; without perspective half the sides of the frame; only their ratio counts.
 
     Returns
     -------
@@ -175,12 +174,12 @@ def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = Fals
 
 
 def _planes_of(axis: F64, z: F64, tan: float) -> tuple[float, float]:
-    """How far out the two planes lie that a frame of this half angle touches the points with: low and high."""
+    """The offsets of the two planes of this half angle that touch the points: low and high."""
     return float((tan * z - axis).max()), float((tan * z + axis).max())
 
 
 def _middle(axis: F64, z: F64, tan: float, distance: float) -> float:
-    """The place along an axis from which the picture of the points, from this distance, has its middle on the axis."""
+    """The place along an axis that centres the picture of the points, from this distance."""
     depth = distance - z
     for _ in range(20):
         low, high = _planes_of(axis, z, tan)

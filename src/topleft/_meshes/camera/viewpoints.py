@@ -124,7 +124,7 @@ def viewpoints(subject: MeshLike | Scene | npt.ArrayLike, n: int, **framing: Unp
 
 
 def _looked_at(subject: MeshLike | Scene | npt.ArrayLike, fit: str) -> Framed:
-    """What all cameras look at: the subject, converted once; for its sphere two points that have the same."""
+    """The subject of all cameras, converted once; for its sphere two points with the same sphere."""
     framed = as_framed(subject)
     if fit != "sphere":
         return framed

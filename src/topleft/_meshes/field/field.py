@@ -31,7 +31,7 @@ from topleft.typing import PerOption, SurfaceOption, YOption
 #: Pixels a triangle. With fewer it pays to compute all planes first: 200,000 triangles at 1080p.
 MAX_PIXELS_TO_LIST = 48
 
-#: They take 64 bytes each, which the thread's scratch memory keeps.
+#: Planes take 64 bytes each in the thread's scratch memory.
 MAX_LISTED_PLANES = 1_000_000
 
 
@@ -64,18 +64,18 @@ def field(
     origin : (column, row), pixels
         The pixel of the grid that is row 0, column 0 of the result, which is the crop of the whole bit for bit.
     window : (width, height), optional
-        How large the result is; from `origin` to the end of the grid unless given.
+        The size of the result; from `origin` to the end of the grid unless given.
     nodata : number, optional
-        What stands where the mesh is not; unless given the `nodata` of the `Grid`, or NaN. With it integers of faces
-        stay what they are.
+        The value where the mesh is not; unless given the `nodata` of the `Grid`, or NaN. With it integers of faces
+        stay integers.
     extent : (x_min, x_max, y_min, y_max), optional
-        What the picture shows, data units; the box of the mesh unless given.
+        The extent of the picture, data units; the box of the mesh unless given.
     pixel_size : float or (float, float), optional
         Width and height of a pixel, data units, instead of `size`; see `Grid.around`.
     y : {"up", "down"}
         "up": row 0 is at y_max, as on a map; "down": row 0 is at y_min. See `Grid`.
     per : {"auto", "vertex", "triangle"}
-        What a value belongs to; "auto" tells by their number.
+        Whether values are of vertices or of triangles; "auto" tells by their number.
     subpixel_bits, threads
         As in `coverage`.
     out : ndarray of the dtype of the result, shape (H, W), optional
@@ -162,7 +162,7 @@ def height_map(
     surface : {"upper", "lower"}
         Whether the largest or the smallest height counts.
     extent : (x_min, x_max, y_min, y_max), optional
-        What the picture shows; the box of the mesh unless given.
+        The extent of the picture; the box of the mesh unless given.
     y : {"up", "down"}
         "up": row 0 is at y_max, as on a map; "down": row 0 is at y_min. See `Grid`.
     subpixel_bits, threads
@@ -231,7 +231,7 @@ def dtype_of_field(values: np.dtype[Any], *, is_of_faces: bool, has_nodata: bool
 
 
 def nodata_of(nodata: object, dtype: type[Any]) -> npt.NDArray[Any]:
-    """What stands where the mesh is not, as an array of one number of the dtype."""
+    """The value where the mesh is not, as an array of one number of the dtype."""
     if nodata is None:
         return np.array([np.nan], dtype)
     number = as_number("nodata", nodata)
@@ -261,7 +261,7 @@ def _grid_of(polygons: Polygons, size: Any, pixel_size: Any, extent: ExtentLike 
 
 
 def extent_around(mesh: MeshLike, extent: ExtentLike | None) -> ExtentLike:
-    """The box round what a mesh shows, unless an extent is given."""
+    """The extent, or the box round a mesh where none is given."""
     polygons = as_polygons(mesh)
     return extent_of(polygons) if extent is None else extent
 
@@ -299,7 +299,7 @@ def range_of(heights: F64, triangles: I32) -> tuple[float, float]:
 
 
 def depth_of(heights: F64, low: float, high: float) -> F64:
-    """The heights that count as -1 to 1, from low to high: what float32 tells apart best."""
+    """The heights scaled from low..high to -1..1, where float32 tells them apart best."""
     with np.errstate(invalid="ignore", over="ignore"):
         middle, half = low / 2 + high / 2, high / 2 - low / 2
         depth: F64 = np.divide(np.subtract(heights, middle), half or 1.0)

@@ -1,4 +1,4 @@
-"""Bakes: what a mesh has at the texels of its texture coordinates, from itself, from another mesh, or from pictures.
+"""Bakes: the values of a mesh at the texels of its atlas, from itself, from another mesh, or from pictures.
 
 Input: a `Mesh` with `uv`. Output: `Baked`, an atlas (H, W, C). The kernels are csrc/grid/atlas.c.
 
@@ -36,12 +36,12 @@ from topleft.typing import BakeOption, BakeRuleOption, TakenOption
 
 MOST_GUTTER = 1024
 OUTSIDE = 2.0**-20
-"""How far texture coordinates may leave [0, 1] before that is told: rounding."""
+"""How far texture coordinates may leave [0, 1] without a warning: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Baked:
-    """What `bake` returns; row 0 is the top, where v = 1, as in a `Texture`.
+    """The result of `bake`; row 0 is the top, where v = 1, as in a `Texture`.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def bake(
     blend: TakenOption = "best",
     threads: int | None = None,
 ) -> Baked:
-    """What a mesh has at the texels of its atlas: the square of its texture coordinates.
+    """The values of a mesh at the texels of its atlas, the square of its texture coordinates.
 
     Parameters
     ----------
@@ -96,19 +96,19 @@ def bake(
     size : int or (width, height)
         Texels.
     rule : {"center", "touched", "area"}
-        Which triangles a texel has. "center": the one that owns its middle, by the top-left rule on vertices as they
+        The triangles of a texel. "center": the one that owns its middle, by the top-left rule on vertices as they
         are. "touched": where none does, the nearest to the middle of those that meet it, at its point nearest to the
-        middle. "area": the mean over all that triangles cover of it.
+        middle. "area": the mean over the area that triangles cover.
     gutter : int, 0 to 1024
-        Texels round charts that get what the nearest texel has (by Euclid, the upper left of several), so that a filter
-        that reaches beyond a chart finds no background.
+        Texels round charts that get the value of the nearest texel (by Euclid, the upper left of several), so that a
+        filter that reaches beyond a chart finds no background.
     source : Mesh, optional
         Another mesh in the same place, a finer one, say: values, normals and colours are those of its point that is
-        nearest to the mesh. Triangles are its own, too.
+        nearest to the mesh. Ids of triangles are its own, too.
     max_distance : float, optional
         Of that point; farther ones give no value.
     cameras : sequence of Camera, optional
-        Of the pictures: each shows the mesh alone, without a lens. A texel gets what a picture shows there if the mesh
+        Of the pictures: each shows the mesh alone, without a lens. A texel gets its pixel of a picture if the mesh
         does not hide it, weighed by the squared cosine of the angle at which it is seen.
     blend : {"best", "mean"}
         Of several pictures the one that sees a texel best, or their weighed mean, in linear light.
@@ -122,14 +122,14 @@ def bake(
     Warns
     -----
     MeshWarning
-        If charts overlap, or triangles leave the square: what lies outside is not baked.
+        If charts overlap, or triangles leave the square: the parts outside are not baked.
 
     Raises
     ------
     ValueError
         If the mesh has no `uv` or no triangles, an option is unknown or out of range, or values do not fit it.
     MeshError
-        If the mesh or `source` lacks what is to be baked.
+        If the mesh or `source` lacks the values to bake.
 
     Examples
     --------
@@ -206,7 +206,7 @@ class Chart(NamedTuple):
 
 
 def chart_of(mesh: Mesh, size: tuple[int, int], rule: str, n_threads: int) -> Chart:
-    """The atlas of a mesh, with warnings of what it does not hold."""
+    """The atlas of a mesh; warns of triangles that leave it, and of charts that overlap."""
     if mesh.uv is None:
         raise ValueError("a mesh is baked by its texture coordinates, got one without uv")
     if not len(mesh.triangles):
@@ -230,7 +230,7 @@ def chart_of(mesh: Mesh, size: tuple[int, int], rule: str, n_threads: int) -> Ch
 
 
 def values_to_bake(mesh: Mesh, what: object) -> F32:
-    """The values of vertices (V, K) or corners (T, 3, K) that a word or an array asks for."""
+    """The values of vertices (V, K) or corners (T, 3, K) that a word names or an array holds."""
     if not isinstance(what, str):
         return as_values(cast(Any, what), len(mesh.vertices), len(mesh.triangles))
     if what == "color":
@@ -384,7 +384,7 @@ def eye_of(camera: Camera) -> F64:
 
 
 def with_gutter(baked: Baked, gutter: int, n_threads: int) -> Baked:
-    """The same with texels round the charts that have what the nearest texel has."""
+    """The same with texels round the charts that have the value of the nearest texel."""
     if not gutter:
         return baked
     height = len(baked.triangle)

@@ -1,4 +1,4 @@
-"""Viewsheds: what of a terrain is seen from a point, and how high above the rest something must stand to be seen.
+"""Viewsheds: the parts of a terrain that a point sees, and how high something must stand elsewhere to be seen.
 
 Input: a height grid, or a mesh that is put on one, and an eye. Output: `Viewshed`. The kernel is csrc/grid/viewshed.c.
 
@@ -25,19 +25,19 @@ from topleft._meshes.field.field import extent_of, height_map
 from topleft._meshes.scene.adapt import as_polygons
 
 EARTH_RADIUS = 6_370_997.0
-"""Metres: that of the sphere that GDAL's curvature coefficient is told for."""
+"""Metres: that of the sphere of GDAL's curvature coefficient."""
 
 
 @dataclass(frozen=True, eq=False)
 class Viewshed:
-    """What `viewshed` returns.
+    """The result of `viewshed`.
 
     Attributes
     ----------
     visible : (H, W) bool
         Whether something `target_height` above the ground is seen.
     above : (H, W) float64
-        How high above the ground something is seen, 0 where the ground is; NaN where there is no ground, or too far.
+        The least height above the ground that is seen, 0 where the ground is; NaN where there is no ground, or too far.
     grid : Grid
         Where the cells are.
 
@@ -72,7 +72,7 @@ def viewshed(
     curvature: float = 0.0,
     threads: int | None = None,
 ) -> Viewshed:
-    """What of a terrain is seen from a point.
+    """The parts of a terrain that are seen from a point.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def viewshed(
     eye_height : float, optional
         How high the eye is above the ground at (x, y), instead of z; 0 unless given.
     target_height : float
-        How high above the ground is looked for.
+        The height above the ground of points to be seen.
     max_distance : float, optional
         Cells farther away in the plane are not looked at.
     curvature : float
@@ -185,7 +185,7 @@ def heights_of(terrain: Any, grid: Grid | None, pixel_size: Any) -> tuple[F64, G
 
 
 def ground_at(heights: F64, at: F64) -> float:
-    """The height between four cells; of what there is of them."""
+    """The height between four cells, or between two where the grid is one cell wide."""
     column, row = (min(int(p), max(n - 2, 0)) for p, n in zip(at.tolist(), heights.shape[::-1], strict=True))
     square = heights[row : row + 2, column : column + 2]
     x, y = float(at[0]) - column, float(at[1]) - row

@@ -38,7 +38,7 @@ U64 = npt.NDArray[np.uint64]
 
 @dataclass(frozen=True, eq=False)
 class Voxels:
-    """What `voxelize` returns.
+    """The result of `voxelize`.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Voxels:
 
     @property
     def volume(self) -> float:
-        """The volume of what is filled."""
+        """The volume of the filled voxels."""
         return float(self.values.sum(dtype=np.float64)) * self.pitch**3
 
     def points(self) -> F64:
@@ -112,14 +112,14 @@ def voxelize(
     Parameters
     ----------
     mesh : Mesh, Scene, or whatever `as_mesh` takes
-        Of a scene all instances, each by itself: what lies in two of them is filled.
+        Of a scene all instances, each by itself: voxels inside two of them are filled.
     shape : int or (X, Y, Z), optional
         How many voxels along the longest side, or along each axis. They are cubes: with three numbers as large as it
         takes to hold the box, which stands in their middle.
     pitch : float, optional
         The side of a voxel, instead of `shape`.
     bounds : (2, 3) array_like, optional
-        Lower and upper corner of what is voxelized; the box of the mesh unless given.
+        Lower and upper corner of the space to fill; the box of the mesh unless given.
     solid : bool
         Whether the inside is filled, by the even-odd rule; otherwise the surface alone.
     rule : {"center", "touched"}
@@ -150,7 +150,7 @@ def voxelize(
     -----
     Seen along z, each column belongs to the triangles that own its middle by the top-left rule, on vertices that are
     rounded to 1/256 voxel (or sample) along x and y. So a closed mesh has an even number of crossings in every column,
-    whatever touches whatever. Where a crossing lies is known to 2**-22 of the depth of the grid. "touched" is
+    wherever parts touch. Where a crossing lies is known to 2**-22 of the depth of the grid. "touched" is
     conservative: no voxel is missing that a triangle of the float64 vertices meets.
 
     Examples
@@ -182,7 +182,7 @@ def voxelize(
         run_parts(
             lambda first, end: engine.count_columns(bits, sample_bits, shares, first, end), len(shares), n_threads
         )
-        return told(grid, shares, n_odd)
+        return with_warning(grid, shares, n_odd)
     check_fits(grid.shape, np.bool_)
     found: npt.NDArray[np.bool_] = FRESH.empty("voxels", grid.shape, np.bool_)
     filled, n_odd = found.view(np.uint8), 0
@@ -198,10 +198,10 @@ def voxelize(
             engine.touch_voxels(points, triangles, 0, len(triangles), filled)
         elif not solid:
             mark_surface(points, triangles, filled, n_threads)
-    return told(grid, found, n_odd)
+    return with_warning(grid, found, n_odd)
 
 
-def told(grid: VoxelGrid, values: npt.NDArray[Any], n_odd: int) -> Voxels:
+def with_warning(grid: VoxelGrid, values: npt.NDArray[Any], n_odd: int) -> Voxels:
     """The result, with a warning where the mesh is not closed."""
     if n_odd:
         line = f"the mesh is not closed: {n_odd} columns of voxels cross it an odd number of times"
@@ -257,7 +257,7 @@ def grid_of(box: F64, shape: object, pitch: object, samples: int) -> VoxelGrid:
 
 
 def counts_of(extent: F64, pitch: float) -> list[int]:
-    """How many voxels hold an extent; what rounding adds is not worth one."""
+    """How many voxels hold an extent; an excess by rounding adds none."""
     counts = np.ceil(extent / pitch * (1 - 2.0**-40))
     return [int(min(max(count, 1.0), 2.0 * MOST_ALONG)) for count in counts.tolist()]
 
@@ -312,7 +312,7 @@ def mark_surface(points: F64, triangles: I32, filled: U8, n_threads: int) -> Non
 
 
 def check_finite(points: F64) -> None:
-    """Raise an error where a vertex is beyond what a grid holds."""
+    """Raise an error where a vertex is not finite, or too far from the grid."""
     if not np.isfinite(points).all():
         i = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
         raise ValueError(f"vertices must be finite and within 2**1000 voxels of the grid, got row {i}")

@@ -1,7 +1,7 @@
-"""Reads by trimesh what has no reader here: 3MF, COLLADA and what else it knows.
+"""Reads formats without a reader here by trimesh: 3MF, COLLADA and others.
 
-Input: a file, unchecked. Output: `Mesh` parts, placed. trimesh cuts polygons of COLLADA into fans, which cover what
-concave ones do not, and leaves out geometries of controllers and of materials that are missing: so its XML is made
+Input: a file, unchecked. Output: `Mesh` parts, placed. trimesh cuts polygons of COLLADA into fans, which reach
+beyond concave ones, and leaves out geometries of controllers and of materials that are missing: so its XML is made
 simpler before.
 
 Based on: Khronos Group, "COLLADA 1.4.1 Specification", 2008.
@@ -50,7 +50,7 @@ UNBOUNDED = {
     **dict.fromkeys((".xdmf", ".xmf"), "it names files wherever they lie"),
     **dict.fromkeys((".cgns", ".e", ".ex2", ".exo", ".h5m", ".hmf", ".med"), "HDF5 unpacks to whatever it says"),
 }
-"""What no budget holds for: whoever trusts the file reads it by meshio, and gives its points and triangles."""
+"""Formats without a budget: whoever trusts the file reads it by meshio, and gives its points and triangles."""
 
 PACKAGES = {
     ".3mf": "lxml networkx", ".dae": "pycollada lxml networkx", ".xaml": "lxml networkx",
@@ -73,7 +73,7 @@ CONVERTERS = {
     **dict.fromkeys((".brep", ".iges", ".igs"), "FreeCAD converts it: import it, and export STEP or OBJ"),
     **dict.fromkeys((".c4d", ".ma", ".max", ".mb", ".skp"), "the program that wrote it exports glTF"),
 }
-"""Formats without a reader, and what makes glTF of them."""
+"""Formats without a reader, and programs that make glTF of them."""
 BINARY_DXF = b"AutoCAD Binary DXF"
 
 NODES_OF_TRIMESH = 4
@@ -100,7 +100,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
         import trimesh
     except ImportError:
         raise MissingPackageError(_needs(source, "trimesh")) from None
-    _check_what_it_is(source, suffix)
+    _refuse_unreadable(source, suffix)
     try:
         with quiet():
             scene, double_sided = _scene(trimesh, source, suffix)
@@ -116,7 +116,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
             f"cannot read {str(source.path)!r}: format {source.path.suffix!r} is none of {readable}"
         ) from None
     except ImportError as error:
-        # trimesh asks for these to guess the encoding of what is not UTF-8: here, of a file that is no text.
+        # trimesh asks for these to guess the encoding of bytes that are not UTF-8: here, of a file that is no text.
         if getattr(error, "name", None) in ("charset_normalizer", "chardet"):
             raise MeshError("it is not text") from error
         raise MissingPackageError(_needs(source, PACKAGES.get(suffix, error.name or str(error)))) from error
@@ -127,8 +127,8 @@ def _needs(source: InputFile, package: str) -> str:
     return f"reading {str(source.path)!r} needs another package: pip install {package}"
 
 
-def _check_what_it_is(source: InputFile, suffix: str) -> None:
-    """Raise an error for what trimesh would fail on in words that do not say why."""
+def _refuse_unreadable(source: InputFile, suffix: str) -> None:
+    """Raise an error with the reason for files on which trimesh fails without one."""
     with source.path.open("rb") as file:
         head = file.read(64)
     if head.startswith(BINARY_DXF):
@@ -150,7 +150,7 @@ def _check_what_it_is(source: InputFile, suffix: str) -> None:
 
 @contextmanager
 def broken_archives() -> Iterator[None]:
-    """Raise an error of ours for members that do not unpack."""
+    """Raise a `MeshError` for members that do not unpack."""
     try:
         yield
     except (zipfile.BadZipFile, RuntimeError, zlib.error, EOFError, OSError) as error:
@@ -245,9 +245,9 @@ class Model3MF:
 
 
 def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | None]:
-    """The meshes that trimesh reads of a file, and whether all materials have two sides, or None: each says so itself.
+    """The meshes that trimesh reads of a file, and whether all materials have two sides; None if each says so itself.
 
-    COLLADA is read after its polygons have been cut; of the sides of its materials trimesh reads nothing.
+    COLLADA is read after its polygons have been cut; trimesh does not read the sides of its materials.
     """
     content = source.content()
     if suffix != ".dae":
@@ -322,7 +322,7 @@ def counted_vtu(budget: Budget) -> Iterator[None]:
 
 
 def _note_missing_pictures(content: bytes, source: InputFile) -> None:
-    """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out without a word."""
+    """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out silently."""
     names = re.findall(rb"<init_from>\s*(?:<ref>)?\s*([^<\s][^<]*\.[A-Za-z]{3,4})\s*<", content)
     for name in names:
         source.find(unquote(name.decode("utf-8", errors="replace")).removeprefix("file://"), "textures")
@@ -349,7 +349,7 @@ def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep what trimesh and meshio print off the terminal; errors say what is wrong."""
+    """Keep the messages of trimesh and meshio off the terminal; errors give the reason."""
     import logging
 
     logger = logging.getLogger("trimesh")
@@ -369,7 +369,7 @@ def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, boo
     Raises
     ------
     MeshError
-        If it is no XML, its polygons name what is not there, or it has more than its budget.
+        If it is no XML, its polygons name missing data, or it has more than its budget.
     """
     budget.spend("max_lines", content.count(b"<") - content.count(b"</"))
     try:
@@ -392,7 +392,7 @@ def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, boo
         for row in node.findall(f"{space}instance_controller"):
             _uncontrol(row, space, named, notes)
     for bound in list(root.iter(f"{space}technique_common")):
-        kept = []  # what is removed one by one is looked for among all
+        kept = []  # `remove` would search all rows for each
         for row in bound:
             if row.tag != f"{space}instance_material" or _is_material(row.get("target", ""), space, named):
                 kept.append(row)
@@ -406,7 +406,7 @@ def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, boo
 
 
 def _has_two_sides(root: Element, space: str, notes: Notes) -> bool:
-    """Whether materials are drawn from both sides, as without a word of theirs: no effect says 0, or not all do."""
+    """Whether materials are drawn from both sides: unless all effects say 0."""
     effects = list(root.iter(f"{space}effect"))
     n_single = sum(row.findtext(f".//{space}double_sided", "").strip() == "0" for row in effects)
     if 0 < n_single < len(effects):
@@ -415,7 +415,7 @@ def _has_two_sides(root: Element, space: str, notes: Notes) -> bool:
 
 
 def _check_walks(root: Element, space: str, named: dict[str | None, Element], budget: Budget) -> None:
-    """Count what the nodes of the scene place, and put those that others name before them, as pycollada likes it."""
+    """Count nodes and triangles that the scene places, and put nodes before those that name them, for pycollada."""
     nodes: dict[str | None, list[Element]] = defaultdict(list)
     for node in root.iter(f"{space}node"):
         nodes[node.get("id")].append(node)
@@ -523,7 +523,7 @@ def _uncontrol(row: Element, space: str, named: dict[str | None, Element], notes
     notes.add(SKINS)
     matrix: str | None = None
     url = row.get("url", "")
-    for _ in range(len(named)):  # a skin may move what a morph makes
+    for _ in range(len(named)):  # a skin may move the result of a morph
         controller = named.get(url[1:])
         if controller is None or controller.tag != f"{space}controller":
             break

@@ -66,7 +66,7 @@ def save_image(
         would have to be scaled, which `ViewLayers.save` does (ids plus 1, distances in millimetres); .tif and .npy hold
         both.
     background : (3,) of 0 to 255
-        What shows through in JPEG, which has no alpha.
+        The colour behind in JPEG, which has no alpha.
     text : mapping of str to str, optional
         Notes that go into a PNG, by keyword; Latin-1.
     grid : Grid, optional
@@ -147,7 +147,7 @@ def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) ->
 
 
 def _check_holds(path: Location, image: npt.NDArray[Any]) -> None:
-    """Raise an error for what the format cannot hold."""
+    """Raise an error for an image that the format cannot hold."""
     kinds = HOLDS[path.suffix.lower()]
     channels = "".join(f", {n}" for n in image.shape[2:])
     found = {f"{image.dtype} (H, W{channels})", f"{image.dtype} (H, W{', K' * (image.ndim - 2)})"}

@@ -2,7 +2,7 @@
 
 Input: arrays by name, from `draw_layers`. Output: a file for each, or one .npz.
 
-In a PNG a layer that is no picture holds whole numbers, and its text chunks tell what they stand for:
+In a PNG a layer that is no picture holds whole numbers, and its text chunks tell their meaning:
 
     number = topleft:offset + topleft:scale * value        value 0 where nothing is, in 16 bits
 """
@@ -24,11 +24,11 @@ from topleft._meshes.io.images import save_image
 from topleft.errors import ImageError
 
 RANGES = {"camera_normal": (-1.0, 1.0), "world_normal": (-1.0, 1.0), "barycentric": (0.0, 1.0)}
-"""Layers of three channels that eight bits show: what 0 and 255 stand for."""
+"""Layers of three channels that eight bits show: the values of 0 and 255."""
 
 LENGTHS = ("distance", "ray_distance")
 MILLIMETRES = 1000.0
-"""Steps of a unit of length, if none are given: what datasets of depth mostly have."""
+"""Steps of a unit of length, if none are given: as most datasets of depth have."""
 
 LARGEST = 65535
 
@@ -69,8 +69,8 @@ def save_layers(
         * .tif, .tiff: pictures and masks (0 and 255) of 8 bits; all else as it is, float32 or int32; of several
           channels each is a page.
         * .png: pictures and masks as in TIFF; normals and barycentrics of 8 bits. Numbers (H, W) of 16 bits, 0 where
-          nothing is: ids plus 1; distances in thousandths, millimetres if units are metres; depth, of which 0 to 1 is
-          1 to 65535; others from the least, 1, to the greatest, 65535.
+          nothing is: ids plus 1; distances in thousandths, millimetres if units are metres; depth, 0 to 1 as 1 to
+          65535; others from the least, 1, to the greatest, 65535.
         * .jpg, .webp: pictures and masks.
     layers : mapping of str to ndarray
     scale : float, optional
@@ -78,7 +78,7 @@ def save_layers(
     matrix : (4, 4) float64, optional
         Clip space from the world; goes into .npz with the layers, as `clip_from_world`.
     background : (3,) of 0 to 255
-        What shows through in JPEG.
+        The colour behind in JPEG.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def _numbers_of_16_bits(
 
 
 def _check_steps(path: Location, name: str, step: float, steps: npt.NDArray[Any]) -> None:
-    """Raise an error for what 16 bits do not hold."""
+    """Raise an error for numbers that 16 bits do not hold."""
     low, high = steps.min(initial=0), steps.max(initial=0)
     if not (low >= 0 and high <= LARGEST):
         raise ImageError(

@@ -1,6 +1,6 @@
 """Reads a mesh from a file of any format.
 
-Input: a path. Output: one `Mesh`, and warnings of what it lacks.
+Input: a path. Output: one `Mesh`, and warnings of what could not be read.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def load(
     max_unpacked_bytes: int | None = None,
     scale: float = 1.0,
 ) -> Mesh | Points:
-    r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
+    r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and other formats.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def load(
     max_bytes : int, optional
         Of the file and all that it names: more are refused. Unless given 8 GiB.
     max_unpacked_bytes : int, optional
-        Of what is in an archive, or in the file in a shorter form: more are refused. Unless given 33,554,432, or 8 for
-        each byte.
+        Of the contents of an archive, or of compressed data in the file: more are refused. Unless given 33,554,432, or
+        8 for each byte.
     time : float, optional
         Seconds, 0 or more: nodes, skins and morph targets of glTF are where an animation has them then; behind its end,
         where it ends. Unless given everything is at rest.
@@ -78,7 +78,7 @@ def load(
         The index or the name of the animation; "all" plays all of them, and where two move the same the first has it.
         Unless given the first one plays, and `MeshWarning` tells of others.
     scale : float
-        Positive. What coordinates are multiplied by: 0.001 makes metres of a file in millimetres.
+        Positive. Multiplies the coordinates: 0.001 makes metres of a file in millimetres.
 
     Returns
     -------
@@ -104,12 +104,12 @@ def load(
     Warns
     -----
     MeshWarning
-        Once for each kind of thing that the mesh lacks: textures that are not there, say.
+        Once for each kind of contents that could not be read: missing textures, say.
 
     Notes
     -----
-    Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened. What is read
-    of each format is told in docs/guide/files.md.
+    Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened.
+    docs/guide/files.md lists the contents of each format that are read.
 
     Examples
     --------

@@ -197,7 +197,7 @@ class _Makers:
         return Material(**own)
 
     def _colors(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
-        """Colour, or its map, beside which programs write any Kd."""
+        """Colour, or its map, which replaces it: exporters write arbitrary Kd there."""
         if "color" in maps:
             picture = self._picture(maps["color"])
             if picture is not None:

@@ -125,7 +125,7 @@ def _distinct(names: list[I64]) -> tuple[I64, I64]:
 
 
 class _Text:
-    """The text of a file, in lines that are told by their first word.
+    """The text of a file, in lines by their first word.
 
     Lines that go on after a backslash are joined, blanks at their beginnings are gone.
     """
@@ -217,7 +217,7 @@ def _starts_of_words(body: U8) -> I64:
 
 
 def _counts(places: I64, ends: I64) -> I64:
-    """How many of the places, ascending, lie before each end and not before the one before."""
+    """How many of the places, ascending, lie between each end and the end before it."""
     counts = np.searchsorted(places, ends)
     counts[1:] -= counts[:-1].copy()
     return counts
@@ -311,7 +311,7 @@ def _indices(body: U8) -> I64:
             values = numbers_of_text(numbers.tobytes(), np.int64)
         else:
             lengths = np.diff(np.append(starts, len(body)))
-            # what stands before the first word is left out
+            # bytes before the first word are left out
             values = numbers_of_text(numbers[starts[0] :][np.repeat(own, lengths)].tobytes(), np.int64)
         if len(values) != len(columns) * int(own.sum()):
             corners[own] = [_corner(body, start) for start in starts[own].tolist()]
@@ -352,7 +352,7 @@ def _materials(text: _Text, source: InputFile) -> tuple[tuple[Material, ...], I6
     materials: list[Material] = []
     place = np.zeros(len(names) + 1, np.int64)
     order = use_of_face[np.sort(np.unique(use_of_face, return_index=True)[1])].tolist()
-    unknown = NONE  # where the one material of all that no library has is
+    unknown = NONE  # the place of the one material for all names that no library has
     for row in order:
         if row != NONE and names[row] in known:
             source.budget.spend("max_nodes", 1)

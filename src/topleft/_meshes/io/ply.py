@@ -112,7 +112,7 @@ def _found(content: bytes, order: str, elements: list[_Element], start: int, sou
     if error is None and not numbers.n_left:
         return found
     lines = [line for line in content[start:].splitlines() if line.strip()]
-    if len(lines) == sum(element.n for element in elements):  # a row a line: the header says too little of each
+    if len(lines) == sum(element.n for element in elements):  # each row has its line: longer than the header says
         ends = np.cumsum([element.n for element in elements]).tolist()
         for element, end in zip(elements, ends, strict=True):
             rows = [_row(line, element) for line in lines[end - element.n : end]]
@@ -124,7 +124,7 @@ def _found(content: bytes, order: str, elements: list[_Element], start: int, sou
 
 
 def _row(line: bytes, element: _Element) -> bytes:
-    """The numbers of a line that the header tells of."""
+    """The numbers of a line that the header declares."""
     words, n = line.split(), 0
     for own in element.properties:
         if own.count_dtype is not None and n < len(words):
@@ -454,7 +454,7 @@ def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, source: InputF
         return Mesh(positions, names, normals, colors, uv)
     else:
         uv = None if uv is None else uv[names.ravel()]
-    # vertices of their own for each triangle: what a face says ends at its edges
+    # vertices of their own for each triangle: the values of a face end at its edges
     source.budget.spend("max_vertices", 3 * len(triangles))
     if color_of_face is not None and colors is None:
         colors = np.repeat(color_of_face[faces], 3, axis=0)

@@ -3,8 +3,8 @@
 Input: an array of uint8 (grey, grey with alpha, RGB, RGBA) or of uint16 (grey). Output: the file, in pieces.
 
 Choosing a filter for each row, as other writers do, takes longer than compressing and gains nothing on rendered
-pictures: here every row is the difference to the row above it, taken by NumPy. What compresses is `isal` where it is
-installed, and zlib's level 1 otherwise.
+pictures: here every row is the difference to the row above it, taken by NumPy. The compressor is `isal` where
+it is installed, and zlib's level 1 otherwise.
 
 Based on: Portable Network Graphics (PNG) Specification, Third Edition, W3C, 2025.
 """
@@ -30,17 +30,17 @@ COMPRESSORS = ("auto", "isal", "zlib")
 
 FILTER_UP = 2
 BAND_BYTES = 1 << 18
-"""Rows are filtered and compressed by so much at a time: what is filtered is still in the cache when it is read."""
+"""Rows are filtered and compressed by so much at a time: filtered bytes are still in the cache when they are read."""
 
 MIN_CHUNK_BYTES = 1 << 10
-"""Less than this waits for what comes next: zlib gives its first two bytes at once."""
+"""Less than this waits for more: zlib gives its first two bytes at once."""
 
 
 class Deflate(Protocol):
     """A compressor that takes a stream by pieces."""
 
     def compress(self, data: Any, /) -> bytes:
-        """Return what comes out so far."""
+        """Return the output so far."""
 
     def flush(self) -> bytes:
         """Return the rest."""
@@ -54,7 +54,7 @@ def encode(image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None, co
     image : (H, W), (H, W, 2), (H, W, 3) or (H, W, 4) uint8, or (H, W) uint16
         Grey, grey and alpha, RGB, RGBA; 16-bit grey. Any layout.
     text : mapping of str to str, optional
-        Notes to go with it: keywords of 1 to 79 characters, and what they say, in Latin-1.
+        Notes to go with it: keywords of 1 to 79 characters, and their text, in Latin-1.
     compressor : {"auto", "isal", "zlib"}
         "auto" takes `isal` where it is installed. The pixels are the same; the bytes of the file are not.
 
@@ -160,7 +160,7 @@ def _crc32() -> Callable[..., int]:
 
 @cache
 def _isal() -> Callable[[], Deflate] | None:
-    """Return what makes a compressor of `isal`, None where it is not installed."""
+    """Return the maker of compressors of `isal`, None where it is not installed."""
     try:
         from isal import isal_zlib
     except ImportError:

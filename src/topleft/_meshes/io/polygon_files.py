@@ -1,6 +1,6 @@
 """Reads polygons from files: GeoJSON, annotations in the format of COCO, and vector files by pyogrio or fiona.
 
-Input: a path. Output: for each picture its polygons, which of them belong together, and what is said of each.
+Input: a path. Output: for each picture its polygons, by objects, and the properties of each object.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class PolygonPicture:
     folder: str = ""  # of the image, as the file has it
     crs: str | None = None  # of the plane, if it is known
     parts: list[ObjectRings] = field(default_factory=list)  # of each object
-    objects: list[Mapping[str, Any]] = field(default_factory=list)  # what is said of each
+    objects: list[Mapping[str, Any]] = field(default_factory=list)  # the properties of each
     n_skipped: int = 0  # objects that are no polygons
 
     def add(self, parts: ObjectRings, said: Mapping[str, Any]) -> None:
@@ -49,7 +49,7 @@ class PolygonPicture:
 
     @property
     def polygons(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Points, where their rings begin and end, and the polygons of these: what `polygons` takes."""
+        """Points, where their rings begin and end, and the polygons of these: the input of `polygons`."""
         points = np.concatenate([np.empty((0, 2)), *(part.points for part in self.parts)])
         lengths = np.concatenate([np.zeros(1, np.int64), *(part.lengths for part in self.parts)])
         counts = np.concatenate([np.zeros(1, np.int64), *(part.counts for part in self.parts)])
@@ -102,8 +102,8 @@ def load_polygons(
 
 
 def _vector_content(path: Path, layer: str | None) -> dict[str, Any]:
-    """A layer of a vector file as what GeoJSON holds."""
-    path.stat()  # that it is missing is told as of other files
+    """A layer of a vector file in the form of GeoJSON."""
+    path.stat()  # raises the same error for a missing file as other formats
     try:
         import pyogrio
         import shapely
@@ -162,7 +162,7 @@ def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPictur
 
 
 def _coco_parts(segmentation: Any, size: tuple[int, int], name: object) -> ObjectRings | None:
-    """Return the polygons of a segmentation: flat rings, or run lengths; None of what is neither."""
+    """Return the polygons of a segmentation: flat rings, or run lengths; None if it is neither."""
     if isinstance(segmentation, list):
         return _joined([[_pairs(flat)] for flat in segmentation], f"annotation {name}")
     if isinstance(segmentation, dict) and "counts" in segmentation:
@@ -221,7 +221,7 @@ def _pairs(flat: list[float]) -> list[tuple[float, float]]:
 
 
 def _joined(polygons: list[list[list[tuple[float, float]]]], what: str) -> ObjectRings:
-    """Return polygons, of each its rings."""
+    """Return polygons from the rings of each."""
     rings = list(chain.from_iterable(polygons))
     points = np.array(list(chain.from_iterable(rings)), np.float64).reshape(-1, 2)
     if not np.isfinite(points).all():

@@ -1,7 +1,7 @@
 """Reads the files that a mesh file names: material libraries, buffers, pictures; from its own folder and nowhere else.
 
 Input: names out of a file that nobody has checked. Output: bytes, or the pixels of a picture; None, and a note, for
-what is not there, lies outside of the folder or cannot be read.
+files that are missing, lie outside of the folder or cannot be read.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "GIF", "TIFF", "PPM", "D
 
 
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
-"""How a file begins that stands for one which has not been fetched."""
+"""The beginning of a pointer, which stands for a file that has not been fetched."""
 
 
 class LfsPointerError(MeshError):
@@ -51,7 +51,7 @@ class Cloud(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """Which time of which animation of a file is read."""
+    """The animation of a file and the time of it to read."""
 
     time: float
     """Seconds."""
@@ -67,7 +67,7 @@ class InputFile:
     path : Path
         The mesh file.
     budget : Budget
-        What it may make.
+        The limits of its contents.
     archive : InputFile, optional
         The archive that it was unpacked from, which gets its notes and its points.
     home : Path, optional
@@ -121,7 +121,7 @@ class InputFile:
     def find(self, name: str, what: str, folder: Path | None = None) -> Path | None:
         """Where such a file is: in the folder of the mesh, or below.
 
-        What is named by a path that leads elsewhere, as other machines have them, is looked for in the folder itself.
+        A file with a path that leads elsewhere, as other machines have them, is looked for in the folder itself.
         """
         key = self._folder if folder is None else folder, name
         if key not in self._found:
@@ -176,7 +176,7 @@ class InputFile:
         return self._pictures[key]
 
     def picture_content(self, name: str) -> bytes | None:
-        """The bytes of a picture that the mesh names, for somebody else to decode; counted each time."""
+        """The bytes of a picture that the mesh names, for the caller to decode; counted each time."""
         path = self.find(name, "textures")
         content = None if path is None else self.read_at(path, name, "textures")
         if content is None:
@@ -219,7 +219,7 @@ class InputFile:
 
 
 def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]:
-    """The numbers that a text holds and nothing else does.
+    """The numbers of a text that holds nothing else.
 
     Raises
     ------
@@ -237,14 +237,14 @@ def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]
 
 
 def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """The values as int64; those that have none there come out as any."""
+    """The values as int64; any number for those beyond its range."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.int64)
 
 
 @contextmanager
 def opened(content: bytes) -> Iterator[Image.Image]:
-    """A picture whose pixels have not been decoded.
+    """A picture before its pixels are decoded.
 
     Raises
     ------
@@ -268,7 +268,7 @@ def opened(content: bytes) -> Iterator[Image.Image]:
 
 
 def rgba_of(image: Image.Image) -> U8:
-    """The picture (H, W, 4), uint8, a few rows at a time: all of it is there twice and not more often."""
+    """The picture (H, W, 4), uint8, a few rows at a time, so that memory holds it at most twice."""
     if image.mode.startswith("I"):  # 16 bits, which convert() would cut off at 255
         grey = (np.asarray(image).clip(0, 65535) >> 8).astype(np.uint8)
         return np.dstack([grey, grey, grey, np.full_like(grey, 255)])

@@ -1,7 +1,7 @@
 """Reads STL, binary and text, and OFF: triangles and polygons, and little else.
 
-Normals of STL are not read: the corners of its triangles say the same. The first word of OFF names what its vertices
-have: colours, normals, texture coordinates.
+Normals of STL are not read: the corners of its triangles say the same. The first word of OFF names the values of
+its vertices: colours, normals, texture coordinates.
 
 Input: a file, unchecked. Output: a `Mesh`, or none where nothing has faces; no memory is taken for more than it holds.
 
@@ -149,7 +149,7 @@ def _faces_of_one_size(values: Array, n_faces: int) -> Faces | None:
 
 
 def _faces_of_lines(lines: list[bytes]) -> Faces:
-    """Faces of which each has a line of its own."""
+    """Faces with a line for each."""
     rows = [line.split() for line in lines]
     counts = whole_numbers(numbers_of_text(b" ".join(row[0] for row in rows)))
     if not all(0 <= n < len(row) for n, row in zip(counts.tolist(), rows, strict=True)):

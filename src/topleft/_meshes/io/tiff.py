@@ -18,7 +18,7 @@ import numpy.typing as npt
 from topleft._core.base.tiff import LIMIT_CLASSIC, Tags, directory, directory_bytes, header
 
 STRIP_BYTES = 1 << 18
-"""Of rows that are compressed together: readers take memory for one strip."""
+"""Bytes of rows that are compressed together: readers take memory for one strip."""
 
 
 def pieces(picture: npt.NDArray[Any], more: Tags | None = None) -> Iterator[bytes]:
@@ -58,7 +58,7 @@ def _strips(page: npt.NDArray[Any]) -> list[bytes]:
 
 
 def _tags(page: npt.NDArray[Any], strips: list[bytes], at: int, is_big: bool, more: Tags | None) -> Tags:
-    """The tags of a page, the strips of which lie in the file from a place on."""
+    """The tags of a page with strips that lie in the file from a place on."""
     (height, width), n = page.shape[:2], page[0, 0].size
     lengths = np.array([len(strip) for strip in strips], np.int64)
     offsets = at + np.cumsum(lengths) - lengths

@@ -1,7 +1,7 @@
-"""Collapse: a mesh with fewer triangles, by fast-simplification, and what its vertices and triangles are made of.
+"""Collapse: a mesh with fewer triangles, by fast-simplification, and the points that each of its vertices replaces.
 
-In: points, triangles. Out: fewer of both, and which points have become one. How far they lie from what they were is
-measured elsewhere: nothing here promises anything.
+In: points, triangles. Out: fewer of both, and which points have become one. Their distance from the mesh is
+measured elsewhere: nothing here bounds it.
 
 Based on: M. Garland, P. S. Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997.
 """
@@ -49,9 +49,9 @@ _lock = threading.Lock()
 
 
 class Collapsed(NamedTuple):
-    """What is left: points (N, 3) float64, triangles (K, 3) int32, and which point (V,) each went into.
+    """The collapsed mesh: points (N, 3) float64, triangles (K, 3) int32, and the row (V,) that each point went into.
 
-    -1 where a point vanished with all its triangles; None where nobody asked.
+    -1 where a point vanished with all its triangles; None unless `with_pairs`.
     """
 
     points: F64
@@ -77,7 +77,7 @@ def collapser() -> Any:
 
 
 def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
-    """How many triangles the next level is to have; 0: there is to be none.
+    """The number of triangles of the next level; 0: there is none.
 
     Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
     nothing but its borders. (Very large meshes are looked at when they have become smaller.)
@@ -97,14 +97,15 @@ def collapse(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool = T
     triangles : (T, 3) int32
     n_wanted : int
     with_pairs : bool
-        Whether it is to be told which points became one, which takes memory.
+        Whether to find which points became one, which takes memory.
 
     Notes
     -----
-    The package collapses in rounds, what costs least first; the thresholds of the rounds are absolute. Points are
-    scaled so that a mesh with the wanted number of triangles needs the middle ones: what a collapse moves the surface
-    by goes with the area of triangles. On the blob of 200,000 triangles that makes the bounds 1.1 to 7 times smaller
-    than a scale of 1 does. A finer scale may end the rounds early; then a coarser one has its turn, then a grid.
+    The package collapses in rounds, the cheapest edges first; the thresholds of the rounds are absolute. Points are
+    scaled so that a mesh with the wanted number of triangles needs the middle ones: the distance by which a
+    collapse moves the surface goes with the area of triangles. On the blob of 200,000 triangles that makes the bounds
+    1.1 to 7 times smaller than a scale of 1 does. A finer scale may end the rounds early; then a coarser one has its
+    turn, then a grid.
 
     The package moves open borders as if there were no surface outside: on the bunny, which is open below, bounds
     are 4 to 6 times smaller where borders stay.
@@ -204,7 +205,7 @@ def border_points(triangles: I32) -> npt.NDArray[np.int64]:
 
 
 def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, with_pairs: bool) -> Collapsed:
-    """Fewer triangles, with the thresholds of the rounds so fine."""
+    """Fewer triangles, with thresholds of the rounds by `fineness`."""
     package = collapser()
     low, high = points.min(axis=0), points.max(axis=0)
     center, size = low / 2 + high / 2, float((high - low).max()) or 1.0
@@ -222,7 +223,7 @@ def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, 
 
 
 def rows_of_pairs(pairs: Any, triangles: I32, n_points: int, left: I32) -> I32 | None:
-    """The row that each point went into, from pairs of points of which the second went into the first.
+    """The row that each point went into, from pairs of points: the second went into the first.
 
     None where the pairs leave other triangles than the package does, as of a mesh that is one point or one line.
     """

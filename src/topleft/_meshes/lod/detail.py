@@ -8,7 +8,7 @@ With u = x / w, rows l of the linear part of the matrix and a viewport W wide, e
     px(q) - px(p) = W/2 (l_x - u l_w) . d / w(q),      and so for y with v and H.
 
 So no p moves by more than bound * s / w_min: s the largest singular value of the matrix of both rows, which is convex
-in (u, v) and so largest in a corner of what the mesh can show in, w_min the least w on both surfaces. Stretched
+in (u, v) and so largest in a corner of the rectangle that shows the mesh, w_min the least w on both surfaces. Stretched
 pixels, shear, the edge of the frame and instances that are scaled are in the matrix.
 """
 
@@ -37,20 +37,20 @@ from topleft.typing import CullOption
 
 @dataclass(frozen=True)
 class Detail:
-    """Which level of a mesh a view needs. Made by `choose_detail`.
+    """The level of a mesh that a view needs. Made by `choose_detail`.
 
     Attributes
     ----------
     level : int
         0: the mesh itself.
     mesh : Mesh
-        What is drawn: the `.triangle` of its visibility buffer are rows of its triangles.
+        The mesh that is drawn: the `.triangle` of its visibility buffer are rows of its triangles.
     bound : float
         How far its surface may lie from the mesh, object units.
     bound_px : float
-        How far a point that shows may lie from where it belongs, pixels.
+        The largest error of a visible point, pixels.
     tolerance : float
-        What was asked for, pixels.
+        The limit that was given, pixels.
     n_triangles : int
         Triangles of the mesh itself.
     why : str
@@ -87,7 +87,7 @@ def choose_detail(
     viewport: tuple[int, int] | None = None,
     origin: tuple[int, int] = (0, 0),
 ) -> Detail:
-    """The coarsest level of a mesh whose points lie within a tolerance of where they belong in a picture.
+    """The coarsest level of a mesh with all points within a tolerance of where they belong in a picture.
 
     Parameters
     ----------
@@ -142,18 +142,18 @@ def choose_detail(
     levels = levels_of(mesh)
     if len(levels) == 1:
         return whole("it has no coarser level")
-    sight = sight_of(camera, size, viewport, origin)
+    screen = screen_error_of(camera, size, viewport, origin)
     place = None if transform is None else np.asarray(transform, np.float64)
 
     def rejected(i: int) -> str:
-        scale = sight.scale_of(place, levels[0], levels[i])
+        scale = screen.scale_of(place, levels[0], levels[i])
         off = "reach the near or the far plane, or the eye"
         if scale is not None:
             off = f"be off by {levels[i].bound * scale:.3g} px"
         return f"level {i}, {len(levels[i].mesh.triangles):,} triangles: may {off}"
 
-    matrix = sight.clip_from_world if place is None else engine.product(sight.clip_from_world, place)
-    (i,), (scale,) = (found.tolist() for found in sight.coarsest(matrix[None], levels, tolerance))
+    matrix = screen.clip_from_world if place is None else engine.product(screen.clip_from_world, place)
+    (i,), (scale,) = (found.tolist() for found in screen.coarsest(matrix[None], levels, tolerance))
     if i == 0:
         return whole(f"no coarser level is sure to be within {tolerance:g} px", (rejected(1),))
     bound_px = levels[i].bound * scale
@@ -163,15 +163,15 @@ def choose_detail(
     return Detail(i, levels[i].mesh, levels[i].bound, bound_px, tolerance, n, why, tuple(others))
 
 
-class Sight(NamedTuple):
-    """What a view says of how far points may be off."""
+class ScreenError(NamedTuple):
+    """The scale of errors in a view: from object units to pixels."""
 
     clip_from_world: F64
     viewport: tuple[int, int]
     window: F64  # as `window_of` gives it
 
     def scale_of(self, place: F64 | None, *levels: Level) -> float | None:
-        """How many pixels a unit is at most on some levels; None where nothing is known of that."""
+        """The most pixels of a unit on some levels; None where that is unknown."""
         matrix = self.clip_from_world if place is None else engine.product(self.clip_from_world, place)
         return engine.pixels_per_unit(matrix, self.viewport, self.window, np.stack([level.extent for level in levels]))
 
@@ -184,9 +184,11 @@ class Sight(NamedTuple):
         return found, scales
 
 
-def sight_of(camera: Camera, size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> Sight:
-    """What a view says of how far points may be off."""
-    return Sight(camera.clip_from_world(viewport or size), viewport or size, window_of(size, viewport, origin))
+def screen_error_of(
+    camera: Camera, size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]
+) -> ScreenError:
+    """The scale of errors in a view: from object units to pixels."""
+    return ScreenError(camera.clip_from_world(viewport or size), viewport or size, window_of(size, viewport, origin))
 
 
 def check_tolerance(tolerance: float) -> float:
@@ -197,7 +199,7 @@ def check_tolerance(tolerance: float) -> float:
 
 
 def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, material: Material | None) -> str | None:
-    """Why nothing but the mesh itself will do, as far as that is known without its levels."""
+    """Why the mesh itself is drawn, as far as that is known without its levels."""
     if tolerance == 0:
         return "tolerance=0: the picture of the mesh itself, to the bit"
     if not len(mesh.triangles):
@@ -212,7 +214,7 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, ma
 
 
 def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> F64:
-    """Where in normalised device coordinates pixels are looked at: lower and upper x, and y, (4,).
+    """The window in normalised device coordinates: lower and upper x, and y, (4,).
 
     All of the viewport, so that a window of a picture has the level of the whole; more where the window has more.
     """
@@ -224,7 +226,7 @@ def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: t
 
 
 def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level) -> float | None:
-    """How far a point that shows may be off, pixels; None where nothing is known of that.
+    """The largest error of a visible point, pixels; None where that is unknown.
 
     Parameters
     ----------
@@ -232,7 +234,7 @@ def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, origina
         Clip from object.
     viewport : (width, height), pixels
     window : (4,) float64
-        What `window_of` gives.
+        The result of `window_of`.
     original, level : Level
     """
     scale = engine.pixels_per_unit(matrix, viewport, window, np.stack([original.extent, level.extent]))
@@ -247,12 +249,12 @@ def detailed(scene: Scene, camera: Camera, size: tuple[int, int], tolerance: flo
         return scene
     if camera.lens is not None:
         return scene  # see `why_whole`
-    sight = sight_of(camera, size, options.get("viewport"), options.get("origin", (0, 0)))
-    matrices = scene.clip_from_objects(sight.clip_from_world)
+    screen = screen_error_of(camera, size, options.get("viewport"), options.get("origin", (0, 0)))
+    matrices = scene.clip_from_objects(screen.clip_from_world)
     meshes = [instance.mesh for instance in scene]
     for one, material, at in scene.looks(options.get("material")):
         if not why_whole(one, camera, tolerance, options.get("cull"), material):
             levels = levels_of(one)
-            for i, level in zip(at.tolist(), sight.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
+            for i, level in zip(at.tolist(), screen.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
                 meshes[i] = levels[level].mesh if level else one
     return scene.with_meshes(meshes)

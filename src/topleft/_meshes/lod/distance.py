@@ -1,10 +1,10 @@
-"""How far two surfaces lie apart: bounds on the two-sided Hausdorff distance, that hold for every point of both.
+"""Bounds the two-sided Hausdorff distance of two surfaces, for every point of both.
 
 In: points and triangles of two surfaces. Out: `DistanceBounds`: a distance that is met, and one that is not passed.
 
 The kernels (`csrc/mesh/nearest.c`, `csrc/mesh/reach.c`) look at triangles by branch and bound; this file puts the
-triangles of a surface in an order that keeps neighbours together, cuts the work in blocks, and adds what rounding may
-hide.
+triangles of a surface in an order that keeps neighbours together, cuts the work in blocks, and adds a bound on
+rounding.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from topleft._core.base.array_types import F64, I32
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._meshes.model.mesh import coincident
 
-#: A bound may pass what is known to be met by this share of it ...
+#: A bound may pass the distance known to be met by this share of it ...
 SHARE = 1 / 16
 
 #: ... or by this share of the size of the surface: half a pixel of a picture in which it is 131,072 pixels wide.
 LEAST = 2.0**-18
 
-#: What float64 may hide, as a share of the largest coordinate: a cut moves a corner by less than four roundings of
+#: Errors of float64, as a share of the largest coordinate: a cut moves a corner by less than four roundings of
 #: 2**-53 of it, a foot is found with fewer than 64, and squares and roots lose less than 2**-45 of the distance.
 ROUNDING_OF_CUT, ROUNDING_OF_FOOT, ROUNDING_OF_ROOT = 2.0**-51, 2.0**-47, 2.0**-45
 
-#: Points or triangles that a thread takes at a time: what is found must not depend on who finds it.
+#: Points or triangles that a thread takes at a time: the result must not depend on the threads.
 BLOCK = 4096
 
 #: Points whose distance is looked at before triangles are.
@@ -41,7 +41,7 @@ PLACE_BITS = 11
 
 
 class DistanceBounds(NamedTuple):
-    """How far two surfaces lie apart, in their own unit: `known <= distance <= bound`, but for rounding on the left."""
+    """Bounds on the distance of surfaces, in their unit: `known <= distance <= bound`, up to rounding on the left."""
 
     known: float
     bound: float
@@ -110,7 +110,7 @@ class TriangleTree:
 
 
 def measure(one: TriangleTree, other: TriangleTree) -> DistanceBounds:
-    """Bounds on the Hausdorff distance between two surfaces: of what is farthest from the other, either way.
+    """Bounds on the Hausdorff distance between two surfaces: of the point farthest from the other surface, either way.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def measure(one: TriangleTree, other: TriangleTree) -> DistanceBounds:
 
 
 def reach(source: TriangleTree, target: TriangleTree, known: float, least: float) -> Reach:
-    """How far the points of one surface are from another, and the roundings that are in it."""
+    """The distances of the triangles of one surface from another, and the most pieces of one."""
     n, tree = len(source.triangles), target.tree
 
     def find(first: int, end: int) -> Reach:
@@ -154,7 +154,7 @@ def blocks(first: int, end: int, n: int) -> list[tuple[int, int]]:
 
 
 def some_points(surface: TriangleTree) -> F64:
-    """At most about `MOST_SAMPLES` points of a surface: what is known of them only spares work."""
+    """At most about `MOST_SAMPLES` points of a surface: their distances only spare work."""
     step = max(1, len(surface.points) // MOST_SAMPLES)
     return np.ascontiguousarray(surface.points[::step])
 

@@ -1,6 +1,6 @@
-"""Levels of detail: a mesh and coarser ones in its stead, each with a bound on how far it lies from the mesh.
+"""Levels of detail: a mesh and coarser ones in its stead, each with a bound on its distance from the mesh.
 
-In: a mesh. Out: `Levels`, which are kept with the mesh, and in a file where that is asked for.
+In: a mesh. Out: `Levels`, which are kept with the mesh, and in a file on request.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Levels(Sequence[Level]):
     """
 
     def __init__(self, mesh: Mesh, coarser: Sequence[Level] = ()) -> None:
-        # Not the mesh itself: it is what keeps its levels alive, and a circle would keep both for ever.
+        # Not the mesh itself: it keeps its levels alive, and a circle would keep both for ever.
         self._original = Level(replace(mesh))
         self._coarser = tuple(coarser)
 
@@ -142,13 +142,13 @@ class Levels(Sequence[Level]):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], mesh: Mesh, *, max_unpacked_bytes: int | None = None) -> Levels:
-        """Read what `save` wrote, and keep it with the mesh.
+        """Read the file of `save`, and keep the levels with the mesh.
 
         Parameters
         ----------
         path : path
         mesh : Mesh
-            The one whose levels they are: its arrays must be those of then, to the bit.
+            The mesh of the levels: its arrays must equal those that were saved, to the bit.
         max_unpacked_bytes : int, optional
             Of all arrays of the levels: a file with more is refused. Unless given 33,554,432, or 8 for each byte of it.
 
@@ -197,7 +197,7 @@ class Levels(Sequence[Level]):
             raise MeshError(f"cannot read {str(path)!r}: broken, or not levels of detail ({error})") from error
         except (ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError,
                 ValueError, zipfile.BadZipFile, zlib.error) as error:  # fmt: skip
-            if isinstance(error, OSError) and error.filename is not None:  # it is the file, not what it says
+            if isinstance(error, OSError) and error.filename is not None:  # it is the file, not its content
                 raise
             raise MeshError(f"cannot read {str(path)!r}: broken, or not levels of detail ({error})") from error
         return keep_levels(mesh, cls(mesh, coarser))

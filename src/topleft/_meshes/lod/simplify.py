@@ -29,8 +29,8 @@ from topleft._meshes.model.normals import unit_or_zero
 #: is added: it is small beside those of coarser levels, and the time that comparisons take goes with the triangles.
 MOST_TO_COMPARE = 300_000
 
-#: A level ends the levels, and is none of them, if it has 1/n of the triangles of the one before and more than n to
-#: this power times its bound: something is lost. Bounds go with the area of triangles on smooth surfaces, with n.
+#: The levels end before one that has 1/n of the triangles of the one before and more than n to
+#: this power times its bound: it has lost a part. Bounds go with the area of triangles on smooth surfaces, with n.
 MOST_POWER = 2.0
 
 #: The attributes of vertices, by their names in a mesh.
@@ -41,7 +41,7 @@ _lock = threading.RLock()
 
 
 class Corners(NamedTuple):
-    """Points that are one only where all that is known of them is equal.
+    """Points that are one only where all their attributes are equal.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Corners(NamedTuple):
 
 
 def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
-    """The mesh and coarser levels of it, each with a bound on how far it lies from the mesh; kept with the mesh.
+    """The mesh and coarser levels of it, each with a bound on its distance from the mesh; kept with the mesh.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     ratio : float
         Triangles of a level as a share of those of the level before, 0.05 to 0.75.
     smallest : int
-        There is no level with fewer triangles than about so many, at least 4.
+        No level has fewer triangles than about this number, at least 4.
 
     Returns
     -------
@@ -92,12 +92,11 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     The bound is one on the two-sided Hausdorff distance of the surfaces as they are drawn, float32 or float64, in units
     of object space: it holds for each point of both, borders included, whatever the collapser did.
 
-    Vertices that stand at one place with equal attributes count as one, and those that no triangle uses as none. What
-    the mesh has of normals, colours and texture coordinates a vertex of a level takes from the point of the level
-    before that is nearest to it, among the triangles round the vertices that went into it. Open borders stay as they
-    are, vertex by vertex, and so do the seams where attributes jump or materials meet: nothing bleeds across and
-    nothing cracks, but no level is coarser than its borders and seams. A mesh without normals
-    has levels without, which crease at the same angle.
+    Vertices that stand at one place with equal attributes count as one, and those that no triangle uses as none. A
+    vertex of a level takes its normal, colour and texture coordinates from the nearest point of the level before,
+    among the triangles round the vertices that went into it. Open borders stay as they are, vertex by vertex, and so do
+    the seams where attributes jump or materials meet: nothing bleeds across and nothing cracks, but no level is coarser
+    than its borders and seams. A mesh without normals has levels without, which crease at the same angle.
 
     Examples
     --------

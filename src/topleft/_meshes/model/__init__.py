@@ -1,1 +1,1 @@
-"""What is drawn: meshes, points, materials, textures and lights."""
+"""Values that pictures are drawn from: meshes, points, materials, textures and lights."""

@@ -1,9 +1,9 @@
 """Environments: light that comes from all around, as values; a picture of it is blurred once for every roughness.
 
-Input: colours, or a picture of all directions. Output: what the kernels read.
+Input: colours, or a picture of all directions. Output: the kernels' inputs.
 
-A picture is turned from its equirectangular form into an octahedron unfolded to a square. Level k is what a surface of
-roughness k / 8 sees: light averaged over the facets of GGX seen from straight above (normal, view and mirrored
+A picture is turned from its equirectangular form into an octahedron unfolded to a square. Level k is for surfaces of
+roughness k / 8: light averaged over the facets of GGX seen from straight above (normal, view and mirrored
 direction are one). The two that see least of it are means of 64 directions, from halvings as large as the part that a
 direction stands for; the others are sums over all texels of a halving.
 
@@ -42,7 +42,7 @@ N_DIRECTIONS = 64
 SIZE_OF_MATT = 32
 
 LEAST_SUMMED, SIZE_OF_SUMS = 0.3, 64
-"""From which roughness on all texels of a halving are added up, and its side: 3 degrees, where facets blur by 10."""
+"""The least roughness that sums all texels of a halving, and its side: 3 degrees, where facets blur by 10."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +54,9 @@ class Environment:
     Parameters
     ----------
     sky : (3,) of 0 to 255
-        sRGB of what is above the horizon; of all around unless there is a ground.
+        sRGB above the horizon; all around unless there is a ground.
     ground : (3,) of 0 to 255, optional
-        sRGB of what is below.
+        sRGB below the horizon.
     image : (H, W, 3) array_like, optional
         Instead of these: uint8 as sRGB, or float as linear light, 0 up. Longitude runs along the rows, the middle
         column is +x, and a quarter to its left -z; row 0 is the top.
@@ -90,7 +90,7 @@ class Environment:
     turn: float = 0.0
     space: str = "world"
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(
             self,
@@ -156,14 +156,14 @@ class Environment:
         return texels, np.array(rows, np.int32)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: the levels are made there."""
+        """The state for another process, which makes the levels itself."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
     __setstate__ = set_read_only
 
 
 DEFAULT_ENVIRONMENT = Environment((255, 255, 255), ground=(90, 90, 90), up=tuple(TO_HEADLIGHT.tolist()), space="eye")
-"""What metallic surfaces mirror unless something is given: white on the side of the headlight, a tenth of it behind."""
+"""Metallic surfaces mirror it unless one is given: white on the side of the headlight, a tenth of it behind."""
 
 
 def _as_light(image: npt.ArrayLike) -> F32:
@@ -231,7 +231,7 @@ def look_up_sphere(image: F32, at: F32) -> F32:
 
 
 def bordered(level: F32) -> F32:
-    """The level (n, n, 3) with a border of one texel: what lies beyond an edge of the unfolded octahedron."""
+    """The level (n, n, 3) with a border of one texel, from beyond the edges of the unfolded octahedron."""
     n = len(level)
     whole = np.empty((n + 2, n + 2, 3), np.float32)
     whole[1:-1, 1:-1] = level
@@ -260,7 +260,7 @@ def look_up_octahedron(level: F32, at: F32) -> F32:
 
 
 def blurred(halvings: list[F32], size: int, roughness: float) -> F32:
-    """What a surface of this roughness sees in each direction, (size, size, 3)."""
+    """The light that a surface of this roughness reflects, by direction, (size, size, 3)."""
     alpha2 = roughness * roughness * roughness * roughness
     if roughness > LEAST_SUMMED:
 

@@ -1,6 +1,6 @@
 """Makes a `Mesh` of a geometry of trimesh: its colours, materials, and the normals that it has already.
 
-Input: `trimesh.Trimesh`, told by its attributes, and its place. Output: `Mesh`. trimesh is not imported.
+Input: `trimesh.Trimesh`, recognized by its attributes, and its place. Output: `Mesh`. trimesh is not imported.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from topleft.typing import AlphaModeOption, EncodingOption
 
 ALPHA_MODES: dict[str, AlphaModeOption] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
 DEFAULT_OF_TRIMESH = ((102, 102, 102), 1.0)
-"""Specular colour and glossiness of trimesh's materials where nobody gave them."""
+"""Specular colour and glossiness that trimesh gives materials without them."""
 
 
 Textures = dict[tuple[int, EncodingOption], Texture]
-"""Those that have been made of pictures, by the `id` of the picture and the encoding."""
+"""Textures made of pictures, by the `id` of the picture and the encoding."""
 
 
 def placed(geometry: Any, transform: npt.NDArray[np.float64], known: Textures | None = None) -> Mesh:
@@ -32,7 +32,7 @@ def placed(geometry: Any, transform: npt.NDArray[np.float64], known: Textures | 
     `known` keeps the textures of a scene, which its geometries share.
     """
     vertices, triangles = np.asarray(geometry.vertices), np.asarray(geometry.faces)
-    # trimesh computes normals when asked for them; what a file gave waits in the cache.
+    # trimesh computes normals when asked for them; those of a file wait in the cache.
     normals = np.asarray(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
     colors = uv = None
     materials: tuple[Material, ...] = ()
@@ -59,7 +59,7 @@ def material_of(source: Any, known: Textures) -> Material | None:
         shininess = float(source.glossiness or 0)
         specular = 0.0 if source.specular is None else float(np.mean(np.asarray(source.specular)[:3])) / 255
         if source.specular is not None and (_rgb(source.specular), shininess) == DEFAULT_OF_TRIMESH:
-            specular = 0.0  # nobody asked for highlights
+            specular = 0.0  # the file sets no highlights
         texture = _texture(source.image, known)
         color = None if texture else _rgb(source.diffuse)
         return Material(color, texture, specular=min(specular, 1.0) if shininess else 0.0, shininess=shininess)
@@ -67,7 +67,7 @@ def material_of(source: Any, known: Textures) -> Material | None:
 
 
 def _metallic_rough(source: Any, known: Textures) -> Material:
-    """What trimesh keeps of a material of glTF."""
+    """The material of glTF that trimesh keeps."""
     factor = source.baseColorFactor
     linear = np.ones(4)
     if factor is not None:

@@ -95,7 +95,7 @@ def _joined_uv(parts: list[Mesh], name: str) -> npt.NDArray[np.float32] | None:
 
 
 def _interpolation_of(parts: list[Mesh]) -> EncodingOption:
-    """What is linear between the colours of all parts: their light, if that holds for each that has some."""
+    """The interpolation of the colours of all parts: linear in light, if that of each part with colours is."""
     own = {part.color_interpolation for part in parts if part.colors is not None}
     return "linear" if own == {"linear"} else "srgb"
 

@@ -42,7 +42,7 @@ class LightKind(StrEnum):
 
 
 class LightSpace(StrEnum):
-    """What a light is fixed to."""
+    """The space that a light is fixed to."""
 
     WORLD = "world"
     EYE = "eye"
@@ -58,7 +58,7 @@ class Light:
         The direction *to* the light, of any length, or the point where it is. World space, or that of the eye (x right,
         y up, the view along -z).
     kind : {"directional", "point", "spot"}
-        What `at` means. A spot is a point whose light stays within a cone.
+        The meaning of `at`. A spot is a point whose light stays within a cone.
     color : (3,) of 0 to 255
         sRGB.
     intensity : float
@@ -96,7 +96,7 @@ class Light:
     inner_deg: float = 0.0
     outer_deg: float = 45.0
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(
             self,
@@ -141,7 +141,7 @@ class Light:
 
 @dataclass(frozen=True)
 class Fog:
-    """The depth cue: with the distance along the view, a colour takes the place of what is seen.
+    """The depth cue: surfaces fade into a colour with the distance along the view.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ class Fog:
     far: float
     color: Color = (255, 255, 255)
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(self, near: float, far: float, color: ColorLike = (255, 255, 255)) -> None: ...
 

@@ -1,4 +1,4 @@
-"""Materials: what a surface is made of, as values."""
+"""Materials of surfaces, as values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TEXTURES = ("texture", "emission_texture", "metallic_roughness_texture", "occlus
 
 
 class AlphaMode(StrEnum):
-    """What the opacity of a material does."""
+    """The effect of a material's opacity."""
 
     OPAQUE = "opaque"
     MASK = "mask"
@@ -36,7 +36,7 @@ class Material:
     texture : Texture, optional
         Used where the mesh has `uv`.
     specular : float
-        Strength of the highlights, 0 to 1: what a mirror turned to the light adds, white.
+        Strength of the highlights, 0 to 1: the white that a mirror turned to the light adds.
     shininess : float
         Blinn's exponent: the larger, the smaller the highlight. 0: none.
     back_color : (3,) of 0 to 255, optional
@@ -49,8 +49,8 @@ class Material:
     opacity : float
         0 to 1, times the opacity of the texture and of the colours of the vertices; looked at by "mask" and "blend".
     alpha_mode : {"opaque", "mask", "blend"}, optional
-        "opaque": opacity is not looked at. "mask": what has less than `alpha_cutoff` (0.5 unless given) is cut out.
-        "blend": what is behind shows through, in pictures of `render`, up to 16 layers of a pixel. Unless given: "mask"
+        "opaque": opacity is not looked at. "mask": pixels below `alpha_cutoff` (0.5 unless given) are cut out.
+        "blend": surfaces behind show through, in pictures of `render`, up to 16 layers of a pixel. Unless given: "mask"
         with an `alpha_cutoff`, else "opaque".
     double_sided : bool
         Whether the back of the triangles shows, too; if not it is culled, unless `cull` says which side is.
@@ -107,7 +107,7 @@ class Material:
     normal_texture: Texture | None = None
     normal_scale: float = 1.0
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(
             self,
@@ -133,7 +133,7 @@ class Material:
         ) -> None: ...
 
     def __repr__(self) -> str:
-        """One line: what differs from a plain material."""
+        """One line: the differences from a plain material."""
         own = ((one.name, getattr(self, one.name), one.default) for one in fields(self))
         told = (
             (name, str(value) if isinstance(value, str) else value)
@@ -171,5 +171,5 @@ class Material:
 
     @property
     def is_metallic_rough(self) -> bool:
-        """Whether light is that of a metallic-rough surface of glTF."""
+        """Whether it is lit as a metallic-rough surface of glTF."""
         return self.metallic is not None or self.roughness is not None

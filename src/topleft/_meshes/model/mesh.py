@@ -1,4 +1,4 @@
-"""A triangle mesh as arrays: positions, indices, and what else is known of its surface; checked once, here.
+"""A triangle mesh as arrays: positions, indices, attributes and materials; checked once, here.
 
 Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages use as they are.
 """
@@ -46,13 +46,12 @@ class Mesh:
     normals : (V, 3) array_like of real numbers, optional
         Directions, of any length; `None`: not known, `vertex_normals` computes them.
     colors : (V, 3) or (V, 4) array_like of uint8, optional
-        sRGB colours, with or without alpha: what is behind shows through where a mesh has no materials, or materials
-        that blend.
+        sRGB colours, with or without alpha, which blends where a mesh has no materials, or materials that blend.
     uv : (V, 2) array_like of real numbers, optional
         Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
         a texture has a seam, vertices stand twice.
     materials : sequence of Material, optional
-        What the triangles are made of.
+        The materials of the triangles.
     material_of_triangle : (T,) array_like of integers, optional
         The row of `materials` that each triangle has; the first unless given.
     uv1 : (V, 2) array_like of real numbers, optional
@@ -62,7 +61,7 @@ class Mesh:
         is sharp; of a mesh without `normals`. 180: no edge is; 0: every one is ("flat"). With less than 180 vertices
         at one place count as one for the normals.
     color_interpolation : {"srgb", "linear"}
-        What is linear between the colours of the vertices: their sRGB numbers, or their light, as glTF has it.
+        Whether colours are linear between vertices in their sRGB numbers, or in their light, as glTF has it.
 
     Raises
     ------
@@ -76,8 +75,8 @@ class Mesh:
     Notes
     -----
     Vertices, normals, colours and uv are read-only views of the caller's memory where the dtype allows. Do not change
-    it while the mesh lives: what has been computed of it is kept. Triangles are copied, unless the array and what it
-    borrows its memory from are read-only.
+    it while the mesh lives: computed values are kept. Triangles are copied, unless the array and the owner of its
+    memory are read-only.
 
     Examples
     --------
@@ -97,7 +96,7 @@ class Mesh:
     crease: float = NO_CREASE
     color_interpolation: EncodingOption = "srgb"
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(
             self,
@@ -138,7 +137,7 @@ class Mesh:
             keep(self, "material_of_triangle", read_only(rows))
 
     def __repr__(self) -> str:
-        """One line: how much there is of what."""
+        """One line: numbers of vertices and triangles, attributes and materials."""
         words = [f"{len(self.vertices):,} vertices", f"{len(self.triangles):,} triangles"]
         words += [name for name in ("normals", "colors", "uv") if getattr(self, name) is not None]
         words += [f"{len(self.materials)} material{'s' * (len(self.materials) > 1)}"] if self.materials else []
@@ -251,7 +250,7 @@ class Mesh:
 
     @cached_property
     def clusters(self) -> Clusters:
-        """The triangles sorted into clusters, which a view needs only some of; made when it is first asked for.
+        """The triangles sorted into clusters, of which a view draws some; made at the first use.
 
         That takes about as long as drawing the mesh some twenty times, and keeps a copy of it of about 30 bytes a
         triangle. Meshes that are drawn more than once ask for it themselves:
@@ -274,7 +273,7 @@ class Mesh:
         return coincident(self.vertices)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: what is computed from it is computed there."""
+        """The state for another process, which computes the rest itself."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
     __setstate__ = set_read_only
@@ -321,7 +320,7 @@ def extreme_points(*parts: Callable[[], FloatArray]) -> F64:
     Returns
     -------
     (7 P, 3) float64
-        Of each of P parts the two ends along each axis, and what is farthest from the centre of the box of all parts.
+        Of each of P parts the two ends along each axis, and the point farthest from the centre of the box of all parts.
     """
     # column by column: NumPy takes twenty times as long along rows of three
     ends = np.concatenate([_ends(part()) for part in parts]).astype(np.float64)
@@ -463,7 +462,7 @@ def _material_rows(values: npt.ArrayLike, n_triangles: int, n_materials: int) ->
         raise TypeError(f"material_of_triangle must hold integers, got {array.dtype}")
     if array.shape != (n_triangles,):
         raise ValueError(f"material_of_triangle must have shape ({n_triangles},), got {array.shape}")
-    array = array.copy()  # what has been checked is what is used
+    array = array.copy()  # nobody changes a copy after the check
     outside = (array < 0) | (array >= n_materials)
     if outside.any():
         row = int(outside.argmax())
@@ -489,7 +488,7 @@ def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def has_holes(material: Material, mesh: Mesh) -> bool:
-    """Whether the material leaves something out of the triangles that have it."""
+    """Whether the material cuts holes into its triangles."""
     return material.alpha_mode == "mask" and bool(material.alpha_cutoff) and has_opacity(material, mesh)
 
 

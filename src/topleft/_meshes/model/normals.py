@@ -1,6 +1,6 @@
 """Faces: normals of triangles, of vertices and of creased corners, the side that these are on, the box round a mesh.
 
-And what a matrix makes of points and normals. Input: vertices and triangles, or rows. Output: arrays whose bits depend
+Also transforms points and normals by a matrix. Input: vertices and triangles, or rows. Output: arrays whose bits depend
 neither on the machine nor on the number of threads.
 
 Based on: Thurmer, G., and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics
@@ -62,7 +62,7 @@ def creased_normals(
     crease_deg : float
         Degrees, 0 to 180.
     places : (first, group), optional
-        What `coincident` gives of the vertices: those of a group count as one. Unless given all are told apart.
+        The result of `coincident` for the vertices: those of a group count as one. Unless given all are distinct.
     threads : int, optional
         Never changes a bit.
 
@@ -196,7 +196,7 @@ def turned_faces(
 ) -> U8:
     """(T,) uint8: 1 where the normals of the corners, added up, point to the other side than the triangle.
 
-    `normals` are (V, 4), or rows (N, 4) of which `row_of_corner` (T, 3) tells each corner's.
+    `normals` are (V, 4), or rows (N, 4), with each corner's in `row_of_corner` (T, 3).
     """
     turned = np.empty(len(triangles), np.uint8)
     if len(normals) != len(vertices) and row_of_corner is None:
@@ -225,7 +225,7 @@ def box_of_triangles(vertices: FloatArray, triangles: I32, *, threads: int | Non
 
 
 def unit_or_zero(vectors: FloatArray) -> F64:
-    """Vectors (N, 3) scaled to length 1, float64; zero stays zero, and what is not finite becomes zero."""
+    """Vectors (N, 3) scaled to length 1, float64; zero stays zero, and rows that are not finite become zero."""
     return _row_by_row(vectors, lambda source, a, b, out: engine.unit_vectors(source, None, a, b, out, None))
 
 
@@ -244,7 +244,7 @@ def moved(points: FloatArray, matrix: F64) -> F64:
 
 
 def turn_of_normals(view: F64) -> F64:
-    """The matrix (3, 3) that takes rows of normals to eye space, but for their lengths: the inverse of that of points.
+    """The matrix (3, 3) that takes rows of normals to eye space, up to their lengths: the inverse of that of points.
 
     Its numbers are sums of products, the same on every machine.
     """
@@ -260,7 +260,7 @@ def turn_of_normals(view: F64) -> F64:
 def _row_by_row(
     rows: FloatArray, work: Callable[[engine.Source, int, int, Any], None], n_columns: int = 3, dtype: Any = np.float64
 ) -> npt.NDArray[Any]:
-    """What `work` writes of ranges of the rows."""
+    """The output of `work` on ranges of the rows, by threads."""
     source, out = engine.Source(_contiguous(rows)), np.empty((len(rows), n_columns), dtype)
     run_parts(lambda first, end: work(source, first, end, out), len(rows), threads_of_rows(len(rows)))
     return out

@@ -22,7 +22,7 @@ from topleft.typing import PointShapeOption, PointUnitOption
 
 
 class PointUnit(StrEnum):
-    """What the size of a point counts."""
+    """The unit of a point's size."""
 
     PX = "px"
     WORLD = "world"
@@ -43,7 +43,7 @@ class Points:
     size : float or (N,) array_like
         Diameter of a disc, side of a square, of all points or of each; positive.
     unit : {"px", "world"}
-        What `size` counts: pixels, whatever the distance, or units of the world, smaller with distance.
+        The unit of `size`: pixels, whatever the distance, or units of the world, smaller with distance.
     shape : {"disc", "square"}
 
     Raises
@@ -75,7 +75,7 @@ class Points:
     unit: str = "px"
     shape: str = "disc"
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(
             self,
@@ -145,7 +145,7 @@ class Points:
         return found
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: what is computed from it is computed there."""
+        """The state for another process, which computes the rest itself."""
         names = ("positions", "colors", "normals", "size", "unit", "shape")
         return {name: self.__dict__[name] for name in names}
 

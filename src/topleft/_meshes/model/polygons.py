@@ -1,4 +1,4 @@
-"""Cuts polygons with any number of corners into triangles that cover just what the polygons cover.
+"""Cuts polygons with any number of corners into triangles that cover the same points.
 
 Input: points, flat or in space, and faces as corners one after the other. Output: triangles, in the order of the faces.
 Polygons in space are seen along their area vector. Convex ones become fans; of the others ears are cut off
@@ -14,7 +14,7 @@ from topleft._core.base.array_types import F64, I64, Array
 from topleft._core.base.arrays import INT32_MAX
 
 MAX_STEPS = 1 << 30
-"""Of all polygons of a call: some seconds. One of 100,000 corners takes up to 200,000,000."""
+"""Steps for all polygons of a call: some seconds. One of 100,000 corners takes up to 200,000,000."""
 
 
 def triangulate(points: Array, corners: Array, n_corners: Array) -> tuple[I64, I64]:
@@ -46,7 +46,7 @@ def triangulate(points: Array, corners: Array, n_corners: Array) -> tuple[I64, I
     if (n_corners == 3).all():
         return np.arange(3 * len(n_corners)).reshape(-1, 3), np.arange(len(n_corners))
     faces = np.repeat(np.arange(len(n_corners)), np.maximum(n_corners - 2, 0))
-    corners = np.array(corners, np.int64)  # a copy: what has been checked is what is used
+    corners = np.array(corners, np.int64)  # a copy, which nobody changes after the check
     if len(corners) and not (0 <= corners.min() and corners.max() < len(points)):
         bad = int(((corners < 0) | (corners >= len(points))).argmax())
         raise IndexError(f"corner {bad} = {corners[bad]} must be one of {len(points)} points")

@@ -1,6 +1,6 @@
-"""Poses in the forms that others write them: a matrix, a rotation and a translation, what BOP has in its files.
+"""Poses in the forms that others write them: a matrix, a rotation and a translation, a mapping of BOP's files.
 
-In: what a caller gives for a pose. Out: a matrix (4, 4).
+In: a caller's pose. Out: a matrix (4, 4).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Textures: pictures of linear light and their halves, made once from an sRGB picture.
 
-Input: uint8 pixels. Output: what the kernels read.
+Input: uint8 pixels. Output: the kernels' inputs.
 
 Based on: Williams, L., "Pyramidal Parametrics", SIGGRAPH 1983; Castano, I., "Computing Alpha Mipmaps", 2010.
 """
@@ -25,11 +25,11 @@ from topleft._core.base.texels import FILTER_CODES, MOST_KEPT_BYTES, ValueLevels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MAX_TEXTURE_SIZE = 1 << 15
-"""Of a side: 16 levels."""
+"""Texels of a side: 16 levels."""
 
 
 class Filter(StrEnum):
-    """What a texture is at a point between its texels, and where they are smaller than a pixel."""
+    """The value of a texture between its texels, and where they are smaller than a pixel."""
 
     NEAREST = "nearest"
     BILINEAR = "bilinear"
@@ -43,7 +43,7 @@ class Filter(StrEnum):
 
 
 class Encoding(StrEnum):
-    """What the values of a picture stand for."""
+    """The meaning of a picture's values."""
 
     SRGB = "srgb"
     LINEAR = "linear"
@@ -54,14 +54,14 @@ N_COVERAGE_POINTS = 1 << 12
 """Points at which the share of a texture that an alpha test lets through is counted; a thousandth of them may miss."""
 
 LEAST_SCALE, MOST_SCALE = 1 / 16, 256.0
-"""Of the opacity of a halving; at the most every texel is opaque that is not clear."""
+"""Factors of the opacity of a halving; by the most every texel that is not clear is opaque."""
 
 BLOCK_TEXELS = 1 << 17
 """Texels that are halved together: 4 MB of float64, which stay in a cache."""
 
 
 class Wrap(StrEnum):
-    """What lies beyond a texture."""
+    """The continuation of a texture beyond its borders."""
 
     REPEAT = "repeat"
     CLAMP = "clamp"
@@ -84,7 +84,7 @@ class Texture:
         "bilinear": between the four texels next to the point. "nearest": the texel that the point lies in.
         "pixelated": "nearest" where texels are larger than a pixel, "trilinear" where they are smaller.
     wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
-        What lies beyond 0 and 1.
+        The continuation beyond 0 and 1.
     encoding : {"srgb", "linear"}
         "srgb": red, green and blue are colours. "linear": they are numbers, 0 to 255 for 0 to 1, as in normal maps.
     uv_set : {0, 1}
@@ -118,7 +118,7 @@ class Texture:
     uv_set: int = 0
     transform: F64 | None = None
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(
             self,
@@ -156,7 +156,7 @@ class Texture:
 
     @cached_property
     def compiled(self) -> engine.Mipmap:
-        """What the kernels read; made when it is first needed."""
+        """The kernels' input; made when it is first needed."""
         return self._mipmap(None)
 
     def compiled_cut_at(self, cutoff: float) -> engine.Mipmap:
@@ -201,7 +201,7 @@ class Texture:
         return int(self.image[..., 3].min()) < 255
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: the texels are made there."""
+        """The state for another process, which makes the texels itself."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
     __setstate__ = set_read_only

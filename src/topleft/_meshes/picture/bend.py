@@ -5,7 +5,7 @@ draws as the lens would show the mesh.
 
 Kernels do it (`csrc/mesh/bend.c`): where the lens bends no edge of a triangle by half of the tolerance, by a bound on
 its second derivative, the triangle is not looked at. Other edges are halved (in space) where their picture, at a
-quarter, half or three quarters of their length, is off by more than the tolerance from what a straight edge would show
+quarter, half or three quarters of their length, is off by more than the tolerance from that of a straight edge
 there, its depth too, unless it is shorter than a pixel there, or where they span a large angle. That is a question to
 the edge alone, and triangles that share an edge share its ends: so they split it alike, and no gap opens.
 """
@@ -33,7 +33,7 @@ from topleft._meshes.model.mesh import Mesh, keep_corner_normals
 from topleft._meshes.model.normals import CornerNormals, moved
 
 WIDEST = np.radians(160)
-"""What lies farther from the axis is never drawn: a triangle round the back of the axis would cover everything. Those
+"""Points farther from the axis are never drawn: a triangle round the back of the axis would cover everything. Those
 that pass the test have a cap of less than 10 degrees and end before that."""
 
 MAX_PARTS, MAX_PARTS_OF_ONE = 1 << 22, 8
@@ -43,10 +43,10 @@ N_TRIED = 1 << 10
 """So many of more triangles are split alone, to tell how many parts all will have."""
 
 N_ANGLES, N_AZIMUTHS = 513, 128
-"""Rings of directions that are asked where they lie in the picture."""
+"""Rings of directions to find in the picture."""
 
 FRAME_MARGIN = 1.05
-"""What lies beyond so many times the frame's half sides is out of the picture."""
+"""Points beyond so many times the frame's half sides are out of the picture."""
 
 N_BENDS, N_ROUND = 4, 32
 """How many directions the second derivative of a lens is taken at: out from the axis in a ring, and round it."""
@@ -87,10 +87,10 @@ class BentMesh:
     Attributes
     ----------
     points_eye : (V', 3) float64
-        Eye space: what `Camera.clip_from_eye` takes to clip space. First the vertices of the mesh, as far as they are
+        Eye space, for `Camera.clip_from_eye`. First the vertices of the mesh, as far as they are
         used, then those of parts.
     triangles : (T', 3) int32
-        Rows of `points_eye`; what the lens cannot see is left out.
+        Rows of `points_eye`; triangles that the lens cannot see are left out.
     parts : SubdividedTriangles or None
         None: the triangles are those of the mesh.
     """
@@ -184,9 +184,9 @@ class BentMesh:
 
 
 class LensMap:
-    """What a lens sees of all directions, and where in a picture: made monotone beyond what the picture can show.
+    """Where a lens shows each direction in a picture: made monotone beyond the angles that the picture shows.
 
-    The polynomials of a lens turn back somewhere beyond the angles that they were fitted to, and would fold what lies
+    The polynomials of a lens turn back somewhere beyond the angles that they were fitted to, and would fold points
     there into the picture. From the angle `limit` on, the picture goes on outwards, evenly.
     """
 
@@ -210,7 +210,7 @@ class LensMap:
         shown = np.flatnonzero(in_frame.reshape(N_ANGLES, -1).any(axis=1))
         step = all_angles[1]
         self.max_angle = min(float(all_angles[shown[-1]]) + 2 * step if len(shown) else np.pi, WIDEST)
-        # A little beyond what shows the extension may begin: the tamer, the fewer edges there are halved.
+        # The extension may begin a little beyond the visible angles: the tamer, the fewer edges there are halved.
         self._extend(angles, rings, min(last, int(np.searchsorted(angles, self.max_angle + 2 * step))))
         least_cosine, _ = engine.cosine_and_sine(min(math.degrees(self.max_angle) / 2 + 45, 89.9))
         # Rounding of cosines near 1: 1e-7 is more than it.
@@ -331,7 +331,7 @@ def bend(
     size : (width, height), pixels
         Of the whole picture.
     near_clip : bool
-        Whether what lies nearer than the near plane may be left out.
+        Whether triangles nearer than the near plane may be left out.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""Draws pictures with materials that what is behind shows through: `alpha_mode="blend"`, and colours with alpha.
+"""Draws pictures with blended materials: `alpha_mode="blend"`, and colours with alpha.
 
-Input: `Mesh` or `Scene`, `Camera`. Output: the visibility buffer of what is opaque; the rest, laid over its picture.
+Input: `Mesh` or `Scene`, `Camera`. Output: the visibility buffer of opaque triangles; the rest, laid over its picture.
 
-What is opaque is drawn as ever. The other triangles are peeled, layers that it hides are left out, the rest is shaded,
+Opaque triangles are drawn as ever. The others are peeled, layers that these hide are left out, the rest is shaded,
 each with its own opacity, and laid over it front to back, in linear light: their order in the mesh does not matter.
 With several samples a pixel each sample is composited by itself, and the light is averaged.
 
@@ -38,7 +38,7 @@ from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
 
 BLENDING = (Shading.SMOOTH, Shading.FLAT, Shading.UNLIT)
-"""What else a picture tells, it tells of the surface that is nearest, as if it were opaque."""
+"""Pictures of other shadings show the nearest surface, as if it were opaque."""
 
 LAYERS, MOST_LAYERS = 4, 16
 """Layers of a pixel: as many as most need; and all that are looked at, where some pixel has more."""
@@ -50,7 +50,7 @@ COLORED = Material(alpha_mode="blend")
 
 
 def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
-    """The triangles (T,) that something shows through, by the materials of the mesh or this one; None if none does."""
+    """The blended triangles (T,), by the materials of the mesh or this one; None if there are none."""
     given = mesh.materials if material is None else (material,)
     materials = given or (COLORED,)
     are_blended = [one.alpha_mode is AlphaMode.BLEND and has_opacity(one, mesh) for one in materials]
@@ -64,13 +64,13 @@ def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
 
 
 def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
-    """Whether the colours of the vertices alone make something show through."""
+    """Whether the material is opaque where the colours of the vertices are."""
     texture = material.texture if is_laid(material.texture, mesh) else None
     return material.opacity == 1 and not (texture is not None and texture.has_alpha)
 
 
 def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | None:
-    """The blended triangles of each instance; None where there are none, or a picture does not tell them apart."""
+    """The blended triangles of each instance; None where there are none, or the shading ignores them."""
     if options.mode not in BLENDING:
         return None
     masks = [
@@ -79,8 +79,8 @@ def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | 
     return None if all(mask is None for mask in masks) else masks
 
 
-def glass_of(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) -> Glass | None:
-    """What a picture composites; None where all of it is opaque."""
+def transparent_pass(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) -> TransparentPass | None:
+    """The pass of a picture's blended triangles; None where all of it is opaque."""
     masks = blended_masks(shot.scene, options)
     if masks is None:
         return None
@@ -88,11 +88,11 @@ def glass_of(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) 
     placed, view = place(shot, view_options, material=options.material)
     if placed.bent is not None:  # the parts that a lens makes of the triangles
         masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
-    return Glass(placed, view, masks, shot.camera, options)
+    return TransparentPass(placed, view, masks, shot.camera, options)
 
 
-class Glass:
-    """A scene some of whose triangles are blended: what is opaque is drawn first, then these are laid over it."""
+class TransparentPass:
+    """A scene with blended triangles: the opaque ones are drawn first, then these are laid over them."""
 
     def __init__(
         self, placed: PlacedScene, view: View, masks: Sequence[Mask | None], camera: Camera, options: ShadingOptions
@@ -103,11 +103,11 @@ class Glass:
 
     @property
     def scene(self) -> Scene:
-        """What ids count the triangles of."""
+        """The scene with the triangles that ids count."""
         return self.whole.whole
 
     def draw_opaque(self) -> SceneFragments:
-        """The visibility buffer of what is opaque."""
+        """The visibility buffer of the opaque triangles."""
         return draw_solid(self.whole, self.view, self.camera, cuts_of(self.scene, self.under.material), self.masks)
 
     @cached_property
@@ -134,7 +134,7 @@ class Glass:
         return Lit(shown, self.camera, self.view.size, self.options)
 
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:
-        """Lay what is visible of the blended triangles over the picture of what is opaque."""
+        """Lay the visible blended triangles over the picture of the opaque ones."""
         if 0 in self.view.size:
             return
         positions = frags.positions
@@ -179,9 +179,9 @@ class Glass:
         light: F32,
         alpha: F32,
     ) -> None:
-        """Add what a sample sees to light times opacity (P, 3), and to opacity (P,); `numbers` (H, W) names the pixels.
+        """Add a sample's colours to light times opacity (P, 3), and to opacity (P,); `numbers` (H, W) names the pixels.
 
-        `under` (P, 4): the colours of what is opaque.
+        `under` (P, 4): the colours of the opaque picture.
         """
         through = np.ones(len(under), np.float32)
         for k in range(len(ids)):

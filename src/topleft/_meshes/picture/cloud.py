@@ -26,7 +26,7 @@ from topleft._meshes.model.points import Points, PointUnit
 from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_each, shade_numbers
 
 NOWHERE_PX = 1e12
-"""Where points stand that a lens does not see: no window shows it."""
+"""The place of points that a lens does not see: outside of every window."""
 
 
 def draw_cloud(
@@ -82,7 +82,7 @@ def through_lens(eye: F64, bent: F64, lens: Lens, projection: F64, frame: tuple[
 
 
 def w_of(bent: F64, projection: F64) -> F64:
-    """What divides the sizes (N,) of points of the world in a picture; 1 for what it cannot show."""
+    """The divisors (N,) of sizes of points in a picture; 1 for points that it cannot show."""
     x, y, z = bent.T
     a, b, c, d = projection[3].tolist()
     w = ((a * x + b * y) + c * z) + d

@@ -39,14 +39,14 @@ def draw_all_edges(
         vertices, triangles = instance.mesh.vertices, instance.mesh.triangles
         is_single = None if cull is not None else instance.mesh.single_sided(options.material or instance.material)
         kinds = [(triangles, cull_of(cull or "none", instance))]
-        if is_single is not None:  # of some the edges of what shows its front
+        if is_single is not None:  # single-sided triangles have edges on their fronts alone
             kinds = [(triangles[is_single == 0], "none"), (triangles[is_single == 1], cull_of("back", instance))]
         for some, side in kinds:
             draw_edges(picture, behind, vertices, some, own_camera, cull=side, threads=options.threads)
 
 
 def cull_of(cull: CullOption, instance: Instance) -> CullOption:
-    """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
+    """The option `cull` for an instance, turned over where it is mirrored."""
     return TURNED.get(cull, cull) if instance.is_mirrored else cull
 
 
@@ -80,7 +80,7 @@ def draw_edges(
 
 
 def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """The depth that edges may have and still show: farther by what the surface falls away within a pixel.
+    """The depth that edges may have and still show: farther by the slope of the surface within a pixel.
 
     The slope along each axis is the smaller of those to the two neighbours: the other one may jump to another surface.
     """

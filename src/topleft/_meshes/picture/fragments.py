@@ -1,7 +1,7 @@
-"""Holds what each instance shows in a visibility buffer: of a mesh or a scene, with or without a lens.
+"""Holds a visibility buffer by instances: of a mesh or a scene, with or without a lens.
 
-Input: ids that count the triangles of all instances, and what they were drawn from. Output: `SceneFragments`, and its
-parts: rectangles of pixels with the fragments and the mesh as they were drawn.
+Input: ids that count the triangles of all instances, and the placed scene. Output: `SceneFragments`, and its parts:
+rectangles of pixels with the fragments and the mesh as they were drawn.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from topleft._meshes.picture.instances import PlacedScene
 
 Ids = NDArray[np.int32] | NDArray[np.int64]
-"""What counts the triangles of all instances: int64 where int32 does not."""
+"""Ids of the triangles of all instances: int64 where int32 does not count them."""
 
 WHOLE = slice(None), slice(None)
 """The box of a part that is all of the picture."""
@@ -37,7 +37,7 @@ WHOLE = slice(None), slice(None)
 
 @dataclass(frozen=True, eq=False)
 class VisiblePart:
-    """What one instance shows: its index, the rectangle of pixels round that, and what was drawn there.
+    """The visible part of one instance: its index, the rectangle of pixels round it, and the fragments there.
 
     `frags` count the triangles that were drawn: of a lens those of `bent`, else those of the mesh.
     """
@@ -89,7 +89,7 @@ class VisiblePart:
 
 
 def parts_of(frags: Fragments, scene: Scene) -> Sequence[VisiblePart]:
-    """What each instance shows that shows anything, of the scene that was drawn; a mesh shows one part."""
+    """The visible parts of the instances that show, of the scene as drawn; a mesh has one part."""
     parts: Sequence[VisiblePart] | None = getattr(frags, "parts", None)
     return [VisiblePart(0, WHOLE, frags, scene[0])] if parts is None else parts
 
@@ -103,7 +103,7 @@ def shown_of(frags: Fragments, scene: Scene) -> Sequence[ShownInstance]:
 def join(
     parts: Sequence[VisiblePart], shape: tuple[int, ...], background: Any, make: Callable[[VisiblePart], NDArray[Any]]
 ) -> NDArray[np.float32]:
-    """A picture made part by part; what is made of a part that is all of it is returned, not copied."""
+    """A picture made part by part; that of a part that fills it is returned, not copied."""
     if len(parts) == 1 and parts[0].box == WHOLE:
         return make(parts[0])
     picture = empty(shape, np.float32)
@@ -115,7 +115,7 @@ def join(
 
 
 class InstanceIds:
-    """What ids of triangles of all instances tell, of a buffer or of layers."""
+    """Tells instances by the ids of their triangles, in a buffer or in layers."""
 
     id: Any  # Ids
     placed: Any
@@ -132,9 +132,9 @@ class InstanceIds:
 
 
 class SceneFragments(InstanceIds, Fragments):
-    """What `rasterize_mesh` returns of a `Scene`.
+    """The visibility buffer of a `Scene`, from `rasterize_mesh`.
 
-    An instance is snapped again when an attribute of it is asked for.
+    An instance is snapped again when an attribute of it is needed.
 
     Attributes
     ----------
@@ -162,13 +162,13 @@ class SceneFragments(InstanceIds, Fragments):
 
     _subject_kind = "Scene"
 
-    #: What was drawn of the one instance that there is, at the first sample; None where that is not kept.
+    #: The fragments of the only instance, at the first sample; None where they are not kept.
     _one: Fragments | None = None
 
     def __init__(
         self, ids: Ids, depth: NDArray[np.float32], placed: PlacedScene, positions: Sequence[tuple[int, int]]
     ) -> None:
-        """Take planes (S, H, W) of what was drawn, and where their samples lie."""
+        """Take drawn planes (S, H, W), and where their samples lie."""
         self._given = ids, depth
         self.placed = placed
         self.positions = positions
@@ -176,7 +176,7 @@ class SceneFragments(InstanceIds, Fragments):
 
     @property
     def drawn_planes(self) -> tuple[Ids, NDArray[np.float32]]:
-        """The planes (S, H, W) of what was drawn; of one instance they are drawn now, if they were not."""
+        """The drawn planes (S, H, W); those of one instance are drawn now, if they were not."""
         return self._given if self._one is None else (self._one._sampled()[1] or self._given)
 
     @cached_property
@@ -190,7 +190,7 @@ class SceneFragments(InstanceIds, Fragments):
         return f"SceneFragments({width}x{height}, {len(self.whole)} instances, {self.whole.n_triangles} triangles)"
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: the parts refer to memory of this one, and are made there."""
+        """The state for another process, which makes the parts itself: they refer to memory of this one."""
         own = vars(self) | {"_given": self.drawn_planes}
         return {name: value for name, value in own.items() if name not in ("parts", "_one", "_snapped_instances")}
 
@@ -215,7 +215,7 @@ class SceneFragments(InstanceIds, Fragments):
 
     @property
     def samples_id(self) -> Ids:
-        """What `id` is, of each sample, (H, W, S)."""
+        """The `id` of each sample, (H, W, S)."""
         return np.moveaxis(self._planes[0], 0, -1)
 
     @cached_property
@@ -271,14 +271,14 @@ class SceneFragments(InstanceIds, Fragments):
         return type(self)(ids[i : i + 1], depth[i : i + 1], self.placed, self.positions[i : i + 1])
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Self:
-        """Return what is left when no other pixels than these show a triangle."""
+        """Return the fragments with nothing in other pixels than these."""
         ids = np.full((1, *self.id.shape), -1, self.id.dtype)
         ids[0, rows, cols] = self.drawn_planes[0][0, rows, cols]
         return type(self)(ids, self.depth[None], self.placed, self.positions[:1])
 
     @cached_property
     def parts(self) -> tuple[VisiblePart, ...]:
-        """What each instance shows that shows anything, in their order."""
+        """The visible parts of the instances that show, in their order."""
         return tuple(self._make_parts())
 
     def _make_parts(self) -> Iterator[VisiblePart]:
@@ -303,7 +303,7 @@ class SceneFragments(InstanceIds, Fragments):
         return join(self.parts, (*self.id.shape, 3), 0.0, lambda part: part.barycentric())
 
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
-        """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
+        """Return the distance of each pixel along the view, as `Fragments.distance` does."""
         view = view_of(camera)
         rows = [engine.product(view[2], instance.transform) for instance in self.whole]
         meshes = [instance.mesh for instance in self.whole]

@@ -1,4 +1,4 @@
-"""Evaluates where in space each visible pixel of a mesh, scene or cloud lies, when a layer asks for it.
+"""Evaluates the points in space of the visible pixels of a mesh, scene or cloud, for layers.
 
 Input: `Shot`. Output: `GBuffer`, from which `layers` are taken.
 """
@@ -30,7 +30,7 @@ from topleft._meshes.scene.scene import Scene
 
 
 class PointKind(IntEnum):
-    """What is told of a point: tl_point_kind in csrc/topleft.h."""
+    """The values of a point: tl_point_kind in csrc/topleft.h."""
 
     ROWS = 0
     LENGTH = 1
@@ -50,7 +50,7 @@ def evaluate(
     threads: int | None = None,
     dtype: type[np.floating[Any]] = np.float32,
 ) -> npt.NDArray[Any]:
-    """What pixels/points.c tells of the points of the pixels, from numbers that are rows (N, 4) times (x, y, z, 1).
+    """The values of pixels' points by pixels/points.c, from numbers that are rows (N, 4) times (x, y, z, 1).
 
     Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the snap,
     relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.
@@ -78,7 +78,7 @@ def points_of(part: VisiblePart) -> F64:
 
 @dataclass(frozen=True, eq=False)
 class GBuffer:
-    """A mesh, scene or cloud and who looks at it.
+    """A mesh, scene or cloud and its camera.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class GBuffer:
     transforms_to : (N, 4, 4) float64, optional
         Where the instances are then.
     rasterizer : Rasterizer, optional
-        What layers hold may lie in its memory, which the next picture overwrites.
+        Layers may lie in its memory, which the next picture overwrites.
     """
 
     shot: Shot
@@ -104,7 +104,7 @@ class GBuffer:
 
     @property
     def scene(self) -> Scene:
-        """What is drawn."""
+        """The scene of the shot."""
         return self.shot.scene
 
     @property
@@ -114,7 +114,7 @@ class GBuffer:
 
     @property
     def camera(self) -> Camera:
-        """Who looks."""
+        """The camera of the shot."""
         return self.shot.camera
 
     @property
@@ -124,7 +124,7 @@ class GBuffer:
 
     @cached_property
     def frags(self) -> Fragments:
-        """The visibility buffer, at the centres of the pixels, without what materials cut out."""
+        """The visibility buffer, at the centres of the pixels, without the holes of materials."""
         if self.shot.cloud is not None:
             return draw_cloud(self.shot.cloud, self.camera, self.size, **self.options)
         return draw_visible(self.shot, self.rasterizer, self.look.get("material"), **self.options)
@@ -135,7 +135,7 @@ class GBuffer:
 
     @cached_property
     def has_holes(self) -> bool:
-        """Whether materials cut something out."""
+        """Whether materials cut holes."""
         return self.shot.cloud is None and any(cuts_of(self.scene, self.look.get("material")))
 
     @cached_property
@@ -146,13 +146,13 @@ class GBuffer:
     def join(
         self, channels: tuple[int, ...], background: float, make: Callable[[VisiblePart], npt.NDArray[Any]]
     ) -> npt.NDArray[np.float32]:
-        """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each part."""
+        """Return a picture (H, W, *channels), made by `make` for the rectangle of each part."""
         return join(self.parts, (*self.frags.depth.shape, *channels), background, make)
 
     def tell(
         self, kind: PointKind, rows_of: Callable[[F64], F64], channels: tuple[int, ...], background: float
     ) -> npt.NDArray[np.float32]:
-        """What matrices tell of the points that show: rows (N, 4) for world from object; of a cloud of the centres."""
+        """The values of visible points by matrices: rows (N, 4) for world from object; of a cloud at the centres."""
         threads, cloud = self.options.get("threads"), self.shot.cloud
         if cloud is None:
             return self.join(
@@ -166,7 +166,7 @@ class GBuffer:
 
 
 def project(points: F64, camera: Camera, transform: F64, size: tuple[int, int]) -> F64:
-    """Where points (P, 3) of an object lie in a picture, pixels (P, 2) float64; NaN for what the camera cannot see."""
+    """Where points (P, 3) of an object lie in a picture, pixels (P, 2) float64; NaN where the camera cannot see."""
     projection = camera.clip_from_eye(size)
     if camera.lens is None:
         is_seen = np.ones(len(points), np.bool_)

@@ -1,4 +1,4 @@
-"""Takes out what materials cut out, so that what lies behind a hole shows, whatever instance it belongs to: alpha test.
+"""Takes out the holes of materials, so that surfaces behind a hole show, of whatever instance: alpha test.
 
 Input: a `Shot`, materials. Output: its buffers or layers without holes: first all triangles without holes are drawn,
 then, instance by instance, the others, each tested pixel by pixel (or sample by sample).
@@ -54,8 +54,8 @@ class Cut:
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
 
-class Holed(NamedTuple):
-    """An instance with holes: its index, its mesh as it is drawn, the camera in its space, and what is cut out."""
+class MaskedInstance(NamedTuple):
+    """An instance with holes: its index, its mesh as it is drawn, the camera in its space, and its cut materials."""
 
     i: int
     mesh: Mesh
@@ -64,7 +64,7 @@ class Holed(NamedTuple):
 
 
 def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
-    """What the materials of a mesh, or this one, cut out of it; None if nothing."""
+    """The materials with holes of a mesh, or this one, and their triangles; None if there are none."""
     materials = mesh.materials if material is None else (material,)
     holes = [has_holes(one, mesh) for one in materials]
     if not any(holes):
@@ -75,14 +75,14 @@ def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
 
 
 def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
-    """What materials, or this one, cut out of the mesh of each instance."""
+    """The materials with holes, or this one, of the mesh of each instance."""
     return [cut_of(one.mesh, one.material if material is None else material) for one in scene]
 
 
 def draw_visible(
     shot: Shot, rasterizer: Rasterizer | None = None, material: Material | None = None, **options: Any
 ) -> Fragments:
-    """The visibility buffer without what materials (or this one) cut out; options as for `rasterize_shot`."""
+    """The visibility buffer without the holes of materials (or this one); options as for `rasterize_shot`."""
     cuts = cuts_of(shot.scene, material)
     if not any(cuts):
         return rasterize_shot(shot, rasterizer, material, **options)
@@ -100,7 +100,7 @@ def draw_solid(
     *,
     memory: Memory = FRESH,
 ) -> SceneFragments:
-    """The visibility buffer of what `place` returned, without what is cut out, and without the triangles of masks.
+    """The visibility buffer of a placed scene, without holes, and without the triangles of masks.
 
     First all triangles without holes are drawn, then, instance by instance, the others.
     """
@@ -114,19 +114,19 @@ def draw_solid(
 
 def holed_instances(
     scene: Scene, cuts: Sequence[Cut | None], camera: Camera, bent: Sequence[BentMesh] | None = None
-) -> list[Holed]:
-    """The instances that something is cut out of, and how they are drawn."""
+) -> list[MaskedInstance]:
+    """The instances with holes, and how they are drawn."""
     found = []
     for i, (instance, cut) in enumerate(zip(scene, cuts, strict=True)):
         mesh = instance.mesh
         if cut is not None:
             if bent is not None:
                 cut, mesh = cut.of_parts(bent[i].source), bent[i].mesh_of(mesh)
-            found.append(Holed(i, mesh, camera.straightened().placed(instance.transform), cut))
+            found.append(MaskedInstance(i, mesh, camera.straightened().placed(instance.transform), cut))
     return found
 
 
-def solid_scene(scene: Scene, holed: Sequence[Holed], masks: Sequence[Mask | None] | None = None) -> Scene:
+def solid_scene(scene: Scene, holed: Sequence[MaskedInstance], masks: Sequence[Mask | None] | None = None) -> Scene:
     """The scene without the triangles that have holes, nor those of masks; ids stay."""
     gone: list[Mask | None] = [None] * len(scene) if masks is None else list(masks)
     for i, _, _, cut in holed:
@@ -135,7 +135,7 @@ def solid_scene(scene: Scene, holed: Sequence[Holed], masks: Sequence[Mask | Non
 
 
 def inputs_of(scene: engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
-    """What the kernel reads of materials with holes."""
+    """The kernel's inputs of materials with holes."""
     finds_inverse_w = len(mesh.vertices) > size[0] * size[1]
     surface = Surface(cut.materials, cut.rows is not None, is_unlit=True)
     inputs = ShadingInputs(
@@ -147,7 +147,7 @@ def inputs_of(scene: engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple
 
 def draw_holed(
     placed: PlacedScene,
-    holed: Sequence[Holed],
+    holed: Sequence[MaskedInstance],
     ids: I32,
     depth: F32,
     *,
@@ -155,7 +155,7 @@ def draw_holed(
     is_peeled: bool = False,
     threads: int | None = None,
 ) -> None:
-    """Draw the triangles with holes over the planes of what one sample sees (1, H, W), or over layers (K, H, W)."""
+    """Draw the triangles with holes over the planes of one sample (1, H, W), or over layers (K, H, W)."""
 
     def draw(i: int, mesh: Mesh, camera: Camera, cut: Cut) -> None:
         snapped = placed.snap(i).at_sample(*at)

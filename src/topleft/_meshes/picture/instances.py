@@ -48,12 +48,12 @@ MOST_PIXELS_OF_PART = 1 << 30
 MIRRORED = {0: 0, 1: 2, 2: 1}
 
 
-#: What a mirrored instance is mirrored by again, to stand in eye space.
+#: The second mirror of mirrored instances that stand in eye space.
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
 
 class DrawnScene(NamedTuple):
-    """What is drawn of a scene, and the scene itself, which ids count the triangles of."""
+    """A scene as drawn, and the scene itself, which has the triangles that ids count."""
 
     scene: Scene
     whole: Scene
@@ -64,7 +64,7 @@ class DrawnScene(NamedTuple):
 def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnScene:
     """The scene as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it.
 
-    What is bent stands in eye space, mirrored instances mirrored twice: so they stay mirrored, for `cull`.
+    Bent meshes stand in eye space, mirrored instances mirrored twice, so that they stay mirrored for `cull`.
     """
     if camera.lens is None:
         return DrawnScene(scene, scene, camera.clip_from_world(frame), None)
@@ -82,12 +82,12 @@ def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_
 
 
 class PlacedScene:
-    """A scene as a camera sees it: its instances are snapped when they are asked for.
+    """A scene as a camera sees it: its instances are snapped when they are needed.
 
     Attributes
     ----------
     scene, whole : Scene
-        What is drawn, and what ids count the triangles of: the same but for a lens.
+        The scene as drawn, and the one that ids count the triangles of: the same except through a lens.
     first_ids, whole_first_ids : (N + 1,) int64
         Where the ids of each instance begin in these, and their end.
     bent : sequence of BentMesh, optional
@@ -113,17 +113,17 @@ class PlacedScene:
         self._kept: dict[int, engine.SnappedMesh] = {}
         self._n_kept = 0  # vertices of these
         self._sides_of_looks: dict[tuple[int, int], tuple[int, NDArray[np.uint8] | None]] = {}
-        self._last: tuple[int, View] | None = None  # the instance that was last asked for: often thrice in turn
+        self._last: tuple[int, View] | None = None  # the last instance that was needed: often thrice in turn
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs: views of instances are made there."""
+        """The state for another process, which makes views of instances itself."""
         return vars(self) | {"_last": None, "_kept": {}, "_n_kept": 0, "_sides_of_looks": {}}
 
     __setstate__ = set_aligned
 
     @property
     def first_ids(self) -> NDArray[np.int64]:
-        """Where the ids of what is drawn of each instance begin."""
+        """Where the ids of each instance of the drawn scene begin."""
         return self.scene.first_ids
 
     @property
@@ -137,11 +137,11 @@ class PlacedScene:
         return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False, material=self._material)
 
     def fragments(self, ids: Ids, depth: NDArray[np.float32], positions: Sequence[tuple[int, int]]) -> SceneFragments:
-        """Return planes (S, H, W) of what was drawn as fragments of the scene, or of the mesh that it is of."""
+        """Return drawn planes (S, H, W) as fragments of the scene, or of its only mesh."""
         return (MeshFragments if self._is_mesh else SceneFragments)(ids, depth, self, positions)
 
     def fragments_of(self, drawn: Fragments, view: View) -> SceneFragments:
-        """Return the same of the one instance that there is, which was drawn alone."""
+        """Return the same of the only instance, which was drawn alone."""
         frags = self.fragments(drawn.id[None], drawn.depth[None], self.positions(view))
         frags._one = drawn
         return frags
@@ -152,7 +152,7 @@ class PlacedScene:
         return list(map(tuple, sample_positions(view.sampling.n_samples, view.grid_bits).tolist()))
 
     def whole_ids(self, ids: Ids) -> Ids:
-        """Return ids in terms of the whole scene: as they are, but for a lens."""
+        """Return ids in terms of the whole scene: as they are without a lens."""
         if self.bent is None or all(one.parts is None for one in self.bent):
             return ids
         firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
@@ -165,7 +165,7 @@ class PlacedScene:
         return self._snap(i, i + 1)[0] if kept is None else kept
 
     def _snap(self, first: int, end: int) -> list[engine.SnappedMesh]:
-        """Return instances [first, end) in the same way: those in one call that need no closer look."""
+        """Return instances [first, end) in the same way: in one call, except those that are snapped alone."""
         view, n = self._view, end - first
         firsts = self._first_vertices[first : end + 1] - self._first_vertices[first]
         found: list[engine.SnappedMesh | None] = [None] * n
@@ -205,7 +205,7 @@ class PlacedScene:
 
     @cached_property
     def _numbers(self) -> NDArray[np.int64]:
-        """What triangle 0 of each instance is called."""
+        """The id of triangle 0 of each instance."""
         has_ids = self._with_depth and self.scene.n_triangles <= INT32_MAX
         return self.first_ids[:-1] + self._first_id if has_ids else np.zeros(len(self.scene), np.int64)
 
@@ -236,12 +236,12 @@ class PlacedScene:
         return found
 
     def corners(self, i: int) -> GivenCorners:
-        """Return what an instance is drawn from."""
+        """Return the arrays and the view that an instance is drawn from."""
         mesh, view = self.scene[i].mesh, self.view_of(i)
         return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport, view.origin, view.zero_to_one)
 
     def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
-        """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
+        """Return an instance snapped; only the part with some triangles, if its mesh is drawn in clusters."""
         if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
             return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i)
@@ -268,7 +268,7 @@ class PlacedScene:
         return self._may_cluster and choices.can_cluster(self._view, sink) and not self._sides[1].any()
 
     def clustered(self, i: int) -> tuple[Clusters, View, int]:
-        """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
+        """Return the clusters of an instance's mesh, their view, and the id of triangle 0."""
         return self.scene[i].mesh.clusters, self.view_of(i), int(self._numbers[i])
 
     def groups(self) -> Iterator[tuple[int, PlacedScene]]:
@@ -289,9 +289,9 @@ class PlacedScene:
         *,
         is_drawn: bool,
     ) -> NDArray[np.intp]:
-        """Return those of some instances whose boxes may show a sample in some rows, or in all; before what `is_drawn`.
+        """Return those of some instances whose boxes may show a sample in some rows, or in all.
 
-        At least the first one otherwise, which clears the target if nothing shows.
+        If `is_drawn`, before the target's depths; otherwise at least the first one, which clears the target.
         """
         may_show: NDArray[np.uint8] = np.ones(len(some), np.uint8)
         for dtype in (np.float32, np.float64):
@@ -353,9 +353,9 @@ class PlacedScene:
     def draw(
         self, targets: list[engine.Target], positions: Sequence[tuple[int, int]], height: int, *, is_first: bool = True
     ) -> None:
-        """Draw what each sample sees into targets of that many rows; (0, 0) is the pixel's centre.
+        """Draw the scene at each sample into targets of that many rows; (0, 0) is the pixel's centre.
 
-        `is_first`: clear them before; otherwise what is there stays unless something lies before it.
+        `is_first`: clear them before; otherwise their samples stay unless something lies before them.
         """
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
@@ -381,7 +381,7 @@ class PlacedScene:
 def rows_of(
     scenes: list[engine.SnappedMesh], target: engine.Target, *, is_first: bool, is_last: bool
 ) -> Callable[[int, int], None]:
-    """Return what draws rows [first, end) of several scenes into one target, which the first of all clears."""
+    """Return a function that draws rows [first, end) of scenes into one target, which the first of all clears."""
 
     def draw_rows(first: int, end: int) -> None:
         for i, scene in enumerate(scenes):
@@ -393,7 +393,7 @@ def rows_of(
 def place(
     shot: Shot, options: dict[str, Any], *, with_depth: bool = True, material: Material | None = None
 ) -> tuple[PlacedScene, View]:
-    """Return the scene as the camera sees it, and the checked options of a verb; `material`: whose backs are culled."""
+    """Return the scene as the camera sees it, and the checked options of a verb; `material` goes before the meshes'."""
     view = View.parse(shot.size, cast(ViewOptions, options))
     if with_depth:
         view.refuse_classic("depth")
@@ -412,10 +412,10 @@ def rasterize_shot(
     is_split: bool = True,
     **options: Any,
 ) -> Fragments:
-    """Return the visibility buffer of what is drawn; options as those of `rasterize`, without `transform`.
+    """Return the visibility buffer of a shot; options as those of `rasterize`, without `transform`.
 
-    `material`: whose backs are culled, instead of those that the meshes have. `rasterizer` and `out`: for a mesh alone,
-    as `is_split` of `View`.
+    `material`: tells whether backs are culled, instead of those of the meshes. `rasterizer` and `out`: for a mesh
+    alone, as `is_split` of `View`.
     """
     if not shot.is_mesh:
         return draw_nearest(*place(shot, options, material=material), depth_test, background_depth, is_split=is_split)
@@ -429,7 +429,7 @@ def rasterize_shot(
 @contextmanager
 def lent(rasterizer: Rasterizer | None, size: tuple[int, int]) -> Iterator[Memory]:
     """Give the memory of a `Rasterizer` of this size, which draws nothing else meanwhile, or fresh memory."""
-    if rasterizer is None:  # fragments refer to what they were drawn from, so nothing of it can be reused
+    if rasterizer is None:  # fragments refer to their inputs, so their memory cannot be reused
         yield FRESH
         return
     if not isinstance(rasterizer, Rasterizer):
@@ -449,7 +449,7 @@ def draw_one(
     *,
     is_split: bool = False,
 ) -> Fragments:
-    """Return the visibility buffer of the one instance that there is; `is_split` as in `View`."""
+    """Return the visibility buffer of the only instance; `is_split` as in `View`."""
     mesh, view = placed.scene[0].mesh, placed.view_of(0)
     view = view.but(is_split=True) if is_split and view.sampling.n_samples > 1 else view
     return draw_fragments(memory, mesh.vertices, mesh.triangles, view, depth_test, background_depth, out)
@@ -464,7 +464,7 @@ def draw_nearest(
     is_split: bool = False,
     memory: Memory = FRESH,
 ) -> SceneFragments:
-    """Return the visibility buffer of what `place` returned; `is_split` as in `View`, and `memory`: of one instance."""
+    """Return the visibility buffer of a placed scene; `is_split` as in `View`, and `memory`: of one instance."""
     if len(placed.scene) == 1:
         return placed.fragments_of(draw_one(memory, placed, depth_test, background_depth, is_split=is_split), view)
     (width, height), positions = view.size, placed.positions(view)
@@ -491,7 +491,7 @@ def draw_groups(
 ) -> NDArray[np.int64]:
     """Draw a scene with more triangles than int32 counts; returns ids in int64, -1 where there is nothing.
 
-    One group after the other into the planes `ids` of the targets, where 0 stands for what earlier groups have drawn:
+    One group after the other into the planes `ids` of the targets, where 0 stands for triangles of earlier groups:
     it is less than all other ids, so that ties are decided as in one picture.
     """
     counted: NDArray[np.int64] = np.full(ids.shape, -1, np.int64)
@@ -512,7 +512,7 @@ def peel_shot(
     material: Material | None = None,
     **options: Any,
 ) -> DepthLayers:
-    """Return the nearest layers of what is drawn; options as those of `peel`, without `transform`."""
+    """Return the nearest layers of a shot; options as those of `peel`, without `transform`."""
     shot.scene.check_counted("a scene that is peeled")
     placed, view = place(shot, options, material=material)
     if shot.is_mesh:
@@ -523,7 +523,7 @@ def peel_shot(
 
 
 def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
-    """Return the mask of what is drawn; options as those of `coverage`, without `transform`."""
+    """Return the mask of a shot; options as those of `coverage`, without `transform`."""
     placed, view = place(shot, options, with_depth=False)
     if len(placed.scene) == 1:
         mesh = placed.scene[0].mesh

@@ -1,6 +1,6 @@
 """Draws the layers of a view by name: the registry of all there are.
 
-Input: a `GBuffer`. Output: an array for each name asked for; nothing else is computed.
+Input: a `GBuffer`. Output: an array for each given name; nothing else is computed.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ NOT_OF_POINTS = ("barycentric", "uv")
 
 
 def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array]:
-    """Return arrays by name, in the order asked for.
+    """Return arrays by name, in the given order.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Prepares what the shading kernels read: materials, lights and a camera as numbers, a mesh as rows of float32.
+"""Prepares the shading kernels' inputs: materials, lights and a camera as numbers, a mesh as rows of float32.
 
 Input: a mesh, its materials, lights, a camera and the size of the whole picture. Output: `ShadingInputs`, which fills
 `engine.ShadingTable`.
@@ -45,17 +45,16 @@ MOST_TABLES = 256
 
 @dataclass(frozen=True, eq=False)
 class CameraRays:
-    """What `tl_shading` in csrc/shading.h tells of the camera, in a shading space whose origin is at `center`.
+    """The camera's fields of `tl_shading` in csrc/shading.h, in a shading space with its origin at `center`.
 
     Attributes
     ----------
     eye : (3,) float64
         Where the camera is; without perspective the unit vector to it.
     ray : (4, 3) float64
-        The ray of pixel position (0, 0), what it gains per column and per row, and, without perspective, along the
-        depth.
+        The ray of pixel position (0, 0), and its steps per column, per row and, without perspective, along the depth.
     eye_from, origin : (3, 3) and (3,) float64
-        Eye space from shading space: `eye_from @ p + origin` but for a scale.
+        Eye space from shading space: `eye_from @ p + origin` up to a scale.
     scale : float
         How many units of eye space one of the shading space is.
     distance_start, distance_scale : float
@@ -73,7 +72,7 @@ class CameraRays:
 
 
 class ShadingMesh:
-    """What shading needs of a mesh.
+    """A mesh as the shading kernels read it.
 
     Attributes
     ----------
@@ -151,7 +150,7 @@ def is_full(material: Material) -> bool:
 
 
 def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
-    """What `tl_material` has of a full material."""
+    """The fields of `tl_material` that only a full material has."""
     metallic, roughness = (1.0 if value is None else value for value in (material.metallic, material.roughness))
     maps = (
         material.metallic_roughness_texture if material.is_metallic_rough else None,
@@ -165,7 +164,7 @@ def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
 
 
 class Surface(NamedTuple):
-    """What a mesh is made of, whoever looks at it."""
+    """The materials of a mesh, the same in every view."""
 
     materials: Sequence[Material]
     is_by_triangle: bool
@@ -177,7 +176,7 @@ class Surface(NamedTuple):
 
 
 def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: bool) -> engine.ShadingTable:
-    """What kernels read of a mesh that nobody looks at yet; the last ones are kept."""
+    """The kernels' inputs of a mesh, without a view; the last ones are kept."""
     key = (*map(id, surface.materials), *surface[1:], is_mirrored)
     kept = own.tables.get(key)
     if kept is not None:
@@ -208,7 +207,7 @@ def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: boo
 
 
 def material_row(one: Material, mesh: Mesh, surface: Surface, back_side: float) -> tuple[Any, ...]:
-    """What `ShadingTable.set_materials` takes of one."""
+    """A material as a row of `ShadingTable.set_materials`."""
     texture = one.texture if is_laid(one.texture, mesh) else None
     has_colors = texture is not None or mesh.colors is not None
     color = (*light_of(one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR))[:3], one.opacity)
@@ -227,9 +226,9 @@ class ShadingInputs:
     Parameters
     ----------
     snapped, mesh
-        What was drawn, and the mesh that it was drawn from.
+        The mesh snapped, as drawn, and the mesh itself.
     camera : Camera
-        Whose projection it is.
+        The camera of the projection.
     view : (4, 4) float64
         Eye space from that of the mesh.
     size : (width, height), pixels
@@ -291,7 +290,7 @@ class ShadingInputs:
         self.shading.set_lights([self._light(light, place) for light in lights], (ambient,) * 3)
 
     def set_environment(self, environment: Environment | None, world_from_mesh: F64) -> None:
-        """Take the environment, or what metallic surfaces mirror without one.
+        """Take the environment, or the default one, which only metallic surfaces mirror.
 
         `world_from_mesh`: as for `set_lights`.
         """
@@ -333,12 +332,12 @@ class ShadingInputs:
         return way / engine.length(way)
 
     def set_picture(self, show: int, matcap: Texture | None, background: Color) -> None:
-        """Take what the picture tells, and its background."""
+        """Take the kind of picture, its matcap and its background."""
         compiled = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").compiled
         self.shading.set_picture(show, compiled, light_of(background), background)
 
     def set_turn(self, show: int, turn: F64) -> None:
-        """Take what is told, in a space that the matrix (3, 3) takes eye space to."""
+        """Take the kind of picture, in a space that the matrix (3, 3) takes eye space to."""
         self.shading.set_turn(engine.product(turn, self.rays.eye_from).tolist())
         self.shading.set_picture(show, None, (0, 0, 0, 0), (0, 0, 0, 0))
 

@@ -1,4 +1,4 @@
-"""Draws the objects of a scene one by one and together: the full mask of each, and what shows of it.
+"""Draws the objects of a scene one by one and together: the full mask of each, and its visible part.
 
 Input: `Scene`, `Camera`. Output: `ObjectMasks`: masks, run lengths, boxes, visible shares.
 """
@@ -37,7 +37,7 @@ MOST_BEYOND_PX = 2**30
 
 @dataclass(frozen=True, eq=False)
 class ObjectMasks:
-    """The masks of the objects of a scene: what `object_masks` returns.
+    """The masks of the objects of a scene: the result of `object_masks`.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class ObjectMasks:
 
     @cached_property
     def visible_share(self) -> F64:
-        """How much of each object shows, of what would if it were alone."""
+        """The visible share of each object's full mask."""
         return self.n_visible / np.maximum(self.n_full, 1)
 
     def visible(self, i: int) -> npt.NDArray[np.bool_]:
@@ -114,7 +114,7 @@ class ObjectMasks:
         return table.encode(table.keys.astype(np.int32), len(self), compressed=compressed)
 
     def scene_gt_info(self, depth: npt.ArrayLike | None = None) -> list[dict[str, Any]]:
-        """What BOP tells of each object of an image in scene_gt_info.json.
+        """The fields of BOP's scene_gt_info.json for each object of an image.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ class ObjectMasks:
             raise IndexError(f"there are {len(self)} objects, got {i}") from None
 
     def _inside(self, corner: tuple[int, int], mask: npt.NDArray[np.bool_]) -> Window:
-        """What of a window lies in the picture, from the corner of the window on."""
+        """The part of a window inside of the picture, from the corner of the window on."""
         (x, y), (height, width) = corner, mask.shape
         left, top = min(max(-x, 0), width), min(max(-y, 0), height)
         right, bottom = min(width, self.size[0] - x), min(height, self.size[1] - y)
@@ -220,7 +220,7 @@ def object_masks(
     subpixel_bits: int | Literal["exact"] = 8,
     threads: int | None = None,
 ) -> ObjectMasks:
-    """Return the full mask of each object of a scene, what shows of it, and how much that is.
+    """Return the full mask of each object of a scene, its visible part, and the share of that.
 
     Parameters
     ----------
@@ -248,8 +248,8 @@ def object_masks(
 
     Notes
     -----
-    Pixels count where their centre is covered, without what materials cut out. What shows of an object is part of its
-    full mask, to the bit: it is the same draw, of the object alone and of all.
+    Pixels count where their centre is covered, without the holes of materials. The visible part of an object is part of
+    its full mask, to the bit: it is the same draw, of the object alone and of all.
 
     References
     ----------
@@ -300,7 +300,7 @@ def object_masks(
 
 
 def seen_in(scene: Scene, camera: Camera, size: tuple[int, int], options: dict[str, Any]) -> tuple[I32, I32]:
-    """Which instance shows (H, W), without what materials cut out, and the boxes of pixels round each (N, 4)."""
+    """Which instance shows (H, W), without the holes of materials, and the boxes of pixels round each (N, 4)."""
     return cast(SceneFragments, draw_visible(Shot(scene, None, camera, size), **options))._found
 
 

@@ -21,7 +21,7 @@ from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
-from topleft._meshes.picture.blended import glass_of
+from topleft._meshes.picture.blended import transparent_pass
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
 from topleft._meshes.picture.edges import draw_all_edges
 from topleft._meshes.picture.fragments import SceneFragments
@@ -65,7 +65,7 @@ def render(
     Parameters
     ----------
     mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
-        What to draw: a path, or a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+        The subject: a path, or a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
         Points have no edges, sides to cull, materials and levels; they are lit where they have normals.
     camera : Camera or (4, 4) array, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up. A matrix is clip from world, see
@@ -73,8 +73,8 @@ def render(
     size : (width, height), or one number for a square; pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade` describes each. The first three composite what shows through, materials
-        with `alpha_mode="blend"` and colours with alpha, in linear light; the others show it as if it were opaque.
+        The meaning of colours; `topleft.shade` describes each. The first three composite blended surfaces, of
+        `alpha_mode="blend"` or colours with alpha, in linear light; the others show these as if they were opaque.
     color : str, (3,) integers of 0 to 255 or (3,) floats of 0 to 1
         sRGB colour of a mesh without colours: "red", "#f00", (255, 0, 0) and (1.0, 0.0, 0.0) are the same.
     background : str, (3,) or (4,) integers of 0 to 255 or floats of 0 to 1
@@ -90,13 +90,13 @@ def render(
     subpixel_bits : int, 0 to 16, or "exact"
         As for `coverage`: which grid vertices snap to. "exact": they stay where they are.
     tolerance : float
-        How far outlines may lie from where they belong, pixels: the mesh is drawn at the coarsest level of detail that
+        The largest error of outlines, pixels: the mesh is drawn at the coarsest level of detail that
         a bound on its distance allows in this view, see `choose_detail`. 0: the mesh itself. Levels are made at the
         first use, which takes a while, and kept with the mesh; `simplify` and `Levels.load` do that beforehand.
     threads : int, optional
         How many threads draw; never changes a bit.
     rasterizer : Rasterizer, optional
-        Of this size: what is needed on the way lies in the memory that it keeps.
+        Of this size: intermediate buffers lie in the memory that it keeps.
     **look
         `lights`, `ambient`, `material`, `matcap`, `fog` and `environment` of `topleft.shade`.
 
@@ -129,12 +129,12 @@ def render(
             raise ValueError("points have no edges")
         return shade_cloud(draw_cloud(shot.cloud, shot.camera, shot.size, **view), shot.cloud, shot.camera, options)
     shot = shot.within(tolerance, cull=cull, material=options.material)
-    glass = glass_of(shot, options, view)
-    frags = draw_visible(shot, rasterizer, options.material, **view) if glass is None else glass.draw_opaque()
+    blended = transparent_pass(shot, options, view)
+    frags = draw_visible(shot, rasterizer, options.material, **view) if blended is None else blended.draw_opaque()
     scene, camera = shot.scene, shot.camera
     picture = shade_by(frags, scene, camera, options)
-    if glass is not None:
-        glass.lay_over(picture, cast(SceneFragments, frags))
+    if blended is not None:
+        blended.lay_over(picture, cast(SceneFragments, frags))
     if edges:
         draw_all_edges(picture, frags, scene, camera, options, cull=cull)
     return picture
@@ -158,7 +158,7 @@ def rasterize_mesh(
     mesh, camera, size, cull, threads
         As for `render`.
     tolerance : float
-        As for `render`; but for 0 ids are those of the level's triangles, ``choose_detail(...).mesh``.
+        As for `render`; unless it is 0 ids are those of the level's triangles, ``choose_detail(...).mesh``.
     rasterizer : Rasterizer, optional
         Of this size: the result lies in its memory, until the next call. Scenes are drawn in memory of their own.
     **view

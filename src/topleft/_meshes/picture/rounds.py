@@ -1,6 +1,6 @@
-"""Draws the instances of a scene in clusters, round by round: what is hidden by those before it is left out.
+"""Draws the instances of a scene in clusters, round by round: clusters that earlier rounds hide are left out.
 
-In: a `PlacedScene`, targets.  Out: whether clusters pay; what each sample sees, in the targets.
+In: a `PlacedScene`, targets.  Out: whether clusters pay; ids and depths of the samples, in the targets.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from topleft._meshes.scene.scene import Scene
 if TYPE_CHECKING:
     from topleft._meshes.picture.instances import PlacedScene
 
-#: Instances that tell what a picture shows of all, and clusters of each: less than a tenth of a millisecond.
+#: Instances surveyed for the share that a picture shows, and clusters of each: less than a tenth of a millisecond.
 SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
 
-#: Instances that are drawn before it is looked which others they hide.
+#: Instances that are drawn before others are tested against their depths.
 FIRST_ROUND = 16
 
 #: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
@@ -37,7 +37,7 @@ CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.
 
 
 def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
-    """Tell whether a scene whose meshes may be drawn in clusters is, and note that they are drawn."""
+    """Tell whether drawing a scene's meshes in clusters pays, and note that they are drawn."""
     scene = placed.scene
     n, n_instances = scene.n_triangles, len(scene)
     wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
@@ -62,7 +62,7 @@ def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray
 
 
 def survey_instances(placed: PlacedScene) -> Survey:
-    """Return what becomes of the clusters of a scene, by some of its instances."""
+    """Return the survey of a scene's clusters, by some of its instances."""
     some = range(0, len(placed.scene), -(-len(placed.scene) // SURVEYED_INSTANCES))
     weights = [placed.scene[i].mesh.triangles.shape[0] for i in some]
     surveys = [ClusteredMesh(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
@@ -95,7 +95,7 @@ def draw_placed(
     *,
     is_first: bool,
 ) -> bool:
-    """Draw what each sample sees into targets, as `PlacedScene.draw` does; returns as `draw_clustered` does."""
+    """Draw all samples into targets, as `PlacedScene.draw` does; returns as `draw_clustered` does."""
     memories = [KeptMemory() for _ in range(n_threads)]
     return all(
         draw_rounds(placed, order, target, height, at, memories, is_first=is_first)
@@ -113,10 +113,10 @@ def draw_rounds(
     *,
     is_first: bool,
 ) -> bool:
-    """Draw what a sample sees into a target, as `draw_placed` does.
+    """Draw a sample into a target, as `draw_placed` does.
 
-    In rounds, each of about as many instances as those before it together: of the others those are left out that lie
-    outside, between samples, or behind what has been drawn.
+    In rounds, each of about as many instances as those before it together: it leaves out the instances that lie
+    outside, between samples, or behind earlier ones.
     """
     keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
     order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
@@ -141,7 +141,7 @@ def draw_round(
     memories: Sequence[Memory],
     **ends: bool,
 ) -> bool:
-    """Draw what a sample sees of some instances, each thread those in its rows; returns as `draw_clustered` does."""
+    """Draw a sample of some instances, each thread those in its rows; returns as `draw_clustered` does."""
     tops = placed.split_rows(some, height, min(height, len(memories)))
 
     def own(first: int, end: int) -> list[int]:

@@ -51,7 +51,7 @@ def shade(
     Parameters
     ----------
     frags : Fragments
-        What `rasterize` or `rasterize_mesh` returned for the mesh or scene. With several samples a pixel a triangle is
+        From `rasterize` or `rasterize_mesh`, of the mesh or scene. With several samples a pixel a triangle is
         shaded once in a pixel, at the first of the samples that see it, and the picture is the mean of the light of the
         samples, each at most white.
     mesh : Mesh, Scene or Points
@@ -62,8 +62,8 @@ def shade(
         "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
         light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour
         that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range
-        of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
-        faces the viewer is light blue.
+        of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue:
+        light blue faces the viewer.
     color, background : str, integers of 0 to 255 or floats of 0 to 1
         sRGB of a mesh without colours and materials, and with alpha where nothing shows; as for `render`.
     depth_range : (float, float), optional
@@ -89,7 +89,7 @@ def shade(
     Raises
     ------
     ValueError
-        If the mesh has other numbers of vertices or triangles than what was drawn, `shading` is unknown, a colour is
+        If the mesh has other numbers of vertices or triangles than the drawn one, `shading` is unknown, a colour is
         none, a number is outside its range, or "matcap" has no matcap.
     TypeError
         If `frags`, the mesh, a light, material, texture or environment is none.

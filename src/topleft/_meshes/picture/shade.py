@@ -1,6 +1,6 @@
 """Shades the visible pixels of instances, all samples of them; colours by ids and distances; gives normals.
 
-Input: what samples see, the instances that show, and a camera. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+Input: samples, the instances that show, and a camera. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 
 Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
 half the light is half as bright on a screen. The kernel is csrc/shade/shade.c.
@@ -45,7 +45,7 @@ MIN_PX_PER_THREAD = 1 << 14
 
 
 class Shading(StrEnum):
-    """What the colour of a pixel tells."""
+    """The meaning of a pixel's colour."""
 
     SMOOTH = "smooth"
     FLAT = "flat"
@@ -58,7 +58,7 @@ class Shading(StrEnum):
 
 SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
 PLAIN = (Material(),)
-"""What is not looked at where normals are told."""
+"""Fills the place of the materials in pictures of normals, which read none."""
 
 GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
 """Greys of the depth picture: neither black nor white, so that it shows on both."""
@@ -160,9 +160,9 @@ class ShownInstance(NamedTuple):
     place: F64
     """World from object, (4, 4)."""
     first_id: int = 0
-    """What its triangle 0 is called in the ids."""
+    """The id of its triangle 0."""
     material: Material | None = None
-    """What goes before the materials of the mesh."""
+    """Goes before the materials of the mesh."""
 
 
 def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
@@ -231,7 +231,7 @@ def shade_instances(shown: Sequence[ShownInstance], seen: SeenSamples, camera: C
 
 
 def rename(shown: Sequence[ShownInstance], seen: SeenSamples) -> tuple[list[ShownInstance], SeenSamples] | None:
-    """Call triangles by numbers that int32 holds, of those instances alone that are seen; None where it does not.
+    """Number the triangles of the instances that are seen in int32; None where it does not hold them.
 
     A row of pixels is not halved.
     """
@@ -251,7 +251,7 @@ def rename(shown: Sequence[ShownInstance], seen: SeenSamples) -> tuple[list[Show
 
 
 def scene_of_tables(shown: Sequence[ShownInstance], tables: Sequence[engine.ShadingTable]) -> engine.ShadedScene:
-    """What kernels read of instances."""
+    """The kernels' inputs of instances."""
     return engine.ShadedScene([one.snapped for one in shown], tables, [one.first_id for one in shown])
 
 
@@ -264,7 +264,7 @@ def look_of(
     *,
     finds_inverse_w: bool,
 ) -> ShadingInputs:
-    """What kernels read of an instance that is seen by `view`, eye from object."""
+    """The kernels' inputs of an instance that is seen by `view`, eye from object."""
     mesh = shown.mesh
     material = shown.material if options.material is None else options.material
     own = mesh.materials if material is None else (material,)
@@ -347,7 +347,7 @@ def eye_distance(depth: F32, camera: Camera) -> F64:
 
 
 def distances(seen: SeenSamples, camera: Camera) -> tuple[float, float]:
-    """The least and the greatest distance along the view of what is shown."""
+    """The least and the greatest distance of visible samples along the view."""
     depth = seen.depth[0][seen.ids[0] >= 0]
     if seen.n_samples > 1:
         _, ids, others = seen.split_pixels()

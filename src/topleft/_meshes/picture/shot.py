@@ -1,4 +1,4 @@
-"""Makes a shot of what is given to be drawn: the subject, who looks at it, and the size of the picture.
+"""Makes a shot: the subject, the camera, and the size of the picture.
 
 Input: whatever a picture takes: a mesh, a scene, points, a path, a camera or none. Output: `Shot`.
 """
@@ -21,7 +21,7 @@ NOTHING = Scene([IN_PLACE])
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """What is drawn, and who looks at it: a `cloud` of points, or else a `scene`; a mesh alone is a scene of one."""
+    """The subject and the camera: a `cloud` of points, or else a `scene`; a mesh alone is a scene of one."""
 
     scene: Scene
     cloud: Points | None
@@ -33,7 +33,7 @@ class Shot:
     def of(
         cls, given: MeshLike | Scene | Points, camera: CameraLike | None, size: object, *, takes_points: bool = True
     ) -> Shot:
-        """Return a shot of what is given; without a camera the three-quarter view."""
+        """Return a shot of a subject; without a camera the three-quarter view."""
         checked = as_size(size)
         subject = as_subject(given) if takes_points else as_meshes(given)
         seen_by = camera_for(subject, camera, checked)

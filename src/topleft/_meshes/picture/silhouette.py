@@ -39,7 +39,7 @@ def silhouette(
     Parameters
     ----------
     mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
-        What to look at.
+        The subject.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
@@ -49,7 +49,7 @@ def silhouette(
     cull : {"none", "back", "front"}, optional
         As for `render`: the side to leave out, whatever materials say.
     tolerance : float
-        As for `render`: how far the outline may lie from where it belongs, pixels.
+        As for `render`: the largest error of the outline, pixels.
     threads : int, optional
         How many threads draw; never changes a bit.
     out : ndarray of bool (float32 for "area"), shape (H, W), optional
@@ -69,7 +69,7 @@ def silhouette(
 
     Notes
     -----
-    What is covered by samples is the union of the triangles. By area it is the sum of their areas, at most 1: the union
+    By samples the cover is the union of the triangles. By area it is the sum of their areas, at most 1: the union
     where triangles do not overlap within a pixel. They do not along the outline of a closed mesh with ``cull="back"``
     that each line of sight enters once; where one part of it hides another, a pixel of the inner outline is full.
     Without culling the far side counts as well, and a pixel on the outline gets up to twice its share. Areas of the

@@ -71,9 +71,9 @@ def render_transparent(
     mesh, camera, size, shading, background, cull, subpixel_bits, tolerance, threads, **look
         As for `render`, one sample a pixel, and as for `shade`.
     opacity : float, 0 to 1
-        How much each layer hides of what lies behind it.
+        How much each layer hides of the layers behind it.
     layers : int, 1 to 16
-        How many are looked at; what lies behind them is not seen.
+        How many are looked at; layers behind them are not seen.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def render_transparent(
 
     Notes
     -----
-    What `alpha_cutoff` leaves out of a texture is no glass: the layers behind it are one fewer.
+    Holes by `alpha_cutoff` are no glass, and no layer.
 
     Examples
     --------
@@ -120,7 +120,7 @@ def render_transparent(
 
 
 def solid_layers(shot: Shot, cuts: Sequence[Cut | None], *, threads: int | None, **options: Any) -> SceneDepthLayers:
-    """The nearest layers of a scene without what is cut out of its meshes."""
+    """The nearest layers of a scene without the holes of its materials."""
     holed = holed_instances(shot.scene, cuts, shot.camera)
     solid = replace(shot, scene=solid_scene(shot.scene, holed))
     found = cast("SceneDepthLayers", peel_shot(solid, threads=threads, **options))
@@ -143,7 +143,7 @@ def visible_layers(
     size: int | tuple[int, int] = DEFAULT_SIZE,
     **options: Unpack[PeelOptions],
 ) -> DepthLayers:
-    """The nearest layers of every pixel of a mesh or scene, whatever its materials cut out; options as for `peel`.
+    """The nearest layers of every pixel of a mesh or scene, with holes of materials filled; options as for `peel`.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ GLASS_LOOKS = frozenset({"shading", "color", "background", "opacity", "layers", 
 
 
 class ViewLayers(Mapping[str, Array]):
-    """Named arrays of one view, in the order asked for: what `render_layers` returns.
+    """Named arrays of one view, in the given order: the result of `render_layers`.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def render_layers(
     Parameters
     ----------
     mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
-        What to look at.
+        The subject.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
@@ -158,9 +158,9 @@ def render_layers(
         Further layers: values of the vertices (V, K) or (V,), or of the corners (T, 3, K); of a scene a sequence of
         such arrays, one of each instance.
     camera_to : Camera, optional
-        For "flow": who looks when it ends; the same camera unless given.
+        For "flow": the camera at its end; the same one unless given.
     transforms_to : (N, 4, 4) array_like, optional
-        For "flow": where the instances of the scene are when it ends, world from object; (4, 4) for a mesh. Unless
+        For "flow": where the instances of the scene are at its end, world from object; (4, 4) for a mesh. Unless
         given they stay.
     cull, subpixel_bits, tolerance, threads
         As for `render`, of every layer. With a tolerance, "triangle" counts those of the level of detail, and there are
@@ -174,12 +174,12 @@ def render_layers(
     Returns
     -------
     ViewLayers
-        Arrays by name, in the order asked for, the attributes last:
+        Arrays by name, in the given order, the attributes last:
 
         ============== ============== ========== =================================================================
-        name           shape, dtype   background what it holds
+        name           shape, dtype   background content
         ============== ============== ========== =================================================================
-        color          (H, W, 4) u8   as asked   the picture of `render`
+        color          (H, W, 4) u8   as given   the picture of `render`
         alpha          (H, W) u8      0          how much of the pixel is covered, of 255
         silhouette     (H, W) bool    False      where the mesh is; with several samples their share, float32
         depth          (H, W) f32     +inf       window depth, 0 near to 1 far
@@ -192,8 +192,8 @@ def render_layers(
         world_normal   (H, W, 3) f32  0          unit, interpolated from the vertices, on the side that is seen
         camera_normal  (H, W, 3) f32  0          the same in eye space: x right, y up, z to the viewer
         uv             (H, W, 2) f32  NaN        texture coordinates, of meshes that have them
-        flow           (H, W, 2) f32  NaN        where the point moves to, pixels (dx, dy), y down; NaN too for
-                                                 what ends behind the camera
+        flow           (H, W, 2) f32  NaN        where the point moves to, pixels (dx, dy), y down; NaN too
+                                                 if it ends behind the camera
         attributes     as given, f32  NaN        interpolated
         ============== ============== ========== =================================================================
 
@@ -203,20 +203,20 @@ def render_layers(
         If there is no such layer, an attribute has its name or does not fit, "flow" has no end, "uv" finds no texture
         coordinates, an option of `render` is wrong, or there are attributes and a tolerance.
     TypeError
-        If an option is unknown, or of colours and no colours are asked for.
+        If an option is unknown, or of colours and "color" is no layer.
 
     Notes
     -----
     The point of a pixel lies on its triangle and projects to within half a sub-pixel of the centre in x and y, 2**-9
-    pixels at 8 bits, which is what the snap moves a vertex by; float32 then rounds it. Flow is the difference of its
-    two projections in float64, so what does not move has flow 0, to the bit.
+    pixels at 8 bits, as far as the snap moves a vertex; float32 then rounds it. Flow is the difference of its
+    two projections in float64, so points that do not move have flow 0, to the bit.
 
-    All layers show the mesh or scene without what its materials cut out. Of `Points` "triangle" is the index of the
+    All layers show the mesh or scene without the holes of its materials. Of `Points` "triangle" is the index of the
     point, and positions, distances and normals are those of its centre all over it; there are no "barycentric" and no
     "uv", and attributes are of the points.
 
     Through a lens a point projects to within its `tolerance_px` and half a sub-pixel of the centre. "distance" is along
-    the axis, also through a fisheye, whose "depth" is that of the distance from the eye.
+    the axis, also through a fisheye; its "depth" is that of the distance from the eye.
 
     Examples
     --------
@@ -260,7 +260,7 @@ def gbuffer_of(
     rasterizer: Rasterizer | None = None,
     **look: Any,
 ) -> GBuffer:
-    """Return what layers are taken of; arguments as for `render_layers`.
+    """Return the G-buffer that layers are made from; arguments as for `render_layers`.
 
     Raises
     ------

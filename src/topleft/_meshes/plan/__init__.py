@@ -1,1 +1,1 @@
-"""What a draw needs, what it will cost, and why."""
+"""The plan of a draw: its choices, their costs, their reasons."""

@@ -1,7 +1,7 @@
-"""What this machine needs per vertex, triangle and pixel: scenes are measured, and costs fitted to them.
+"""Calibrates the costs of this machine per vertex, triangle and pixel: measures scenes, and fits costs to them.
 
-Costs that choices follow from are then scaled, a choice after the other, so that less time is lost than with what
-ships; where this does not hold for other scenes, what ships is kept.
+Costs that decide are then scaled, a choice after the other, so that less time is lost than with the shipped costs,
+which are kept where this does not hold for other scenes.
 
 In: seeded scenes. Out: `Costs`, with how far off their estimates are for scenes that were not fitted.
 """
@@ -36,7 +36,7 @@ from topleft.typing import SamplingOption
 
 GROUPS = {"mask": Sink.MASK, "count": Sink.COUNT, "depth": Sink.NEAREST, "samples": Sink.SAMPLES, "area": Sink.COUNT}
 
-#: The clock of what several threads do.
+#: The clock of work by several threads.
 WALL = time.perf_counter_ns
 
 FRAMES = ((640, 360), (1280, 720), (1920, 1080))
@@ -49,7 +49,7 @@ HELD_OUT = ((50_000, 4), (12_000, 12), (4_000, 35), (600, 150), (80, 500))
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A scene as it is drawn, and what it took."""
+    """The counts of a scene as drawn, and its time."""
 
     counts: NDArray[np.float64]
     ns: float
@@ -61,12 +61,12 @@ def calibrate(*, n_rounds: int = 5) -> Costs:
     Parameters
     ----------
     n_rounds : int
-        Each number is the least of so many measurements.
+        Each number is the least of this many measurements.
 
     Returns
     -------
     Costs
-        With today's date, and how far off they are for scenes that were not fitted.
+        With today's date, and their errors for scenes that were not fitted.
     """
     fits: dict[str, Any] = {}
     ratios = []
@@ -130,7 +130,7 @@ def scenes(kinds: tuple[tuple[int, int], ...], *, with_blob: bool = False, seed:
 
 
 def measure_draw(scene: Any, view: View, group: str, sink: Sink, n_rounds: int) -> Sample:
-    """Draw a scene and count what it is made of."""
+    """Draw a scene; return its counts and its time."""
     memory = KeptMemory()
     samplings: dict[str, SamplingOption] = {"samples": "msaa4", "area": "area"}
     options: ViewOptions = {"threads": 1, "sampling": samplings.get(group, "center")}
@@ -146,7 +146,7 @@ def measure_draw(scene: Any, view: View, group: str, sink: Sink, n_rounds: int) 
 
 
 def drawing(memory: KeptMemory, snapped: Snapped, view: View, group: str, sink: Sink) -> Callable[[], object]:
-    """Return what draws a scene once, on memory that is there."""
+    """Return a function that draws a scene once, on memory that is there."""
     shape = view.size[::-1]
     if group == "area":
         areas = memory.empty("pixels", shape, np.float32)
@@ -208,7 +208,7 @@ def measure_vertices(n_rounds: int) -> dict[str, Any]:
 
 
 def measure_others(n_rounds: int) -> dict[str, float]:
-    """Return the costs of what is neither a vertex nor a draw."""
+    """Return the costs that belong neither to vertices nor to a draw."""
     n = 200_000
     wide: NDArray[np.int64] = np.zeros((n, 3), np.int64)
     narrow: NDArray[np.int32] = np.zeros((n, 3), np.int32)
@@ -234,7 +234,7 @@ def measure_others(n_rounds: int) -> dict[str, float]:
 
 
 def measure_beyond(n_rounds: int) -> tuple[float, float]:
-    """Return what a triangle outside of a clip plane costs before the draw, beyond its vertices, and in the draw."""
+    """Return the cost of a triangle outside of a clip plane: before the draw, beyond its vertices, and in the draw."""
     n = 30_000
     vertices = np.random.default_rng(4).uniform(-0.5, 0.5, (3 * n, 4))
     vertices[:, 3] = 1
@@ -271,7 +271,7 @@ class Tuned:
     z: float | None = None
 
     def draws(self, seed: int) -> Iterator[Callable[[], object]]:
-        """Give what draws each scene in a picture of its own."""
+        """Yield for each scene a function that draws it, all on the memory of one `Rasterizer`."""
         picture = Rasterizer(FRAMES[-1], threads=self.threads)
         for n, size_px in self.scenes:
             vertices, triangles, colors = random_triangles(n, size_px, *FRAMES[-1], seed)
@@ -306,15 +306,15 @@ TUNED = (
     Tuned("pays_to_share", ("shared_item",), "coverage", ((20_000, 2), (50_000, 2), (100_000, 2)), threads=2),
 )  # fmt: skip
 
-#: What rows are multiplied with, to find what suits a machine.
+#: Factors that rows are multiplied by, to find the best for a machine.
 FACTORS = (1.0, 0.25, 0.5, 0.71, 1.41, 2.0, 4.0)
 
-#: How much less time must be lost, of scenes that were not looked at when the costs were chosen.
+#: The least share of time that tuned costs must save on scenes that they were not chosen by.
 LEAST_GAIN = 0.01
 
 
 def tune(own: Costs, n_rounds: int) -> Costs:
-    """Return costs with what loses the least time in each choice, on scenes, and on others no more than what ships."""
+    """Return the costs that lose the least time in each choice, on other scenes no more than the shipped ones."""
     shipped, n_scenes = Costs(), 0
     lost = np.zeros(2)
     for one in TUNED if available_threads() > 1 else [one for one in TUNED if one.threads == 1]:
@@ -332,7 +332,7 @@ def tune(own: Costs, n_rounds: int) -> Costs:
     return replace(own, tuned=(*np.exp(lost / n_scenes).tolist(), n_scenes))
 
 
-#: Rows that `calibrate` measures, by the choice that follows from them: kept only where that does.
+#: Rows that `calibrate` measures, by the choice that they decide: kept only if `tune` prefers them.
 MEASURED = {"pays_without_depth": ("flat_pixel",), "is_direct": ("paint",), "threads_to_draw": ("wake",)}
 
 
@@ -342,7 +342,7 @@ def scaled(costs: Costs, rows: tuple[str, ...], factor: float) -> Costs:
 
 
 def losses(one: Tuned, draw: Callable[[], object], tables: list[Costs], n_rounds: int) -> NDArray[np.float64]:
-    """Return the logarithm of the time of what each table chooses, by that of the better way."""
+    """Return the logarithm of the time that each table's choice takes, over that of the better way."""
     decide, in_use = getattr(choices, one.choice), cost_table()
     picked: list[int] = []
 

@@ -1,4 +1,4 @@
-"""Finds what decides how triangles are drawn: transform, clip and snap as in the draw, then a census in its place.
+"""Finds the facts that decide a draw: transforms, clips and snaps as the draw does, then takes a census in its place.
 
 In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` turns into sentences; the bytes that a call needs.
 """
@@ -34,7 +34,7 @@ CLASSES = (
 
 MOST_SHOWS = "most of the mesh shows, and drawing that cluster by cluster takes longer"
 
-#: Of closed meshes: 89 triangles a meshlet.
+#: Measured on closed meshes: 89 triangles a meshlet.
 TRIANGLE_BYTES_OF_MESHLETS = 19.2
 
 
@@ -45,13 +45,13 @@ class ClusterFacts:
     Attributes
     ----------
     clusters : Clusters or None
-        What is drawn from; None when the mesh is drawn whole.
+        The clusters that are drawn; None when the mesh is drawn whole.
     why_not : str
-        Why it is.
+        Why it is drawn whole.
     n_outside, n_turned, n_hidden, n_drawn : int
         Clusters outside of the picture, turned away, hidden, and drawn.
     meshlet_bytes : int
-        What meshlets take of memory, about, where pictures come to be drawn from them; else 0.
+        About the memory of meshlets, where later pictures are drawn from them; else 0.
     """
 
     clusters: Clusters | None
@@ -76,7 +76,7 @@ class Decided(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What decides how a scene is drawn."""
+    """The facts that decide how a scene is drawn."""
 
     verb: str
     outputs: tuple[str, ...]
@@ -98,7 +98,7 @@ class Facts:
     n_clipped: int  # vertices outside of a clip plane
     n_cut: int  # triangles that a plane cuts and that are drawn as pieces
     n_pieces: int
-    common_depth: float | None  # of all vertices, whatever is made of it
+    common_depth: float | None  # of all vertices
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
     is_large_shapes: bool  # large triangles, whose picture is written row by row
     work_ms: float  # of one thread, as guessed before the draw
@@ -112,7 +112,7 @@ class Facts:
 
     @property
     def n_beyond(self) -> int:
-        """Triangles of which the clip planes leave nothing."""
+        """Triangles that the clip planes cut away whole."""
         return self.n_triangles - self.n_cut + self.n_pieces - sum(row[0] for row in self.census)
 
     @property
@@ -162,7 +162,7 @@ class Facts:
 def find_facts(
     vertices: ArrayLike, triangles: ArrayLike, view: View, verb: str, outputs: tuple[str, ...], test: DepthTest | None
 ) -> tuple[Facts, NDArray[np.int32]]:
-    """Return what a scene is, and its triangles as a copy that nobody changes.
+    """Return the facts of a scene, and a copy of its triangles that nobody changes.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Deci
 
 
 def find_sink(verb: str, view: View) -> Sink:
-    """Return what a verb other than `rasterize` does with a covered sample."""
+    """Return the sink of a verb other than `rasterize`."""
     if verb == "fill":
         return Sink.LABEL
     if verb == "overdraw" or view.sampling is Sampling.AREA:
@@ -253,7 +253,7 @@ def find_sink(verb: str, view: View) -> Sink:
 
 
 def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None) -> ClusterFacts:
-    """Return what `rasterize_mesh` does from the second picture of a mesh on; clusters are made for it if need be."""
+    """Return the clusters that `rasterize_mesh` draws from the second picture of a mesh on, made if need be."""
     n_triangles = len(mesh.triangles)
     if verb != "rasterize":
         return ClusterFacts(None, f"{verb} draws arrays, which may change")
@@ -288,7 +288,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
 
 
 def bytes_of_meshlets(clusters: Clusters) -> int:
-    """Return what the meshlets of a mesh take of memory: exactly once they are grown, about before."""
+    """Return the memory of a mesh's meshlets: exactly once they are grown, about before."""
     if clusters.has_meshlets:
         return clusters.meshlets.n_bytes
     return round(TRIANGLE_BYTES_OF_MESHLETS * clusters.n_triangles)
@@ -297,8 +297,8 @@ def bytes_of_meshlets(clusters: Clusters) -> int:
 def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     """Return the bytes of scratch, which is kept from call to call, and of results, by name.
 
-    What only the data can tell comes on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the pieces
-    of cut triangles, about 100 bytes each; triangles in several bands of rows.
+    Amounts that depend on the data come on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the
+    pieces of cut triangles, about 100 bytes each; triangles in several bands of rows.
     """
     view, n = facts.view, facts.n_triangles
     width, height = view.size
@@ -341,7 +341,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
 
 
 def result_bytes(facts: Facts) -> dict[str, int]:
-    """Return the bytes of what the verb returns; colours have four bytes a pixel."""
+    """Return the bytes of the verb's results; colours have four bytes a pixel."""
     width, height = facts.view.size
     n_pixels, n_samples = width * height, facts.view.sampling.n_samples
     many = facts.view.sampling is Sampling.AREA or n_samples > 1

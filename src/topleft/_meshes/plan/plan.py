@@ -1,4 +1,4 @@
-"""`plan`: what a scene needs, what was left out, and why, before it is drawn.
+"""`plan`: the choices, costs and memory of a draw, with reasons, before it is made.
 
 In: the arguments of a verb. Out: a `Plan`, which explains itself, and which verbs take as `plan=` to save its work.
 """
@@ -44,7 +44,7 @@ OUTPUTS = {
     "interpolate": "rasterize",
 }
 
-#: What another call of the verb may not change; transform, origin, viewport and the like may.
+#: Options that a plan fixes; calls may change transform, origin, viewport and the like.
 FIXED = ("size", "subpixel_bits", "sampling", "method", "cull")
 
 #: The names of options that a `View` holds as numbers.
@@ -82,14 +82,14 @@ class Plan:
     verb : str
         "coverage", "overdraw", "fill" or "rasterize".
     outputs : tuple of str
-        What was asked for.
+        Results of the draw.
     size : (int, int)
         Width and height of the picture in pixels.
     n_vertices, n_triangles : int
     stages : tuple of Stage
         In the order of the pipeline: name, choice, why, rejected, estimated_ms.
     classes : mapping of str to int
-        Triangles, or pieces of cut ones, by what is done with them.
+        Triangles, or pieces of cut ones, by the way they are drawn.
     scratch_bytes, result_bytes : mapping of str to int
         Memory by name: kept from call to call, and returned.
     threads : int
@@ -125,12 +125,12 @@ class Plan:
 
     @property
     def estimated_ms(self) -> float:
-        """What a call on memory that is kept should take, in milliseconds."""
+        """The estimated time of a call on memory that is kept, in milliseconds."""
         return sum(stage.estimated_ms or 0.0 for stage in self.stages)
 
     @property
     def measured_ms(self) -> Mapping[str, float]:
-        """What the stages of the last call with this plan took, in milliseconds; empty before there was one."""
+        """The times of the stages in the last call with this plan, in milliseconds; empty before there was one."""
         return {name: ns / 1e6 for name, ns in self._clock.ns.items()}
 
     def __repr__(self) -> str:
@@ -144,7 +144,7 @@ class Plan:
         return as_html(self.to_dict())
 
     def explain(self) -> str:
-        """Return a table: each stage, what was chosen, why, what was not, and what it takes."""
+        """Return a table of the stages: the choice, its reason, rejected alternatives, and the time."""
         return as_text(self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
@@ -235,7 +235,7 @@ class Plan:
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the plan's own int32 triangles, whose indices have been checked.
 
-        The array that the plan was made from is taken to be what it was then; any other is compared.
+        The array that the plan was made from is taken to be unchanged; any other is compared.
 
         Raises
         ------
@@ -280,31 +280,31 @@ def plan(
     tolerance: float = 0.0,
     **view: Unpack[ViewOptions],
 ) -> Plan:
-    """Return how a scene is drawn: what is chosen at each stage, why, what is left out, and what it should take.
+    """Return the plan of a draw: at each stage the choice, its reason, rejected alternatives, and the estimated time.
 
     Vertices are transformed, cut and snapped as the verb does it, and triangles are counted in the code that draws
-    them: the plan says what happens, it does not guess. It costs about as much as a draw. With
-    ``subpixel_bits="exact"`` the scene is drawn once, so that the plan tells how many samples were in doubt and what
-    decided them; its classes are those of the same triangles on 2**-8 px.
+    them: the plan counts, it does not guess. It costs about as much as a draw. With
+    ``subpixel_bits="exact"`` the scene is drawn once, so that the plan tells how many samples were in doubt and how
+    they were decided; its classes are those of the same triangles on 2**-8 px.
 
     Parameters
     ----------
     vertices, triangles, size, **view
         As in `coverage`; or a mesh and a camera in the place of the first two, as in `rasterize_mesh`.
     outputs : str or sequence of str
-        What is wanted: "coverage"; "overdraw"; "color" (`fill`); or any of "triangle", "depth", "mask",
+        The results: "coverage"; "overdraw"; "color" (`fill`); or any of "triangle", "depth", "mask",
         "barycentric" and "interpolate" (`rasterize`).
     depth_test : "less", "greater" or None
         As in `rasterize`.
     tolerance : float
-        Of a mesh and a camera: how far outlines may be off, pixels, as in `render`. The plan is that of the level of
+        Of a mesh and a camera: the largest error of outlines, pixels, as in `render`. The plan is that of the level of
         detail that is drawn, and has a stage "detail" that tells which, and why.
 
     Returns
     -------
     Plan
         ``.explain()`` is a table, ``.to_dict()`` the same for JSON. As ``plan=`` of the verbs it saves the conversion
-        and the check of the triangles, and notes what each stage takes; ``.measure()`` does so too.
+        and the check of the triangles, and notes the time of each stage; ``.measure()`` does so too.
 
     Raises
     ------
@@ -370,7 +370,7 @@ def plan(
 def plan_mesh(
     mesh: Any, camera: Camera, size: tuple[int, int], tolerance: float, options: ViewOptions
 ) -> tuple[Mesh, Stage]:
-    """Return the level that is drawn, and what is to be told of it; set the transform."""
+    """Return the level that is drawn, and its stage; set the transform."""
     if "transform" in options:
         raise ValueError("transform is that of the camera: give either")
     viewport = options.get("viewport")

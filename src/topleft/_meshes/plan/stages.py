@@ -1,4 +1,4 @@
-"""What happens to a scene, stage by stage: what was chosen, why, what was left out, and what it should take.
+"""Describes a draw, stage by stage: the choice, its reason, rejected alternatives, and the estimated time.
 
 In: `Facts` and `Costs`. Out: `Stage`s, in the order of the pipeline.
 """
@@ -26,9 +26,9 @@ class Stage:
     Attributes
     ----------
     name, choice, why : str
-        What is done, and why that is enough.
+        The stage, its choice, and why that is enough.
     rejected : tuple of str
-        What else could have been done, and why it was not.
+        Alternatives, and why they were not chosen.
     estimated_ms : float or None
         None: part of another stage, which is named in `timed_in`.
     timed_in : str
@@ -64,7 +64,7 @@ def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
 
 
 def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int, costs: Costs) -> list[Stage]:
-    """Return the stages of a mesh that is drawn again, with one that tells what its clusters save, for each sample."""
+    """Return the stages of a mesh that is drawn again, with one on the savings of its clusters, for each sample."""
     if found.clusters is None:
         stages[1:1] = [Stage("clusters", "none", found.why_not, timed_in="method"), *plan_meshlets(found, costs)]
         return stages
@@ -108,7 +108,7 @@ def plan_meshlets(found: ClusterFacts, costs: Costs) -> list[Stage]:
 
 
 def plural(n: int, thing: str) -> str:
-    """Return a number with what it counts."""
+    """Return a number with the noun that it counts."""
     return f"{n:,} {thing}" if n == 1 else f"{n:,} {thing}s"
 
 
@@ -132,7 +132,7 @@ def plan_detail(found: Detail) -> Stage:
 
 
 def plan_input(facts: Facts, costs: Costs) -> Stage:
-    """Tell what becomes of the caller's arrays."""
+    """Tell how the caller's arrays are read."""
     reads = "read as they are" if not facts.is_vertex_copy else f"copied to contiguous {facts.point_dtype}"
     converts = facts.index_dtype not in ("int32", "uint32")
     indices = "made int32, checked on the way" if converts else "read as they are, checked while drawing"
@@ -361,7 +361,7 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
 
 
 def plan_threads(facts: Facts, costs: Costs) -> Stage:
-    """Tell how many threads draw, and what each takes."""
+    """Tell how many threads draw, and the work of each."""
     view, n = facts.view, facts.n_triangles
     n_threads, usable = facts.drawing.n_threads, available_threads()
     wake = f"waking a thread takes {costs.wake / 1e3:.0f} us"
@@ -386,7 +386,7 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
 
 
 def plan_memory(facts: Facts, costs: Costs) -> Stage:
-    """Tell what is allocated."""
+    """Tell which memory is allocated."""
     scratch, results = memory_of(facts)
     kept, made = sum(scratch.values()), sum(results.values())
     parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)

@@ -1,4 +1,4 @@
-"""A plan as text and as HTML. In: what `Plan.to_dict` gives. Out: a string."""
+"""A plan as text and as HTML. In: the mapping of `Plan.to_dict`. Out: a string."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def as_text(plan: Mapping[str, Any]) -> str:
 
 
 def title(plan: Mapping[str, Any]) -> str:
-    """Return what is drawn, in a line."""
+    """Return the draw in a line: verb, outputs, sizes, threads."""
     width, height = plan["size"]
     n_threads = plan["threads"]
     return (
@@ -45,7 +45,7 @@ def wrap(text: str, width: int) -> list[str]:
 
 
 def paragraph(head: str, text: str) -> list[str]:
-    """Return a text with a head that hangs out."""
+    """Return a text with a hanging head."""
     first, *others = wrap(text, WIDTH - len(INDENT) - len(head))
     return [INDENT + head + first, *(INDENT + " " * len(head) + line for line in others)]
 

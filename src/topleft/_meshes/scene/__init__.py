@@ -1,1 +1,1 @@
-"""What callers give to be drawn: paths, meshes of other libraries, meshes placed in one world."""
+"""The subjects that callers give: paths, meshes of other libraries, meshes placed in one world."""

@@ -1,4 +1,4 @@
-"""Adapters: a path, or the mesh of another library, told by its attributes, as a `Mesh`.
+"""Adapters: a path, or the mesh of another library, recognized by its attributes, as a `Mesh`.
 
 Input: a path, `trimesh.Trimesh` and `trimesh.Scene`, `meshio.Mesh`, `pyvista.PolyData` and `pyvista.UnstructuredGrid`,
 `matplotlib.tri.Triangulation`, anything with `vertices` and `triangles` (or `faces`), or a pair of arrays. Output:
@@ -41,8 +41,8 @@ def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
     Returns
     -------
     Mesh
-        Of a path what `load` reads, unless that is points. Vertices share the memory of the subject's where they are
-        float32 or float64 (V, 3). Flat points get z = 0.
+        Of a path the mesh that `load` reads; points are refused. Vertices share the memory of the subject's where they
+        are float32 or float64 (V, 3). Flat points get z = 0.
         Faces with more corners, concave ones too, are cut into triangles, in the order of the faces; masked triangles
         are left out. Curved cells of meshio and VTK (triangle6, quad8, ...) are drawn straight, from corner to corner.
         Of solid cells (tetra, hexahedron, wedge, pyramid) comes the skin: the sides that no second cell has. Of
@@ -107,7 +107,7 @@ def as_polygons(subject: MeshLike) -> Polygons:
 
 
 def _maker_for(subject: MeshLike) -> Callable[[Any], Polygons] | None:
-    """What makes polygons of a subject with these attributes."""
+    """The function that makes polygons of a subject with these attributes."""
     has = {name for name in ("x", "y", "triangles", "points", "celltypes", "faces") if hasattr(subject, name)}
     if {"x", "y", "triangles"} <= has:
         return of_triangulation

@@ -1,6 +1,6 @@
 """Makes triangles of faces and cells as other libraries keep them: faces of any number of corners, skins of solids.
 
-Input: what meshio, pyvista and matplotlib have as meshes, or arrays; whose kind `adapt.py` tells. Output: `Polygons`.
+Input: meshes of meshio, pyvista and matplotlib, or arrays; `adapt.py` tells the kind. Output: `Polygons`.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def of_triangulation(subject: Any) -> Polygons:
 
 
 def of_arrays(subject: Any) -> Polygons:
-    """Triangles of what has `vertices` and `faces` or `triangles`."""
+    """Triangles of an object with `vertices` and `faces` or `triangles`."""
     faces = getattr(subject, "faces", None)
     return _plain(subject.vertices, subject.triangles if faces is None else faces)
 
@@ -171,7 +171,7 @@ def of_padded(subject: Any) -> Polygons:
 
 
 def _rows_of_padded(padded: npt.NDArray[Any]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Where the rows of one array begin, before each of which stands its length, and these."""
+    """Where the rows of one array begin, and their lengths; each row has its length before it."""
     starts, sizes, at, numbers = [], [], 0, padded.tolist()
     while at < len(numbers):
         size = numbers[at]

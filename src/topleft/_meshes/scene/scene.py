@@ -1,6 +1,6 @@
 """Scenes: meshes that stand in one world, each placed by a matrix, as often as wanted.
 
-Input: meshes and matrices; or whatever a caller gives to be drawn, a path, say. Output: a `Scene`, or the `Mesh`,
+Input: meshes and matrices; or another subject, a path, say. Output: a `Scene`, or the `Mesh`,
 `Scene` or `Points` that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
 """
 
@@ -41,8 +41,8 @@ class Instance:
     mesh : Mesh
     transform : (4, 4) or (3, 4) array_like, pair (R, t) or (rvec, tvec), or mapping
         World from object, with last row [0, 0, 0, 1] and not singular; a rotation (3, 3), or OpenCV's vector (3,) for
-        it, and a translation (3,); or what BOP writes, with `cam_R_m2c` and `cam_t_m2c`: the camera is the world then.
-        One that mirrors turns the winding over, and what `cull` leaves out with it, so that the outside stays outside.
+        it, and a translation (3,); or a mapping of BOP, with `cam_R_m2c` and `cam_t_m2c`: the camera is the world then.
+        One that mirrors turns the winding over, and `cull` with it, so that the outside stays outside.
     name : str, optional
     material : Material, optional
         For all triangles, instead of those of the mesh; `render(material=)` goes before it.
@@ -75,7 +75,7 @@ class Instance:
     material: Material | None = None
     color: InitVar[ColorLike | None] = None
 
-    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+    if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
         def __init__(
             self,
@@ -128,7 +128,7 @@ class Instance:
 
 
 IN_PLACE = Instance(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)))
-"""Nothing, where its vertices are."""
+"""An empty mesh in place, which `with_mesh` copies."""
 vars(IN_PLACE)["is_mirrored"] = False  # as copies know
 
 
@@ -140,7 +140,7 @@ class Scene:
     ----------
     instances : iterable of Instance, mesh, (mesh, transform) or (mesh, transform, name)
         At least one. A mesh is whatever `as_mesh` takes: a `Mesh`, a path, a mesh of trimesh, (vertices, triangles).
-        By itself it stands where its vertices are. What is to be shared by several instances is made a `Mesh` first.
+        By itself it stands where its vertices are. Make a `Mesh` first to share it among instances.
 
     Raises
     ------
@@ -172,7 +172,7 @@ class Scene:
             raise ValueError("a scene needs at least one instance, got none")
 
     def __getstate__(self) -> dict[str, object]:
-        """What another process needs: the rest is found out there."""
+        """The state for another process, which finds out the rest itself."""
         return {"instances": self.instances}
 
     def _repr_html_(self) -> str:
@@ -279,7 +279,7 @@ class Scene:
             raise ValueError(f"{what} must have at most {INT32_MAX} triangles, got {self.n_triangles}")
 
     def with_transforms(self, transforms: npt.ArrayLike) -> Scene:
-        """The scene with its instances elsewhere: meshes and materials are shared, and what is known of them kept.
+        """The scene with its instances elsewhere: meshes and materials are shared, and values computed of them kept.
 
         Parameters
         ----------
@@ -363,7 +363,7 @@ def counted_ranges(first_ids: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]
 
 
 def as_instance(value: object) -> Instance:
-    """Return an instance of what a scene is made from."""
+    """Return the instance of a value that a scene is made from."""
     if isinstance(value, Instance):
         return value
     if isinstance(value, Scene):
@@ -381,7 +381,7 @@ def as_instance(value: object) -> Instance:
 
 
 def is_subject(value: object) -> bool:
-    """Whether `as_mesh` is to be asked what it makes of it."""
+    """Whether the value is to be given to `as_mesh`."""
     return isinstance(value, Mesh) or is_mesh_like(value) or is_pair(value) or hasattr(value, "vertices")
 
 
@@ -409,7 +409,7 @@ def as_subject(given: MeshLike | Scene | Points) -> Mesh | Scene | Points:
 
 
 def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
-    """The same for what needs triangles: points are refused."""
+    """The same for calls that need triangles: points are refused."""
     return given if isinstance(given, Scene) else as_mesh(given)
 
 
@@ -419,7 +419,7 @@ def scene_of(subject: Mesh | Scene) -> Scene:
 
 
 def unchecked_scene(instances: Sequence[Instance], **known: object) -> Scene:
-    """A scene of instances, and what is known of it."""
+    """A scene of checked instances, with values known of it."""
     scene = object.__new__(Scene)
     vars(scene).update(instances=tuple(instances), **known)
     return scene

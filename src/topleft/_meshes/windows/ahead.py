@@ -1,6 +1,6 @@
-"""Does work ahead of who takes it: blocks of a mesh, windows of a raster, each on a thread of its own.
+"""Does work ahead of its caller: blocks of a mesh, windows of a raster, each on a thread of its own.
 
-Input: a function, and what it is called with. Output: what it returns, in order.
+Input: a function, and its arguments. Output: its results, in order.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ Made = TypeVar("Made")
 
 
 def in_order(make: Callable[[Item], Made], items: Iterable[Item], n_threads: int, n_ahead: int = 0) -> Iterator[Made]:
-    """Yield what a function makes of items, in their order, on so many threads.
+    """Yield the results of a function for items, in their order, on so many threads.
 
-    No more than `n_ahead` are begun that have not been asked for, twice as many as there are threads unless given. With
+    At most `n_ahead` are begun before they are taken, twice as many as there are threads unless given. With
     one thread it is the caller's, and nothing is begun ahead. In a forked child, where the threads are not, the caller
-    makes what is left.
+    makes the rest.
     """
     if n_threads == 1:
         yield from map(make, items)

@@ -1,7 +1,7 @@
-"""Polygons as a huge raster: which windows each of them may touch, and what a window shows of them.
+"""Polygons as a huge raster: the windows that each of them may touch, and the pixels of a window.
 
-Input: rings in pixels, of any number of polygons. Output: what `Tiles` needs in the place of triangles, an index of
-windows and a `Painter`; each window is the crop of what `polygons` draws of all of them, to the bit.
+Input: rings in pixels, of any number of polygons. Output: an index of windows and a `Painter`, for
+`Tiles` in the place of triangles; each window is the crop of the picture that `polygons` draws, to the bit.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_SPANS = 1 << 28
 
 
 def are_polygons(subject: Any) -> bool:
-    """Whether something is geometries and no mesh: shapely's, GeoJSON, ring offsets of polygons, lists of polygons."""
+    """Whether a subject is geometries and no mesh: shapely's, GeoJSON, ring offsets of polygons, lists of polygons."""
     if isinstance(subject, RingSet) or hasattr(subject, "__geo_interface__") or hasattr(subject, "geom_type"):
         return True
     if isinstance(subject, Mapping):
@@ -157,7 +157,7 @@ class AreaPainter(Painter):
 
     @classmethod
     def of_kind(cls, kind: str, grid: Grid | None, areas: Areas, values: Any, options: dict[str, Any]) -> AreaPainter:
-        """Return what draws windows of polygons.
+        """Return the painter of windows of polygons.
 
         Raises
         ------

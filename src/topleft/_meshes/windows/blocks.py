@@ -42,7 +42,7 @@ INDICES = (np.int32, np.int64)
 
 
 class Triangles(Protocol):
-    """Triangles that are asked for by their indices."""
+    """Triangles that are read by their indices."""
 
     n: int
     n_components: int
@@ -68,8 +68,8 @@ class IndexedTriangles:
     triangles: Array
     faces: Array | None = None
     n_faces: int = 0
-    owner: object = None  # what removes temporary files
-    named: dict[str, Array] = field(default_factory=dict)  # what a file says of vertices and faces besides
+    owner: object = None  # removes temporary files
+    named: dict[str, Array] = field(default_factory=dict)  # other values of vertices and faces in a file
 
     def __post_init__(self) -> None:
         first = self.columns[0]
@@ -165,7 +165,7 @@ class SeparateTriangles:
 
 @dataclass(frozen=True)
 class MappedArray:
-    """Where in a file an array lies: what other processes get of it."""
+    """The place of an array in a file, for other processes."""
 
     path: str
     offset: int
@@ -219,7 +219,7 @@ def triangles_of(mesh: Any, folder: str | os.PathLike[str] | None) -> Triangles:
 
 
 def of_arrays(points: Any, triangles: Any, faces: Array | None = None, n_faces: int = 0) -> IndexedTriangles:
-    """Return triangles of arrays, whose shapes and dtypes are checked; mapped ones stay where they are."""
+    """Return triangles of arrays, with checked shapes and dtypes; mapped ones stay where they are."""
     points, triangles = as_array("vertices", points), as_array("triangles", triangles)
     if triangles.size == 0 and triangles.ndim == 1:
         triangles = np.empty((0, 3), np.int32)
@@ -263,7 +263,7 @@ def triangles_of_file(path: Path) -> Triangles:
 
 
 def side_by_side(columns: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Return one array (V, 3) of three columns whose numbers lie side by side in a file; others as they are."""
+    """Return one array (V, 3) of three columns that lie side by side in a file; others as they are."""
     x, dtype = columns[0], columns[0].dtype
     places = [column.__array_interface__["data"][0] - x.__array_interface__["data"][0] for column in columns]
     if any(column.dtype != dtype for column in columns) or places != [0, dtype.itemsize, 2 * dtype.itemsize]:
@@ -322,7 +322,7 @@ class _Temporary:
 
 
 def fingerprint_of(triangles: Triangles, arrays: dict[str, Array | None], words: object) -> str:
-    """Return what tells a mesh, arrays that go with it, and options from others."""
+    """Return a hash of a mesh, the arrays that go with it, and options."""
     digest = hashlib.blake2b(repr(words).encode(), digest_size=16)
     for part in triangles.parts():
         digest.update(f"{part.dtype.str}{part.shape}".encode())

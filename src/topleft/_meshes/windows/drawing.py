@@ -1,9 +1,9 @@
-"""Draws what a window of a raster shows: masks, counts, labels, depth, colours, fields, heights.
+"""Draws a window of a raster: masks, counts, labels, depth, colours, fields, heights.
 
 Input: the triangles of the window with what belongs to them, and where it lies. Output: the array, the crop of the
 whole raster to the bit.
 
-A `Painter` has two halves. `gather` takes what a window needs out of the mesh; `draw` makes the picture of that alone,
+A `Painter` has two halves. `gather` takes a window's triangles out of the mesh; `draw` makes the picture of that alone,
 so it can be sent to another process. Each triangle has three corners of its own there: their pixels are computed from
 the same numbers by the same operations as for the whole mesh, so they are the same.
 """
@@ -111,7 +111,7 @@ class Painter:
         return np.column_stack([pixels, flat[:, 2]]) if self.n_components == 3 and self.needs_depth else pixels
 
     def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
-        """Take out of the mesh what a window needs."""
+        """Take a window's triangles out of the mesh."""
         return Payload(which, triangles.corners(which, memory))
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
@@ -270,13 +270,13 @@ class FillPainter(Painter):
         self.style = {name: value for name, value in self.options.items() if name not in self.view and name != "per"}
         self.style["per"] = "triangle" if self.is_flat else "vertex"
         self.channels = self.values.shape[1:]
-        # one pixel of nothing tells dtype and background, and what is wrong with the options
+        # one pixel of nothing tells dtype and background, and raises the errors of the options
         nothing = Payload(np.empty(0, np.int32), np.empty((0, 3, self.n_components)), self.values[:0])
         sample = self.draw(nothing, (0, 0), (1, 1), 1)
         self.dtype, self.empty = sample.dtype, sample[0, 0].copy()
 
     def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
-        """Take out of the mesh what a window needs."""
+        """Take a window's triangles out of the mesh."""
         at = which if self.is_flat else triangles.indices(which).ravel()
         return Payload(which, triangles.corners(which, memory), np.ascontiguousarray(self.values[at]))
 
@@ -284,7 +284,7 @@ class FillPainter(Painter):
         """Return the pixels of a window (H, W) or (H, W, C)."""
         assert payload.values is not None
         n, view = len(payload.triangles), self.view_at(origin, threads)
-        if out is not None:  # `fill` draws over what is there
+        if out is not None:  # `fill` draws over its pixels
             out[...] = self.empty
         return fill(self.points(payload), rows(n), payload.values, size, out=out, **self.style, **view)
 
@@ -321,7 +321,7 @@ class FieldPainter(Painter):
                 self.widen(float(part.min()), float(part.max()))
 
     def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
-        """Take out of the mesh what a window needs."""
+        """Take a window's triangles out of the mesh."""
         if self.is_of_faces:
             values = self.values[which if self.faces is None else self.faces[which]]
         else:
@@ -406,7 +406,7 @@ ON_GRIDS = ("field", "height_map")
 
 
 def painter_of(kind: str, grid: Grid | None, triangles: Triangles, values: Any, options: dict[str, Any]) -> Painter:
-    """Return what draws windows of a kind of raster.
+    """Return the painter of a kind of raster.
 
     Raises
     ------
@@ -428,7 +428,7 @@ def painter_of(kind: str, grid: Grid | None, triangles: Triangles, values: Any, 
 
 
 def without_values(painter: Painter) -> Painter:
-    """Return a painter that draws what it is given, without the arrays from which that is gathered."""
+    """Return a painter that draws payloads, without the arrays that `gather` takes them from."""
     light = replace(painter)
     vars(light).update({**vars(painter), "values": None, "faces": None})
     return light

@@ -1,6 +1,6 @@
 """Windows of a raster as jobs for other processes.
 
-Input: a painter, and what a window needs of the mesh. Output: objects that are called and return pixels.
+Input: a painter, and the payload of a window. Output: objects that are called and return pixels.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A raster of any size, of which windows are drawn when they are needed.
+"""A raster of any size: its windows are drawn when they are needed.
 
-Input: a mesh or polygons, a grid or a size in pixels, and what pixels hold. Output: `WindowedRaster`: any window, any
+Input: a mesh or polygons, a grid or a size in pixels, and the kind of pixels. Output: `WindowedRaster`: any window, any
 part by slicing, all windows in order, jobs for other processes. Every pixel equals that of the whole raster, however it
 is cut.
 """
@@ -32,8 +32,8 @@ from topleft.typing import RasterKindOption, YOption
 
 Path = str | os.PathLike[str]
 
-#: Pixels a side of a window. 80 px a triangle, two cores: 166 Mpx/s with 1024, 203 with 2048, 152 with 4096; what is
-#: written once more, ids of triangles as names, is then still in the cache.
+#: Pixels a side of a window. 80 px a triangle, two cores: 166 Mpx/s with 1024, 203 with 2048, 152 with 4096; pixels
+#: that are written once more, ids of triangles as names, are then still in the cache.
 WINDOW = 2048
 
 INDEX_BYTES = 256 << 20
@@ -51,7 +51,7 @@ class Window:
     x, y : int
         Its first pixel in the raster.
     pixels : ndarray (H, W) or (H, W, C)
-        What it shows.
+        Its picture.
     n_triangles : int
         How many triangles may touch it; 0: it is blank.
 
@@ -164,7 +164,7 @@ class WindowedRaster:
 
     @property
     def has_means(self) -> bool:
-        """Whether the mean of neighbouring pixels says something: not of labels, masks and counts."""
+        """Whether the mean of neighbouring pixels has a meaning: not for labels, masks and counts."""
         if self.is_of_polygons and not self.painter.channels:  # values of polygons may be names
             return self.dtype.kind == "f"
         return self.dtype.kind == "f" or (self.kind == "fill" and self.painter.options.get("dtype") is None)
@@ -184,7 +184,7 @@ class WindowedRaster:
 
     @property
     def index(self) -> WindowIndex | AreaIndex:
-        """Which triangles each window needs; made when it is first asked for."""
+        """Which triangles each window needs; made at the first use."""
         if self._index is None and isinstance(self.triangles, Areas):
             self._index = AreaIndex(self.triangles, self.tiling)
         elif self._index is None:
@@ -241,7 +241,7 @@ class WindowedRaster:
         return self.painter.window(payload, origin, size, self.threads if threads is None else threads, out)
 
     def job(self, row: int, column: int) -> Callable[[], Array]:
-        """Return what draws a window in another process: it carries the triangles that touch it, or where they are."""
+        """Return a job that draws a window in another process: it carries the window's triangles, or where they are."""
         origin, size = self.place(row, column)
         which = self.index.of_window(row, column)
         if self.is_mapped:
@@ -253,7 +253,7 @@ class WindowedRaster:
         return self.windows()
 
     def windows(self, *, reuse: bool = False) -> Iterator[Window]:
-        """Yield all windows, row by row; each thread draws one, a few ahead of the one that is asked for.
+        """Yield all windows, row by row; each thread draws one, a few ahead of the caller.
 
         Parameters
         ----------
@@ -330,7 +330,7 @@ class WindowedRaster:
         return part[(*own, *keys[2:])]
 
     def explain(self) -> str:
-        """Return what drawing it takes: windows, triangles listed, memory, in lines; makes the index."""
+        """Return the costs of drawing it: windows, triangles listed, memory, in lines; makes the index."""
         index, (w, h) = self.index, self.window_size
         n_bytes = w * h * self.dtype.itemsize * int(np.prod(self.painter.channels, dtype=int))
         most = int(index.counts.max(initial=0))

@@ -104,7 +104,7 @@ class WindowIndex:
         folder: str | None,
         n_threads: int = 1,
     ) -> None:
-        """`check`: looks at the corners of each block, and gets what tells where one of its triangles is."""
+        """`check`: looks at the corners of each block, and gets a function that names one of its triangles."""
         self.tiling = tiling
         check_fits((tiling.n_rows, tiling.n_columns + 1), np.int32, np.int32)
         self.counts = np.zeros((tiling.n_rows, tiling.n_columns), np.int32)

@@ -49,7 +49,7 @@ static inline void step_line(classic_line *l)
         l->y++;
 }
 
-/* Takes the pixels of row y; first and last stay what they were when there is none. */
+/* Takes the pixels of row y; leaves first and last as they were when there is none. */
 static inline void take_run(const classic_target *t, classic_line *l, int64_t y, int64_t *first, int64_t *last,
                             int is_right)
 {

@@ -1,7 +1,7 @@
 /* Edge increment: integer edge functions, set up once a triangle, then stepped by additions along rows and columns.
  *
  * In: vertices, snapped to sub-pixels ("integer": truncated to pixels, which are sampled at their corner).  Out: the pixels
- * whose three edge functions are >= 0 after one unit was taken off the edges that own nothing.  "bottom-right" takes it off
+ * with all three edge functions >= 0 after one unit was taken off the edges that own nothing.  "bottom-right" takes it off
  * the top and left edges: as watertight, but other pixels.
  *
  * Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988;

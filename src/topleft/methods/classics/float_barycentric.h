@@ -1,6 +1,6 @@
 /* Float barycentric: every pixel centre of the bounding box, three weights in floating point, all of them >= 0.
  *
- * In: vertices as they are, nothing is snapped.  Out: the pixels whose centre has no negative weight; edges belong to both
+ * In: vertices as they are, nothing is snapped.  Out: the pixels without a negative weight at the centre; edges belong to both
  * their triangles, where rounding lets them.  All in float32; "float64" is the same in float64.
  *
  * Based on: scratchapixel, Rasterization: a Practical Implementation, 2015;

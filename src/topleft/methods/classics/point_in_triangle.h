@@ -1,6 +1,6 @@
 /* Point in triangle: every pixel of the bounding box, three cross products each.
  *
- * In: vertices, truncated to pixels.  Out: the pixels whose three cross products have one sign, zero included, so either
+ * In: vertices, truncated to pixels.  Out: the pixels with three cross products of one sign, zero included, so either
  * winding will do and edges belong to both their triangles.  "top-left" turns the triangle one way round and takes one
  * unit off the edges that are neither top nor left.
  *

@@ -1,4 +1,4 @@
-/* The classics and the production walkers once more, with their steps: what a page plays, and Python's `trace` returns. */
+/* The classics and the production walkers once more, with their steps: a page plays them, and Python's `trace` returns them. */
 #include "steps.h"
 
 #include "classics.h"

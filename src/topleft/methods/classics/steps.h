@@ -1,8 +1,8 @@
-/* The steps of a method as numbers, for a page that plays them: includes before classics.h what CLASSIC_STEP is there.
+/* The steps of a method as numbers, for a page that plays them: defines CLASSIC_STEP before it includes classics.h.
  *
- * In: what a method tells.  Out: a stream of int64 words, a step after the other: kind, triangle, x, y, last, is drawn, then
+ * In: the steps of a method.  Out: a stream of int64 words, a step after the other: kind, triangle, x, y, last, is drawn, then
  * the numbers that the kind lists, two words each, low and high half (a real number: its bits, and 0).  x and last are
- * cut to the window, from whose corner pixels count; steps outside are left out. */
+ * cut to the window and count from its corner; steps outside are left out. */
 #ifndef CLASSIC_STEPS_H
 #define CLASSIC_STEPS_H
 

@@ -1,4 +1,4 @@
-/* What the classics share: pixels out, points in whole pixels.
+/* Shared by the classics: pixels out, points in whole pixels.
  *
  * In: pixel-space vertices, finite and within the method's limit.  Out: a window of the picture.  `plot` and `fill_span`
  * clamp to the window; `put` is for loops that are clamped already.  Nothing else writes. */
@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What a method tells of a step, by steps.h: the kind, pixels x to last of row y, whether they are drawn, and the numbers
+/* Reports a step of a method, by steps.h: the kind, pixels x to last of row y, whether they are drawn, and the numbers
  * that decided it, whole or real.  Nothing, unless that file was included before. */
 #ifndef CLASSIC_STEP
 #define CLASSIC_STEP(t, kind, x, y, last, is_drawn, ...) ((void)0)

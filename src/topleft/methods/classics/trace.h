@@ -1,4 +1,4 @@
-/* The steps of a method: what steps.c has for Python and for the module of WebAssembly. */
+/* The steps of a method: the interface of steps.c to Python and to the module of WebAssembly. */
 #ifndef CLASSIC_TRACE_H
 #define CLASSIC_TRACE_H
 

@@ -1,4 +1,4 @@
-/* The two production walkers, a sample or a row at a time: what csrc/raster/walk.h does, with its steps, for reading.
+/* The two production walkers, a sample or a row at a time: csrc/raster/walk.h with its steps, for reading.
  *
  * In: vertices in pixels, |x| < 2^60 sub-pixels.  Out: spans.  Both walk E' = (2E + bias) >> (bits + 1), bias -1 on edges that
  * are neither top nor left: the floor keeps its sign at every sample, and E' changes by -dy a column and dx a row.
@@ -24,7 +24,7 @@ static inline tl_int128 cross_of_sides(int64_t ax, int64_t ay, int64_t bx, int64
     return i128_sub(i128_product(ax, by), i128_product(ay, bx));
 }
 
-/* The columns or rows whose centres lie between the lowest and the highest of three numbers. */
+/* The columns or rows with centres between the lowest and the highest of three numbers. */
 static inline void find_centers(const int64_t *at, int bits, int64_t first, int64_t end, int64_t *range)
 {
     const int64_t before_center = larger(0, ((int64_t)1 << bits) / 2 - 1);
@@ -80,7 +80,7 @@ static void walk_edge(const classic_target *t, classic_walk *w)
     }
 }
 
-typedef struct { /* where an edge that is not horizontal crosses the row, and what it changes by */
+typedef struct { /* where an edge that is not horizontal crosses the row, and its step */
     int is_left;
     tl_int128 quotient, rest, quotient_step, rest_step, divisor;
 } classic_crossing;

@@ -1,6 +1,6 @@
 """The exact reference: the rules of the picture in Python integers and fractions, slow and obviously right.
 
-In: vertices, triangles and options, as in the public calls, taken to be valid.  Out: what each pixel must hold.
+In: vertices, triangles and options, as in the public calls, taken to be valid.  Out: the exact value of each pixel.
 Each pixel centre in the bounding box of each triangle is tested on its own: three edge functions in integers, then
 the fill rule.  After the snap nothing is rounded: depths, weights and attributes are fractions.  Vertices that are not
 snapped (``subpixel_bits="exact"``) are the fractions that their float64 numbers stand for.  Before it, clip space
@@ -41,13 +41,13 @@ class Vertex(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A triangle that is drawn: an input triangle (its index in `triangle`), or what clipping left of it."""
+    """A triangle that is drawn: an input triangle (its index in `triangle`), or a piece of it after clipping."""
 
     triangle: int
     vertices: tuple[Vertex, Vertex, Vertex]
 
     def denominator(self) -> int:
-        """Return what makes integers of all coordinates, powers of two, when they are multiplied by it."""
+        """Return the power of two that makes all coordinates integers when they are multiplied by it."""
         return max(v.denominator for vertex in self.vertices for v in vertex.xy_fx)
 
 
@@ -156,7 +156,7 @@ class Projection(NamedTuple):
         ]  # fmt: skip
 
     def clip(self, polygon: list[Position]) -> list[Position]:
-        """Return what Sutherland and Hodgman's walk leaves of a triangle; only planes that it crosses cut."""
+        """Return a triangle clipped by Sutherland and Hodgman's walk; only planes that it crosses cut."""
         outside = [[d < 0 for d in plane] for plane in zip(*map(self.distances, polygon), strict=True)]
         if any(all(plane) for plane in outside):
             return []
@@ -302,8 +302,8 @@ def fragments(
 
     The frame is the window of the whole picture at ``origin``.  Each pixel is sampled at its centre, or ``sample``
     sixteenths of a pixel from it, -8 to 7.  Coordinates are sixteenths of a sub-pixel, so that samples are integers
-    even with 0 sub-pixel bits; of vertices that are not snapped, sixteenths of what all corners of a piece are
-    multiples of.
+    even with 0 sub-pixel bits; of vertices that are not snapped, sixteenths of a power of two that divides all
+    corners of a piece.
     """
     bits, (x_origin, y_origin) = view.get("subpixel_bits", 8), origin
     is_exact = bits == "exact"
@@ -360,8 +360,8 @@ def visible(
 ) -> dict[Point, Fragment]:
     """Return the fragment that wins each covered pixel, by ``(row, column)``.
 
-    Depths are compared as the buffer holds them, rounded to float32.  A fragment must be nearer than what is there, so
-    that the lower triangle index wins a tie.  Without a test, or without depth (``(V, 2)`` vertices), the last wins.
+    Depths are compared as the buffer holds them, rounded to float32.  A fragment must be nearer than the pixel's depth,
+    so the lower triangle index wins a tie.  Without a test, or without depth (``(V, 2)`` vertices), the last wins.
     """
     if np.shape(vertices)[1] == 2:
         depth_test = None
@@ -383,7 +383,7 @@ def ids(vertices: Any, triangles: Any, size: Point, **options: Any) -> np.ndarra
 
 
 def depth(vertices: Any, triangles: Any, size: Point, **options: Any) -> np.ndarray:
-    """Return the depth of what is seen: Fraction, shape (H, W), None where nothing is; options as for `visible`."""
+    """Return the depth of each pixel: Fraction, shape (H, W), None where nothing is; options as for `visible`."""
     return _picture(size, None, {p: f.depth() for p, f in visible(vertices, triangles, size, **options).items()})
 
 
@@ -397,7 +397,7 @@ def barycentric(vertices: Any, triangles: Any, size: Point, **options: Any) -> n
 
 
 def interpolate(vertices: Any, triangles: Any, values: Any, size: Point, **options: Any) -> np.ndarray:
-    """Return the attributes of what is seen: Fraction, shape (H, W, K), 0 where there is nothing.
+    """Return the attributes of each pixel: Fraction, shape (H, W, K), 0 where there is nothing.
 
     ``values`` has shape (V, K), per vertex, or (T, 3, K), per corner; options as for `visible`.
     """

@@ -1,4 +1,4 @@
-"""The exact reference for blending: what a colour does to one pixel, in fractions, or in float32 step by step.
+"""The exact reference for blending: one colour over one pixel, in fractions, or in float32 step by step.
 
 In: the old pixel, a colour, a mode, and how much of the pixel the colour covers.  Out: the new pixel.
 
@@ -63,14 +63,14 @@ def blend_uint8(old: Sequence[int], color: Sequence[int], mode: str, alpha: str,
 
 
 def _alpha_uint8(alpha: int, coverage: Fraction, share: Fraction) -> Fraction:
-    """Return the alpha of a colour in a pixel: what it is in a whole one, else a multiple of 2**-15."""
+    """Return the alpha of a colour in a pixel: unchanged in a whole one, else a multiple of 2**-15."""
     return Fraction(alpha, 255) if coverage == 1 else Fraction(nearest(share * 2**15 * alpha / 255), 2**15)
 
 
 def _weigh_uint8(
     old: Sequence[int], color: Sequence[int], share: Fraction | int, above: Fraction, *, is_over: bool
 ) -> list[int]:
-    """Return old and new colour in proportion to what each of them covers, and both together as alpha."""
+    """Return old and new colour in proportion to their coverage, and the sum of both as alpha."""
     if share == 1 and not is_over:
         return list(color)
     if old[-1] == 255 and (is_over or color[-1] == 255):

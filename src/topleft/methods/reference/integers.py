@@ -3,14 +3,14 @@
 In: vertices in pixels, float64, as they are or after a snap (`snapped`, `projected`). Out: how many triangles cover
 each sample, which one shows, its depth; which squares an edge meets; the areas in them.
 
-A block holds triangles whose boxes have about the same size. Coordinates are int64 where all of them are multiples of
-2^-16 px and edge functions fit, otherwise float64 whose signs are looked at again in fractions where they are in doubt,
-and Python integers where centres of pixels are no float64. `topleft.methods.reference` tests a sample at a time in
+A block holds triangles with boxes of about the same size. Coordinates are int64 where all of them are multiples of
+2^-16 px and edge functions fit, otherwise float64: signs in doubt are decided again in fractions. They are
+Python integers where centres of pixels are no float64. `topleft.methods.reference` tests a sample at a time in
 fractions; tests hold one to the other.
 
 Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988;
 J. R. Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997;
-R. Levien, font-rs, 2015 (an edge adds what lies to the right of it).
+R. Levien, font-rs, 2015 (an edge adds the area to the right of it).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ I64 = NDArray[np.int64]
 Point = tuple[int, int]
 Block = tuple[Array, I64, I64, int, int]  # triangles, first row and column of each box, rows and columns of a box
 
-BLOCK_SAMPLES = 2**18  # at a time: what the second-level cache holds
+BLOCK_SAMPLES = 2**18  # at a time: they fit into the second-level cache
 SIDES = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # of boxes of a block
 INT64_LIMIT = 2**29  # of coordinates from the first sample: products of two differences stay below 2^60
 CENTER_LIMIT = 2**48  # sixteenths of a pixel are float64 below
-ERROR_BOUND = (3 + 16 * 2.0**-53) * 2.0**-53  # Shewchuk's A: of the sum of the products, what float64 is off by at most
-DEPTH_ERROR = 2.0**-46  # of the largest |z|, what a depth by exact edge functions is off by at most in float64
+ERROR_BOUND = (3 + 16 * 2.0**-53) * 2.0**-53  # Shewchuk's A: the greatest error in float64, of the sum of the products
+DEPTH_ERROR = 2.0**-46  # the greatest error of a depth in float64, of the largest |z|, by exact edge functions
 NOTHING = np.iinfo(np.int64).max
 
 
@@ -87,7 +87,7 @@ def turns(corners: Array) -> NDArray[np.int8]:
 
 
 def terms(p: Array, q: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return what the edge functions of p to q, (n, 2), at x and y, (n, ...), are the differences of."""
+    """Return the two terms of the edge functions of p to q, (n, 2), at x and y, (n, ...): their difference is E."""
     far = (slice(None), *[None] * (x.ndim - 1))
     px, py, dx, dy = (a[far] for a in (p[:, 0], p[:, 1], q[:, 0] - p[:, 0], q[:, 1] - p[:, 1]))
     return dx * (y - py), dy * (x - px)
@@ -113,7 +113,7 @@ def side(p: Array, q: Array, x: Array, y: Array) -> Array:
 
 
 class ExactPicture:
-    """What the samples of a window hold: one a pixel, so many sixteenths of a pixel from its centre.
+    """The samples of a window: one a pixel, so many sixteenths of a pixel from its centre.
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ def areas(vertices: Any, triangles: Any, size: Point) -> F64:
 def area_to_the_right(p: F64, q: F64, column: Array, row: Array) -> F64:
     """Return the area of each pixel to the right of its edge, negative where the edge runs up.
 
-    That is the height of the edge in the row times the mean of what it leaves of the pixel's width, which is a ramp
+    That is the height of the edge in the row times the mean share of the pixel's width to its right, a ramp
     from 0 to 1 along the edge.
     """
     (px, py), (qx, qy) = (end.T[:, :, None, None] for end in (p, q))

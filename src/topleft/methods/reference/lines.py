@@ -34,7 +34,7 @@ def lines(
     subpixel_bits: int = 8, cull: str = "none", clip_depth: str = "minus_one_to_one", near_clip: bool = True,
     far_clip: bool = True,
 ) -> list[Line]:  # fmt: skip
-    """Return what the clip planes leave of the edges of triangles that are not culled, each once."""
+    """Return the clipped edges of triangles that are not culled, each once."""
     points = np.asarray(vertices).tolist() if transform is None else reference.transform_to_clip(vertices, transform)
     width, height = viewport or size
     view = Projection((width / 2.0, height / 2.0), subpixel_bits, clip_depth == "zero_to_one", near_clip, far_clip)

@@ -1,6 +1,6 @@
 """The exact reference of depth peeling and of compositing.
 
-In: scenes, as in `reference`; colours of layers.  Out: the sorted layers of each pixel, and what is seen through them.
+In: scenes, as in `reference`; colours of layers.  Out: the sorted layers of each pixel, and the colour through them.
 
 Based on: C. Everitt, Interactive Order-Independent Transparency, 2001;
 T. Porter, T. Duff, Compositing Digital Images, 1984.
@@ -47,9 +47,9 @@ def layers(
 
 
 def over(colors: Sequence[Sequence[Fraction]], background: Sequence[Fraction] | None) -> list[Fraction]:
-    """Return what is seen of straight colours, the nearest first, alpha last and 1 for opaque: straight again.
+    """Return the composite of straight colours, the nearest first, alpha last and 1 for opaque: straight again.
 
-    `background` lies behind all; None is nothing, which is also what is returned where nothing is seen: zeros.
+    `background` lies behind all; None is nothing. Where nothing is seen the result is zeros.
 
     Examples
     --------

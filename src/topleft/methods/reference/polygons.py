@@ -4,8 +4,8 @@ In: rings of points in pixels, and the rule.  Out: masks, and the area of each p
 
 A sample is inside by its winding number: each edge that passes its row on the left counts 1 downwards and -1 upwards.
 A row is passed at its upper end, not at its lower one, and a sample on an edge lies right of it: the top-left rule.
-Areas: between the heights at which edges end, cross or pass from column to column, their order does not change; what
-lies between two neighbours is inside or not, and is a trapezoid.
+Areas: between the heights at which edges end, cross or pass from column to column, their order does not change; the
+trapezoid between two neighbours is inside or not.
 
 Based on: D. Alciatore, R. Miranda, A Winding Number and Point-in-Polygon Algorithm, 1995.
 """
@@ -76,7 +76,7 @@ def polygon_mask(
     subpixel_bits: int = 8,
     sample: tuple[int, int] = (0, 0),
 ) -> NDArray[np.bool_]:
-    """Return the pixels whose sample lies inside: the centre, or so many sixteenths of a pixel right of and below it.
+    """Return the pixels with their sample inside: the centre, or so many sixteenths of a pixel right of and below it.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """The exact reference of the other kinds of sampling: several samples a pixel, and conservative coverage.
 
-In: scenes, as in `reference`.  Out: what each sample, or each pixel square, must hold.  Integers only: samples are
-counted in sixteenths of a sub-pixel, squares in sub-pixels, and with vertices that are not snapped in what all corners
-of a triangle are multiples of.
+In: scenes, as in `reference`.  Out: the exact value of each sample, or pixel square.  Integers only: samples
+count in sixteenths of a sub-pixel, squares in sub-pixels, and with vertices that are not snapped in a power of two
+that divides all corners of a triangle.
 
 Based on: Microsoft, Direct3D 11.3 Functional Specification, 2015 (standard sample patterns);
 S. Gottschalk, M. C. Lin, D. Manocha, OBBTree: A Hierarchical Structure for Rapid Interference Detection, 1996
@@ -55,7 +55,7 @@ def sample_ids(vertices: Any, triangles: Any, size: Point, n_samples: int, **opt
 
 
 def sample_depth(vertices: Any, triangles: Any, size: Point, n_samples: int, **options: Any) -> np.ndarray:
-    """Return how deep what each sample sees lies at that sample: Fraction, shape (H, W, S), None for nothing."""
+    """Return the depth at each sample: Fraction, shape (H, W, S), None for nothing."""
     return _stack(reference.depth, vertices, triangles, size, n_samples, **options)
 
 
@@ -139,8 +139,8 @@ def mean(
 ) -> list[float]:
     """Return the mean of the colours (S, C) of one pixel's samples, of uint8 rounded to nearest, ties to even.
 
-    `is_straight`: the last of 2 or 4 channels is alpha, and colours count as much as they are opaque. `tables`: what
-    takes uint8 colours to light, and light to colours.
+    `is_straight`: the last of 2 or 4 channels is alpha, and weights the colours. `tables`: from uint8 colours
+    to light, and from light to colours.
 
     Examples
     --------

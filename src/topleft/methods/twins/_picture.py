@@ -1,4 +1,4 @@
-"""What the pure twins share: a picture of counts, and spans that are clamped to it.
+"""Shared by the pure twins: a picture of counts, and spans that are clamped to it.
 
 A twin is its kernel's method written for reading: NumPy where whole rows or boxes are one expression, Python elsewhere.
 """
@@ -17,7 +17,7 @@ Span = Callable[[int, int, int], None]
 
 
 def new_picture(size: Pixel) -> tuple[NDArray[np.int32], Span]:
-    """Return counts of shape (H, W), and what draws into them."""
+    """Return counts of shape (H, W), and the function that draws spans into them."""
     counts = np.zeros((size[1], size[0]), np.int32)
 
     def span(y: int, first: int, last: int) -> None:

@@ -40,7 +40,7 @@ FLAT_TOP, FLAT_BOTTOM = 0, 1  # which ends of the lines the flat side connects
 
 
 def fill_basic(span: Span, left: tuple[Pixel, Pixel], right: tuple[Pixel, Pixel], flat: int, variant: str) -> None:
-    """Draw what lies between two lines, given from the top down, that begin and end in the same rows."""
+    """Draw the pixels between two lines, given from the top down, that begin and end in the same rows."""
     if variant == "wireframe":
         for x, y in chain(line(*left), line(*right)):
             span(y, x, x)

@@ -22,7 +22,7 @@ def overdraw(vertices: Any, triangles: Any, size: Pixel, variant: str = "") -> N
     """Return how often each pixel is drawn: int32, shape (H, W)."""
     real: Any = np.float64 if variant == "float64" else np.float32
     counts, _ = new_picture(size)
-    with np.errstate(all="ignore"):  # what overflows covers nothing
+    with np.errstate(all="ignore"):  # a triangle that overflows covers nothing
         for corners in corners_of(vertices, triangles):
             a, b, c = np.array(corners, real)
             area = cross(a, b, *c)

@@ -86,7 +86,7 @@ class Accessors:
         Raises
         ------
         MeshError
-            If it says what is no accessor, or lies beyond its buffer.
+            If it is no valid accessor, or lies beyond its buffer.
         """
         row = entry(self._tree, "accessors", index)
         if index not in self._arrays:

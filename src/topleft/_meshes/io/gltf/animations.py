@@ -1,7 +1,7 @@
 """The nodes of a glTF file at a time of its animations.
 
-Input: the JSON, unchecked, and a moment. Output: the JSON with nodes whose translations, rotations, scales and weights
-are those of the moment.
+Input: the JSON, unchecked, and a moment. Output: the JSON with the nodes' translations, rotations, scales and
+weights of the moment.
 
 Based on: Khronos Group, "glTF 2.0 Specification", 2021, 3.11 and appendix C.
 """
@@ -21,14 +21,14 @@ from topleft.errors import MeshError
 ALL_CLIPS = "all"
 N_NUMBERS = {"translation": 3, "rotation": 4, "scale": 3, "weights": None}
 N_PARTS = {"STEP": 1, "LINEAR": 1, "CUBICSPLINE": 3}
-"""Of a key: a spline has a tangent before the value and one behind it."""
+"""Values of a key: a spline has a tangent before the value and one behind it."""
 
 NEARLY_ONE = 0.9995
-"""Cosine of half the angle between rotations that are as evenly mixed by numbers: off by less than 1e-6 of it."""
+"""Rotations with a larger cosine of half their angle are mixed linearly: off by less than 1e-6 of it."""
 
 
 def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -> Tree:
-    """The file at a moment: before the first key of a property its value, behind the last one that.
+    """The file at a moment: a property has the value of its first key before it, that of its last key after it.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -
 
 
 def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFile) -> list[Tree]:
-    """The animations that play: that of an index or a name, all of them, or the first, and others are told.
+    """The animations that play: that of an index or a name, all of them, or the first, with a note of the others.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def value_at(sampler: Tree, accessors: Accessors, time: float, path: str) -> F64
 
 
 def slerp_weights(a: F64, b: F64, u: float) -> tuple[float, float]:
-    """How much of two quaternions a rotation has that goes the short way from one to the other, evenly.
+    """The weights of two quaternions in the rotation that goes the short way between them at an even speed.
 
     Based on: Shoemake, K., "Animating Rotation with Quaternion Curves", SIGGRAPH 1985.
     """

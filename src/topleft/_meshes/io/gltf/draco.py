@@ -1,4 +1,4 @@
-"""Tells how much a mesh that Draco has compressed declares, before it is unpacked.
+"""Reads the sizes that a mesh compressed by Draco declares, before it is unpacked.
 
 Input: its bytes. Output: numbers of triangles and vertices, and the bytes of each vertex. A mesh of 180,000 triangles
 may have 450 bytes, and attributes of 480 MB may have 58 kB. They follow the connectivity, which is skipped.
@@ -21,14 +21,14 @@ MOST_DEEP = 32
 SEQUENTIAL, STANDARD, VALENCE, COMPRESSED, TAGGED = 0, 0, 2, 0, 0
 N_VALENCES = 6
 MOST_TAGS = 1 << 20
-"""They are read one by one, in Python; symbols have tags where there are few of them."""
+"""Tags are read one by one, in Python; symbols have tags where there are few of them."""
 TAG_BITS, TAG_BASE = 12, 1 << 14
 BYTES_OF_TYPE = (0, 4, 4, 4, 4, 4, 4, 8, 8, 4, 8, 4)
-"""Of int8, uint8, int16, ... uint64, float32, float64, bool while they are unpacked; none has number 0."""
+"""Bytes of int8, uint8, int16, ... uint64, float32, float64, bool while unpacked; no type has number 0."""
 
 
 class DracoSize(NamedTuple):
-    """How much a mesh declares."""
+    """The sizes that a mesh declares."""
 
     n_triangles: int
     n_vertices: int
@@ -170,7 +170,7 @@ def _row_bytes(rest: DracoBytes, bytes_of_decoder: int) -> int:
     for _ in range(n_decoders):
         n = rest.number()
         for _ in range(n):
-            rest.byte()  # what it is for
+            rest.byte()  # its attribute
             total += BYTES_OF_TYPE[rest.byte()] * rest.byte()
             rest.byte()  # whether it is normalized
             rest.number()
@@ -179,7 +179,7 @@ def _row_bytes(rest: DracoBytes, bytes_of_decoder: int) -> int:
 
 
 def declared_by_draco(content: bytes) -> DracoSize:
-    """What a mesh declares: a file that says so is no promise that it holds it.
+    """The sizes that a mesh declares, which it need not hold.
 
     Raises
     ------

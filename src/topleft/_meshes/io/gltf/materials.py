@@ -279,7 +279,7 @@ def transform_of(row: Tree) -> npt.NDArray[np.float64]:
     Raises
     ------
     MeshError
-        If it holds what are no numbers.
+        If it holds other values than numbers.
     """
     angle = _number(row, "rotation", 0)
     (du, dv), (su, sv) = _numbers(row, "offset", (0, 0)), _numbers(row, "scale", (1, 1))

@@ -3,7 +3,7 @@
 Input: a file, unchecked. Output: `Mesh` parts in the order of the nodes, placed in the world; poses of cameras.
 
 The format is JSON and arrays, so `json`, NumPy and Pillow read it: pygltflib would give the same JSON as classes,
-and trimesh leaves out most of what a material says.
+and trimesh leaves out most fields of a material.
 
 Based on: Khronos Group, "glTF 2.0 Specification", 2021.
 """
@@ -86,7 +86,7 @@ def read_gltf(source: InputFile) -> list[Mesh]:
     Raises
     ------
     MeshError
-        If the file is broken or needs what is not read.
+        If the file is broken or needs an extension that is not read.
     """
     tree, blob = _tree_and_blob(source)
     _check_extensions(tree, source)

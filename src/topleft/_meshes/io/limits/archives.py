@@ -22,14 +22,14 @@ from topleft.errors import MeshError
 MESH_SUFFIXES = (
     ".gltf", ".glb", ".vrm", ".obj", ".ply", ".stl", ".stl_ascii", ".off", ".dae", ".3mf",
 )  # fmt: skip
-"""Of members that are read as meshes; the others may be named by them."""
+"""Suffixes of members that are read as meshes; these may name the others."""
 
 PIECE_BYTES = 1 << 20
 NODES_OF_MEMBER = 6
 """Nodes of glTF that take as long as a member that is written and read: 0.3 ms."""
 
 MOST_FOLDERS = 32
-"""Of the name of a member."""
+"""Folders in the name of a member."""
 
 BROKEN = (zipfile.BadZipFile, tarfile.TarError, EOFError, NotImplementedError, RuntimeError, zlib.error)
 
@@ -125,13 +125,13 @@ def _written_of_zip(file: IO[bytes], budget: Budget, folder: Path) -> list[Path]
 
 
 def _check_method(row: zipfile.ZipInfo) -> None:
-    """Raise an error for what takes as much memory as a member asks for."""
+    """Raise an error for methods that take as much memory as a member asks for."""
     if row.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2):
         raise MeshError(f"{row.filename[:80]!r} in its archive is compressed by method {row.compress_type}")
 
 
 def _place(folder: Path, name: str, budget: Budget) -> Path | None:
-    """Where a member goes; None for what would lie outside, too deep, or over another one."""
+    """Where a member goes; None for places outside, too deep, or of another one."""
     budget.spend("max_nodes", NODES_OF_MEMBER)
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     if not 0 < len(parts) <= MOST_FOLDERS or any(part == ".." or ":" in part or len(part) > 200 for part in parts):

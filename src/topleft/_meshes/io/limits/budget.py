@@ -1,9 +1,9 @@
-"""Counts what a file makes of its bytes, all of it together, and refuses more than its options allow.
+"""Counts all contents that a file makes of its bytes, and refuses more than its options allow.
 
 Input: numbers that a file declares, before memory is asked for. Output: an error that names the number and the option.
 
-What a file may make without an option grows with the bytes that it has: a file that holds its triangles one by one is
-never refused, one that multiplies them is. The least of each is what ends within 5 seconds and 1 GB.
+Limits without an option grow with the bytes of the file: one that holds its triangles one by one is
+never refused, one that multiplies them is. The least of each ends within 5 seconds and 1 GB.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from topleft.errors import MeshError
 
 
 class Limit(NamedTuple):
-    """How much of a kind a file may have if no option says so."""
+    """The limit of a file, for contents of one kind, without an option."""
 
     what: str
     least: int

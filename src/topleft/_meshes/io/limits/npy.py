@@ -1,4 +1,4 @@
-"""Reads arrays of NumPy out of .npy and .npz files: those that are asked for, after their headers have been checked.
+"""Reads arrays of .npy and .npz files by name, after a check of their headers.
 
 Input: a file, unchecked. Output: arrays; no memory is taken for more than the file holds.
 """

@@ -1,4 +1,4 @@
-"""Counts how often the nodes of a file are reached from its roots, before somebody walks there.
+"""Counts how often the nodes of a file are reached from its roots, before they are walked.
 
 Input: for each node those below it, which may be shared. Output: numbers of ways; doubling thirty times costs nothing.
 
@@ -15,11 +15,11 @@ from topleft.errors import MeshError
 Node = TypeVar("Node", bound=Hashable)
 
 MANY = 1 << 62
-"""Ways beyond that are not told apart."""
+"""Ways beyond are not counted."""
 
 
 def walks(below: Mapping[Node, Iterable[Node]], roots: Iterable[Node]) -> dict[Node, tuple[int, int]]:
-    """For each node that is reached, by how many ways, and how many steps they have together.
+    """The number of ways to each node that is reached, and the number of all their steps.
 
     Raises
     ------
