@@ -1,4 +1,4 @@
-/* The contract of csrc/grid: a mesh on the texels of its texture coordinates, and what is seen of a height grid. */
+/* The contract of csrc/grid: a mesh on the texels of its texture coordinates, and the viewshed of a height grid. */
 #ifndef TL_ATLAS_H
 #define TL_ATLAS_H
 
@@ -16,7 +16,7 @@ typedef struct {
 #define TL_NO_TEXEL 16384 /* farther than any gutter reaches */
 #define TL_MOST_CHANNELS 4
 
-/* A picture that a camera has taken of a mesh, and what it shows. */
+/* A picture that a camera has taken of a mesh, and its buffers. */
 typedef struct {
     int64_t width, height;
     const int32_t *ids; /* triangles, -1 for none */

@@ -1,11 +1,11 @@
-/* Clusters: what a mesh in object space is sorted into, and what a pass over one needs.  Part of the contract of
+/* Clusters of a mesh in object space, and a view of them.  Part of the contract of
  * topleft.h, which includes it behind the types that it uses. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
 #ifndef TOPLEFT_CLUSTERS_H
 #define TOPLEFT_CLUSTERS_H
 
-/* A mesh in object space, sorted into clusters: few neighbouring triangles, whose vertices stand together. */
+/* A mesh in object space, sorted into clusters: few neighbouring triangles, their vertices together. */
 
 #define TL_CLUSTER 256      /* triangles at most; and vertices, so that a byte tells them apart */
 #define TL_CLUSTER_GROUP 64 /* clusters that have a box in common */
@@ -32,7 +32,7 @@ typedef struct {
     double matrix[16]; /* clip from object */
     /* left, right, top, bottom: a pixel beyond it where side[0] * x (y) + side[1] * w < 0 */
     double side[4][2];
-    double eye[4];           /* what the rows of x, y and w take to 0 */
+    double eye[4];           /* the rows of x, y and w take it to 0 */
     double scale_x, scale_y; /* sub-pixels a unit of normalized device coordinates */
     double half_width_px, half_height_px;
     double sample_px[2]; /* the one sample of a pixel, from its left and from its top */
@@ -40,11 +40,11 @@ typedef struct {
     double length[3];    /* of the rows of x, y and w, without their last number */
     double error;        /* of the vertex stage, as a share of the sum of all terms of a row */
     int near_clip, far_clip, zero_to_one;
-    int is_farthest; /* what lies farther is drawn first */
+    int is_farthest; /* the farther one is drawn first */
     tl_cull cull;
 } tl_cluster_view;
 
-/* What a view shows of a cluster. */
+/* The visibility of a cluster in a view. */
 typedef enum {
     TL_VISIBILITY_OUTSIDE,
     TL_VISIBILITY_CULLED,

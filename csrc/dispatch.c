@@ -68,7 +68,7 @@ typedef struct {
     unsigned saved;                             /* which vectors a thread keeps while others run, of xgetbv */
 } cpu_words;
 
-#ifdef __APPLE__ /* whose system tells of longer ones once they are used, and saves them from then on */
+#ifdef __APPLE__ /* its system tells of longer ones once they are used, and saves them from then on */
 enum { SAVES_AVX2 = 0x06, SAVES_AVX512 = 0x06 };
 #else /* 128 and 256 bits; masks, 512 bits, 32 vectors */
 enum { SAVES_AVX2 = 0x06, SAVES_AVX512 = 0xe6 };
@@ -109,7 +109,7 @@ extern const tl_meshlet_kernels tl_meshlets_vbmi;
 
 static int cpu_has_vbmi(void) { return has(ask_cpu().ecx_7, bit_AVX512VBMI | bit_AVX512VBMI2); }
 #endif
-#else /* every processor has what the unit is compiled for: aarch64, WebAssembly */
+#else /* every processor has the unit's instructions: aarch64, WebAssembly */
 static int cpu_has_simd128(void) { return 1; }
 static int cpu_has_avx2(void) { return 0; }
 static int cpu_has_avx512(void) { return 0; }

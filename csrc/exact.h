@@ -13,9 +13,9 @@
 /* How many decisions were made by each means. */
 typedef struct tl_exact_counts {
     int64_t n_triangles;  /* that were drawn, of each pass */
-    int64_t n_on_grid;    /* of which all vertices lie on 2^-8 px, where others of their vector were in doubt */
+    int64_t n_on_grid;    /* with all vertices on 2^-8 px, where others of their vector were in doubt */
     int64_t n_refined;    /* samples and row ends that lie too near an edge for float lanes */
-    int64_t n_turns;      /* triangles of which the sign of the area was refined */
+    int64_t n_turns;      /* triangles: the sign of the area was refined */
     int64_t n_expansions; /* signs that only sums of many numbers told */
     int64_t n_integers;   /* signs that only integers of 2176 bits told */
 } tl_exact_counts;
@@ -30,8 +30,8 @@ typedef struct tl_exact_pieces {
     int64_t n_points, n_pieces;
 } tl_exact_pieces;
 
-/* A mesh whose vertices are the float64 numbers that stand here.  A vertex that cannot be drawn has x NaN.  What is
- * drawn are the triangles of the mesh, collapsed to a point where a clip plane cuts them, and then all pieces. */
+/* A mesh with the float64 vertices that stand here.  A vertex that cannot be drawn has x NaN.  Drawn are
+ * the triangles of the mesh, collapsed to a point where a clip plane cuts them, and then all pieces. */
 typedef struct tl_exact_points {
     const double
         *points; /* (n_points, stride): x and y in pixels, and depth when stride > 2; behind them those of pieces */

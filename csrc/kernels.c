@@ -1,5 +1,5 @@
 /* The kernel table of one instruction set: every stage, compiled together, with nothing visible but the table.  A stage
- * includes what it stands on; these are the ones that the table names.
+ * includes the files it needs; these are the ones that the table names.
  * isa_*.c name the set (TL_ISA_NAME) and the table (TL_KERNELS) and include this file. */
 #include "topleft.h"
 

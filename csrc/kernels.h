@@ -1,4 +1,4 @@
-/* The kernel table: what an instruction set has, a function a line.  Part of the contract of topleft.h, which includes
+/* The kernel table of an instruction set, a function a line.  Part of the contract of topleft.h, which includes
  * it behind all types. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
@@ -40,23 +40,23 @@ typedef struct tl_kernels {
     int64_t (*cut_clusters)(const int32_t *triangles, const int32_t *order, int64_t n, int32_t *seen,
                             tl_cluster *clusters, int32_t *vertices, uint8_t *corners, int64_t *n_used);
 
-    /* Measures clusters [first, end), a multiple of TL_CLUSTER_GROUP, whose vertices `source` holds, and the boxes of
+    /* Measures clusters [first, end), a multiple of TL_CLUSTER_GROUP, with vertices in `source`, and the boxes of
      * their groups. */
     void (*measure_clusters)(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end,
                              tl_cluster *clusters, double *group_boxes);
 
-    /* Counts some clusters, one of each `step`, by what a view does with them, whatever hides them: outside of the
+    /* Counts some clusters, one of each `step`, by their visibility in a view, hidden or not: outside of the
      * window, turned away and culled, showing their backs, the others. */
     void (*survey_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int64_t step,
                             int64_t n_of[TL_N_VISIBILITIES]);
 
-    /* Counts of the same clusters those that the window may show, and in *n_hidden those of them that all lie behind
-     * what the target shows. */
+    /* Counts of the same clusters those that the window may show, and in *n_hidden those of them that lie wholly behind
+     * surfaces of the target. */
     int64_t (*count_hidden)(const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window,
                             const tl_target *target, int64_t step, int64_t *n_hidden);
 
     /* Tells of n boxes, each under a matrix of its own in place of the view's, whether they may show: not outside of
-     * the window, nor, unless target is NULL, behind what that shows. */
+     * the window, nor, unless target is NULL, behind its surfaces. */
     void (*find_shown)(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
                        const tl_window *window, const tl_target *target, uint8_t *shown);
 
@@ -70,15 +70,15 @@ typedef struct tl_kernels {
     int64_t (*narrow_triangles)(const int64_t *triangles, int64_t n_triangles, int64_t n_vertices, int32_t *out);
 
     /* Returns -1, or, when it has met an index outside [0, n_vertices), the number of a row at or before which there is
-     * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
+     * one; the picture is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of
-     * 0.  A bad row of a mesh whose vertices are not snapped may also be that of one that is not finite; it is drawn
+     * 0.  A bad row of a mesh without snapped vertices may also be that of one that is not finite; it is drawn
      * without clusters and not to SAMPLES. */
     int64_t (*draw)(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice);
 
     /* The numbers of vertices [first, end) as float64 in `points`, or NULL: they stay where they are.  Returns how many
-     * cannot be drawn: what is not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are
-     * rounded to 2^-bits px, and what leaves 2^62 of these cannot be drawn. */
+     * cannot be drawn: not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are
+     * rounded to 2^-bits px, and those beyond 2^62 of these cannot be drawn. */
     int64_t (*take_points)(const tl_source *source, int64_t first, int64_t end, int bits, double *points);
 
     /* The clip space, or object space by the matrix, of vertices [first, end) to points in pixels, not snapped,
@@ -95,7 +95,7 @@ typedef struct tl_kernels {
     int64_t (*count_classes)(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                              tl_census *census);
 
-    /* The depth of n pixels whose triangles all lie at one: `depth` where there is an id, `background` elsewhere.  The
+    /* The depth of n pixels, one for all triangles: `depth` where there is an id, `background` elsewhere.  The
      * ids are xored with `flip` first. */
     void (*set_flat_depth)(int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out);
 
@@ -110,12 +110,12 @@ typedef struct tl_kernels {
     /* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach. */
     void (*find_columns)(const tl_bins *bins, int64_t n_bands, int32_t *columns);
 
-    /* Lists pixels whose samples see several triangles, from place `at` on, where there is room for 16 more than there
+    /* Lists pixels that show several triangles, from place `at` on, where there is room for 16 more than there
      * are; returns where they end. */
     int64_t (*split_pixels)(const tl_seen_samples *seen, const tl_split *split, int64_t at);
 
-    /* Writes rows of `width` ids that sample k, not the first, sees, from those of the first and `split`, whose rows
-     * begin with these. */
+    /* Writes rows of `width` ids that sample k, not the first, sees, from those of the first and `split`, which
+     * begins with the same row. */
     void (*spread_ids)(const tl_split *split, int k, int64_t n_rows, int64_t width, const int32_t *first_ids,
                        int32_t *ids);
 
@@ -140,7 +140,7 @@ typedef struct tl_kernels {
     /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
     int64_t (*blend)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas);
 
-    /* Fills the canvas, whose ground is no NULL, with the flat colours of a few triangles: tl_is_large_shapes.
+    /* Fills the canvas, its ground not NULL, with the flat colours of a few triangles: tl_is_large_shapes.
      * 2^sample_bits samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as
      * `draw` does. */
     int64_t (*fill_large_shapes)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
@@ -195,7 +195,7 @@ typedef struct tl_kernels {
                   const float *depth, uint8_t *pixels);
 
     /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target.
-     * With `split`, whose rows begin with the window's, there is the plane of the first sample alone. */
+     * With `split`, its rows those of the window, there is the plane of the first sample alone. */
     void (*shade_samples)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
                           int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
                           const tl_split *split, uint8_t *pixels);
@@ -204,17 +204,17 @@ typedef struct tl_kernels {
      * is NORMALS. */
     void (*shade_normals)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, float *out);
 
-    /* Per pixel of `ids` (rows of window->width): what is told of its point, float32 or float64. */
+    /* Per pixel of `ids` (rows of window->width): the value of its point, float32 or float64. */
     void (*fill_points)(const tl_snapped *snapped, const tl_window *window, const tl_points *points, const int32_t *ids,
                         void *out);
 
-    /* Draws n triangles over a target, NEAREST or PEEL, of all others, but for what their materials cut out; the window
+    /* Draws n alpha-tested triangles over a target, NEAREST or PEEL, of all others; the window
      * as for a share of a part, and fewer than 2^31 pixels. */
     void (*cut_out)(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target);
 
-    /* Copies triangles [first, end); what is single-sided and turned the way that the mesh culls is collapsed to a
-     * point, of what a plane cuts the pieces, in place.  The result is drawn with any cull. */
+    /* Copies triangles [first, end).  A single-sided one turned the way that the mesh culls is collapsed to a
+     * point; if a plane cuts it, so are its pieces, in place.  The result is drawn with any cull. */
     void (*drop_sides)(const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
                        int32_t *triangles);
 
@@ -246,7 +246,7 @@ typedef struct tl_kernels {
     int64_t (*face_normals)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out,
                             float *rows);
 
-    /* 1 for the triangles of [first, end) whose corners have normals, rows of four, that point to the other side, else
+    /* 1 for the triangles of [first, end) with corner normals, rows of four, that point to the other side, else
      * 0; row_of_corner is (n_triangles, 3), the triangles themselves where vertices have a row each. */
     int64_t (*find_turned)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
                            const float *normals, const int32_t *row_of_corner, uint8_t *is_turned);
@@ -308,7 +308,7 @@ typedef struct tl_kernels {
     int64_t (*group_rows)(const uint32_t *rows, int n_words, int64_t n, int table_bits, int32_t *table, int32_t *first,
                           int32_t *group);
 
-    /* The boxes of a surface, all but whose nodes are there. */
+    /* Sets the boxes of a surface's nodes; all else of it is there. */
     void (*build_tree)(tl_surface *surface);
 
     /* The nearest triangle of points [first, end), and where on it unless `at` is NULL.  Returns the largest
@@ -316,8 +316,8 @@ typedef struct tl_kernels {
     double (*find_nearest)(const tl_surface *surface, const double *points, int64_t first, int64_t end,
                            int32_t *triangle, double *at);
 
-    /* How far triangles [first, end) can be from a surface.  A bound is near enough when it passes what is known by
-     * `least`, or by that share.  In and out: reach, of which `known` counts on entry. */
+    /* How far triangles [first, end) can be from a surface.  A bound is near enough when it passes the known one by
+     * `least`, or by that share.  In and out: reach, only `known` is read on entry. */
     void (*find_reach)(const tl_surface *surface, const double *points, const int32_t *triangles, int64_t first,
                        int64_t end, double share, double least, tl_reach *reach);
 
@@ -362,7 +362,7 @@ typedef struct tl_kernels {
      * full. */
     int64_t (*share_polygons)(const tl_polygons *polygons, const tl_share_job *job);
 
-    /* The windows that n triangles may touch, whose corners (n, 3, 2) are in pixels.  With out = NULL sets `boxes`,
+    /* The windows that n triangles, corners (n, 3, 2) in pixels, may touch.  With out = NULL sets `boxes`,
      * adds to starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be
      * snapped, or -1.  Otherwise writes the spans of each row from starts[row] on, which is then where they end, by the
      * boxes. */
@@ -374,7 +374,7 @@ typedef struct tl_kernels {
      * end.  Returns how many spans are longer. */
     int64_t (*sort_spans)(const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out);
 
-    /* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to what the numbers of triangles change by from
+    /* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to the differences of triangle counts from
      * window to window: rows of n_columns + 1 numbers. */
     void (*count_windows)(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
                           int32_t *steps);
@@ -394,11 +394,11 @@ typedef struct tl_kernels {
     void (*grad_points)(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
                         void *rast_db);
 
-    /* The sums by vertex of what the gradients of `rast` and of `rast_db` give in a band.  Returns, as the next two do,
+    /* The gradients of vertices from those of `rast` and `rast_db`, summed in a band.  Returns, as the next two do,
      * the number of a triangle that does not exist, or -1. */
     int64_t (*grad_points_vjp)(const tl_grad_view *view, const tl_grad_points *points);
 
-    /* Attributes in a band, and what they change by. */
+    /* Attributes in a band, and their slopes. */
     int64_t (*grad_values)(const tl_grad_view *view, const tl_grad_values *values);
 
     /* Their gradients: sums by row of attributes, and those of `rast` and `rast_db`. */
@@ -425,7 +425,7 @@ typedef struct tl_kernels {
 
     /* Rows [first, end) of an atlas, (rows of) width texels.  Where an id is -1, that of the nearest triangle that
      * meets the texel, and its values there; `squared` has a number a texel of these rows, INFINITY.  Or means over
-     * what triangles cover: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */
+     * covered areas: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */
     void (*touch_texels)(const tl_atlas *atlas, int64_t first, int64_t end, int32_t *ids, float *squared, float *out);
     void (*average_texels)(const tl_atlas *atlas, int64_t first, int64_t end, double *sums, float *most, int32_t *ids,
                            float *out);
@@ -437,7 +437,7 @@ typedef struct tl_kernels {
                         int32_t *room, int32_t *from);
     void (*copy_texels)(const int32_t *from, int64_t first, int64_t end, int64_t n_bytes, uint8_t *texels);
 
-    /* Adds what a picture shows of texels [first, end), at positions, with normals and ids (-1: none), to sums and
+    /* Adds a picture's colours of texels [first, end), at positions, with normals and ids (-1: none), to sums and
      * weights. */
     void (*add_taken)(const tl_taken *taken, const float *positions, const float *normals, const int32_t *ids,
                       int64_t first, int64_t end, float *sums, float *weights);
@@ -454,7 +454,7 @@ typedef struct tl_kernels {
     void (*scatter_columns)(const uint64_t *bits, int64_t n_rows, int64_t n_columns, int64_t n_words,
                             const int64_t *strides, uint8_t *out);
 
-    /* Writes 1 for the voxels of a grid of a shape that triangles [first, end) meet, whose points are in voxels. */
+    /* Writes 1 for the voxels of a grid of a shape that triangles [first, end) meet; points are in voxels. */
     void (*touch_voxels)(const double *points, int64_t n_points, const int32_t *triangles, int64_t first, int64_t end,
                          const int64_t *shape, uint8_t *out);
 } tl_kernels;

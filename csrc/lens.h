@@ -1,4 +1,4 @@
-/* The contract of lenses: what one does to directions, and what its picture makes of triangles.  Part of the contract
+/* The contract of lenses: how one bends directions, and the triangles of its picture.  Part of the contract
  * of topleft.h, which includes it.
  *
  * Axes are those of OpenCV: x right, y down, z along the view; the image plane lies at z = 1.  "Eye space" has y up and
@@ -11,7 +11,7 @@
 #define TL_LENS_RINGS 16
 
 /* Edges of a larger angle, as the lens sees them, are halved in any case: so every triangle is small enough on the
- * sphere of directions for the test of what the picture cannot show.  cos(0.25). */
+ * sphere of directions for the test whether the picture cannot show it.  cos(0.25). */
 #define TL_LEAST_EDGE_COSINE 0x1.f01549f7deea1p-1
 
 /* Relative error of the distance that a fisheye has for depth: longer edges are halved, too. */

@@ -1,5 +1,5 @@
-/* Meshlets: what a mesh is grown into where bytes can be permuted and its coordinates are float32 numbers, and what
- * drawing them needs.  Part of the contract of topleft.h, which includes it behind the types that it uses. */
+/* Meshlets of a mesh with float32 coordinates, for processors that permute bytes, and a pass
+ * that draws them.  Part of the contract of topleft.h, which includes it behind the types that it uses. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
 #ifndef TOPLEFT_MESHLETS_H
@@ -70,7 +70,7 @@ typedef struct {
     const tl_view *view;
     const tl_window *window;
     const tl_target *target;   /* NEAREST, FARTHEST */
-    const tl_kernels *kernels; /* what draws triangles that are large, or need draw_fallback */
+    const tl_kernels *kernels; /* draw triangles that are large, or need draw_fallback */
     int32_t first_id;
     int32_t sample_x_fx, sample_y_fx; /* where in a pixel it is sampled, from the centre */
 } tl_meshlet_pass;
@@ -87,7 +87,7 @@ typedef struct {
     int64_t (*list)(const tl_meshlet_pass *pass, int64_t first, int64_t end, tl_seen_meshlet *seen, int32_t *fallback,
                     int64_t *n_fallback);
 
-    /* Draws what is listed of rows [row0, row1) of the window, cleared first if `is_first`.  `others`, a number for
+    /* Draws the listed meshlets, rows [row0, row1) of the window, cleared first if `is_first`.  `others`, a number for
      * each triangle, gets those that clip planes may cut, or that 64 bits cannot hold; returns how many. */
     int64_t (*draw)(const tl_meshlet_pass *pass, const tl_seen_meshlet *seen, int64_t n_seen, const int32_t *fallback,
                     int64_t n_fallback, int32_t row0, int32_t row1, int is_first, tl_seen_meshlet *sorted,

@@ -1,4 +1,4 @@
-/* The contract of distances between surfaces: a surface whose triangles stand in a tree of boxes, and what is measured.
+/* The contract of distances between surfaces: a surface with its triangles in a tree of boxes, and the results.
  * Coordinates are those of the object, moved so that the origin is near. */
 #ifndef TOPLEFT_NEAREST_H
 #define TOPLEFT_NEAREST_H

@@ -1,4 +1,4 @@
-/* Polygons: rings of points, and what is drawn of them.  Part of the contract of topleft.h, which includes it. */
+/* Polygons: rings of points, and how they are drawn.  Part of the contract of topleft.h, which includes it. */
 #ifndef TOPLEFT_POLYGONS_H
 #define TOPLEFT_POLYGONS_H
 
@@ -17,14 +17,14 @@ typedef struct {
     const int64_t *rings;       /* (n_rings + 1,): ring k has the points [rings[k], rings[k + 1]), and closes itself */
     const int64_t *polygons;    /* (n_polygons + 1,): polygon i has the rings [polygons[i], polygons[i + 1]) */
     const uint8_t *is_wide;     /* (n_polygons,): some point is not narrow */
-    const int8_t *weights;      /* (n_rings,): what a ring's signed area counts, -1, 0 or 1; see `certify_polygons` */
+    const int8_t *weights;      /* (n_rings,): the factor of a ring's signed area, -1, 0 or 1; see `certify_polygons` */
     const uint8_t *is_simple;   /* (n_polygons,): the weights are right; otherwise pixels are resolved one by one */
     int64_t n_polygons;
     int bits;
     int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
     int64_t *crossings_left;          /* of all threads: how often rings may cross, see slabs.c */
-    struct tl_pause *pause;           /* of this call, or NULL: what has begun is drawn to its end */
+    struct tl_pause *pause;           /* of this call, or NULL: the picture is drawn to its end */
 } tl_polygons;
 
 /* The pixels [left, right) x [top, bottom) that a polygon reaches into, cut off at the window. */
@@ -81,7 +81,7 @@ typedef struct {
     tl_polygon_test test;
     int64_t width, top, bottom; /* rows of the window that are drawn */
     int n_bytes;                /* of a pixel, 1 or 4 */
-    int32_t background;         /* what the rows get first */
+    int32_t background;         /* the rows get it first */
     int waits;                  /* spans are written later, when their memory has come */
     void *pixels;               /* the window's first pixel, rows of `width` */
     int32_t *cells;             /* (TL_CELL_ROWS * tl_polygon_stride(width),), all 0, and left so */
@@ -98,7 +98,7 @@ typedef struct {
     int32_t *cells;  /* (n_cells,), all TL_CELL_CLEAR, and left so */
     int64_t n_cells; /* at least TL_LEAST_SHARE_CELLS */
     tl_piece_scratch *pieces;
-    /* pixels: the sum of the shares, at most 1; or, with colours, the mix of what is there and the polygon's by its
+    /* pixels: the sum of the shares, at most 1; or, with colours, the mix of the pixel's and the polygon's by its
      * share */
     float *pixels;       /* the window's first pixel, rows of `width` pixels of n_channels */
     const float *colors; /* (n_polygons, n_channels), or NULL */

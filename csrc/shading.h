@@ -1,5 +1,5 @@
-/* The contract of shading: what a surface is made of, what lights it, and where it is seen from.
- * Colours are linear light, 1 is white.  Vectors are those of one space, the shading space, whose origin is near the
+/* The contract of shading: the material of a surface, its lights, and where it is seen from.
+ * Colours are linear light, 1 is white.  Vectors are those of one space, the shading space, with its origin near the
  * mesh. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 #ifndef TOPLEFT_SHADING_H
@@ -68,13 +68,13 @@ typedef struct {
 typedef enum { TL_SURROUNDINGS_SKY = 0, TL_SURROUNDINGS_IMAGE = 1 } tl_surroundings_kind;
 
 /* Light from all around, in a space of its own, up is y: a sky over a ground, or a picture of all directions, an
- * octahedron unfolded to a square.  Level k < n_levels - 1 is what a surface of roughness k / (n_levels - 2) sees of
- * it, level n_levels - 1 what a matt one sees.  A texel is four float, round each level stands a border of one. */
+ * octahedron unfolded to a square.  Level k < n_levels - 1 is blurred for a surface of roughness k / (n_levels - 2),
+ * level n_levels - 1 for a matt one.  A texel is four float, round each level stands a border of one. */
 typedef struct {
     tl_surroundings_kind kind;
     float from_shading[3][4]; /* rows; the fourth number is not read */
     float sky[3], ground[3];
-    float diffuse; /* its share of what matt surfaces get: 0 where they are lit otherwise, else 1 */
+    float diffuse; /* its share of the light of matt surfaces: 0 where they are lit otherwise, else 1 */
     const float *texels;
     int32_t offset[TL_MAX_LEVELS], size[TL_MAX_LEVELS]; /* in texels; the size without the border */
     int n_levels;
@@ -87,7 +87,7 @@ typedef struct {
     float at[3]; /* the unit vector to the light, or where it is */
     float color[3];
     float falloff; /* of a point at distance d: the light is divided by 1 + falloff * d^2 */
-    /* A spot is a point whose light is, at the angle a from its unit axis, (cone_scale * cos a + cone_offset)^2, the
+    /* A spot is a point with a light of, at the angle a from its unit axis, (cone_scale * cos a + cone_offset)^2, the
      * sum cut off at 0 and 1. */
     float axis[3], cone_scale, cone_offset;
 } tl_light;
@@ -100,7 +100,7 @@ typedef struct {
     int finds_inverse_w;  /* instead of reading it there, from the vertices and their matrix, for those that show */
     /* (n_triangles, 3): the row of `corner_normals` that each corner has; NULL: the normals are those of its vertex */
     const int32_t *normal_of_corner;
-    const float *corner_normals; /* rows of four: the unit normal, or 0, and what is not read */
+    const float *corner_normals; /* rows of four: the unit normal, or 0, and one that is not read */
     /* (n_triangles, 4): unit, on the side that is counter-clockwise; NULL: interpolated ones */
     const float *face_normals;
     const void *positions; /* (n_vertices, 3) float32 or float64: the face normal where interpolated ones cancel */
@@ -123,8 +123,8 @@ typedef struct {
     tl_show show;
     const tl_texture *matcap; /* MATCAP */
     float eye_from[3][4];     /* the rows of the rotation to eye space; the fourth number is not read */
-    /* Where the pixel (x, y) of the picture looks: from `eye` along ray[0] + x ray[1] + y ray[2], 1/w of which is the
-     * point that is seen.  Without perspective the ray starts at that point instead, and ends at `depth` times
+    /* Where the pixel (x, y) of the picture looks: from `eye` along ray[0] + x ray[1] + y ray[2]; 1/w of that is the
+     * visible point.  Without perspective the ray starts at that point instead, and ends at `depth` times
      * ray[3]. */
     int has_perspective;
     float eye[3], ray[4][3];
@@ -136,11 +136,11 @@ typedef struct {
     uint8_t background_bytes[4];
 } tl_shading;
 
-/* An instance of a picture: what was drawn of it, and how it is shaded. */
+/* An instance of a picture: its mesh, and how it is shaded. */
 typedef struct {
-    const tl_snapped *snapped; /* whose first id is not read */
+    const tl_snapped *snapped; /* its first id is not read */
     const tl_shading *shading;
-    int32_t first_id; /* what its triangle 0 is called in the picture's ids */
+    int32_t first_id; /* the id of its triangle 0 in the picture */
 } tl_shaded;
 
 /* The instances of a picture, by their first ids, which ascend; a mesh is one.  All show the same, over one background,

@@ -24,7 +24,7 @@ typedef struct {
 /* Windows of a span that its triangle is written to one by one. */
 #define TL_SHORT_SPAN 2
 
-/* Vertices and triangles where they lie: rows of numbers of any kind, of which a copy is made. */
+/* Vertices and triangles where they lie: rows of numbers of any kind, to be copied. */
 typedef struct {
     const char *points;
     int64_t point_stride; /* bytes from row to row */
@@ -39,7 +39,7 @@ typedef struct {
  * index. */
 typedef enum { TL_MERGE_LESS = 0, TL_MERGE_GREATER = 1, TL_MERGE_LATER = 2 } tl_merge_rule;
 
-/* Two visibility buffers of one picture; the first gets what shows in either. */
+/* Two visibility buffers of one picture; they are merged into the first. */
 typedef struct {
     int32_t *ids; /* -1 for nothing */
     float *depth;

@@ -107,7 +107,7 @@ typedef struct {
     int64_t width, height;
     int subpixel_bits;
     tl_test test;
-    tl_pause *pause; /* or NULL: what has begun is drawn to its end */
+    tl_pause *pause; /* or NULL: the picture is drawn to its end */
 } tl_window;
 
 /* Counts work that takes as long as so many pixels of a large triangle, up to 2^62; not below the next question, where
@@ -118,8 +118,8 @@ static inline void tl_count_work(const tl_window *window, int64_t n_px)
         window->pause->left_px -= n_px;
 }
 
-/* Whether to give up the picture: kernels return soon, buffers of which they say so are left as they were found, and
- * what else they return means nothing. */
+/* Whether to give up the picture: kernels return soon, leave buffers as they were found where they say so, and
+ * all else that they return means nothing. */
 static inline int tl_is_given_up(const tl_window *window)
 {
     return window->pause && window->pause->left_px < 0 && window->pause->poll(window->pause);
@@ -138,8 +138,8 @@ typedef enum {
     TL_SINK_COUNT = 1,    /* int32 += 1 */
     TL_SINK_LABEL = 2,    /* int32 = id, painter's order: the later triangle wins */
     TL_SINK_PAINT = 3,    /* the same, and float = depth */
-    TL_SINK_NEAREST = 4,  /* id and depth where depth < what is there; at equal depth the lower id */
-    TL_SINK_FARTHEST = 5, /* id and depth where depth > what is there; at equal depth the lower id */
+    TL_SINK_NEAREST = 4,  /* id and depth where depth < that of the pixel; at equal depth the lower id */
+    TL_SINK_FARTHEST = 5, /* id and depth where depth > that of the pixel; at equal depth the lower id */
     TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
     TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
     TL_SINK_PEEL = 8,     /* ids and depths of the nearest layers, sorted: `peeled` */
@@ -206,10 +206,10 @@ typedef struct {
     int sample_bits;
     const int32_t *samples_fx; /* (2^sample_bits, 2): x, y of each from the pixel's centre */
     int sample;                /* the one that is being drawn; draw knows */
-    int32_t flip;              /* LABEL: what ids are xored with, 0, or TL_FLIP: the earlier triangle wins */
+    int32_t flip;              /* LABEL: ids are xored with it: 0, or TL_FLIP: the earlier triangle wins */
     tl_census *census;         /* CENSUS */
     const tl_peeled *peeled;   /* PEEL; the window has less than 2^31 pixels */
-    /* NEAREST, FARTHEST: what no depth of a segment of a row lies behind, tl_segments(stride_px) numbers a row, set by
+    /* NEAREST, FARTHEST: a bound behind all depths of a segment of a row, tl_segments(stride_px) numbers a row, set by
      * draw, so that large triangles and clusters that lie behind are left out; or NULL */
     float *bounds;
 } tl_target;
@@ -228,8 +228,8 @@ static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGM
 #define TL_BLENDED_RUNS 128  /* of a row of these */
 #define TL_SHAPES_BLENDED 16 /* triangles */
 
-/* How many are few, by what is done otherwise: bits are drawn; every triangle is stored over a background; labels are
- * drawn first, or samples averaged. */
+/* How many are few, by the other way to draw them: bits; every triangle stored over a background; labels
+ * first, or samples averaged. */
 typedef enum { TL_SHAPES_OF_BITS = 2, TL_SHAPES_STORED = 4, TL_SHAPES_LABELLED = 64 } tl_shape_limit;
 static inline int tl_is_large_shapes(int64_t n, int n_samples, int64_t width, int64_t height, tl_shape_limit most)
 {
@@ -250,23 +250,23 @@ static inline int tl_shape_label_bits(int sample_bits) { return sample_bits ? 64
 /* A bit a sample, and a word behind the end. */
 static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 64 + 2; }
 
-/* A mesh after the snap: what kernels draw. */
+/* A mesh after the snap, which kernels draw. */
 typedef struct {
     tl_vertex_set mesh;
-    /* (n_triangles, 3), maybe the caller's memory: draw checks the indices; what reads them again has them from
+    /* (n_triangles, 3), maybe the caller's memory: draw checks the indices; later reads go through
      * vertex/corners.h, in case they have changed */
     const int32_t *triangles;
     int64_t n_triangles;
     const tl_pieces *pieces; /* of triangles with TL_CLIPPED vertices, or NULL */
     tl_cull cull;
     tl_method method;
-    int32_t first_id; /* what triangle 0 is called in a buffer of ids that several meshes share; read by draw alone */
-    /* (n_triangles,): what each is called, from first_id on; NULL: its index; read by draw alone */
+    int32_t first_id; /* the id of triangle 0 in a buffer of ids that several meshes share; read by draw alone */
+    /* (n_triangles,): the id of each, less first_id; NULL: its index; read by draw alone */
     const int32_t *names;
 } tl_snapped;
 
 /* The part of a mesh that one pass draws.  Several passes may share a mesh: each takes some of the triangles, draws
- * what of them lies in its own window and lists those outside of it for the passes that own the rest of the picture. */
+ * them in its own window and lists those that reach outside of it for the passes that own the rest of the picture. */
 typedef struct {
     const int32_t *ids; /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
     int64_t first, end;
@@ -275,9 +275,9 @@ typedef struct {
     /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
     int32_t *outside;
     int64_t n_outside;
-    const tl_window *picture;       /* what all the passes draw; read when there is `outside` */
+    const tl_window *picture;       /* that all the passes draw; read when there is `outside` */
     int is_first, is_last;          /* of the passes over the window: the first clears it */
-    struct tl_exact_counts *counts; /* out: added up, of a mesh whose vertices are not snapped; or NULL */
+    struct tl_exact_counts *counts; /* out: added up, of a mesh without snapped vertices; or NULL */
 } tl_slice;
 
 /* The triangles that reach into a window, and the first and last band of rows of each. */
@@ -289,7 +289,7 @@ typedef struct {
 
 #define TL_MAX_SAMPLES 16 /* of a pixel */
 
-/* Pixels whose samples see several triangles, row by row from left to right: those of row y are [rows[2 y], rows[2 y +
+/* Pixels that show several triangles, row by row from left to right: those of row y are [rows[2 y], rows[2 y +
  * 1]) of the columns, and of the ids and depths of each sample but the first, which lie `room` numbers apart. */
 typedef struct {
     int64_t *rows;
@@ -299,7 +299,7 @@ typedef struct {
 } tl_split;
 
 /* The ids and depths that 2^sample_bits samples see in the rows [row0, row0 + n_rows) of a picture: the first sample in
- * all columns, and the others, `plane` pixels apart, in the columns [col0, col0 + n_cols), outside of which none sees
+ * all columns, and the others, `plane` pixels apart, in the columns [col0, col0 + n_cols): outside of them none sees
  * anything. */
 typedef struct {
     const int32_t *first_ids, *ids;
@@ -324,7 +324,7 @@ typedef struct {
     int64_t stride_px;
     void *cells;
     int is_wide;
-    int is_clamped; /* what lies in more than one triangle counts as 1, instead of the sum of its areas */
+    int is_clamped; /* a pixel counts as 1 at most, instead of the sum of its areas */
 } tl_area;
 
 #define TL_CELL_CLEAR (1 << 30)
@@ -372,7 +372,7 @@ static inline int64_t tl_blend_cells(int64_t width)
 
 /* The layers that are seen through each other, and their colours: straight, alpha last. */
 typedef struct {
-    const int32_t *ids;  /* planes, of the first pixel on; -1, or what is no triangle, ends the layers of a pixel */
+    const int32_t *ids;  /* planes, of the first pixel on; -1, or an id of no triangle, ends the layers of a pixel */
     int64_t n_triangles; /* that were peeled */
     int64_t plane_px;
     int n_layers;
@@ -403,7 +403,7 @@ typedef struct {
 typedef struct {
     int is_smooth;      /* float32 coverage; otherwise uint8, 1 where a line is */
     void *pixels;       /* rows of stride_px */
-    const float *depth; /* what hides lines, the same stride, or NULL */
+    const float *depth; /* hides lines; the same stride, or NULL */
     double depth_bias;  /* how far behind it a line still shows */
     int is_farthest;    /* the larger depth is the nearer one */
     int64_t stride_px;
@@ -424,7 +424,7 @@ typedef struct {
 
 /* ---- creases ------------------------------------------------------------------------------------------- */
 
-/* Sides at a vertex that more triangles share join nothing: what is compared is bounded. */
+/* Sides at a vertex that more triangles share join nothing: comparisons are bounded. */
 #define TL_MOST_AT_SIDE 32
 
 /* The triangles round vertices. */
@@ -442,7 +442,7 @@ typedef struct {
     const int32_t *starts;        /* (n_vertices + 1,): the rows of each vertex's groups, none if there is but one */
     const int32_t *groups;        /* (3 n_triangles,): the group of each corner at its vertex, -1 without an area */
     const int32_t *own_triangles; /* (n_triangles, 3): the rows of corners that are in no row of a group */
-    int64_t first_row;            /* what row 0 of the groups is called in row_of_corner */
+    int64_t first_row;            /* the number of row 0 of the groups in row_of_corner */
     double *of_vertices;          /* (n_vertices, 3) */
     double *of_groups;            /* (rows, 3) */
     int32_t *row_of_corner;       /* (n_triangles, 3), or NULL */
@@ -484,10 +484,10 @@ typedef struct {
     int is_f64_out;
 } tl_points;
 
-/* Values of vertices, or of corners, whose slopes are wanted, and the triangles that show. */
+/* Values of vertices, or of corners, to find slopes of, and the triangles that show. */
 typedef struct {
     const int32_t *slot; /* of each triangle its place among those that show */
-    const double *steps; /* of each corner what its weight over w changes by along x and y, and its w: (n, 3, 3) */
+    const double *steps; /* of each corner the slopes of its weight over w along x and y, and its w: (n, 3, 3) */
     const int32_t *rows; /* of each corner its row of `values`: (n, 3) */
     const float *values; /* (rows, n_values) */
     int64_t n_values;
@@ -497,7 +497,7 @@ typedef struct {
 
 #define TL_RLE_LINE 64 /* bytes of a row that are looked at together */
 
-/* A window of a picture whose runs of equal pixels are listed, down its columns. */
+/* A window of a picture, to list its runs of equal pixels down the columns. */
 typedef struct {
     const uint8_t *pixels; /* of a mask uint8, of ids int32 */
     int n_bytes;           /* of a pixel, 1 or 4 */

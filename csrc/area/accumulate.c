@@ -54,7 +54,7 @@ TL_INLINE vi left_sum(int32_t *row, vi *seen)
     return vi_set1((int32_t)(uint32_t)sum);
 }
 
-/* The sums of the next TL_LANES cells, the first n of which are pixels: what lies right of the window may be anything,
+/* The sums of the next TL_LANES cells, the first n are pixels.  Cells right of the window may hold anything,
  * as the same edges are moved there by different widths. */
 TL_INLINE vi accumulate_lanes(int32_t *cells, int64_t n, vi *carry, vi *seen)
 {
@@ -139,7 +139,7 @@ TL_INLINE int64_t next_met(const uint64_t *met, int64_t k, int64_t end)
     return end;
 }
 
-/* The same where it is known which cells edges meet: what lies between is written as runs, without looking at it. */
+/* The same where it is known which cells edges meet: those between are written as runs, unread. */
 TL_INLINE int accumulate_met(const area_plane *plane, const tl_area *target, int is_clamped)
 {
     const int64_t stride = plane->stride, n_cols = plane->n_cols;

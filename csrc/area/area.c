@@ -2,7 +2,7 @@
  * In: vertex records and triangles.  Out: float32 pixels.
  *
  * Triangles become edges, edges become differences in cells (ramp.c), and one pass over the rows sums these up
- * (accumulate.c): the cost goes with the edges, not with what they enclose.  Sums are integers, so order, threads and
+ * (accumulate.c): the cost goes with the edges, not with the area.  Sums are integers, so order, threads and
  * vectors do not matter, and where a mesh tiles the plane they are 2^24 to the last bit. */
 #ifndef TL_AREA_C
 #define TL_AREA_C
@@ -97,7 +97,7 @@ static void make_room_for_edges(area_state *s)
     s->n[TL_EDGES_NONE] = 0;
 }
 
-/* One edge of a triangle of positive area (y down).  What kind it is depends on the edge alone, or triangles that share
+/* One edge of a triangle of positive area (y down).  Its kind depends on the edge alone, or triangles that share
  * it would not agree. */
 static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
 {
@@ -167,7 +167,7 @@ TL_INLINE void push_edges(area_state *s, const lane_corners *c, vm drawn, vm tur
         int32_t kinds[TL_LANES], records[4 * TL_LANES];
         vi_store(kinds, kind);
         vi_store_quads(records, (const vi[4]){x0, y0, dx, vi_select(vi_gt(negative, zero), dy, vi_sub(zero, dy))});
-        for (int lane = 0; lane < TL_LANES; lane++) /* no branch: what has no effect goes to a queue that is emptied */
+        for (int lane = 0; lane < TL_LANES; lane++) /* no branch: edges without effect go to a queue that is emptied */
             v4_store(&s->edges[kinds[lane]][s->n[kinds[lane]]++].x_fx, v4_load(records + 4 * vi_quad_slot(lane)));
     }
     make_room_for_edges(s);

@@ -1,17 +1,17 @@
-/* What one pixel row of an edge adds to the area of the pixels, as differences from each pixel to the next.
- * In: edges, top to bottom.  Out: cells, whose sums from the left are the area right of the edges.
+/* Ramp: adds one pixel row of an edge to the area of the pixels, as differences from each pixel to the next.
+ * In: edges, top to bottom.  Out: cells; their sums from the left are the area right of the edges.
  *
  * In its row an edge runs from `low` to `high` and is `height` tall.  Of pixel [k, k + 1) the area right of it is
  * Q(k + 1) - Q(k), where Q(x) = steep * (min(x, high) - low)^2 + height * max(x - high, 0), steep = height / (2 (high -
  * low)).  It is computed in float64 and rounded once, to 2^-24 px^2.  Nothing in it depends on the triangle but the
- * sign, nor on the window: what two triangles share cancels to the last bit.
+ * sign, nor on the window: shared edges of two triangles cancel to the last bit.
  *
  * Error: x is off by less than 2^-36 px (three roundings of numbers below 2^14 + 1), Q by less than 2^-11 of a unit, so
  * an area is off by less than 0.501 units of 2^-24 px^2, and is exact right of `high`: a height is a whole number of
  * units.
  *
  * An edge of any length and anywhere, |x_fx| < 2^62, has the same differences (add_exact_edge): where it enters and
- * leaves a row is then an exact quotient of 128-bit integers; what is rounded to float64 is only its fraction and the
+ * leaves a row is then an exact quotient of 128-bit integers; only its fraction is rounded to float64, and the
  * length of the ramp.
  *
  * Based on: R. Levien, font-rs (signed area, accumulated along rows), 2015; D. Turner, FreeType's smooth rasterizer
@@ -27,7 +27,7 @@
 #include "vertex/fixed.h"
 
 #define TL_AREA_BITS 24
-/* cells before column 0: rows start on a cache line, and the last four take what lies left of it */
+/* cells before column 0: rows start on a cache line, and the last four take areas left of it */
 #define TL_CELL_PAD 16
 /* A cell holds this much more than its value.  No addition changes it by more than 2^24 + 1, so a value that leaves
  * [-2^30, 2^30) shows as a sign bit before it can wrap, and `seen` keeps it. */
@@ -48,7 +48,7 @@ typedef struct {
     int bits;
     int is_sparse; /* most cells are met by no edge; read by accumulate alone */
     uint64_t *met; /* a bit of each TL_MET_CELLS cells: whether an edge has been added to any of them; or NULL */
-    int n_waiting; /* cells [at, at + 4) and what will be added to them, in the order of vi_store_quads */
+    int n_waiting; /* cells [at, at + 4) and their sums to be added, in the order of vi_store_quads */
     int32_t at[TL_WAITING_QUADS], quads[4 * TL_WAITING_QUADS];
     v4 seen; /* every value that a cell ever had, or-ed */
 } area_plane;
@@ -56,7 +56,7 @@ typedef struct {
 /* An edge that 32-bit lanes can take, upper end first. */
 typedef struct {
     int32_t x_fx, y_fx, dx;
-    int32_t signed_dy; /* > 0: what lies right of it is added */
+    int32_t signed_dy; /* > 0: the area right of it is added */
 } edge_record;
 
 /* The same, ready for its rows; and TL_LANES of them. */
@@ -132,7 +132,7 @@ static __attribute__((noinline)) void note_quads(const area_plane *plane, int n)
         note_met(plane->met, plane->at[i], plane->at[i] + 4);
 }
 
-/* Adds what waits to the cells.  They are all over the memory, and beyond the second-level cache: to compute first,
+/* Adds waiting sums to the cells.  They are all over the memory, and beyond the second-level cache: to compute first,
  * fetch meanwhile and add later takes a third off 200,000 triangles of 8 px. */
 TL_ONCE void flush_quads(area_plane *plane)
 {
@@ -255,7 +255,7 @@ TL_INLINE void add_wide_row(area_plane *plane, int64_t row, int64_t col, double 
 {
     if (col >= plane->n_cols)
         return;
-    /* what lies left of column 0 belongs to the cell before it: left_sum would take the rest there for less than
+    /* the area left of column 0 belongs to the cell before it: left_sum would take the rest there for less than
      * nothing */
     const int64_t first = col < 0 ? -col - 1 : 0, passed = (int64_t)high + 2;
     const int64_t visible = passed < plane->n_cols - col ? passed : plane->n_cols - col;
@@ -354,7 +354,7 @@ static void add_exact_row(area_plane *plane, int64_t row, int64_t col, double lo
     plane->seen = v4_or(plane->seen, v4_load((const int32_t[4]){seen, 0, 0, 0}));
 }
 
-/* An edge from its upper to its lower end; sign > 0: what lies right of it is added. */
+/* An edge from its upper to its lower end; sign > 0: the area right of it is added. */
 static void add_exact_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1, int sign)
 {
     const int bits = plane->bits;

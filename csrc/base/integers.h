@@ -1,7 +1,7 @@
 /* Integers of 128 bits: the compiler's where it has them, otherwise a struct of two words; both give the same bits.
  * And of 64 bits under the same names, for code that is written once for both.
  *
- * No function but those named `wrapping` may overflow.  The struct serves 32-bit machines, and Windows, whose
+ * No function but those named `wrapping` may overflow.  The struct serves 32-bit machines, and Windows: its
  * libraries cannot divide 128 bits; TL_NO_INT128 forces it.  tests/engine/test_integers.py holds both to Python's
  * integers. */
 #ifndef TL_INTEGERS_H

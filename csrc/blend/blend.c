@@ -1,8 +1,8 @@
 /* Blend: the pass that puts the colours of triangles into the canvas, one triangle after the other.
  * In: vertex records, triangles and their colours.  Out: pixels.
  *
- * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at
- * a time, as in rows.c, and whose rows are then drawn triangle by triangle.  What lanes cannot take empties the queue
+ * Nothing is drawn out of order: one queue of triangles.  Setup and row ends are computed a vector of triangles at
+ * a time, as in rows.c; rows are then drawn triangle by triangle.  A triangle that lanes cannot take empties the queue
  * and is drawn by itself.  Where clip planes cut triangles that are not snapped, all of them are, and the pieces of one
  * in its place.  Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
 #ifndef TL_BLEND_C
@@ -30,7 +30,7 @@
 #include "blend/mix_u8.c"
 
 typedef struct {
-    walk_state walk; /* its queue `rows` holds what waits */
+    walk_state walk; /* its queue `rows` holds waiting triangles */
     blend_state mix;
 } blend_pass;
 

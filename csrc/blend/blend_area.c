@@ -1,4 +1,4 @@
-/* Blend, by area: the pass that gives each triangle what of each pixel's square lies in it.
+/* Blend, by area: the pass that weights each triangle by its area in each pixel's square.
  * In: triangles, one after the other.  Out: pixels.
  *
  * Small triangles take places below one another in an atlas of cells, moved there by whole pixels, which changes no
@@ -37,7 +37,7 @@ typedef struct {
 
 /* ---- small triangles --------------------------------------------------------------------------------------------- */
 
-/* Blends what the atlas holds, and clears it. */
+/* Blends the triangles in the atlas, and clears it. */
 static __attribute__((noinline)) void flush_atlas(area_pass *p)
 {
     blend_state *b = p->mix;
@@ -118,7 +118,7 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     const vi col = vi_shift_right(x_min, bits), row = vi_shift_right(y_min, bits);
     const vi last_col = vi_shift_right(x_max, bits), last_row = vi_shift_right(y_max, bits);
     const vi n_cols = vi_sub(last_col, col), n_rows = vi_sub(last_row, row); /* less one */
-    /* the cell right of the last column holds what is left of it.  A special vertex has x = INT32_MIN. */
+    /* the cell right of the last column holds the rest of its area.  A special vertex has x = INT32_MIN. */
     vm single =
         vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     single = vm_or(single, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));
@@ -175,7 +175,7 @@ static int64_t blend_areas(blend_state *b)
     area_pass p;
     p.mix = b, p.n = p.n_atlas_rows = 0;
     place_plane(&atlas, &(tl_area){.cells = b->canvas->cells}, &p.area.plane);
-    p.area.plane.stride = TL_ATLAS_COLS; /* what an edge adds right of a row is 0 */
+    p.area.plane.stride = TL_ATLAS_COLS; /* an edge adds 0 right of a row */
     p.area.snapped = snapped, p.area.window = &atlas, p.area.bad_row = -1;
     memset(p.area.n, 0, sizeof p.area.n);
     const tl_slice all = {.first = 0, .end = snapped->n_triangles};

@@ -89,7 +89,7 @@ TL_INLINE void mix_ramps(blend_state *b, const blend_side *s, int q, int32_t bas
         v4_store(b->packed + at[k] + 4 * q, v4_load(mixed + 4 * vi_quad_slot(k)));
 }
 
-/* At most n rows from `row` on, of which each side passes all.  Returns how many were drawn, or if none, minus how many
+/* At most n rows from `row` on; each side passes all.  Returns how many were drawn, or if none, minus how many
  * are left to others: those where the sides share pixels, or reach beyond the window. */
 TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side *left, blend_side *right, int64_t row,
                             int n, tl_mix mode)
@@ -128,7 +128,7 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
             mix_run(b, first[k], at[1][k] - first[k]);
             continue;
         }
-        /* from the left to the right: right of the triangle before what it covers takes 1.6 times as long */
+        /* from the left to the right: right of the triangle before its pixels takes 1.6 times as long */
         if (first[k] > start)
             put_solid(b->packed + start, first[k] - start, b->ground);
         put_solid(b->packed + first[k], at[1][k] - first[k], over_ground[0]);
@@ -154,7 +154,7 @@ static __attribute__((noinline)) int blend_some_rows(blend_state *b, const area_
     return blend_between(b, plane, left, right, row, n, b->mode);
 }
 
-/* Rows [first_row, end_row) of the window, of a triangle whose vertices are narrow. */
+/* Rows [first_row, end_row) of the window, of a triangle with narrow vertices. */
 static __attribute__((noinline)) void blend_rows_of(blend_state *b, const tl_triangle *t, int64_t first_row,
                                                     int64_t end_row, int strip)
 {
@@ -221,7 +221,7 @@ static __attribute__((noinline)) void blend_area_single(blend_state *b, int64_t 
         return;
     if (!b->is_flat)
         begin_gouraud(b, i, &parts.set, parts.corners, parts.is_cut);
-    /* strips of what is not narrow are as wide as the window */
+    /* strips of other triangles are as wide as the window */
     const int n_rows = strip_rows(is_narrow ? min64(window->width, right - left + 4) : window->width);
     tl_count_work(window, 4 * (end_row - first_row) * (16 + min64(window->width, right - left)));
     if (TL_LANES > 1 && n == 1 && is_narrow && b->is_flat && b->canvas->is_u8 && is_near(window) &&

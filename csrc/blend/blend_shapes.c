@@ -1,7 +1,7 @@
 /* Blend of a few large flat triangles over one colour, a row of the picture after the other.
  * In: triangles and their colours, the colour behind them.  Out: every pixel, written once.
  *
- * A band of rows is drawn as runs (mix_shapes.c) by what draws large triangles into pixels, and then written. */
+ * A band of rows is drawn as runs (mix_shapes.c) by the walkers of large triangles, and then written. */
 #ifndef TL_BLEND_SHAPES_C
 #define TL_BLEND_SHAPES_C
 
@@ -57,7 +57,7 @@ static int64_t blend_large_shapes(blend_state *b)
     open_run run = start_pixels(canvas->pixels, window->width, window->height, canvas->stride_px);
     f.is_in_place = !canvas->packed;
     if (f.is_in_place)
-        run.n_px = 0; /* nothing is written twice: what stands aside is there */
+        run.n_px = 0; /* nothing is written twice: pixels aside are there already */
     b->shapes = &f, b->window = &band, b->packed = canvas->packed;
     b->stride = f.is_in_place ? canvas->stride_px : window->width;
     b->n_laid = INT64_MAX;

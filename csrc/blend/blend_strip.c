@@ -1,8 +1,8 @@
-/* Blend, by area: a triangle by itself, by strips of rows whose cells stay in the first-level cache.
+/* Blend, by area: a triangle by itself, by strips of rows with cells that stay in the first-level cache.
  * In: a triangle, or the pieces that clip planes leave of it.  Out: pixels.
  *
- * The areas are those of area.c, in cells that no other triangle shares.  They are summed from the left, and what is
- * covered blends; between two edges lies a run as it is without areas.
+ * The areas are those of area.c, in cells that no other triangle shares.  They are summed from the left, and covered
+ * pixels blend; between two edges lies a run as it is without areas.
  *
  * Based on: R. Levien, font-rs, 2015. */
 #ifndef TL_BLEND_STRIP_C
@@ -74,7 +74,7 @@ TL_INLINE int32_t take_left_cells(int32_t *cells)
     return sum;
 }
 
-/* Columns [col, end) of a row that no edge meets, whose pixels are all covered by `sum`. */
+/* Columns [col, end) of a row that no edge meets, all pixels covered by `sum`. */
 TL_INLINE void blend_even(blend_state *b, int64_t at, int64_t col, int64_t end, int32_t sum, int is_u8, tl_mix mode)
 {
     if (sum >= TL_WHOLE) {
@@ -85,7 +85,7 @@ TL_INLINE void blend_even(blend_state *b, int64_t at, int64_t col, int64_t end, 
         mix_block(b, at + col, vm_first(end - col), vi_set1(sum), is_u8, mode);
 }
 
-/* As blend_cells, of rows of which it is known which cells are met; no other is looked at. */
+/* As blend_cells, of rows with a list of the cells that edges meet; no other is looked at. */
 TL_INLINE void blend_met_cells(blend_state *b, const cell_block *c, int is_u8, tl_mix mode)
 {
     const vi bias = vi_set1(TL_CELL_ZERO);
@@ -110,8 +110,8 @@ TL_INLINE void blend_met_cells(blend_state *b, const cell_block *c, int is_u8, t
     }
 }
 
-/* Sums the cells of each row from the left, blends, and clears the cells.  What is covered whole, from one edge to the
- * next, is a run as it is without areas. */
+/* Sums the cells of each row from the left, blends, and clears the cells.  Whole pixels from one edge to the
+ * next are a run as it is without areas. */
 TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mix mode)
 {
     const vi bias = vi_set1(TL_CELL_ZERO);
@@ -143,7 +143,7 @@ TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mi
     }
 }
 
-/* Fetches the pixels of n_rows x n_cols samples: what is done to a row is too long for the next one's loads to start
+/* Fetches the pixels of n_rows x n_cols samples: the work on a row is too long for the next one's loads to start
  * early. */
 TL_INLINE void fetch_pixels(const blend_state *b, int64_t at, int64_t n_rows, int64_t n_cols)
 {
@@ -293,7 +293,7 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
                        .met = plane.met,
                        .met_at = TL_CELL_PAD / TL_MET_CELLS,
                    });
-    for (int64_t k = 0; k < n_rows; k++) /* what lies right of the window, for nobody */
+    for (int64_t k = 0; k < n_rows; k++) /* cells right of the window, for nobody */
         for (int64_t i = plane.n_cols / TL_LANES * TL_LANES; i < plane.stride - TL_CELL_PAD; i += TL_LANES)
             vi_store(plane.cells + k * plane.stride + TL_CELL_PAD + i, vi_set1(TL_CELL_ZERO));
 }

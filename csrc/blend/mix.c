@@ -45,7 +45,7 @@ TL_INLINE int begin_flat(blend_state *b, int64_t id)
     return alpha > 0 || b->mode != TL_MIX_OVER_STRAIGHT;
 }
 
-/* Takes up a triangle of `set`, or a piece of triangle `id`, whose colours are those of its vertices. */
+/* Takes up a triangle of `set`, or a piece of triangle `id`, with colours of its vertices. */
 static void begin_gouraud(blend_state *b, int64_t id, const tl_vertex_set *set, const int32_t *corners, int is_piece)
 {
     b->whole_mode = b->mode == TL_MIX_REPLACE_STRAIGHT ? TL_MIX_REPLACE : b->mode;
@@ -65,7 +65,7 @@ static void begin_gouraud_of_mesh(blend_state *b, int64_t id)
     begin_gouraud(b, id, &b->snapped->mesh, corners, 0);
 }
 
-/* The same of a triangle of the mesh, or of a piece of it, whose vertices are not snapped. */
+/* The same of a triangle of the mesh, or of a piece of it, with vertices that are not snapped. */
 static void begin_exact_gouraud(blend_state *b, int64_t id, int64_t piece)
 {
     const tl_exact_points *points = b->snapped->mesh.exact;
@@ -83,7 +83,7 @@ static void begin_exact_gouraud(blend_state *b, int64_t id, int64_t piece)
     }
 }
 
-/* Colours at the centres of n pixels of a row, of which the triangle may cover any part: where the centre lies outside,
+/* Colours at the centres of n pixels of a row; the triangle may cover any part of each: where the centre lies outside,
  * each weight below 0 is taken as 0. */
 static void color_partly_covered(blend_state *b, int64_t row, int64_t col, int n, void *out)
 {

@@ -1,4 +1,4 @@
-/* Mix: what a colour does to pixels.  The state of one pass, and what every mode is called.
+/* Mix: how a colour is combined with pixels.  The state of one pass, and the names of the modes.
  *
  * uint8 pixels are four bytes in a 32-bit lane, alpha in the highest; pictures with fewer channels are packed into such
  * lanes before the pass and unpacked after it, with alpha 255 where they have none.  float32 pixels stay where they
@@ -16,7 +16,7 @@
 #include "pixels/weights_one.c"
 
 /* STRAIGHT: the last channel is alpha, and the others are not multiplied by it.  The other modes treat all channels
- * alike, but for what OVER_PREMULTIPLIED reads in the last channel of the colour. */
+ * alike, except that OVER_PREMULTIPLIED reads alpha in the last channel of the colour. */
 typedef enum {
     TL_MIX_REPLACE,
     TL_MIX_REPLACE_STRAIGHT, /* the same where a triangle covers the whole pixel */
@@ -43,11 +43,11 @@ typedef struct blend_state {
     float *floats;              /* float32: a channel a lane */
     int64_t stride;             /* in pixels, of either */
     int64_t n_samples;
-    int32_t ground; /* what all pixels get first; uint8 */
+    int32_t ground; /* all pixels get it first; uint8 */
     int64_t n_laid; /* rows that have it, the first ones; all, where there is none */
     int n_channels, is_flat;
     tl_mix mode;
-    tl_mix whole_mode; /* what the triangle at hand does to pixels that it covers whole */
+    tl_mix whole_mode; /* of the triangle at hand, for pixels that it covers whole */
     int32_t color;     /* of a flat triangle; and as float32, over and over */
     float pattern[TL_MAX_LANES + 4];
     /* Gouraud: the triangle at hand, and the colours of a run of its pixels. */

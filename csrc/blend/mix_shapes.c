@@ -90,7 +90,7 @@ TL_INLINE int run_from(row_runs *r, int32_t col)
     return k;
 }
 
-/* Runs [k, end) become one, whose pixels stand aside, together with neighbours of that kind. */
+/* Runs [k, end) become one, with pixels that stand aside, together with neighbours of that kind. */
 TL_INLINE void join_runs(row_runs *r, int k, int end)
 {
     if (k > 0 && r->key[k - 1] == TL_KEY_ASIDE)

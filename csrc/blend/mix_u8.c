@@ -25,7 +25,7 @@ TL_INLINE vi byte_of(vi a, int shift) { return vi_and(vi_shift_right(a, shift), 
  * -127..127, that is q + (257 r + 32896 - q) / 65536, and the fraction lies between 2 / 65536 and 65535 / 65536. */
 TL_INLINE vi divide_by_255(vi x) { return vi_mul_high_halves(vi_add(x, vi_set1(0x00800080)), vi_set1(0x01010101)); }
 
-/* Lanes whose pixel is not opaque. */
+/* Lanes with a pixel that is not opaque. */
 TL_INLINE vm translucent(vi pixels) { return vi_gt_unsigned(vi_set1((int32_t)0xff000000), pixels); }
 
 /* (d * (255 - alpha) + s * alpha) / 255, byte by byte. */
@@ -118,8 +118,8 @@ TL_INLINE vi divide_sums(vi color, vd above, vi under, vd below, vd divisor)
     return vi_round(vd_div(vd_add(vd_mul(vd_from_vi(color), above), vd_mul(vd_from_vi(under), below)), divisor));
 }
 
-/* Straight alpha where one of the two is translucent: `alpha`, of the colour in this pixel, and `rest`, what it leaves
- * of the other one, in 1 / (255 * 2^15). */
+/* Straight alpha where one of the two is translucent: `alpha`, of the colour in this pixel, and `rest`, the remaining
+ * one of the other, in 1 / (255 * 2^15). */
 static __attribute__((noinline)) vi cover_translucent(vi d, vi s, vi alpha, vi rest)
 {
     const vi under = byte_of(d, 24), zero = vi_set1(0);
@@ -152,7 +152,7 @@ TL_INLINE vi mix_part_u8(vi d, vi s, vi area, vm m, tl_mix mode)
     return move_bytes(d, mode == TL_MIX_REPLACE ? s : mix_whole_u8(d, s, m, mode), coverage);
 }
 
-/* The same, and what it should be where the part is the whole: a weight in 2^-15 is too coarse for an alpha below
+/* The same, and exact where the part is the whole: a weight in 2^-15 is too coarse for an alpha below
  * 255. */
 TL_INLINE vi mix_area_u8(vi d, vi s, vi area, vm m, tl_mix mode, tl_mix whole_mode)
 {

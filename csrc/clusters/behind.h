@@ -29,7 +29,7 @@ TL_INLINE int row_beats(const float *row, int64_t col0, int64_t col1, vf depth, 
     return 1;
 }
 
-/* The same of a row with bounds, which take what is found out of whole segments: depths only come before it. */
+/* The same of a row with bounds, which keep the results of whole segments: depths only come before them. */
 TL_INLINE int bounded_row_beats(const float *row, float *bounds, int64_t width, int64_t col0, int64_t col1, float depth,
                                 int is_farthest)
 {

@@ -1,6 +1,6 @@
-/* Clusters: a mesh in object space as sets of neighbouring triangles, each measured once, of which a view needs only
+/* Clusters: a mesh in object space as sets of neighbouring triangles, each measured once; a view needs only
  * some.
- * In: vertices and triangles.  Out: clusters, what stands in them, and the boxes and normals that cluster_view.c looks
+ * In: vertices and triangles.  Out: clusters, their vertices, and the boxes and normals that cluster_view.c looks
  * at.
  *
  * Based on: G. M. Morton, A Computer Oriented Geodetic Data Base, 1966 (the order); S. Kumar, D. Manocha, B. Garrett,

@@ -1,5 +1,5 @@
-/* What a view draws of a clustered mesh: which clusters it needs, which of them lie behind what is drawn, and a cluster
- * as a mesh of its own, whose vertices stay in the first-level cache.
+/* A view of a clustered mesh: which clusters it needs, which of them are hidden, and a cluster
+ * as a mesh of its own, with vertices that stay in the first-level cache.
  * In: a clustered mesh in object space, a matrix; then a depth buffer.  Out: the clusters that may draw a sample;
  * snapped vertices and triangles, which raster.c draws.
  *
@@ -35,7 +35,7 @@ typedef struct {
 } seen_box;
 
 #define TL_N_SIDES 6      /* left, right, above, below, near, far */
-#define TL_IN_DEPTH 0x30u /* within near and far: no triangle is cut into pieces, whose corners are others */
+#define TL_IN_DEPTH 0x30u /* within near and far: no triangle is cut into pieces, which have other corners */
 
 static inline seen_box place_box(const double *low, const double *high, const double *matrix)
 {
@@ -118,8 +118,8 @@ static int is_between_samples(const seen_box *box, const tl_cluster_view *v)
 /* Whether every triangle of a box within the near and far planes is certain to be turned the way that is culled after
  * the snap.
  *
- * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: what the
- * rows of x, y and w take to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes
+ * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: the
+ * rows of x, y and w take it to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes
  * twice the area by less than 4 d (lx + ly) + 8 d^2 sub-pixels^2 when no side is longer than (lx, ly). */
 static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
@@ -153,7 +153,7 @@ static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const s
     return c->min_height * factor > 8.0 * moved * sides && c->min_area * factor > 16.0 * moved * moved;
 }
 
-/* Whether the cluster shows its back, or what is culled, about: it is drawn late then, when what is in front of it may
+/* Whether the cluster shows its back, or the culled side, about: it is drawn late then, when surfaces before it may
  * hide it. */
 static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
@@ -168,7 +168,7 @@ static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_
 /* The depth of the vertex stage for z / w. */
 static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
 
-/* Whether the middle of a box lies before what the window shows there: then it is not hidden, and this is the cheaper
+/* Whether the middle of a box lies before the depth of the window there: then it is not hidden.  The cheaper
  * test. */
 static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window,
                                const tl_target *target)
@@ -183,7 +183,7 @@ static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, co
     return target->sink == TL_SINK_FARTHEST ? there < z : there > z;
 }
 
-/* Whether all of a box lies behind what the window shows where it is, found out by looking at so many pixels at
+/* Whether all of a box lies behind the depths of the window there, by a look at so many pixels at
  * most. */
 static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target,
                      int64_t most_px)
@@ -300,7 +300,7 @@ static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, co
 }
 
 /* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a
- * target of depths, without groups of them that what it shows hides.  `room` has 8 bytes for each cluster.  Returns how
+ * target of depths, without groups of them that it hides.  `room` has 8 bytes for each cluster.  Returns how
  * many. */
 static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window,
                              const tl_target *target, int32_t *list, void *room)
@@ -352,8 +352,8 @@ static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, 
     }
 }
 
-/* Counts of the same clusters those that the window may show, and in *n_hidden those of them that all lie behind what
- * the window shows. */
+/* Counts of the same clusters those that the window may show, and in *n_hidden those of them that the window
+ * hides. */
 static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window,
                             const tl_target *target, int64_t step, int64_t *n_hidden)
 {
@@ -374,7 +374,7 @@ static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, 
 }
 
 /* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window or between
- * samples, nor, with a target of depths, behind what it shows. */
+ * samples, nor, with a target of depths, behind them. */
 static void find_shown(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
                        const tl_window *window, const tl_target *target, uint8_t *shown)
 {
@@ -397,7 +397,7 @@ typedef struct {
     int32_t names[TL_CLUSTER];
 } cluster_mesh;
 
-/* Lists the triangles that have a special corner, and leaves the others, whose number it returns. */
+/* Lists the triangles that have a special corner, and leaves the others; returns their number. */
 static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t n, tl_slice *slice)
 {
     int64_t n_left = 0;

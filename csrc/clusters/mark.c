@@ -1,5 +1,5 @@
 /* Mark: the vertices that some triangles use.
- * In: ids, most of which repeat the one before.  Out: a byte for each block of vertices. */
+ * In: ids; most repeat the one before.  Out: a byte for each block of vertices. */
 #ifndef TL_MARK_C
 #define TL_MARK_C
 

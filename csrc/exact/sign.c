@@ -3,8 +3,8 @@
  * within 2^-50 of its size.
  *
  * Four ways, each taken where the one before it cannot tell: the rounded E and a bound on its error; exact differences,
- * whose products are compared by rounded value and then by error; sums of floating-point numbers that do not overlap;
- * integers of 2176 bits, of which every finite float64 is one, counted in 2^-1074.
+ * with products compared by rounded value and then by error; sums of floating-point numbers that do not overlap;
+ * integers of 2176 bits: every finite float64 is one, counted in 2^-1074.
  *
  * Based on: J. R. Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997. */
 #ifndef TL_SIGN_C
@@ -255,7 +255,7 @@ static __attribute__((noinline)) int slow_sign(exact_point a, exact_point b, exa
     return big_edge(a, b, p, &size_of_edge);
 }
 
-/* The rounded E, and in *bound what it errs by at most (Shewchuk's A); where nothing overflows or underflows. */
+/* The rounded E, and in *bound its greatest error (Shewchuk's A); where nothing overflows or underflows. */
 TL_INLINE double rounded_edge(exact_point a, exact_point b, exact_point p, double *bound)
 {
     const double left = (b.x - a.x) * (p.y - a.y), right = (b.y - a.y) * (p.x - a.x);
@@ -319,7 +319,7 @@ typedef struct {
     int factor;
 } edge_term;
 
-/* The sign of a sum of n edge functions, in integers: what is positive, and what is negative. */
+/* The sign of a sum of n edge functions, in integers: positive terms against negative ones. */
 static int big_terms_sign(const edge_term *terms, int n)
 {
     const int n_words = 2 * TL_BIG_WORDS;

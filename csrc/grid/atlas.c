@@ -1,4 +1,4 @@
-/* Atlas: what a mesh has at the texels of its texture coordinates.
+/* Atlas: a mesh's values at the texels of its texture coordinates.
  * In: triangles in texels, values of their corners, pictures that cameras have taken.  Out: values of texels.
  *
  * Based on: I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974 (the part of a triangle in a texel). */
@@ -14,7 +14,7 @@
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
 
-#define TL_MOST_PART 7 /* corners of what four lines leave of a triangle */
+#define TL_MOST_PART 7 /* corners of a triangle cut by four lines */
 
 typedef struct {
     double x[TL_MOST_PART + 1], y[TL_MOST_PART + 1];
@@ -154,7 +154,7 @@ static void touch_texels(const tl_atlas *a, int64_t first, int64_t end, int32_t 
     }
 }
 
-/* Rows [first, end): means of the values over what triangles cover of texels, and the share that they cover (width a
+/* Rows [first, end): means of the values over the covered areas of texels, and the share that they cover (width a
  * row); of the triangle that covers most the id, the first of several.  `sums`: room for (rows, width, 1 + n_values),
  * `most`: for (rows, width), both 0. */
 static void average_texels(const tl_atlas *a, int64_t first, int64_t end, double *sums, float *most, int32_t *ids,
@@ -249,7 +249,7 @@ static void copy_texels(const int32_t *from, int64_t first, int64_t end, int64_t
 }
 
 /* Whether a picture shows a point, which lies at (x, y) of it: the id of the texel, or no nearer depth, at one of the
- * four pixels whose middles are next to it. */
+ * four pixels with middles next to it. */
 static int is_seen(const tl_taken *t, double x, double y, double z, int32_t id)
 {
     const int64_t left = (int64_t)floor(x - 0.5), top = (int64_t)floor(y - 0.5);
@@ -282,7 +282,7 @@ static void take_light(const tl_taken *t, double x, double y, float *light)
         light[c] = (float)(sums[c] / total); /* one shows it: see is_seen */
 }
 
-/* Adds what a picture shows of texels [first, end) to their sums (n_channels of them) and weights: light times the
+/* Adds a picture's colours of texels [first, end) to their sums (n_channels of them) and weights: light times the
  * squared cosine at which it is seen; or keeps the light that is seen best. */
 static void add_taken(const tl_taken *t, const float *positions, const float *normals, const int32_t *ids,
                       int64_t first, int64_t end, float *sums, float *weights)

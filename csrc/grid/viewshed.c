@@ -2,7 +2,7 @@
  * In: heights at the middles of cells, a point.  Out: heights above the ground, 0 where the ground is seen.
  *
  * The line to each cell is followed by itself, over every line between the middles of neighbours, along rows and along
- * columns, where the height is between theirs; but for blocks that lie below what has hidden the cell already.
+ * columns, where the height is between theirs; except blocks that lie below the slope that hides the cell already.
  *
  * Based on: W. R. Franklin, C. K. Ray, Higher Isn't Necessarily Better: Visibility Algorithms and Experiments, 1994
  * (R3, along both axes). */
@@ -77,7 +77,7 @@ static double block_height(const tl_terrain *t, const sight *s, int64_t block, d
     return most;
 }
 
-/* The steepest way up over all of a line, block by block from the eye on: most blocks lie below what hides them. */
+/* The steepest way up over all of a line, block by block from the eye on: most blocks lie below the slope so far. */
 static double follow(const tl_terrain *t, const sight *s)
 {
     double most = -INFINITY;

@@ -1,4 +1,4 @@
-/* Voxels: columns of crossings to what lies inside, and the voxels that triangles meet.
+/* Voxels: from columns of crossings the inside voxels, and the voxels that triangles meet.
  * In: bits that TL_SINK_PEEL has noted of a mesh seen along its columns, or points in voxels.  Out: a byte or a share
  * of each voxel, the steps of a column side by side.
  *

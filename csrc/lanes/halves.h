@@ -1,4 +1,4 @@
-/* Lanes of 16 and 8 bits, and tables of 64 numbers in registers: what meshlets/ needs besides the sixteen lanes of
+/* Lanes of 16 and 8 bits, and tables of 64 numbers in registers: for meshlets/, besides the sixteen lanes of
  * lanes_avx512.h.  With AVX-512 VBMI and VBMI2 alone: TL_HAS_HALVES tells.
  *
  *   vi as 32 halves (vh_), vb 32 bytes, vhm 32 bits; unsigned unless their name says signed
@@ -31,7 +31,7 @@ TL_INLINE vi vi_pick_64(const void *table, vi i)
         _mm512_permutex2var_epi32(_mm512_load_si512(p), i, _mm512_load_si512(p + 64)),
         _mm512_permutex2var_epi32(_mm512_load_si512(p + 128), i, _mm512_load_si512(p + 192)));
 }
-/* the bytes of 128 whose numbers are the lowest bytes of the lanes; what stands in the other bytes means nothing */
+/* the bytes of 128 with numbers in the lowest bytes of the lanes; the other bytes mean nothing */
 TL_INLINE vi vi_pick_bytes(const uint8_t *table, vi i)
 {
     return _mm512_permutex2var_epi8(_mm512_loadu_si512(table), i, _mm512_loadu_si512(table + 64));

@@ -25,7 +25,7 @@
  *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
  *   vi_prefix_count(bits)   how many of the bits [0, k] are set
  *   vi_spill(p, a)          a store of lanes that are then read one by one
- *   vd_power(a, sum, mask)  the number whose bits are `sum` less the bits of a in `mask`
+ *   vd_power(a, sum, mask)  the number with bits of `sum` less the bits of a in `mask`
  *   vd_load_records(base, stride, i, c)    four doubles at base + 8 * stride * i[k], as columns
  *   vd_load_pairs(base, stride, first, x, y)    two doubles at base + 8 * stride * first[3 * k], as columns
  *   vd_load_triples(base, first, x, y, z)    three doubles at base + 24 * first[3 * k], as columns

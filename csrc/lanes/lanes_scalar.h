@@ -1,4 +1,4 @@
-/* One lane, plain C: the definition of what every other instruction set must give. */
+/* One lane, plain C: the definition of the results of every other instruction set. */
 #ifndef TL_LANES_SCALAR_H
 #define TL_LANES_SCALAR_H
 

@@ -92,7 +92,7 @@ TL_INLINE void v2d_store(double *p, v2d a) { *(v2d_there *)p = a; }
 TL_INLINE vd vd_load(const double *p) { return (vd){v2d_load(p), v2d_load(p + 2)}; }
 TL_INLINE void vd_store(double *p, vd a) { v2d_store(p, a.lo), v2d_store(p + 2, a.hi); }
 
-/* ---- what the three have under different names ------------------------------------------------------------------- */
+/* ---- different names in the three -------------------------------------------------------------------------------- */
 
 #if defined(TL_ON_NEON)
 TL_INLINE vi vi_min(vi a, vi b) { return (vi)vminq_s32((int32x4_t)a, (int32x4_t)b); }
@@ -137,7 +137,7 @@ TL_INLINE vd vd_from_vf(vf a)
     return (vd){(v2d)vcvt_f64_f32(vget_low_f32((float32x4_t)a)), (v2d)vcvt_high_f64_f32((float32x4_t)a)};
 }
 TL_INLINE vf vf_from_vd(vd a) { return (vf)vcvt_high_f32_f64(vcvt_f32_f64((float64x2_t)a.lo), (float64x2_t)a.hi); }
-/* conversions saturate: what is out of range, and NaN, becomes INT32_MIN here */
+/* conversions saturate: numbers out of range, and NaN, become INT32_MIN here */
 TL_INLINE vi vi_in_range(vf a, int32x4_t b)
 {
     return (vi)vbslq_s32(vcaltq_f32((float32x4_t)a, vdupq_n_f32(0x1p31f)), b, vdupq_n_s32(INT32_MIN));
@@ -428,7 +428,7 @@ TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
 }
 #endif
 
-/* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
+/* Numbers with bits [begin, end) set, none where begin >= end; begin >= 0, end in 0..31. */
 #if defined(TL_ON_NEON)
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 {
@@ -445,7 +445,7 @@ TL_INLINE vi power_of_two(vi n)
     const v16u table = {1, 2, 4, 8, 16, 32, 64, 128}, before = {0, 8, 16, 24, 0, 8, 16, 24, 0, 8, 16, 24, 0, 8, 16, 24};
     return (vi)v16_swizzle(table, every - before);
 }
-#else                   /* as a float: 2^31, out of range, becomes INT32_MIN, whose bits are the same */
+#else                   /* as a float: 2^31, out of range, becomes INT32_MIN, with the same bits */
 TL_INLINE vi power_of_two(vi n) { return (vi)_mm_cvttps_epi32((__m128)((n + 127) << 23)); }
 #endif
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)

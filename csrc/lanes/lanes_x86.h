@@ -55,7 +55,7 @@ TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
         vi_store(p + TL_LANES * k, rows[k]);
 }
 TL_INLINE vw vw_zero(void) { return (vw){TL_SI(setzero)(), TL_SI(setzero)()}; }
-/* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
+/* Numbers with bits [begin, end) set, none where begin >= end; begin >= 0, end in 0..31. */
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 {
     const vi ones = TL_MM(set1_epi32)(-1);

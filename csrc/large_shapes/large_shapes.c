@@ -44,7 +44,7 @@ TL_INLINE int32_t word_of_key(const tl_target *target, tl_sink sink, uint64_t ke
     return word;
 }
 
-/* The rows of a band from `at` on, whose spans are listed. */
+/* The rows of a band from `at` on; their spans are listed. */
 TL_INLINE void put_rows(const tl_snapped *snapped, const tl_window *band, const tl_target *target, const span_table *t,
                         int64_t at, open_run *run, tl_sink sink)
 {

@@ -1,7 +1,7 @@
 /* Runs: a row of a picture as runs of pixels that hold the same, and how they get into memory.
  * In: spans of triangles.  Out: pixels, each written once.
  *
- * A run has a key: a mask's bit, a count, a label, or what each sample of its pixels sees, side by side. */
+ * A run has a key: a mask's bit, a count, a label, or the labels of all samples of its pixels, side by side. */
 #ifndef TL_ROW_RUNS_C
 #define TL_ROW_RUNS_C
 
@@ -120,7 +120,7 @@ static void put_pixels(char *pixels, int64_t n, const char *value, size_t pixel_
 {
     const size_t all = (size_t)n * pixel_bytes, most = 1024 / pixel_bytes * pixel_bytes;
     memcpy(pixels, value, pixel_bytes);
-    for (size_t done = pixel_bytes; done < all;) { /* twice as many each time, up to what stays near */
+    for (size_t done = pixel_bytes; done < all;) { /* twice as many each time, up to 1 kB */
         const size_t part = done < most ? done : most, size = all - done < part ? all - done : part;
         memcpy(pixels + done, pixels, size);
         done += size;
@@ -154,7 +154,7 @@ TL_INLINE void put_patterns(char *pixels, int64_t n, const char *value, int64_t 
     memcpy(pixels + all - period, pattern, (size_t)period); /* some of it again */
 }
 
-/* A run that is known as far as `end`, and may go on: in a picture whose rows follow one another in the next row, too.
+/* A run that is known as far as `end`, and may go on, in the next row, too, if rows follow one another.
  * Pixels are counted from the first one of the rows that this pass writes. */
 typedef struct {
     char *pixels;
@@ -169,7 +169,7 @@ TL_INLINE open_run start_pixels(void *pixels, int64_t width, int64_t n_rows, int
     return (open_run){.pixels = pixels, .n_px = width == stride ? width * n_rows : 0};
 }
 
-/* Writes what is known, and may write a few pixels more, which are written later. */
+/* Writes the known pixels, and may write a few more, which are written again later. */
 TL_INLINE void close_run(const open_run *run, int pixel_bytes)
 {
     char *const pixels = run->pixels + run->first * pixel_bytes;

@@ -74,7 +74,7 @@ static void list_row_spans(const tl_snapped *snapped, const tl_window *band, con
     t->n_slots = slot;
 }
 
-/* Rows of a band whose spans fit: as many as stay in the first-level cache, or as are worth setting all up anew. */
+/* Rows of a band with spans that fit: as many as stay in the first-level cache, or as are worth setting all up anew. */
 static void start_span_table(span_table *t, const tl_snapped *snapped, int n_samples, int64_t width)
 {
     const int64_t n = max64(spans_in_row(snapped, n_samples), 1), hot = TL_SHAPE_SPANS / 4 / n;

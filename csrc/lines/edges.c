@@ -1,5 +1,5 @@
 /* The edges of the triangles that are not culled, each shared one once, by ascending lower index; and where the line of
- * an edge begins and ends, and what of it is hidden.
+ * an edge begins and ends, and which parts of it are hidden.
  * In: triangles; two vertices, snapped or cut by a clip plane.  Out: pairs of vertices, the lower index first; two ends
  * in fixed point, in an order that is the edge's own.
  *

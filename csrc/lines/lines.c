@@ -42,7 +42,7 @@ static void flush_plain(line_state *s)
     uint8_t *restrict pixels = s->target->pixels;
     const int32_t *restrict at = s->at, n = s->n;
     int32_t k = 0;
-    /* four loads for eight stores: a load waits for any store before it whose address ends in the same 12 bits; 30 % of
+    /* four loads for eight stores: a load waits for any store before it with the same last 12 bits of address; 30 % of
      * blob(100k) */
     for (; k + 8 <= n; k += 8) {
         uint64_t pairs[4];
@@ -57,7 +57,7 @@ static void flush_plain(line_state *s)
     s->n = 0;
 }
 
-/* No branch: what is hidden cannot be predicted; a third of the time. */
+/* No branch: hidden pixels cannot be predicted; a third of the time. */
 static void flush_hidden(line_state *s)
 {
     const tl_line_target own = *s->target, *target = &own; /* a copy that no store can change */
@@ -152,7 +152,7 @@ static void draw_line(const line_state *s, const int32_t *edge)
 
 /* TL_LANES lines inside the window. */
 typedef struct {
-    vi x, y, steps, across, along, aside; /* along, aside: what a step adds to the number of a pixel */
+    vi x, y, steps, across, along, aside; /* along, aside: added to the number of a pixel by a step */
     vd z, slope;
 } lane_lines;
 

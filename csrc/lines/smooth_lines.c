@@ -1,6 +1,6 @@
 /* Smooth lines: the edges of a mesh as lines one pixel wide with round ends, between the snapped ends themselves.
  * In: snapped vertices, pairs of them.  Out: float coverage, max(0, 1 - distance of the pixel's centre from the edge),
- * which is what a box one pixel wide, across the line, sees of it; of several lines the largest counts.
+ * which is the share of a box one pixel wide, across the line; of several lines the largest counts.
  * Based on: S. Gupta, R. F. Sproull, Filtering Edges for Gray-Scale Displays, 1981.
  *
  * u runs along the longer side of the line, v across, both from its first end in half sub-pixels.  The line is at most

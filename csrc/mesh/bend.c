@@ -1,11 +1,11 @@
-/* Bend: triangles in parts whose sides are straight in the picture of a lens, to within a tolerance.
+/* Bend: triangles in parts with straight sides in the picture of a lens, to within a tolerance.
  * In: points in eye space, their records, triangles.  Out: which triangles are drawn as they are, which cannot show,
  * and the parts of the others.
  *
- * An edge is straight where its chord, on the sphere of directions, is within what the lens allows at both ends: the
+ * An edge is straight where its chord, on the sphere of directions, is within the lens's limit at both ends: the
  * largest second derivative of the lens in the rings there, times the square of the chord over 8, is then less than
  * half of the tolerance.  Other edges are looked at at a quarter, half and three quarters of their length, and halved
- * where the picture, its depth too, is off by more than the tolerance from what a straight edge would show; unless
+ * where the picture, its depth too, is off by more than the tolerance from that of a straight edge; unless
  * that is shorter than a pixel there.  Both are questions to the edge alone, and its ends may change places: triangles
  * that share an edge, by index or by position, split it alike, and no gap opens. */
 #ifndef TL_BEND_C
@@ -61,7 +61,7 @@ static int side_between(int a, int b)
     return -1;
 }
 
-/* ---- what is looked at ---------------------------------------------------------------------------------- */
+/* ---- triangles and edges --------------------------------------------------------------------------------- */
 
 /* The corners of TL_LANES triangles, as the columns of their records. */
 TL_INLINE void load_records(const float *records, const int32_t corners[3][TL_MAX_LANES], vf columns[3][4])
@@ -74,7 +74,7 @@ TL_INLINE void load_records(const float *records, const int32_t corners[3][TL_MA
     }
 }
 
-/* The corners of TL_LANES triangles from the i-th on, of which n are there. */
+/* The corners of TL_LANES triangles from the i-th on; n are there. */
 TL_INLINE void load_corner_columns(const int32_t *triangles, int64_t i, int64_t n, int32_t corners[3][TL_MAX_LANES])
 {
     if (TL_LANES > 1 && i > 0 && n >= TL_LANES) { /* 16 bytes, from the number before each triangle on */
@@ -98,7 +98,7 @@ TL_INLINE vf chord_squared(const vf *a, const vf *b)
 }
 
 /* The triangles that cannot show for certain: they lie in a cap round the middle of their directions that ends before
- * what shows begins, or are nearer than the near plane throughout.  1e-5: ten times what float32 errs by. */
+ * the picture begins, or are nearer than the near plane throughout.  1e-5: ten times the error of float32. */
 TL_INLINE vm find_outside(const tl_lens *lens, const vf corner[3][4])
 {
     const vf one = vf_set1(1.0f), half = vf_set1(0.5f);

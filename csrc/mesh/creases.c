@@ -4,7 +4,7 @@
  *
  * Two corners of a vertex belong together when their triangles share a side at the vertex and their normals differ by
  * at most the angle; so do those that a chain of such pairs joins.  A triangle without an area has no normal: its two
- * sides at the vertex count as one, so that what is on either side of it are neighbours.  Sides that more than
+ * sides at the vertex count as one, so that the triangles on either side of it are neighbours.  Sides that more than
  * TL_MOST_AT_SIDE triangles share join nothing.
  *
  * Each vertex is worked on by itself, and sums have the order of the triangles: threads change no bit.

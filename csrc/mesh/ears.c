@@ -165,7 +165,7 @@ static void end_reflex(ear_face *f, int32_t i)
 }
 
 /* A triangle that may be an ear.  A point is in it when (bx - ax) (y - ay) >= (by - ay) (x - ax) for each side, in
- * float64, whose products and differences are monotone: a box's ends tell for all its points.  Those are off by less
+ * float64; its products and differences are monotone: a box's ends tell for all its points.  Those are off by less
  * than 2^-49 for coordinates of size 1, so a point that counts as inside lies in the triangle's box, larger by as much
  * of its sides as that is of its area. */
 typedef struct {
@@ -283,7 +283,7 @@ static void cut_off(ear_face *f, int32_t i)
     }
 }
 
-/* Makes room for a face of k corners, whose x and y are filled in. */
+/* Makes room for a face of k corners, to fill in their x and y. */
 static void open_ears(ear_face *f, int32_t k, int64_t *room)
 {
     f->x = (double *)room, f->y = f->x + k, room += 2 * (int64_t)k;

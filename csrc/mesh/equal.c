@@ -15,7 +15,7 @@
 
 enum {
     TL_HASHED_TOGETHER = 32,
-    TL_MOST_PROBES = 64, /* of a row on average: files can be made whose hashes meet */
+    TL_MOST_PROBES = 64, /* of a row on average: files can be made to have equal hashes */
 };
 
 TL_INLINE uint64_t hash_of(const uint32_t *row, int n_words)

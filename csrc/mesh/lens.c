@@ -21,7 +21,7 @@
 #define TL_NOT_PLAIN -1.0f
 #define TL_TOO_NEAR -2.0f /* nearer than the near plane, too */
 
-/* Points in camera axes, and what the lens makes of them. */
+/* Points in camera axes, and where the lens shows them. */
 typedef struct {
     vd p[3], far, off_axis, direction[3];
     vd place[2], reach;
@@ -137,7 +137,7 @@ static void see_lanes(const tl_lens *lens, lens_lanes *l)
         go_on_outwards(lens, l, beyond);
 }
 
-/* Records of points, by float32: what they tell leaves more room than that.  A point that is too near is so for
+/* Records of points, by float32: their users leave more room than that.  A point that is too near is so for
  * certain. */
 TL_INLINE void make_records(const tl_lens *lens, const vd *p, vf *record)
 {

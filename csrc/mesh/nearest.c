@@ -59,7 +59,7 @@ TL_INLINE double above_inside(const double p[3], const double a[3], const double
     return squared_between(p, at);
 }
 
-/* The point of the triangle that is nearest to p: above its inside, or on a side.  A needle whose inside is lost in
+/* The point of the triangle that is nearest to p: above its inside, or on a side.  A needle with its inside lost in
  * rounding has its sides. */
 static double nearest_of_triangle(const double p[3], const double a[3], const double b[3], const double c[3],
                                   double at[3])

@@ -1,7 +1,7 @@
 /* Normals of triangles and of vertices, which side these are on, and the box round a mesh; and rows of three numbers as
  * unit vectors, turned, moved, and as the rows of four that shading reads.
  * In: vertices, triangles, vectors or colours of a mesh.  Out: unit vectors, flags, a box; rows of float64 (n, 3), or
- * of float32 (n, 4) whose last number is 1.
+ * of float32 (n, 4) with 1 as last number.
  *
  * Triangles go by blocks: corners are gathered one by one, all that follows is computed a vector of triangles at a
  * time, and sums are scattered one by one.  Angles have an arctangent of their own, as those of C libraries differ.
@@ -22,8 +22,8 @@
 #include "lanes/angle.h"
 #include "lanes/lanes.h"
 
-/* The powers of two, 2^-1 to 2^1022, that take numbers up to 2^1022 to [1/2, 1): products with them are exact but for
- * what is lost below 2^-1074; and what undoes them. */
+/* The powers of two, 2^-1 to 2^1022, that take numbers up to 2^1022 to [1/2, 1): products with them are exact down
+ * to 2^-1074; and their inverses. */
 TL_INLINE vd power_to_one(vd a) { return vd_power(a, 2045ull << 52, 2047ull << 52); }
 TL_INLINE vd power_from_one(vd power) { return vd_power(power, 2046ull << 52, 2047ull << 52); }
 
@@ -161,7 +161,7 @@ static int64_t bad_face(const int32_t *triangles, int64_t first, int64_t end, in
     return -1;
 }
 
-/* Differences of what is beyond 2^1000 might overflow: such a face is made smaller, exactly. */
+/* Differences of numbers beyond 2^1000 might overflow: such a face is made smaller, exactly. */
 TL_INLINE void gather_as(const void *data, int is_f32, const int32_t *triangles, face_block *b)
 {
     for (int i = 0; i < b->n; i++) {

@@ -3,9 +3,9 @@
  *
  * The distance from one triangle of the surface is a convex function, so over a convex piece of a triangle it is
  * largest at a corner, and the distance from the surface is not larger than that.  No point of a piece is farther from
- * the surface than its middle by more than its radius, either.  Where neither is near enough to what is known to be
- * met, the piece is cut along the sides of the triangle that is nearest to its middle: what lies above that triangle is
- * judged by it, the rest by others.  Where that does not help, the piece is halved.  A bound holds wherever the cuts
+ * the surface than its middle by more than its radius, either.  Where neither is near enough to the known
+ * distance, the piece is cut along the sides of the triangle that is nearest to its middle: the part above that one
+ * is judged by it, the rest by others.  Where that does not help, the piece is halved.  A bound holds wherever the cuts
  * are, and whichever triangle judges: those that did last are asked before the tree.
  *
  * Based on: M. Tang, M. Lee, Y. J. Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009;
@@ -56,7 +56,7 @@ static void add_corner(convex *p, const double at[3])
     p->n++;
 }
 
-/* Cuts a piece by the plane through `at`, into what lies in the direction of `normal` and what does not.  Returns 0 and
+/* Cuts a piece by the plane through `at`, into the part in the direction of `normal` and the rest.  Returns 0 and
  * cuts nothing where either would be thinner than `slack`.  There must be room for two corners more. */
 static int cut(const convex *p, const double at[3], const double normal[3], double slack, convex *inside,
                convex *outside)
@@ -134,7 +134,7 @@ static double enough_of(const reaching *r)
 }
 
 /* The foot of the middle of a piece: on a triangle that is remembered, if the middle lies above its inside and not
- * farther than what is known to be met; else on the nearest. */
+ * farther than the known distance; else on the nearest. */
 static foot foot_of_middle(reaching *r, const double middle[3])
 {
     const tl_surface *s = r->surface;
@@ -150,7 +150,7 @@ static foot foot_of_middle(reaching *r, const double middle[3])
     return foot_of(r, middle);
 }
 
-/* Cuts a piece along the sides of a triangle, across the triangle that it is of; pushes what lies outside.  Returns how
+/* Cuts a piece along the sides of a triangle, across the triangle that it is of; pushes the parts outside.  Returns how
  * many there are. */
 static int cut_along(const reaching *r, convex *p, int64_t triangle, double slack, convex *rest)
 {
@@ -217,7 +217,7 @@ static double middle_of(const convex *p, double middle[3])
     return largest;
 }
 
-/* A bound for a piece, by the cheapest means that is enough; else what is left of it stays on top, and the rest
+/* A bound for a piece, by the cheapest means that is enough; else a part of it stays on top, and the rest
  * below. */
 static double bound_piece(reaching *r, convex *stack, int *n)
 {

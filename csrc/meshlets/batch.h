@@ -3,7 +3,7 @@
  * Units: a grid of 2^-8 px, whatever the picture's sub-pixels are, at most 8 bits: those of a coarser grid are
  * multiples.  x runs to the right, y upwards, from the left end of the row below the meshlet's own window of 128 x 128
  * pixels: so both are positive 16-bit numbers, and an edge keeps its zero (the top-left rule) where the pair
- * x | y << 16 of its end is less than that of its start.  A triangle whose drawn side shows is counter-clockwise. */
+ * x | y << 16 of its end is less than that of its start.  A triangle that shows its drawn side is counter-clockwise. */
 #ifndef TL_MESHLET_BATCH_H
 #define TL_MESHLET_BATCH_H
 
@@ -30,7 +30,7 @@
 /* A meshlet of a batch. */
 typedef struct {
     vi pairs[4];   /* x | y << 16 of the vertices */
-    vi x[2], y[2]; /* the same apart, and what rounds them to samples added */
+    vi x[2], y[2]; /* the same apart, plus the offset that rounds them to samples */
     int32_t z_low[TL_MESHLET_VERTICES] __attribute__((aligned(64))),
         z_high[TL_MESHLET_VERTICES] __attribute__((aligned(64)));
     const tl_meshlet *meshlet;
@@ -84,7 +84,7 @@ typedef struct {
 
 /* ---- sixteen triangles of a meshlet ------------------------------------------------------------------------- */
 
-/* The corners of triangles whose numbers are the lowest bytes of the lanes. */
+/* The corners of triangles with numbers in the lowest bytes of the lanes. */
 TL_INLINE void pick_corners(const meshlet_slot *s, vi triangle, vi *corner)
 {
     for (int k = 0; k < 3; k++)

@@ -173,15 +173,15 @@ static void start_meshlets(meshlet_batch *s, const tl_meshlet_pass *pass, int32_
     memcpy(s->is_f64 ? (void *)s->matrix64 : (void *)s->matrix, pass->source->matrix,
            s->is_f64 ? sizeof s->matrix64 : sizeof s->matrix);
     s->scale_x = pass->seen->scale_x, s->scale_y = pass->seen->scale_y;
-    /* a sample off the centre sees what the centre sees of vertices that have moved the other way */
+    /* a sample off the centre sees the view of the centre with vertices moved the other way */
     s->x_fx = s->scale_x - unit * (double)window->x_px - (double)pass->sample_x_fx;
     s->y_fx = s->scale_y - unit * (double)window->y_px - (double)pass->sample_y_fx;
     s->is_zero_to_one = pass->view->zero_to_one;
     s->n_slots = s->n_fragments = s->small.n = s->middle.n = s->rows.n = 0;
-    memset(s->sample, 0, sizeof s->sample); /* what is prefetched behind the end of the list */
+    memset(s->sample, 0, sizeof s->sample); /* prefetched behind the end of the list */
 }
 
-/* ---- what lies behind what has been drawn: depths only come nearer, so what is hidden now stays so ------------- */
+/* ---- occlusion: depths only come nearer, so a meshlet that is hidden now stays hidden -------------------------- */
 
 /* Whether the depth of a sample, if that is drawn here, does not beat this one. */
 TL_INLINE int shows_at(const meshlet_batch *s, int32_t col, int32_t row, float depth)
@@ -247,8 +247,8 @@ static inline int slab_in_order(const draw_order *order, const tl_seen_meshlet *
     return ((at->side & TL_SIDE_BACK) == order->late ? TL_ORDER_SLABS : 0) + in_slab;
 }
 
-/* Sorts what reaches into rows [row0, row1) by the band that its last row lies in, and there into the order in which it
- * is drawn; starts[TL_ORDERED * band] is where a band begins, TL_ORDER_SLABS on where those of it that are late do. */
+/* Sorts meshlets that reach into rows [row0, row1) by the band of their last row, and there into the order of
+ * drawing; starts[TL_ORDERED * band] is where a band begins, TL_ORDER_SLABS on where those of it that are late do. */
 static int sort_bands(const tl_seen_meshlet *seen, int64_t n, int32_t row0, int32_t row1, const draw_order *order,
                       int64_t *starts, tl_seen_meshlet *sorted)
 {
@@ -272,7 +272,7 @@ static int sort_bands(const tl_seen_meshlet *seen, int64_t n, int32_t row0, int3
     return n_bands;
 }
 
-/* Draws list[first] to list[end - 1] without those that are hidden; what follows up to `limit` is drawn soon. */
+/* Draws list[first] to list[end - 1] without those that are hidden; those up to `limit` are drawn soon. */
 static int draw_listed_meshlets(meshlet_batch *s, const tl_seen_meshlet *list, int64_t first, int64_t end,
                                 int64_t limit)
 {
@@ -299,7 +299,7 @@ static int draw_late_meshlets(meshlet_batch *s, tl_seen_meshlet *list, int64_t f
     return draw_listed_meshlets(s, list, first, n, n);
 }
 
-/* Draws what `seen` and `fallback` list of rows [row0, row1) of the window, cleared first if `is_first`.  `others` gets
+/* Draws `seen` and `fallback` in rows [row0, row1) of the window, cleared first if `is_first`.  `others` gets
  * the names of triangles that clip planes may cut, or that 64 bits cannot hold; returns how many. */
 static int64_t draw_meshlets(const tl_meshlet_pass *pass, const tl_seen_meshlet *seen, int64_t n_seen,
                              const int32_t *fallback, int64_t n_fallback, int32_t row0, int32_t row1, int is_first,

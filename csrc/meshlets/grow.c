@@ -1,9 +1,9 @@
 /* Grows meshlets: sets of triangles that share vertices, at most 64 of them.
- * In: triangles along a curve.  Out: meshlets, with what measure.c finds out about each.
+ * In: triangles along a curve.  Out: meshlets, with the bounds that measure.c finds of each.
  *
- * A piece of the curve at a time, so that what is looked up lies in a near cache: the triangles round each vertex, how
+ * A piece of the curve at a time, so that look-ups stay in a near cache: the triangles round each vertex, how
  * many of them are free.  A meshlet begins with the next free triangle.  It then takes triangles that need no new
- * vertex; then of those that need one the one nearest to its middle whose new vertex has few other free triangles, so
+ * vertex; then of those that need one the nearest to its middle with few other free triangles at the new vertex, so
  * that none are left over that lie alone. */
 #ifndef TL_GROW_C
 #define TL_GROW_C
@@ -18,7 +18,7 @@
 #include "meshlets/measure.c"
 #include "meshlets/pair.c"
 
-#define TL_MAX_CANDIDATES 4096 /* of a meshlet; what does not fit is found along the curve */
+#define TL_MAX_CANDIDATES 4096 /* of a meshlet; the others are found along the curve */
 #define TL_MAX_JUMP 256        /* along the curve, to a triangle that shares no vertex */
 #define TL_LEAST_GROWN 20      /* triangles of a meshlet with 64 vertices that no two of them share */
 #define TL_LIVE_WEIGHT 0.1f    /* of a free triangle at the new vertex, against the distance from the middle */

@@ -153,8 +153,8 @@ TL_INLINE void place_reach(const lane_view *l, vf inverse_w, lane_bounds *b)
     b->moved = vf_fma(vf_max(moved[0], moved[1]), inverse_w, set(0.501f));
 }
 
-/* The meshlets that are certain to hold no sample, each of which lies half a pixel from where `at` begins.  Beside
- * what corners move, `at` has errors: no more than those of the vertex stage for the forms, and 0.013 pixels for the
+/* The meshlets that are certain to hold no sample; each sample lies half a pixel from where `at` begins.  Beside
+ * moves of corners, `at` has errors: no more than those of the vertex stage for the forms, and 0.013 pixels for the
  * division and the sum, of numbers below 2^15. */
 TL_INLINE vm between_samples(const lane_view *l, const lane_bounds *b, const vf at[2])
 {
@@ -187,7 +187,7 @@ TL_INLINE lane_eye place_eye(const lane_view *l, const lane_bounds *b)
     return (lane_eye){along, across, vf_sqrt(squares)};
 }
 
-/* The meshlets whose triangles are all certain to be turned one way after the snap: with `along` as it is the one that
+/* The meshlets with all triangles certain to be turned one way after the snap: with `along` as it is the one that
  * is culled (of a view that culls nothing: the front shows), with `along` negated the other one.
  *
  * Twice the area of a triangle in the picture is n . g(a) times a factor, as is_turned_away in cluster_view.c has it.
@@ -220,7 +220,7 @@ TL_INLINE vf depth_bound(const lane_view *l, const lane_bounds *b, vf q, vf inve
                             vf_mul(inverse_least, set(1.0001f)));
     const vf ndc = l->is_farthest ? vf_add(q, reach) : vf_sub(q, reach);
     const vf depth = l->is_zero_to_one ? ndc : vf_fma(ndc, set(0.5f), set(0.5f));
-    return vf_add(depth, set(l->is_farthest ? 0x1p-21f : -0x1p-21f)); /* what is drawn lies in [0, 1] */
+    return vf_add(depth, set(l->is_farthest ? 0x1p-21f : -0x1p-21f)); /* drawn depths lie in [0, 1] */
 }
 
 /* Lists meshlets [first, end) that the window may show in `seen`, and others for draw_fallback in `fallback`; returns

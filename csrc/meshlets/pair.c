@@ -1,6 +1,6 @@
 /* Pairs the triangles of a meshlet: two that share an edge and lie on its two sides are drawn together, because no
  * pixel is in both.
- * In: a meshlet whose triangles stand in any order.  Out: triangles 2k and 2k + 1 are a pair. */
+ * In: a meshlet with triangles in any order.  Out: triangles 2k and 2k + 1 are a pair. */
 #ifndef TL_PAIR_C
 #define TL_PAIR_C
 
@@ -68,7 +68,7 @@ static inline void put_triangle(tl_meshlet *to, int at, const tl_meshlet *from, 
     to->names[at] = from->names[i];
 }
 
-/* Orders n triangles by pairs, with an empty one for each that has no partner.  What there is no room for goes to
+/* Orders n triangles by pairs, with an empty one for each that has no partner.  Triangles without room go to
  * `rest`; NULL: there is room.  Returns how many there are now. */
 static int pair_up(tl_meshlet *m, int n, tl_meshlet *rest, int *n_rest)
 {

@@ -1,4 +1,4 @@
-/* Planes of depth of sixteen triangles of a meshlet: the operations of setup_plane in setup.c, whose second corner is
+/* Planes of depth of sixteen triangles of a meshlet: the operations of setup_plane in setup.c; its second corner is
  * the third here.
  * In: corners as pairs from a sample.  Out: z = (z0 + slope_y * y) + slope_x * x of units of 2^-8 px, as setup.c has it
  * of half sub-pixels: slopes and distances differ from those by powers of two, and products not at all. */

@@ -133,7 +133,7 @@ TL_INLINE void queue_larger(meshlet_batch *s, meshlet_slot *slot)
     }
 }
 
-/* All triangles of a meshlet whose vertices are 32-bit numbers. */
+/* All triangles of a meshlet with 32-bit vertices. */
 TL_INLINE void queue_wide(meshlet_batch *s, meshlet_slot *slot)
 {
     const vi left = vi_set1(-slot->at.left_px), right = vi_set1(s->width - slot->at.left_px);

@@ -100,7 +100,7 @@ TL_INLINE vi snap_slot(meshlet_batch *s, meshlet_slot *slot, int is_wide, int is
                                              vi_lt_unsigned(vi_add(y_rest, near_by), range)))
                      << 16 * k;
         any = vi_or_three(any, x_fx, y_fx);
-        if (is_wide) { /* within 2^19, shifted: there the words mean what they should, and areas fit */
+        if (is_wide) { /* within 2^19, shifted: there the words are right, and areas fit */
             const vi reach = vi_set1(1 << 19 >> s->fine_bits), range = vi_set1((1 << 20 >> s->fine_bits) - 1);
             s->is_too_far |=
                 vm_any(vm_or(vi_gt_unsigned(vi_add(x_fx, reach), range), vi_gt_unsigned(vi_add(y_fx, reach), range)));

@@ -1,5 +1,5 @@
 /* Tiny triangles of a batch of meshlets: which hold a sample, which samples they cover, their depths.  A stage runs
- * over all meshlets of the batch before the next one begins: what ends a loop has long been known then.
+ * over all meshlets of the batch before the next one begins: the end of a loop has long been known then.
  * In: meshlets with snapped vertices.  Out: samples of triangles with boxes up to 2x2 in the list; the numbers of those
  * with larger ones.
  *
@@ -167,7 +167,7 @@ static __attribute__((noinline)) void cover_tiny(meshlet_batch *s)
     }
 }
 
-/* Depths of what is covered: samples with their names go to the list. */
+/* Depths of covered samples: they go to the list with their names. */
 static __attribute__((noinline)) void list_covered(meshlet_batch *s)
 {
     /* the lowest bit that is set -> column | row << 16 */

@@ -61,7 +61,7 @@ static __attribute__((noinline)) void turn_wide(const meshlet_batch *s, meshlet_
     turn_some(slot, turned);
 }
 
-/* The triangles of sixteen whose partner shows the other side: the two of them may cover the same samples. */
+/* The triangles of sixteen with a partner that shows the other side: the two of them may cover the same samples. */
 TL_INLINE vm is_folded(const meshlet_slot *slot, vi triangle)
 {
     if (!(slot->at.side & TL_SIDE_BOTH))

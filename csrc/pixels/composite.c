@@ -1,7 +1,7 @@
-/* Composite: what is seen through the layers of a pixel, the nearest first.
+/* Composite: the colour through the layers of a pixel, the nearest first.
  * In: planes of ids, colours of triangles or of the layers of pixels.  Out: pixels with alpha.
  *
- * A layer of opacity a lets 1 - a of what lies behind it through, so layer k counts w = a_k * (1 - a_0) * ... * (1 -
+ * A layer of opacity a lets 1 - a of the light behind it through, so layer k counts w = a_k * (1 - a_0) * ... * (1 -
  * a_(k-1)).  The colour is the mean of the colours by w, the alpha their sum.  All in float64, the operations in this
  * order, rounded once.
  *
@@ -15,7 +15,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* The layer with its colour at `color`, of which one step is 1 / one. */
+/* The layer with its colour at `color`, in steps of 1 / one. */
 #define TL_ADD_LAYER(NAME, T, ONE)                                                                 \
     TL_INLINE void NAME(const T *color, int n_colors, double *through, double *sum, double *alpha) \
     {                                                                                              \

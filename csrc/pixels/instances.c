@@ -7,7 +7,7 @@
 
 #include "topleft.h"
 
-/* The last of n instances whose first id is not above `id`; n where no instance has it. */
+/* The last of n instances with a first id not above `id`; n where no instance has it. */
 static int64_t instance_of(const int64_t *first_ids, int64_t n, int64_t id)
 {
     int64_t low = 0, high = n;

@@ -16,7 +16,7 @@
 #include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 
-/* The first samples of paint_flat whose colours have four bytes, a vector at a time; returns how many. */
+/* The first samples of paint_flat, with colours of four bytes, a vector at a time; returns how many. */
 TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *colors, const uint8_t *ground,
                               uint8_t *restrict out)
 {

@@ -1,4 +1,4 @@
-/* Points: where in space the pixels of a visibility buffer lie, and what follows from that: distances, and ways in the
+/* Points: where in space the pixels of a visibility buffer lie, their distances, and their ways in the
  * picture.
  * In: ids, the mesh they were drawn from, positions of its vertices.  Out: float32, or float64, of each pixel.
  *

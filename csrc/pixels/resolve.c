@@ -1,7 +1,7 @@
 /* Resolves MSAA: the colour of a pixel from those of its samples, all with the same weight (a box filter one pixel
- * wide); and the depth of a picture whose triangles all lie at one, after the ids have been drawn without any.
- * In: the label of each sample, or colours of samples; ids.  Out: colours; a sample with label -1 counts as what the
- * pixel holds; ids and depth.
+ * wide); and the depth of a picture with one depth for all triangles, after the ids have been drawn without any.
+ * In: the label of each sample, or colours of samples; ids.  Out: colours; a sample with label -1 counts as the old
+ * pixel; ids and depth.
  *
  * uint8: the mean rounded to nearest, ties to even.  float32: summed in float64 in the order of the samples, rounded
  * once.  Straight alpha that differs between the samples: colours are weighted by it.
@@ -117,7 +117,7 @@ TL_INLINE vi mean_pairs(vi sums, int sample_bits)
     return vi_and(vi_shift_right(vi_add(vi_add(sums, half), is_odd), sample_bits), vi_set1(0x00ff00ff));
 }
 
-/* Where the colours of triangles stand, and what becomes of those of a pixel's samples. */
+/* Where the colours of triangles stand, and how those of a pixel's samples are averaged. */
 typedef struct {
     const char *colors;
     int row_bytes, n_channels, is_u8, sample_bits;
@@ -135,7 +135,7 @@ TL_ONCE void mean_labels(const mean_source *s, const int32_t *labels, char *pixe
     mean_pixel(own, s->sample_bits, s->n_channels, s->is_u8, s->transfer, pixel);
 }
 
-/* The mean of the bytes of TL_LANES pixels, four a colour; `own` is what they hold.  Lanes in `rest` are weighted by an
+/* The mean of the bytes of TL_LANES pixels, four a colour; `own` are the old ones.  Lanes in `rest` are weighted by an
  * alpha that differs, and left for others. */
 TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi own, vm *rest)
 {
@@ -250,7 +250,7 @@ TL_INLINE void mean_flat_pixels(const mean_source *s, const int32_t *labels, int
     }
 }
 
-/* n pixels whose samples have the colours of their triangles; planes of labels lie `stride` apart. */
+/* n pixels with samples in the colours of their triangles; planes of labels lie `stride` apart. */
 static void mean_flat(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette,
                       int n_channels, int is_u8, const tl_transfer *transfer, void *pixels)
 {

@@ -1,5 +1,5 @@
 /* Run lengths of masks and of ids, down the columns as COCO counts them.
- * In: rows of pixels of one or four bytes.  Out: runs of equal pixels; what they are as counts of each object; the
+ * In: rows of pixels of one or four bytes.  Out: runs of equal pixels; the runs as counts of each object; the
  * counts as text.
  *
  * A line of cache of each row is compared with the row above it, a word at a time; the rows at which a column changes
@@ -25,7 +25,7 @@ TL_INLINE int64_t value_at(const tl_run_source *s, int64_t row, int64_t column)
     return value;
 }
 
-/* Adds `row` to the lists of the columns whose pixels differ in two words, the first `column` columns into the line. */
+/* Adds `row` to the lists of the columns that differ in two words, the first `column` columns into the line. */
 TL_INLINE void note_changes(uint64_t differs, int n_bytes, int64_t column, int64_t height, int32_t row, int32_t *rows,
                             int32_t *n_rows)
 {

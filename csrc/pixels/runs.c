@@ -1,4 +1,4 @@
-/* Runs: the parts of a row that one triangle owns, and what its pixels need to know of it, a vector of runs at a time.
+/* Runs: the parts of a row that one triangle owns, and its coefficients for the pixels, a vector of runs at a time.
  * In: a row of ids, vertex records, attributes of vertices.  Out: coefficients, which reach the pixels by a load and a
  * permutation.
  *
@@ -50,7 +50,7 @@ enum {                                /* coefficients of runs, float32 */
        RUN_V = RUN_U + 3,
        RUN_COLOR = RUN_V + 3,
        RUN_GRADIENT = RUN_COLOR + 9, /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
-       RUN_REST = RUN_GRADIENT + 6,  /* of the unsnapped: what E1 and E2 lack in the middle of a block, and a column */
+       RUN_REST = RUN_GRADIENT + 6,  /* of the unsnapped: rests of E1 and E2 in the middle of a block, and a column */
        RUN_ALPHA = RUN_REST + 4,     /* from here on of full materials and holes */
        RUN_UV1 = RUN_ALPHA + 3,      /* as RUN_U and RUN_V, of the second set */
        RUN_GRADIENT1 = RUN_UV1 + 6,
@@ -60,7 +60,7 @@ enum {                                /* coefficients of runs, float32 */
 };
 enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, RUN_COLUMN, N_RUN_INTS };
 
-/* A triangle whose edge functions are float64: E_k = at[k] + step[k] * (x_fx - from[k]) in the row of the run. */
+/* A triangle with float64 edge functions: E_k = at[k] + step[k] * (x_fx - from[k]) in the row of the run. */
 typedef struct {
     double at[3], step[3], from[3];
     float area;
@@ -71,7 +71,7 @@ typedef struct {
     const tl_window *window;
     const tl_shading *shading;
     const tl_view *view;
-    int32_t first_id;                                               /* what triangle 0 is called in the ids */
+    int32_t first_id;                                               /* the id of triangle 0 */
     int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
     int needs_alpha, needs_uv1, needs_tangents[2];                  /* the same; tangents of each set of uv */
     int needs_more;                                                 /* any of these */
@@ -217,7 +217,7 @@ TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
     return vf_load(side);
 }
 
-/* The rows of the normals of TL_LANES triangles whose corners have some of their own. */
+/* The rows of the normals of TL_LANES triangles with corner normals. */
 TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][TL_MAX_LANES])
 {
     const int32_t *ids = s->ints[RUN_ID] + slot, *of_corner = s->shading->normal_of_corner;
@@ -360,7 +360,7 @@ TL_INLINE void load_edges(const shade_runs *s, const run_setup *r, vf edge[2][3]
 
 /* Tangents of TL_LANES triangles: the directions in which u and v grow, over the length of the longer one, and the hand
  * (1: right) that they make with the normal towards the viewer.  All are turned where the other side is lit than that
- * of the normals of the mesh, so that what they bend is turned as a whole.  0 where uv have no area. */
+ * of the normals of the mesh, so that bent normals are turned as a whole.  0 where uv have no area. */
 TL_INLINE void set_tangents(shade_runs *s, int slot, const run_setup *r, const float *uv, vf side, int first)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), minus = vf_set1(-1.0f);
@@ -493,8 +493,8 @@ static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vert
     e->area = det < 0.0 ? -1.0f : 1.0f;
 }
 
-/* Edge functions over the area, of vertices that are not snapped, whose range no float32 has.  Of a sliver whose box
- * holds more of its areas float64 has lost the weights: it takes the mean of its corners. */
+/* Edge functions over the area, of vertices that are not snapped, beyond the range of float32.  Of a sliver with a box
+ * of more of its areas float64 has lost the weights: it takes the mean of its corners. */
 #define TL_BOX_AREAS 0x1p36
 static void normalize_edges(special_run *e, const tl_vertex_set *set, const int32_t *corners, const double *x_fx,
                             const double *y_fx, float *row_step)
@@ -572,7 +572,7 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     }
 }
 
-/* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: what wraps on the way there
+/* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: a sum that wraps on the way
  * comes back at the pixel.  Returns the runs that need others; their sum is the area. */
 TL_INLINE vm find_edges(shade_runs *s, int slot, int64_t row, vi *x, vi *y, vf *col_step, vf *row_step)
 {
@@ -621,8 +621,8 @@ TL_INLINE void load_exact_corners(const tl_exact_points *points, const int32_t *
     *x = vd_load(lanes[0]), *y = vd_load(lanes[1]);
 }
 
-/* A number near column `near` and its step, in units: the nearest integers, which int32 has modulo 2^32, and what they
- * lack; as the coefficients of edge k. */
+/* A number near column `near` and its step, in units: the nearest integers, which int32 has modulo 2^32, and the
+ * rests; as the coefficients of edge k. */
 TL_INLINE void put_exact_edge(shade_runs *s, int slot, int k, vd e, vd step, vi near, vd to_middle)
 {
     const vd integers = vd_set1(0x1.8p52); /* next to it are the integers, and its last bits theirs */
@@ -640,7 +640,7 @@ TL_INLINE void put_exact_edge(shade_runs *s, int slot, int k, vd e, vd step, vi 
  * Edge functions are counted in 2^-24 of twice the area: an integer, exact modulo 2^32 at every column, and a rest,
  * float32, which stays below 17 and errs by less than 2^-20.  The sum of both is rounded once.  Both are found in
  * float64 at the column of the block that is nearest to corner 0, and rests counted from the middle of the block.  So
- * E / area errs by 2^-24 of itself, 2^-44, and what float64 has lost: less than 2^-50 boxes over areas.  Nothing
+ * E / area errs by 2^-24 of itself, 2^-44, and the error of float64: less than 2^-50 boxes over areas.  Nothing
  * depends on the window: columns and rows are those of the picture. */
 TL_INLINE vm find_exact_edges(shade_runs *s, int slot, int64_t row, const vd *x, const vd *y, vf *col_step,
                               vf *row_step, vf *area)
@@ -722,7 +722,7 @@ TL_INLINE void fetch_vertex(const shade_runs *s, int32_t corner)
         fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), corner);
 }
 
-/* Asks for what names the corners of runs [first, end), and for the normals of their faces. */
+/* Prefetches the corner indices of runs [first, end), and the normals of their faces. */
 TL_INLINE void fetch_triangles(const shade_runs *s, int first, int end)
 {
     const tl_shading *shading = s->shading;
@@ -760,8 +760,8 @@ TL_INLINE void fetch_corners(const shade_runs *s, int first, int end)
     }
 }
 
-/* The corners of all runs, times 2^shift.  A pass of its own, as what is stored number by number is not yet there for
- * vectors, nor the other way round: meanwhile the processor has the next vector of runs. */
+/* The corners of all runs, times 2^shift.  A pass of its own: numbers stored one by one are not yet there for a
+ * vector load, nor the other way round; meanwhile the processor has the next vector of runs. */
 TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
 {
     const int end = TL_LANES + s->n_runs;
@@ -885,7 +885,7 @@ TL_ONCE void set_runs(shade_runs *s, int64_t row)
             s->ints[RUN_MATERIAL][slot] = shading->material_of[s->ints[RUN_ID][slot]];
 }
 
-/* A vector of pixels: where its lanes find their runs, and what they are to show. */
+/* A vector of pixels: the runs of its lanes, and the quantity to show. */
 typedef struct {
     const shade_runs *s;
     int first;  /* the slot of the run that lane 0 belongs to, or of the first one behind it */
@@ -952,7 +952,7 @@ typedef struct {
     vd x_fx; /* of the pixels */
     vi special;
     int32_t number[TL_MAX_LANES]; /* the same, lane by lane */
-    vm rest;                      /* lanes whose runs are still to come */
+    vm rest;                      /* lanes with their runs still to come */
     const special_run *run;
 } special_lanes;
 

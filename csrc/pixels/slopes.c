@@ -1,5 +1,5 @@
-/* Slopes: what values of vertices change by from pixel to pixel, along x and along y.
- * In: ids, weights of pixels, and of each triangle that shows what its weights change by.  Out: float32.
+/* Slopes: the changes of vertices' values from pixel to pixel, along x and along y.
+ * In: ids, weights of pixels, and the slopes of the weights of each visible triangle.  Out: float32.
  *
  * The weights of a pixel are l / (l0 + l1 + l2) with l linear in x and y, and the sum is 1/w:
  * d weight = w (d l - weight d sum).  All is float64, rounded once at the end. */

@@ -1,6 +1,6 @@
-/* Split: lists the pixels whose samples see several triangles; all others show what their first sample sees.
- * In: ids and depth of each sample of a band of rows.  Out: the columns of such pixels, and what their samples see; of
- * these the ids of every pixel. */
+/* Split: lists the pixels that show several triangles; all others show that of their first sample.
+ * In: ids and depth of each sample of a band of rows.  Out: the columns of such pixels, the ids and depths of their
+ * samples; from these the ids of every pixel. */
 #ifndef TL_SPLIT_C
 #define TL_SPLIT_C
 

@@ -17,7 +17,7 @@
 #include "shading.h"
 #include "lanes/lanes.h"
 
-/* Beyond these a float64 has no fraction; of what is no number the texel is the first. */
+/* Beyond these a float64 has no fraction; the texel of NaN is the first. */
 #define TL_LAST_FRACTION 0x1p52
 
 /* The largest integer not above a. */
@@ -119,7 +119,7 @@ TL_INLINE double level_of(const tl_levels *t, const float *slopes)
     return level < last ? level : last;
 }
 
-/* Channels whose sums are kept at a time. */
+/* Channels that are summed at a time. */
 #define TL_MAX_SUMS 16
 
 /* One pixel; v from the top down. */

@@ -2,7 +2,7 @@
  * In: ids, the mesh they were drawn from.  Out: barycentric weights, or values of the vertices.
  *
  * The bits are those of weights_of_pixel: edge functions are integers below 2^53, so float64 has them exactly, and
- * every operation after that is the same.  What does not fit is left to weights_of_pixel itself, pixel by pixel:
+ * every operation after that is the same.  The rest is left to weights_of_pixel itself, pixel by pixel:
  * triangles that a clip plane cuts, coordinates beyond 2^30, boxes beyond 2^52, and 1/w that vd_quotients might not
  * take. */
 #ifndef TL_WEIGHTS_C
@@ -105,7 +105,7 @@ TL_INLINE void load_inverse_w(const tl_vertex_set *set, const int32_t *vertices,
             q[lane] = inverse_w(set, vertices[lane]);
 }
 
-/* The corners of runs and their 1/w: in a pass of its own, as what is stored number by number is not yet there for
+/* The corners of runs and their 1/w: in a pass of its own, as numbers stored one by one are not yet there for
  * vectors. */
 TL_INLINE void load_run_corners(weighed_span *r)
 {
@@ -162,7 +162,7 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
     }
 }
 
-/* Edge functions of the lanes whose runs are float64. */
+/* Edge functions of the lanes with float64 runs. */
 static void set_float64_edges(const shaded_lanes *p, vi special, vd *e, vm *is_back)
 {
     const vd zero = vd_set1(0.0);
@@ -177,7 +177,7 @@ static void set_float64_edges(const shaded_lanes *p, vi special, vd *e, vm *is_b
     }
 }
 
-/* Weights of the lanes whose runs are left to weights_of_pixel; lanes whose triangle is not there cease to be
+/* Weights of the lanes with runs that are left to weights_of_pixel; lanes of a missing triangle cease to be
  * visible. */
 static void set_lonely_weights(weighed_span *r, const shaded_lanes *p, vi special, int64_t row, int i)
 {

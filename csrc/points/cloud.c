@@ -1,8 +1,8 @@
 /* Clouds: points drawn as discs or squares, the nearest in every pixel.
  * In: snapped vertices, a size each.  Out: ids and depth, as those of triangles.
  *
- * A point covers the samples in its disc, the rim included, or in its square, of whose sides the left one and the upper
- * one count; and in any case those in the square of a pixel's size round it, so that no point is too small to show.
+ * A point covers the samples in its disc, the rim included, or in its square: its left and its upper side
+ * count; and in any case those in the square of a pixel's size round it, so that no point is too small to show.
  * All of it is decided in whole numbers, doubled: the sample of a pixel lies half a pixel off the grid. */
 #ifndef TL_CLOUD_C
 #define TL_CLOUD_C
@@ -14,7 +14,7 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 
-/* The largest whole number whose square is at most a, 0 <= a <= 2^60. */
+/* The largest whole number with a square of at most a, 0 <= a <= 2^60. */
 static inline int64_t floor_root(int64_t a)
 {
     int64_t root = (int64_t)sqrt((double)a);
@@ -22,7 +22,7 @@ static inline int64_t floor_root(int64_t a)
     return root + ((root + 1) * (root + 1) <= a);
 }
 
-/* Pixels of a row, or rows of a window, whose samples are off a centre by low to high: first to last, cut to [0, n).
+/* Pixels of a row, or rows of a window, with samples off a centre by low to high: first to last, cut to [0, n).
  * `sample` is that of pixel 0 in units of half a sub-pixel, pixels are 2^shift apart. */
 static inline void span_of(int64_t center, int64_t low, int64_t high, int64_t sample, int shift, int64_t n,
                            int64_t *first, int64_t *last)

@@ -1,7 +1,7 @@
 /* Crossings: where the edges of rings pass the samples of rows.
  * In: rings in fixed point.  Out: a row, a column and a direction for each row that an edge passes.
  *
- * An edge counts in the row whose sample is at Y when (y0 > Y) != (y1 > Y), and for the columns whose sample is at or
+ * An edge counts in the row with its sample at Y when (y0 > Y) != (y1 > Y), and for the columns with a sample at or
  * right of the crossing: the top-left rule.  Of an edge from its upper end (x0, y0), dy > 0, in row r and with `unit`
  * sub-pixels a pixel     column = ceil(N / D),  D = unit dy,  N = (x0 - sample_x) dy + dx (Y - y0).
  *

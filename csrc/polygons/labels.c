@@ -1,9 +1,9 @@
 /* Labels: many polygons, the later one over the earlier ones.
  * In: rings, and a number for each polygon.  Out: rows of int32, or of bytes.
  *
- * A polygon of one ring whose downward edges have as many rows as it spans is met once each way in each row, for a
+ * A polygon of one ring with downward edges of as many rows as it spans is met once each way in each row, for a
  * closed ring is met as often downwards as upwards in each: two columns a row, no lists.  Others list the crossings
- * of their rows.  Polygons of many edges, and those whose squares count, go through bits.  Rows of a picture lie far
+ * of their rows.  Polygons of many edges, and tests of squares, go through bits.  Rows of a picture lie far
  * apart in memory: spans may wait until their lines have come. */
 #ifndef TL_POLYGON_LABELS_C
 #define TL_POLYGON_LABELS_C
@@ -224,7 +224,7 @@ TL_INLINE void label_polygon(const tl_polygons *p, int64_t polygon, const tl_lab
             return;
         }
     }
-    write_all_waiting(job, n_bytes); /* what follows does not wait */
+    write_all_waiting(job, n_bytes); /* spans below do not wait */
     for (int64_t row = top; row < bottom && !is_polygon_given_up(p, TL_CELL_ROWS * job->width); row += TL_CELL_ROWS)
         label_by_bits(p, polygon, job, row, row + TL_CELL_ROWS < bottom ? row + TL_CELL_ROWS : bottom, value);
 }

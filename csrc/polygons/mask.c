@@ -1,4 +1,4 @@
-/* Mask: the pixels whose sample lies inside of one polygon.
+/* Mask: the pixels with a sample inside of one polygon.
  * In: rings.  Out: bytes, 0 or 1.
  *
  * Even-odd: a bit a pixel, in which crossings cancel in pairs, and the parity from the left of 64 of them at a time.

@@ -1,7 +1,7 @@
-/* Pieces: the exact share of each pixel that lies in a polygon whose rings may cross, touch or cover each other.
+/* Pieces: the exact share of each pixel that lies in a polygon with rings that may cross, touch or cover each other.
  * In: rings.  Out: a row of shares, float64, at a time.
  *
- * Edges are cut at the rows, and each pixel takes the pieces that reach into it (slabs.c).  What lies left of it comes
+ * Edges are cut at the rows, and each pixel takes the pieces that reach into it (slabs.c).  Edges left of it come
  * in as winding numbers alone.  A pixel's share depends on the edges, not on the window: ends of pieces are quotients
  * of integers, each rounded once, and counted from the pixel. */
 #ifndef TL_POLYGON_PIECES_C
@@ -95,7 +95,7 @@ static void note_left(piece_row *w, const tl_edge_piece *e)
     note_change(w, e->tb, -e->sign);
 }
 
-/* The shares of the columns [left, right) of the row whose n pieces these are: shares[column - left]. */
+/* The shares of the columns [left, right) of the row of these n pieces: shares[column - left]. */
 static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64_t n, int64_t left, int64_t right,
                         const tl_piece_scratch *scratch, double *shares)
 {
@@ -133,7 +133,7 @@ static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64
             col++;
             continue;
         }
-        /* nothing but level edges until the next piece begins: what is left of here tells */
+        /* nothing but level edges until the next piece begins: the windings left of here tell */
         const int64_t end = taken < n && pairs[taken].key < right ? pairs[taken].key : right;
         const double share = resolve_pixel(&w, col);
         for (; col < end; col++)

@@ -30,7 +30,7 @@ TL_INLINE void fill_parity(uint64_t *bits, int64_t n_words)
     }
 }
 
-/* Sums of directions to the pixels that are wound round; clears the cells, whose number is a multiple of 64. */
+/* Sums of directions to the pixels that are wound round; clears the cells, a multiple of 64. */
 TL_INLINE void fill_winding(int32_t *cells, int64_t n_cells, uint64_t *bits)
 {
     vi carry = vi_set1(0);

@@ -1,9 +1,9 @@
 /* Shares: the exact area of each pixel that lies in a polygon, as sums, mixes of colours, or a table.
- * In: rings, and what the area of each counts.  Out: float32.
+ * In: rings, and the weight of each one's area.  Out: float32.
  *
  * A polygon is drawn into cells of its own box, which stay in the cache (area/ramp.c), and these are summed along
- * rows; sums are integers modulo 2^32, so however often edges cover each other on the way, what is left in [0, 2^24]
- * is right.  Polygons whose rings meet are resolved pixel by pixel (pieces.c). */
+ * rows; sums are integers modulo 2^32, so however often edges cover each other on the way, the result in [0, 2^24]
+ * is right.  Polygons with rings that meet are resolved pixel by pixel (pieces.c). */
 #ifndef TL_POLYGON_SHARES_C
 #define TL_POLYGON_SHARES_C
 
@@ -23,7 +23,7 @@
 #define TL_WHOLE (1 << TL_AREA_BITS)
 
 /* Small polygons are drawn some at a time, one below the other: vectors of edges are then fuller, which takes a third
- * off 20,000 cells of 28 px.  What an edge adds does not depend on where it is drawn. */
+ * off 20,000 cells of 28 px.  The areas of an edge do not depend on where it is drawn. */
 #define TL_STACK_COLUMNS 64
 #define TL_STACK_HEIGHT 128
 #define TL_STACK_ROWS 512
@@ -64,7 +64,7 @@ TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t firs
     vi kind = vi_min(rows, last_kind);
     kind = vi_select(vi_gt(width, dy2), vi_add(kind, vi_set1(TL_EDGES_FLAT)), kind);
     kind = vi_select(vi_gt(width, vi_add(dy2, vi_shift_left(dy2, 1))), vi_set1(TL_EDGES_SHALLOW), kind);
-    /* what lies right of edges that run upwards is added */
+    /* areas right of edges that run upwards are added */
     const vi signed_dy = vi_select(is_up, weight > 0 ? dy : vi_sub(zero, dy), weight > 0 ? vi_sub(zero, dy) : dy);
     int32_t kinds[TL_LANES], records[4 * TL_LANES];
     vi_spill(kinds, kind);
@@ -75,7 +75,7 @@ TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t firs
     }
 }
 
-/* Draws a polygon whose rings do not meet, moved so far, into the cells of the plane. */
+/* Draws a polygon without rings that meet, moved so far, into the cells of the plane. */
 static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon, int32_t right_fx, int32_t down_fx)
 {
     for (int64_t ring = p->polygons[polygon]; ring < p->polygons[polygon + 1]; ring++) {
@@ -257,7 +257,7 @@ static void put_shares(void *to, int64_t row, int64_t left, int64_t right, const
     }
 }
 
-/* The rows [top, bottom) of a polygon whose rings do not meet. */
+/* The rows [top, bottom) of a polygon without rings that meet. */
 static void share_simply(area_state *s, const tl_polygons *p, share_output *out, const tl_polygon_box *box, int64_t top,
                          int64_t bottom)
 {

@@ -1,4 +1,4 @@
-/* Simple: whether the rings of a polygon neither cross nor touch, and what the area of each ring then counts.
+/* Simple: whether the rings of a polygon neither cross nor touch, and then the weight of each ring's area.
  * In: rings.  Out: a weight for each ring, and a flag for each polygon.
  *
  * Where rings do not meet, the winding number is constant on either side of each: k outside of it and k + s inside, s
@@ -7,9 +7,9 @@
  *
  * A ring that turns one way alone, once round, is simple.  Otherwise rings are cut into chains of a few edges, which
  * are the leaves of a tree: neighbours along a ring lie near each other, so no sort is needed.  Two nodes are apart
- * when their boxes are, or when a line parts them.  A chain whose edges point into one half plane does not meet
+ * when their boxes are, or when a line parts them.  A chain with edges into one half plane does not meet
  * itself, and the direction in which it always goes on is a good one for such a line: that serves rings of noise,
- * whose spikes lie side by side.  What is left is decided edge by edge.  All in integers, or in doubles that are.
+ * with spikes side by side.  The rest is decided edge by edge.  All in integers, or in doubles that are.
  *
  * Based on: M. I. Shamos, D. Hoey, Geometric Intersection Problems, 1976 (that n log n comparisons do); D. H. Ballard,
  * Strip Trees, 1981 (a tree over the chain itself). */

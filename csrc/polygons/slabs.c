@@ -4,10 +4,10 @@
  * The heights at which pieces begin, end, enter or leave the pixel cut it into slabs, which no end lies within.  There
  * the pieces are sorted from left to right at the upper end, and swapped where they cross, the highest crossing
  * first, until they are sorted at the lower end: a crossing costs log n, and the order is one at each height,
- * whatever rounding does to the heights.  What lies between two neighbours is inside or not.
+ * whatever rounding does to the heights.  The trapezoid between two neighbours is inside or not.
  *
- * Error: heights are off by 2^-50 px where edges cross at all steeply; what is thinner than TL_THIN counts as
- * nothing, and so does what a crossing of nearly parallel edges is off by, which is as thin.
+ * Error: heights are off by 2^-50 px where edges cross at all steeply; slabs thinner than TL_THIN count as
+ * nothing, and so does the error of a crossing of nearly parallel edges, which is as thin.
  *
  * Based on: J. L. Bentley, T. A. Ottmann, Algorithms for Reporting and Counting Geometric Intersections, 1979. */
 #ifndef TL_POLYGON_SLABS_C
@@ -40,7 +40,7 @@ typedef struct {
 /* An event at a height: the piece 8 times over and one of these, or -1 - k for the k-th change. */
 enum { COMES_LEFT, ENDS_LEFT, ENTERS, ENTERS_FROM_LEFT, LEAVES, LEAVES_TO_LEFT, N_KINDS = 8 };
 
-/* The pieces of one row, from left to right, and what is known of it. */
+/* The pieces of one row, from left to right, and the state of its sweep. */
 typedef struct {
     const tl_polygons *p;
     const tl_edge_piece *pieces;
@@ -204,7 +204,7 @@ static inline double area_along(const piece_row *w, int64_t col, slab_edge *e, d
     return (double)step * x * height;
 }
 
-/* The area in a slab whose edges cross: they are sorted, and know the windings at its upper end. */
+/* The area in a slab with edges that cross: they are sorted, and know the windings at its upper end. */
 static double resolve_crossings(piece_row *w, int64_t col, double y, double next, int32_t right)
 {
     const int n = w->n_edges;

@@ -1,5 +1,5 @@
 /* Touched: the squares of pixels that meet a polygon in positive area, or lie wholly inside of it.
- * In: rings, and the pixels whose centre lies inside.  Out: bits.
+ * In: rings, and the pixels with their centre inside.  Out: bits.
  *
  * Where rings do not meet, each edge is a border between inside and outside: a square that one passes through meets
  * both, and any other is like its centre.  Where they do, the share of each pixel tells (pieces.c). */
@@ -15,7 +15,7 @@
 #include "polygons/points.c"
 #include "polygons/row_bits.c"
 
-#define TL_NO_SHARE 0x1p-40 /* of a pixel: what is less is rounding, see pieces.c */
+#define TL_NO_SHARE 0x1p-40 /* of a pixel: less is rounding, see pieces.c */
 
 typedef struct {
     uint64_t *bits; /* of row `top` */
@@ -75,7 +75,7 @@ static void mark_shares(void *to, int64_t row, int64_t left, int64_t right, cons
         bits[c >> 6] |= (uint64_t)(shares[c - left] > least) << (c & 63);
 }
 
-/* Turns the bits of the pixels whose centre lies inside, rows [top, bottom), into those of the squares. */
+/* Turns the bits of the pixels with their centre inside, rows [top, bottom), into those of the squares. */
 static void test_squares(const tl_polygons *p, int64_t polygon, const tl_polygon_box *box, tl_polygon_test test,
                          int64_t width, int64_t top, int64_t bottom, uint64_t *bits, int64_t row_words,
                          const tl_piece_scratch *scratch)

@@ -21,7 +21,7 @@
 
 typedef vm box_masks[TL_SMALL_BOX][TL_SMALL_BOX];
 
-/* The lanes whose boxes have a sample at a place. */
+/* The lanes with a sample at a place of their box. */
 TL_INLINE vm in_box(vm live, vi n_cols, vi n_rows, int row, int col)
 {
     return vm_and(live, vm_and(vi_gt(n_rows, vi_set1(row)), vi_gt(n_cols, vi_set1(col))));
@@ -145,7 +145,7 @@ TL_LIST_COPIES(flush_small_fixed, (walk_state * s), s)
 
 /* ---- TL_FLOAT -------------------------------------------------------------------------------------------- */
 
-/* Sets `in` to what lanes decide; returns the lanes that are in doubt at some sample, in the box or beside it. */
+/* Sets `in` to the samples inside, as lanes decide; returns the lanes in doubt at some sample, in the box or beside. */
 TL_INLINE vm test_boxes(const lane_exact *t, vi n_cols, vi n_rows, int size, box_masks in)
 {
     const vf band = vf_select(t->on_grid, vf_set1(0.0f), t->band);

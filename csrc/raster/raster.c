@@ -81,7 +81,7 @@ TL_INLINE vi shorter_side(const walk_state *s, const lane_batch *b)
     return vi_min(vi_sub(end, first), vi_sub(b->bottom, b->top));
 }
 
-/* Leaves to be drawn singly what lanes could take but should not, and to nobody what is turned away for certain. */
+/* Moves triangles that lanes could take but should not to the single ones, and drops those turned away for certain. */
 TL_INLINE void take_out(const walk_state *s, tl_geometry g, tl_sink sink, lane_batch *b)
 {
     if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows.c */
@@ -307,7 +307,7 @@ TL_LIST_COPIES(draw_snapped,
                 int64_t *bad_row),
                snapped, window, target, slice, bad_row)
 
-/* Counts the triangles of a mesh by what draw_snapped does with them: in its own code. */
+/* Counts the triangles of a mesh by the walkers that draw_snapped sends them to: in its own code. */
 static int64_t count_classes(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                              tl_census *census)
 {
@@ -367,7 +367,7 @@ static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t 
     }
 }
 
-/* Every triangle of a slice whose vertices are not snapped; from n_whole on they are pieces. */
+/* Every triangle of a slice without snapped vertices; from n_whole on they are pieces. */
 TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
                            tl_slice *slice, tl_exact_counts *counts, int64_t *bad_row, tl_sink sink)
 {

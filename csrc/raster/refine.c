@@ -21,7 +21,7 @@ typedef struct {
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
 } row_ends;
 
-/* The row ends of one triangle, for what is refined. */
+/* The row ends of one triangle, to be refined. */
 typedef struct {
     exact_point corners[3];
     double v[3], dx[3], dy[3], band[3]; /* of the edges in their order; at row 0 of the box */
@@ -66,7 +66,7 @@ static __attribute__((noinline)) void bisect_row(const refined_triangle *a, int 
     *(is_left ? first : end) = low;
 }
 
-/* The columns [*first, *end) of a row of which some end is in doubt. */
+/* The columns [*first, *end) of a row with an end in doubt. */
 TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first, int64_t *end, tl_exact_counts *counts)
 {
     const double y = a->sample_y + (double)row;
@@ -163,7 +163,7 @@ TL_INLINE void decide_columns(const picked_points *m, int k, tl_test test, doubt
 }
 
 /* Sets the bits of a row of the lanes in doubt as if columns in doubt were inside, and lists these; returns the lanes
- * whose bands are as wide as columns. */
+ * with bands as wide as columns. */
 TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band, vm doubted, vi n_cols, int row,
                           int32_t *bits, doubted_columns *d)
 {
@@ -198,7 +198,7 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
 }
 
 /* Decides all rows of the lanes in doubt: by their grid, by float64 at each column in doubt, by the exact sign; and
- * rows whose bands are wide by themselves. */
+ * rows with bands that are wide by themselves. */
 static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const box_queue *q, int i, lane_exact *t,
                                                          vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES])
 {

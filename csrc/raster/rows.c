@@ -50,8 +50,8 @@ TL_INLINE void sort_float_edges(const walk_state *s, const lane_exact *t, float 
     sort_edges(TL_FLOAT, &sides, t->e, t->dx, inverse, band, r);
 }
 
-/* The triangles [i, i + TL_LANES) of a queue of n, whose rows end up to 17 or 62 columns away, as `far` says.  t: of
- * TL_FLOAT, for what is refined. */
+/* The triangles [i, i + TL_LANES) of a queue of n; their rows end up to 17 or 62 columns away, as `far` says.  t: of
+ * TL_FLOAT, to refine. */
 TL_INLINE void load_rows(walk_state *s, tl_geometry g, tl_sink sink, const box_queue *q, int i, int n, float far,
                          lane_exact *t, row_lanes *r)
 {
@@ -244,7 +244,7 @@ TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Whether rows are drawn as spans, one after the other: of masks, whose samples are bits, and where a block of columns
+/* Whether rows are drawn as spans, one after the other: of masks (samples are bits), and where a block of columns
  * would be as narrow as the rows of middle boxes.  Else in blocks of TL_LANES rows and columns. */
 #define TL_BY_SPANS(sink) (TL_LANES == 4 || (sink) == TL_SINK_MASK)
 

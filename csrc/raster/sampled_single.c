@@ -3,7 +3,7 @@
  *
  * The rows of a large triangle are the same for all samples but for their ends: the pixels between these are stored as
  * whole words, and two words at each end are put together from the spans of the samples, a vector of rows at a time.
- * Rows whose ends are more than two words wide, or that some samples miss, are put together word by word. */
+ * Rows with ends more than two words wide, or that some samples miss, are put together word by word. */
 #ifndef TL_SAMPLED_SINGLE_C
 #define TL_SAMPLED_SINGLE_C
 
@@ -38,7 +38,7 @@ TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int
     }
 }
 
-/* A row of which sample k covers the columns [first[k], end[k]). */
+/* A row in which sample k covers the columns [first[k], end[k]). */
 TL_INLINE void cover_row(const tl_target *target, int64_t at, const int32_t *first, const int32_t *end)
 {
     int32_t least = INT32_MAX, inner = 0, inner_end = INT32_MAX, most = 0;
@@ -121,7 +121,7 @@ typedef struct {
     int32_t left[TL_MAX_LANES], right[TL_MAX_LANES]; /* words from the one that holds column 0 */
 } word_rows;
 
-/* Returns the lanes whose rows can be put so.  `skip`: pixels of the first word before column 0. */
+/* Returns the lanes with rows that can be put so.  `skip`: pixels of the first word before column 0. */
 TL_INLINE unsigned find_words(const sampled_ends *ends, int sample_bits, vi skip, word_rows *w)
 {
     const int word_shift = 6 - sample_bits;

@@ -1,6 +1,6 @@
 /* Sides: which side of a triangle shows.
- * In: a mesh of either kind.  Out: its triangles, those of which one side is not drawn collapsed where they show it; of
- * what a plane cuts the pieces, in place. */
+ * In: a mesh of either kind.  Out: its triangles; single-sided ones are collapsed where they show the other side, or
+ * their pieces, in place, if a plane cuts them. */
 #ifndef TL_SIDES_C
 #define TL_SIDES_C
 
@@ -64,7 +64,7 @@ static void drop_pieces(const tl_snapped *snapped, int64_t i)
 }
 
 /* Copies triangles [first, end), those collapsed to a point that are single-sided and do not show the side that the
- * cull of the mesh leaves; of what a plane cuts the pieces instead, in place. */
+ * cull of the mesh leaves; of a clipped one the pieces instead, in place. */
 static void drop_sides(const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
                        int32_t *triangles)
 {

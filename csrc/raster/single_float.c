@@ -35,7 +35,7 @@ typedef struct {
     int32_t id;
 } single_triangle;
 
-/* The first pixel of [low, high) whose sample, so far from its upper left corner, is not left of x; `high` if none is.
+/* The first pixel of [low, high) with a sample, so far from its upper left corner, not left of x; `high` if none is.
  * Exact: x - centre can only round to an integer that is too low. */
 static int64_t first_pixel(double x, double centre, int64_t low, int64_t high)
 {
@@ -57,7 +57,7 @@ static int64_t first_square(double x, int64_t low, int64_t high)
     return n - ((double)n > x);
 }
 
-/* The pixels of [low, high) whose samples lie in an extent, or whose squares meet it in more than a line, or lie in
+/* The pixels of [low, high) with samples in an extent, or with squares that meet it in more than a line, or lie in
  * it. */
 static int64_t find_single_box(double x0, double x1, tl_test test, double centre, int64_t low, int64_t high,
                                int64_t *first)
@@ -180,8 +180,8 @@ TL_INLINE unsigned find_single_end(const single_triangle *t, int64_t row, int32_
 typedef struct {
     int n;
     int is_left[3];
-    int64_t at[3], step[3]; /* q, and what a row adds */
-    int64_t band[3];        /* what lies so near to an integer is refined */
+    int64_t at[3], step[3]; /* q, and its step from row to row */
+    int64_t band[3];        /* q so near to an integer is refined */
     int64_t twice[3];       /* twice of it, or -1: nothing is */
 } row_steps;
 

@@ -1,7 +1,7 @@
 /* The state of a pass over a mesh, and triangles on their way through it, of either geometry: TL_FIXED, vertices that
  * are snapped (triangles_fixed.c), and TL_FLOAT, vertices that are not (triangles_float.c).  Each walker has a copy for
- * either: a geometry is a constant wherever it is a parameter, as a sink is, and what the other one needs is in no
- * copy. */
+ * either: a geometry is a constant wherever it is a parameter, as a sink is, and no copy has code of the other
+ * one. */
 #ifndef TL_STATE_H
 #define TL_STATE_H
 
@@ -89,7 +89,7 @@ typedef struct {
     vd x[3], y[3], z[3];           /* z: where there is depth */
     tl_test test;                  /* a constant where the sink is */
     vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
-    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
+    vf e[3], dx[3], dy[3];         /* edge functions there; a row adds dx, a column subtracts dy */
     vf xy;                         /* X * Y */
     vf from_x[3], from_y[3], band; /* of boxes of up to 4x4: points from the first sample, and the band of samples */
     vi sample;                     /* the first sample: row * stride_px + column */
@@ -233,8 +233,8 @@ TL_INLINE int make_room(walk_state *s, int n)
 
 /* ---- triangles of a slice -------------------------------------------------------------------------------- */
 
-/* Copies the corners of the triangles [i, i + TL_LANES) of a slice, unchecked; behind the end zeros.  What another
- * thread then writes to the indices is not seen any more. */
+/* Copies the corners of the triangles [i, i + TL_LANES) of a slice, unchecked; behind the end zeros.  Later
+ * writes of another thread to the indices are not seen. */
 TL_INLINE const int32_t *slice_corners(const tl_snapped *snapped, const tl_slice *slice, int64_t i, int32_t *own)
 {
     if (!slice->ids && i + TL_LANES <= slice->end) {
@@ -275,7 +275,7 @@ TL_INLINE void fetch_listed(const void *rows, size_t n_bytes, const int32_t *tri
     }
 }
 
-/* The window has fewer than 2^31 samples; what lanes draw needs it within 2^30 pixels of 0. */
+/* The window has fewer than 2^31 samples; lanes need it within 2^30 pixels of 0. */
 TL_INLINE void start_walk(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target)
 {
     const int64_t farthest = (int64_t)1 << 30;
@@ -292,7 +292,7 @@ TL_INLINE void start_walk(walk_state *s, const tl_snapped *snapped, const tl_win
 TL_INLINE void set_slice(walk_state *s, tl_slice *slice)
 {
     s->slice = slice;
-    memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
+    memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* prefetched behind the end of the list */
     if (slice->outside && !slice->clusters) {
         s->limits.picture_top = (int32_t)slice->picture->y_px;
         s->limits.picture_bottom = (int32_t)min64(slice->picture->y_px + slice->picture->height, (int64_t)1 << 30);

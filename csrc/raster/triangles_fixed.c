@@ -1,4 +1,4 @@
-/* Fixed: TL_LANES triangles at a time whose vertices are snapped, in 32-bit lanes.
+/* Fixed: TL_LANES triangles at a time with snapped vertices, in 32-bit lanes.
  * In: vertex records and triangles.  Out: boxes, edge functions, depth planes; the triangles that 32 bits cannot take.
  *
  * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits,

@@ -1,9 +1,9 @@
-/* Float: TL_LANES triangles at a time whose vertices are not snapped, as edge functions in float32 with a band of
+/* Float: TL_LANES triangles at a time without snapped vertices, as edge functions in float32 with a band of
  * doubt.
  * In: points in pixels and triangles.  Out: boxes, edge functions, depth planes; which lanes lie on a grid.
  *
  * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers that stand in the
- * array, with the top-left rule where one is 0.  Boxes are exact: the samples in the extent, of which centre - x is
+ * array, with the top-left rule where one is 0.  Boxes are exact: the samples in the extent.  centre - x is
  * exact from column 0 on; left of it a rounded one may be one too low, and is compared.
  *
  * Points are measured in float64 from the first sample of the box.  Extents are at most TL_MAX_BOX_PX.  u = 2^-24;
@@ -11,16 +11,16 @@
  * and any E in the box is at most XY.
  *
  * 1. Rows: edge functions are set up in float64 and rounded once to float32.  float64: differences, two products, their
- *    difference: at most 8 * 2^-53 XY = 2^-26 u XY, in the slack of what follows.  Rounding errs by |e0| u, |dx| u,
+ *    difference: at most 8 * 2^-53 XY = 2^-26 u XY, in the slack below.  Rounding errs by |e0| u, |dx| u,
  *    |dy| u; at row i <= height and column k <= width, E = e0 + i dx - k dy, that adds up to 3 u XY.
  * 2. Boxes of up to 4x4 samples: the distances of the points are rounded to float32, and the rest is float32.  Points
  *    moved by u X and u Y move E = (A - S) x (B - S) by 4 u XY.  The setup rounds dx, dy, two products and their
  *    difference: 5 u XY; i dx and k dy err by 2 u XY; six additions of values up to XY by 6 u XY.  Squares subtract
  *    their corner: 2 u XY; of an edge that float32 takes for level or upright they may take the wrong one, where E
- *    differs by 4 u XY at most.  That is 23 u XY: what lies within 24 u XY of 0 is refined (TL_BOX_BAND).  Twice the
+ *    differs by 4 u XY at most.  That is 23 u XY: E within 24 u XY of 0 is refined (TL_BOX_BAND).  Twice the
  *    area errs by 13 u XY: three points moved, 6; four differences, two products and theirs, 7.
  *    Places (exact.h) stand up to 2^-19 px beside points, and are measured without an error: that moves E by
- *    2^-18 (X + Y) <= 128 u XY instead of 4 u XY.  Together 147 u XY: what lies within 156 u XY is refined
+ *    2^-18 (X + Y) <= 128 u XY instead of 4 u XY.  Together 147 u XY: E within 156 u XY is refined
  *    (TL_PLACE_BAND), and twice the area errs by less than twice that.  Boxes are those of the places and a unit around
  *    them; a sample beside the extent lies outside of some edge as any other does.
  * 3. Rows: v = e0 + i dx, rounded once or twice, errs by 5 u XY at most from E at column 0, the errors of k dy for any
@@ -29,7 +29,7 @@
  *    |q - nearest integer| <= M / d + 36 u in boxes of up to 17 columns, 130 u in those of up to 62.
  *    Farther out both ends of the comparison are clamped to the box.
  * 4. A band above 1/2, of a nearly level edge, refines every row: |q - nearest integer| <= 1/2.  A level edge is never
- *    refined: the box, which is exact, says what it says.  A difference that only float32 takes for 0 is set to 1e-30.
+ *    refined: the exact box decides.  A difference that only float32 takes for 0 is set to 1e-30.
  *    Squares are tested at corners up to a pixel outside the extent: X and Y are then two pixels more.
  * 5. Vertices on 2^-8 px: ties are systematic, so lanes in doubt are looked at, and the band of those on the grid is 0.
  *    Boxes of up to 4x4 samples: points are measured without an error, edge functions are multiples of 2^-16, and while
@@ -60,7 +60,7 @@
 #define TL_GRID_BITS 8
 #define TL_GRID_VECTORS 64    /* on fine grids few vectors have a tie */
 #define TL_EXACT_BOX 64.0f    /* pixels */
-#define TL_HALF_UNIT 0x1p-17f /* half of what edge functions on the grid are multiples of */
+#define TL_HALF_UNIT 0x1p-17f /* half of the unit of edge functions on the grid */
 
 /* The corners of a triangle that is turned, or not. */
 TL_INLINE void load_turned(const walk_state *s, int32_t id, int is_turned, exact_point *p)
@@ -245,7 +245,7 @@ TL_INLINE void set_box_edges(const walk_state *s, lane_exact *t, vm on_grid)
     }
 }
 
-/* The triangles of which all vertices lie on 2^-8 px; of_boxes: and that are so small that set_box_edges is exact. */
+/* The triangles with all vertices on 2^-8 px; of_boxes: and that are so small that set_box_edges is exact. */
 TL_INLINE vm find_on_grid(const walk_state *s, const lane_exact *t, int of_boxes)
 {
     vd off = vd_set1(0.0);
@@ -255,7 +255,7 @@ TL_INLINE vm find_on_grid(const walk_state *s, const lane_exact *t, int of_boxes
     return of_boxes ? vm_and(good, vf_ge(vf_set1(TL_EXACT_BOX * (float)s->points->band), t->xy)) : good;
 }
 
-/* Moves what set_box_edges made of the lanes in m by half a unit, outwards where an edge owns its ties and else
+/* Moves edge functions of set_box_edges, in lanes of m, by half a unit, outwards where an edge owns its ties and else
  * inwards: none is ever 0 at a sample then. */
 TL_INLINE void set_ties(lane_exact *t, vm m)
 {
@@ -347,13 +347,13 @@ TL_INLINE void store_points_to_pick(const lane_exact *t, picked_points *m)
     vd_store(m->sample_x, t->sample_x), vd_store(m->sample_y, t->sample_y);
 }
 
-/* When a triangle covers a pixel, by what is drawn: squares have masks and counts alone. */
+/* When a triangle covers a pixel, by the sink: squares have masks and counts alone. */
 TL_INLINE tl_test test_of(const walk_state *s, tl_sink sink)
 {
     return sink == TL_SINK_MASK || sink == TL_SINK_COUNT ? s->window->test : TL_TEST_SAMPLE;
 }
 
-/* The first pixels whose samples are not left of x. */
+/* The first pixels with samples not left of x. */
 TL_INLINE vi first_pixels(vd x, vd centre, int is_left_of_0)
 {
     const vi n = vi_ceil(vd_sub(x, centre));
@@ -363,7 +363,7 @@ TL_INLINE vi first_pixels(vd x, vd centre, int is_left_of_0)
     return vi_add(n, vi_select(is_low, vi_set1(1), vi_set1(0)));
 }
 
-/* The pixels from *first to *end whose samples lie in extents, or whose squares meet them in more than a line, or lie
+/* The pixels from *first to *end with samples in extents, or with squares that meet them in more than a line, or lie
  * in them. */
 TL_INLINE void find_pixels_of(vd low, vd high, tl_test test, double centre, int is_left_of_0, vi *first, vi *end)
 {
@@ -402,7 +402,7 @@ TL_INLINE void find_boxes_of_points(const walk_state *s, tl_sink sink, vm live, 
     b->xy = vf_mul(vf_max(vf_add(vf_from_vd(width), border), one), vf_max(vf_add(vf_from_vd(height), border), one));
 }
 
-/* The pixels whose samples lie between places, or up to a unit beside them. */
+/* The pixels with samples between places, or up to a unit beside them. */
 TL_INLINE void find_pixels_of_places(vi low, vi high, double centre, vi *first, vi *end)
 {
     const int32_t at = place_of(centre), unit = 1 << TL_PLACE_BITS;
@@ -462,7 +462,7 @@ TL_INLINE void place_float(const walk_state *s, tl_sink sink, vi col, vi row, vf
 #define TL_LEAST_BOX 1e-250
 #define TL_MOST_EXTENT 1e120
 
-/* Sets aside what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range.
+/* Sets aside triangles that lanes could draw except for the depth; as plane_of_points: extents of lanes are in range.
  * */
 TL_INLINE void take_out_slivers(walk_state *s, lane_exact *t)
 {
@@ -540,7 +540,7 @@ TL_INLINE lane_planes plane_of_lanes(const walk_state *s, const lane_exact *t)
     return p;
 }
 
-/* Leaves out for certain what is turned away. */
+/* Leaves out triangles that are turned away for certain. */
 TL_INLINE void drop_turned(const walk_state *s, lane_batch *b)
 {
     if (s->snapped->cull == TL_CULL_NONE)

@@ -1,7 +1,7 @@
 /* The two walkers, written once and compiled for 64-bit and 128-bit integers: single_fixed.c includes this file twice,
  * which has no guard therefore.
- * In: a set-up triangle.  Out: the covered span of each row.  TL_INT is the integer, TL_OP(name) what
- * base/integers.h has for it, TL_WALK(name) names its copy.
+ * In: a set-up triangle.  Out: the covered span of each row.  TL_INT is the integer, TL_OP(name) its
+ * operation in base/integers.h, TL_WALK(name) names its copy.
  *
  * Both walk E' = (2E + bias) >> (bits + 1), bias -1 on edges that are neither top nor left.  2E changes by multiples of
  * 2^(bits+1) from sample to sample, so the floor keeps its sign at every sample, and E' changes by exactly -dy a column

@@ -1,6 +1,6 @@
 /* Alpha test: triangles with holes in their texture, drawn over a visibility buffer or over layers; samples with too
- * little opacity are left out, so that what is behind them stays.
- * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest of what is left in every
+ * little opacity are left out, so that surfaces behind them stay.
+ * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest remaining sample in every
  * pixel.
  *
  * A triangle is drawn by itself into a tile, then tested pixel by pixel: the order of the list does not matter. */
@@ -61,7 +61,7 @@ typedef struct {
     cutout_tile tile;
 } cutout;
 
-/* Leaves out of n pixels of a row what the buffer hides. */
+/* Leaves out those of n pixels of a row that the buffer hides. */
 TL_INLINE void hide_nearest(const cutout *c, int n, int32_t *own, const float *own_depth, int64_t to)
 {
     const int32_t *ids = (const int32_t *)c->target->pixels + to;
@@ -77,7 +77,7 @@ TL_INLINE void hide_nearest(const cutout *c, int n, int32_t *own, const float *o
     }
 }
 
-/* Puts what is left of n pixels of a row of a tile into the buffer, from its pixel `to` on. */
+/* Puts the remaining ones of n pixels of a row of a tile into the buffer, from its pixel `to` on. */
 TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64_t row, int64_t column, int n,
                            int64_t from, int64_t to)
 {
@@ -159,7 +159,7 @@ static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int3
         }
 }
 
-/* Draws n triangles over what a target holds: a visibility buffer, or the layers of pixels. */
+/* Draws n triangles over a target: a visibility buffer, or the layers of pixels. */
 static void cut_out(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target)
 {

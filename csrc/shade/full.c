@@ -2,7 +2,7 @@
  * In: a vector of pixels.  Out: their light, linear, and their opacity.
  *
  * The tangent frame of a normal map is that of the triangle: where u and v grow by their gradients over it, as
- * per-pixel derivatives would have it, but without their rounding.  The tangent is u's direction less what of it lies
+ * per-pixel derivatives would have it, but without their rounding.  The tangent is u's direction less its part
  * along the normal of the pixel, the bitangent is at right angles to both, on the side to which v grows (uv with v up;
  * maps with green up).  Meshes bring no tangents of their own.  A surface that is seen from behind has its bent normal
  * turned round as a whole (glTF 2.0, 3.9.5).
@@ -34,7 +34,7 @@ TL_INLINE int textures_of(const tl_material *m, const tl_texture **textures)
     return n;
 }
 
-/* A set of uv whose coefficients begin at `first`, those of its gradients at `gradient`. */
+/* A set of uv with coefficients from `first` on, those of its gradients from `gradient` on. */
 TL_INLINE void find_uv(const shaded_lanes *p, int first, int gradient, vf *uv, vf *du, vf *dv)
 {
     const vf u = vf_mul(weighed(p, first, first + 1, first + 2), p->inv_q);

@@ -8,8 +8,8 @@
  * A light of intensity 1 makes a white matt surface white that faces it: so its light is pi, which cancels that of f.
  * The denominator of D is (n . h)^2 alpha^2 + |n x h|^2: there nothing cancels.  Roughness counts as at least
  * TL_LEAST_ROUGHNESS, so that alpha^4 stays far from the rounding of float32 and a highlight is no smaller than a lamp.
- * What the surroundings send is their blurred light in the mirrored direction times the share that a surface mirrors of
- * white surroundings (the split sum); the rest of it, times the base, is what the matt ground gets.
+ * The light of the surroundings is their blurred light in the mirrored direction times the share that a surface mirrors
+ * of white surroundings (the split sum); the matt ground gets the rest of it, times the base.
  *
  * Based on: Khronos, glTF 2.0 Specification, appendix B (BRDF); B. Walter et al., 2007 (GGX); E. Heitz, Understanding
  * the Masking-Shadowing Function in Microfacet-Based BRDFs, 2014 (V, height-correlated); C. Schlick, An Inexpensive

@@ -38,7 +38,7 @@ TL_INLINE int is_far(const tl_texture *t)
            (int64_t)t->width[0] * t->height[0] >= TL_FAR_TEXELS;
 }
 
-/* Finds out whether what is shown has such textures. */
+/* Finds out whether the materials have such textures. */
 static void note_far(shade_runs *s)
 {
     s->has_far_texels = 0;

@@ -27,7 +27,7 @@ TL_INLINE vi encode_light(const tl_shading *shading, const vf *rgba)
                    opacity);
 }
 
-/* Writes the words of the pixels of a vector that show something, of which n are left. */
+/* Writes the words of the pixels of a vector that show something; n are left. */
 TL_INLINE void put_shaded(int32_t *pixels, unsigned visible, int n, vi word)
 {
     const vm lanes = vm_from_bits(visible);
@@ -63,7 +63,7 @@ TL_INLINE void start_span(int32_t *pixels, int32_t word, int n, const int32_t *i
             vi_store_masked(pixels + x, vm_first(n - x), vi_set1(word));
 }
 
-/* n pixels of a span from `column` on, whose runs are set; `depth` is that of the first. */
+/* n pixels of a span from `column` on, with their runs set; `depth` is that of the first. */
 TL_INLINE void shade_runs_of(const shade_runs *s, int n, int64_t column, int64_t row, const float *depth,
                              int32_t *pixels)
 {
@@ -131,7 +131,7 @@ static void set_inverse_w(const tl_source *source, const float *rows, int64_t fi
     }
 }
 
-/* The unit normals of n pixels of a span from `column` on, whose runs are set: a plane an axis. */
+/* The unit normals of n pixels of a span from `column` on, with their runs set: a plane an axis. */
 TL_INLINE void find_unit_normals(const shade_runs *s, int n, int64_t column, float (*planes)[TL_SPAN_ROOM], int first)
 {
     const vf zero = vf_set1(0.0f);

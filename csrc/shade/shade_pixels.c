@@ -15,7 +15,7 @@
 #include "shade/light.c"
 #include "shade/texture.c"
 
-/* Edge functions of the lanes whose runs are special, run by run. */
+/* Edge functions of the lanes with special runs, run by run. */
 static void set_special_edges(shaded_lanes *p)
 {
     special_lanes own = start_special(p, pick_int(p, RUN_SPECIAL));
@@ -51,7 +51,7 @@ TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t 
         set_special_edges(p);
 }
 
-/* The normal of a face whose vertices have none that could be interpolated; 0 if it has no area. */
+/* The normal of a face without normals of vertices to interpolate; 0 if it has no area. */
 static void face_normal(const shade_runs *s, int32_t id, double *n)
 {
     const tl_shading *shading = s->shading;
@@ -122,7 +122,7 @@ TL_INLINE void set_normals(shaded_lanes *p)
 
 TL_INLINE void set_uv_lanes(shaded_lanes *p) { find_uv(p, RUN_U, RUN_GRADIENT, p->uv, p->du, p->dv); }
 
-/* Vector i of the span that begins at `column`, and what attributes are weighted by. */
+/* Vector i of the span that begins at `column`, and the weights of its attributes. */
 TL_INLINE void start_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {
     find_pixels(p, s, i, column);

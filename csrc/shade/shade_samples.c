@@ -1,5 +1,5 @@
 /* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each
- * pixel that it shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its
+ * pixel that it shows in, at the first of the samples that see it; the pixel is the mean of the light at its
  * samples, each at most white, as a display and the buffers of graphics hardware have it.
  * In: planes of ids, or one plane and the pixels that show several triangles; the instances.  Out: red, green, blue and
  * opacity, uint8. */
@@ -50,7 +50,7 @@ TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t str
     return any;
 }
 
-/* Shades n pixels of a span from place `first` on, whose runs are set, and adds their light, as a display shows it,
+/* Shades n pixels of a span from place `first` on, with their runs set, and adds their light, as a display shows it,
  * times the samples that see it. */
 TL_INLINE void add_samples(sample_sums *sums, const shade_runs *s, int first, int n, int64_t column, int64_t row,
                            const float *depth)
@@ -74,7 +74,7 @@ TL_INLINE void add_samples(sample_sums *sums, const shade_runs *s, int first, in
     }
 }
 
-/* Shades what sums->ids names in n pixels, instance by instance. */
+/* Shades the triangles of sums->ids in n pixels, instance by instance. */
 TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, span_list *list, const int32_t *at_fx, int64_t row,
                           int64_t column, int n, const float *depth)
 {
@@ -88,7 +88,7 @@ TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, span_list *list, con
     }
 }
 
-/* Mean light over the background ("over"), encoded.  A pixel of whose samples none or all see a triangle owes nothing
+/* Mean light over the background ("over"), encoded.  A pixel with no or all samples on a triangle owes nothing
  * to rounding. */
 TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, int sample_bits, int x)
 {
@@ -133,7 +133,7 @@ static int64_t unpack_span(const tl_split *split, int64_t at, int64_t end, int64
     return at;
 }
 
-/* All samples of n pixels see what the first does. */
+/* All samples of n pixels see the triangle of the first. */
 TL_INLINE int find_whole(sample_sums *sums, const int32_t *ids, int sample_bits, int n)
 {
     const vi none = vi_set1(-1);

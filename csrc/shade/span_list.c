@@ -31,7 +31,7 @@ typedef struct {
     span_part parts[TL_SPAN];
 } span_list;
 
-/* Notes what a full material needs. */
+/* Notes the needs of a full material. */
 static void note_full(shade_runs *s, const tl_material *m)
 {
     const tl_texture *textures[TL_MAX_TEXTURES];
@@ -53,7 +53,7 @@ static void start_runs(shade_runs *s, const tl_window *window, const tl_view *vi
         memset(s->floats[k], 0, TL_MAX_LANES * sizeof(float));
 }
 
-/* Runs of a mesh from now on, and what its shading needs of them. */
+/* Runs of a mesh from now on, and the needs of its shading. */
 static void set_mesh(shade_runs *s, const tl_snapped *snapped, const tl_shading *shading)
 {
     int shines = 0, has_texture = 0, is_lit = 0, has_points = 0;
@@ -90,7 +90,7 @@ static void start_list(span_list *list, const tl_shaded_scene *scene)
     list->scene = scene, list->last = scene->instances, list->set = NULL;
 }
 
-/* The last of the instances whose first id is not above `id`, or the first of all. */
+/* The last of the instances with a first id not above `id`, or the first of all. */
 static const tl_shaded *find_instance(const tl_shaded_scene *scene, int32_t id)
 {
     int64_t low = 0, high = scene->n;

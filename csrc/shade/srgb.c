@@ -73,13 +73,13 @@ TL_INLINE vi to_word(vi r, vi g, vi b, vi a)
 #define TL_MOST_GREY 63.0f
 #define TL_GREY_STEPS 1024.0f
 
-/* 2^(35 / 12) / (255 * 1.055): what the product of two roots is too little by, of a colour in steps of 2^-15 and light
+/* 2^(35 / 12) / (255 * 1.055): the factor that the product of two roots lacks, of a colour in steps of 2^-15 and light
  * in those of 2^-10, where srgb_root has those of 2^-16; and its factor, which stands in both. */
 #define TL_GREY_SCALE 0x1.cbddbcp-6f
 
 static int is_white(const float *color) { return color[0] == color[1] && color[1] == color[2]; }
 
-/* Whether what is to be shown has one colour and white light, and not too much of it; the roots of the colour if so. */
+/* Whether the surface has one colour and white light, and not too much of it; the roots of the colour if so. */
 static void start_grey(shade_runs *s)
 {
     const tl_shading *shading = s->shading;

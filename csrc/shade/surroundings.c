@@ -1,9 +1,9 @@
 /* Surroundings: the light that comes from all around, as a matt surface gathers it and as a shiny one mirrors it.
  * In: directions in the shading space, a roughness.  Out: light, linear.
  *
- * A sky over a ground needs no picture.  A matt surface whose normal has the height h gets (1 + h) / 2 of the sky.  A
+ * A sky over a ground needs no picture.  A matt surface with a normal of height h gets (1 + h) / 2 of the sky.  A
  * rough one sees the horizon blurred: along one axis the slopes of GGX facets have the cumulative distribution
- * (1 + x / sqrt(x^2 + a^2)) / 2, and a facet turns what it mirrors by twice its own angle, so x is the slope of the
+ * (1 + x / sqrt(x^2 + a^2)) / 2, and a facet turns mirrored light by twice its own angle, so x is the slope of the
  * mirrored direction and a twice alpha; for large alpha the half circle ends it.  SPREAD_* fit that: within 0.007 of
  * the integral over the facets for every roughness and height, exact for a mirror and for alpha = 1, which sees
  * (1 + h) / 2 again.

@@ -29,7 +29,7 @@ TL_INLINE vf vf_log2(vf a)
     return vf_fma(sum, t, vf_from_vi(exponent));
 }
 
-/* Where a coordinate falls: the texel before it, the share of the one behind, and what to do at the end of a row. */
+/* Where a coordinate falls: the texel before it, and the share of the one behind. */
 typedef struct {
     vi first;
     vf share;

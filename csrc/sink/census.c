@@ -1,5 +1,5 @@
 /* Census: how many triangles each part of the drawing code would take, counted where it decides.
- * In: what raster.c and single_fixed.c know of triangles.  Out: tl_census. */
+ * In: the decisions of raster.c and single_fixed.c.  Out: tl_census. */
 #ifndef TL_CENSUS_C
 #define TL_CENSUS_C
 

@@ -1,4 +1,4 @@
-/* Coverage while it is drawn, a bit a sample, and what the picture holds of it at the end.
+/* Coverage while it is drawn, a bit a sample, and its picture at the end.
  * In: samples as they are drawn.  Out: a byte of 0 or 1 each; or, of 2 to 16 samples a pixel, the covered share,
  * float32.
  *

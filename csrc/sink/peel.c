@@ -2,8 +2,8 @@
  * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id, or
  * bits.
  *
- * Depth peeling draws the mesh once a layer, each time what lies behind the layer before.  Here a sample goes through
- * the planes from the first to the last: where it comes before what is there it takes the place, and what was there
+ * Depth peeling draws the mesh once a layer, each time the surfaces behind the last layer.  Here a sample goes through
+ * the planes from the first to the last: where it comes before the one there it takes the place, and the old one
  * goes on, until an empty place ends it.  Neighbours on a surface do so together, a vector of them.
  *
  * Based on: C. Everitt, Interactive Order-Independent Transparency, 2001 (depth peeling); L. Carpenter, The A-buffer,

@@ -1,4 +1,4 @@
-/* Sinks: what covered samples do to the buffers.  The walkers know nothing of what is drawn.
+/* Sinks: write covered samples to the buffers.  The walkers do not depend on the sink.
  * In: lanes, spans or lists of samples.  Out: mask, counts, bits of samples, or ids with depth.
  * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so
  * that each copy of the code keeps one case. */
@@ -19,7 +19,7 @@
 /* Samples interpolated by weights at a time. */
 #define TL_CHUNK 64
 
-/* A copy of a function for each sink of whole samples, so that inner loops know what they draw, and a call of the right
+/* A copy of a function for each sink of whole samples, a constant of its inner loops, and a call of the right
  * one.  Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...),
  * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND, TL_SINK_SPANS and TL_SINK_CENSUS have code of their
  * own. */
@@ -48,7 +48,7 @@
     case TL_SINK_CENSUS: __builtin_trap();                                    \
     }
 
-/* Code that only lists samples needs fewer copies: what a list holds is places, places and ids, or depths, too.  A copy
+/* Code that only lists samples needs fewer copies: a list holds places, places and ids, or depths, too.  A copy
  * has one sink of its kind for all. */
 #define TL_LIST_COPIES(f, declared, ...)                         \
     TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)   \
@@ -280,9 +280,9 @@ static __attribute__((noinline)) void put_columns_farthest(const plane_row *r, c
     put_columns(r, target, TL_SINK_FARTHEST, at, first, end);
 }
 
-/* The same without segments in which all that is drawn lies before the triangle.  Along a row depths as they are
- * rounded never turn back, so those at the ends of a segment bound the others, to the bit.  What a triangle covers
- * whole is a bound from then on: other depths only come before it.  Returns whether anything was left out. */
+/* The same without segments where all depths lie before the triangle.  Along a row depths as they are
+ * rounded never turn back, so those at the ends of a segment bound the others, to the bit.  A segment covered
+ * whole has a bound from then on: other depths only come before it.  Returns whether anything was left out. */
 TL_INLINE int put_bounded(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, float *bounds,
                           int64_t first, int64_t end)
 {
@@ -314,7 +314,7 @@ TL_INLINE int put_bounded(const plane_row *r, const tl_target *target, tl_sink s
     return is_any_behind;
 }
 
-/* The sinks that keep what comes first by depth, whatever comes when. */
+/* The sinks that keep the nearest or farthest depth, in any order. */
 TL_INLINE int sink_keeps_order(tl_sink sink) { return sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST; }
 
 /* Columns of a triangle from which on its rows may look at bounds, and of a row from which on it does, or is drawn by

@@ -2,7 +2,7 @@
  * In: corners in pixels, before the snap.  Out: spans sorted by rows of windows, by index within a row.
  *
  * A span may have windows too many, never too few: the box of a triangle is widened by TL_SPAN_MARGIN_PX, which is more
- * than what the snap moves (half a pixel at most) and what a pixel's square adds.  A triangle of more than one row and
+ * than the move of the snap (half a pixel at most) and a pixel's square together.  A triangle of more than one row and
  * column of windows is cut by each row, so that a long thin one is listed along its way and not in all of its box.  The
  * point where an edge enters a row is computed in float64: its error is below 2^-50 of the largest coordinate, and
  * TL_SPAN_SLACK of it is added. */
@@ -34,7 +34,7 @@ static inline void windows_between(double low, double high, int64_t length_px, d
     *end = (int32_t)(to * per_px) + 1;
 }
 
-/* Of numbers: fmin and fmax, which know what to do with those that are none, are calls. */
+/* Of numbers: fmin and fmax, which handle NaN, are calls. */
 static inline double min_f64(double a, double b) { return a < b ? a : b; }
 static inline double max_f64(double a, double b) { return a > b ? a : b; }
 static inline double min3_f64(double a, double b, double c) { return min_f64(a, min_f64(b, c)); }
@@ -125,7 +125,7 @@ static int64_t list_spans(const tl_tiling *t, const double *corners_px, int64_t 
 }
 
 /* Counts the spans of a row by their windows, or with `out` writes their triangles in that order.  Those of more than
- * TL_SHORT_SPAN windows are left out: what is written is at most so many times as long as the spans. */
+ * TL_SHORT_SPAN windows are left out: the list is at most so many times as long as the spans. */
 static int64_t sort_spans(const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out)
 {
     int64_t n_long = 0;
@@ -145,7 +145,7 @@ static int64_t sort_spans(const tl_window_span *spans, int64_t n, int64_t *start
     return n_long;
 }
 
-/* Counts the triangles of windows, as what changes from one to the next. */
+/* Counts the triangles of windows, as differences from one to the next. */
 static void count_windows(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
                           int32_t *steps)
 {

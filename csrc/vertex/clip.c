@@ -121,7 +121,7 @@ static inline int clip_turn(const tl_source *source, const int32_t *corners)
 }
 
 /* The snap may dent a corner of the convex polygon inwards; a fan from that corner still turns one way only.  Corners
- * that changed places leave no such fan: then the one with the least area turned over, whose triangles that turn
+ * that changed places leave no such fan: then the one with the least area turned over; its triangles that turn
  * against the source triangle are left out.  Returns the apex, and in *turn the sign of the triangles to draw. */
 static int fan_apex(const tl_pieces *p, int64_t first, int n, int source_turn, int *turn)
 {
@@ -247,7 +247,7 @@ typedef struct {
     int n, is_cut;
 } triangle_parts;
 
-/* The corners of what no plane cuts are put into `own`. */
+/* The corners of a triangle that no plane cuts are put into `own`. */
 static inline triangle_parts parts_of(const tl_snapped *snapped, int64_t i, int32_t *own)
 {
     const tl_pieces *pieces = snapped->pieces;

@@ -173,7 +173,7 @@ TL_INLINE vm inside_lanes(const vd *p, const tl_view *view)
     return inside;
 }
 
-/* The same of float32 numbers: 0 < w < infinity says what the two tests of w say. */
+/* The same of float32 numbers: 0 < w < infinity equals the two tests of w. */
 TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
 {
     const vf z = p[2], w = p[3], zero = vf_set1(0.0f);

@@ -99,7 +99,7 @@ static inline int load_triangle(const tl_vertex_set *set, const int32_t *corners
     return sign;
 }
 
-/* Whether a triangle whose area had a sign is not drawn. */
+/* Whether a triangle with an area of this sign is not drawn. */
 static inline int is_culled(int sign, tl_cull cull)
 {
     return sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT);
@@ -141,7 +141,7 @@ static inline void setup_plane(tl_triangle *t)
     t->slope_y = (z2 * x1 - z1 * x2) * inverse;
 }
 
-/* Prepares weights_at: what colours, and the depth of slivers, are interpolated with. */
+/* Prepares weights_at, the weights of colours and of the depth of slivers. */
 static inline void setup_weights(tl_triangle *t, const tl_window *window)
 {
     const int bits = window->subpixel_bits;

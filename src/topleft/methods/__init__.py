@@ -1,7 +1,7 @@
 """The registry: the only list of the library's methods of filling, with the claims of each.
 
 `METHODS` are the production ones: exact, identical buffers. `CLASSICS` are those of the literature, as published, to be
-compared; a variant's name stands after a slash. Their kernels are imported when one is first asked for.
+compared; a variant's name stands after a slash. Their kernels are imported on first use.
 
 classics/    draws triangles as the literature does: a compiled kernel for each classic
 reference/   draws triangles exactly and slowly, in integers and fractions: the reference of all others

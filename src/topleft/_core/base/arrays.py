@@ -60,7 +60,7 @@ def apart_from(out: object, name: str, values: ArrayLike) -> ArrayLike:
 
 
 def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
-    """Return the memory of another library's array: of PyTorch, JAX, or whatever speaks DLPack or the array API."""
+    """Return the memory of another library's array: of PyTorch, JAX, or any with DLPack or the array API."""
     kind = f"{type(tensor).__module__.partition('.')[0]}.{type(tensor).__name__}"
     if hasattr(tensor, "__dlpack_device__"):
         try:
@@ -124,7 +124,7 @@ def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
 
 
 def as_triangles(values: ArrayLike) -> NDArray[np.signedinteger[Any]]:
-    """Return (T, 3) triangles as a contiguous int32 or int64 array; indices are not looked at.
+    """Return (T, 3) triangles as a contiguous int32 or int64 array; indices are not checked.
 
     Unsigned indices beyond the signed range come out negative, which no index may be.
     """

@@ -63,7 +63,7 @@ def spread_colors(colors: U8, are_light: bool, spread: Callable[[Array], F64]) -
 
 
 def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
-    """The colour as whole numbers of 0 to 255; RGB becomes opaque where RGBA is asked for.
+    """The colour as whole numbers of 0 to 255; RGB becomes opaque RGBA if that is wanted.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ def crs_text(crs: Any) -> str | None:
 
 
 def is_same_crs(one: str, other: str) -> bool:
-    """Whether two names are of one CRS; pyproj is asked where they differ."""
+    """Whether two names are of one CRS; pyproj decides where they differ."""
     if one.casefold() == other.casefold():
         return True
     pyproj = _pyproj("comparing two CRS")
@@ -194,7 +194,7 @@ def _crs_of_coordinates(array: Any) -> str | None:
 
 
 def numbers_without_data(raster: Any) -> list[float]:
-    """Return the numbers that a raster of xarray says stand for none."""
+    """Return the numbers that stand for no data in a raster of xarray."""
     said = getattr(raster, "attrs", None)
     if not isinstance(said, Mapping):
         return []

@@ -18,10 +18,10 @@ CACHE_LINE = 64
 #: Arrays below it are NumPy's own: the system keeps memory for them, without page faults.
 MIN_BLOCK_BYTES = 4 << 10
 
-#: Several arrays of so many bytes together are asked for at once before the first of them is touched.
+#: Several arrays of so many bytes together are allocated at once before the first of them is written.
 MIN_CHECKED_BYTES = 1 << 30
 
-#: Most bytes of arrays that have died which the process keeps for arrays to come: ids and depth of four samples a pixel
+#: Most bytes of freed arrays that the process keeps for new ones: ids and depth of four samples a pixel
 #: in a picture of 4096x4096.
 MAX_WAITING_BYTES = 512 << 20
 
@@ -56,7 +56,7 @@ class Memory(Protocol):
         """Return an uninitialised array."""
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
-        """Return n int32 that are all `value`; who changes them puts that back."""
+        """Return n int32 that are all `value`; the caller restores it before it returns."""
 
 
 class FreshMemory:
@@ -89,7 +89,7 @@ class KeptMemory:
         return block[:n_bytes].view(dtype).reshape(shape)
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
-        """Return n int32 that are all `value`: filled once, put back by whoever changed them."""
+        """Return n int32 that are all `value`: filled once, restored by callers."""
         block = self._constants.get(name)
         if block is None or block.size < n:
             block = self._constants[name] = FRESH.constant(name, n, value)
@@ -148,10 +148,10 @@ engine.keep_blocks(MAX_WAITING_BYTES)
 
 
 def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return an uninitialised array, in memory of one that has died where there is some of about that size.
+    """Return an uninitialised array, in memory of a freed one of about that size if there is some.
 
-    Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The memory is nobody else's until
-    the array and all its views have died; then it waits for another array, `MAX_WAITING_BYTES` at most.
+    Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The array and all its views own
+    the memory until they are freed; then it waits for another array, `MAX_WAITING_BYTES` at most.
     """
     n_bytes = _size(shape, dtype)
     if n_bytes < MIN_BLOCK_BYTES:

@@ -49,7 +49,7 @@ def _list_of(names: list[str]) -> str:
 
 
 def tell(lines: Iterable[str], stacklevel: int) -> None:
-    """Warn of each line, as if where the caller was called; who listens gets them instead."""
+    """Warn of each line, at the place of the caller's call; a listener gets them instead."""
     heard = _listener.get()
     if heard is not None:
         heard.extend(lines)

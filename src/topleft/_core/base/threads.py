@@ -82,7 +82,7 @@ def threads_for(threads: object, n_triangles: int) -> int:
 
 
 def threads_of_rows(n: int, threads: int | None = None) -> int:
-    """Return how many threads some triangles or vertices are worth that are measured or moved, not drawn."""
+    """Return how many threads are worth it to measure or move, not draw, some triangles or vertices."""
     return max(1, min(count_threads(None, n), n // MIN_ROWS_PER_THREAD)) if threads is None else threads
 
 
@@ -122,7 +122,7 @@ def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Pa
 
 
 def _start(take: Callable[[], None], n: int, jobs: list[Future[None]]) -> None:
-    """Let up to n threads take parts; fewer where the system or a Python that ends refuses them."""
+    """Let up to n threads take parts; fewer if the system refuses them, or Python is shutting down."""
     try:
         pool = _shared_pool()
         for _ in range(n):

@@ -206,7 +206,7 @@ cdef class PixelPoints:
                 self.points.rows[i][k] = rows[i, k]
 
     def fill(self, SnappedMesh mesh, const int32_t[:, ::1] ids, out: Array, int64_t first_row, int64_t n_rows):
-        """Write rows of a visibility buffer's points: their positions, depths or distances, (H, W) or (H, W, C)."""
+        """Write rows of the value of each pixel's point, a `tl_point_kind`, (H, W) or (H, W, C)."""
         cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
         cdef uint8_t[::1] flat
         if n_rows and ids.shape[1]:

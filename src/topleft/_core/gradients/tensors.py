@@ -82,7 +82,7 @@ class PixelGrid:
         return (self.n_pictures, self.height, self.width, *columns)
 
     def refuse(self, bad: int) -> None:
-        """Raise an error for the number of a triangle that does not exist."""
+        """Raise an error for the id of a triangle that does not exist."""
         if bad >= 0:
             raise IndexError(f"rast must hold ids of the {len(self.tri)} triangles of tri plus 1, got {bad + 1}")
 
@@ -118,7 +118,7 @@ def points(
 
 
 def faces_of(grid: PixelGrid, band: Band, n_columns: int, n_values: int) -> engine.GradientSums:
-    """Return room for sums by triangle: so many columns, and where there are few values those of them."""
+    """Return room for sums by triangle: so many columns, plus those of values if these are few."""
     more = engine.SUMS_OF_VALUES if 0 < n_values <= engine.FEW_COLUMNS else 0
     return sums_of(len(grid.tri), n_columns + more, band, grid.width, "faces")
 
@@ -339,7 +339,7 @@ def squares(
 
 
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return of each edge 3 * the triangle across it + the corner there that it is opposite to, int32 (T, 3); -1: none.
+    """Return for each edge 3 * the triangle across it + its opposite corner there, int32 (T, 3); -1: none.
 
     Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next; there, and
     where two triangles are wound differently, it is -2 less that.

@@ -67,7 +67,7 @@ def draw_mask(
 
 
 def sort_bands(prepared: Prepared, band_rows: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:
-    """Return the polygons of each band of rows, and where those of each begin."""
+    """Return the polygons of each band of rows, and the first place of each band."""
     height = prepared.frame.size[1]
     n_bands = -(-height // band_rows)
     starts = np.empty(n_bands + 2, np.int64)

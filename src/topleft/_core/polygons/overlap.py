@@ -162,7 +162,7 @@ class Overlap:
         return self._reduced(np.fmax, self._values_of(raster, nodata))
 
     def stdevs(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
-        """Return the standard deviation (P,) of a raster (H, W) over each polygon, of all it holds; NaN without data.
+        """Return the population standard deviation (P,) of a raster (H, W) over each polygon; NaN without data.
 
         It is the root of the mean of the squares of the differences to the mean, each weighted by its share.
         """
@@ -223,7 +223,7 @@ class Overlap:
         return self._added(self.areas)
 
     def spread(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return a raster (H, W): the values (P,) of polygons, each pixel with as much of them as it shares.
+        """Return a raster (H, W): the values (P,) of polygons, weighted by the area shared with each pixel.
 
         Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
         """
@@ -399,7 +399,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
 
     rooms: list[Chunk] = []
     done, n_listed, entries = 0, 0, []
-    while done < n:  # as many polygons as there is room for, all of them but for huge tables
+    while done < n:  # as many polygons as there is room for: all, except in huge tables
         end = end_of_room(before, done, MAX_ENTRIES_AT_ONCE)
         n_room = int(before[end] - before[done])
         check_fits((n_listed + n_room,), dtype, np.float32)
@@ -416,7 +416,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
 
 
 def end_of_room(before: npt.NDArray[np.int64], first: int, n_entries: int) -> int:
-    """Return up to which polygon from `first` on so many entries have room; at least one."""
+    """Return the end of the polygons from `first` on that so many entries have room for; at least one."""
     end = int(np.searchsorted(before, before[first] + n_entries, "right")) - 1
     return min(len(before) - 1, max(end, first + 1))
 
@@ -478,7 +478,7 @@ def list_range(
                 if not is_next:
                     pixels[at : at + n_entries], areas[at : at + n_entries] = own[0][:n_entries], own[1][:n_entries]
         except BaseException:
-            with turn:  # who waits for this block waits no longer
+            with turn:  # wake the threads that wait for this block
                 is_lost = True
                 turn.notify_all()
             raise

@@ -49,7 +49,7 @@ class ClusterRoute(Enum):
 
 
 class MeshletLimits(NamedTuple):
-    """Limits from which a mesh is drawn in clusters: `triangles`, or the share outside and those in view a pixel."""
+    """Limits above which a mesh is drawn from meshlets: `triangles`, or the share outside and those in view a pixel."""
 
     triangles: float
     outside: float
@@ -110,7 +110,7 @@ def is_affine(matrix: NDArray[Any] | None) -> bool:
 
 
 def must_cut(n_outside: int) -> bool:
-    """Tell whether triangles are looked through for those that a clip plane cuts: no vertex outside, none cut."""
+    """Tell whether to search for triangles that a clip plane cuts: no vertex outside, none cut."""
     return n_outside > 0
 
 
@@ -131,7 +131,7 @@ def pays_to_share(n_items: int) -> bool:
 
 
 def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
-    """Return how many threads draw, in bands of rows: as many as are asked for, or as many as the work is worth."""
+    """Return how many threads draw, in bands of rows: `threads=`, or as many as the work is worth."""
     n_threads = view.threads
     if n_threads is None:
         n_threads = available_threads()
@@ -194,7 +194,7 @@ def pays_float_lanes(view: View) -> bool:
 def can_cluster(view: View, sink: Sink) -> bool:
     """Tell whether the clusters of a mesh may be drawn one by one, in any order: where that decides nothing."""
     is_on_grid = view.grid_bits == view.subpixel_bits and (sink is not Sink.SAMPLES or view.grid_bits <= 8)
-    if view.single_sided is not None:  # clusters do not know which triangles are
+    if view.single_sided is not None:  # clusters do not know single-sided triangles
         return False
     return sink in ORDER_FREE and is_on_grid and 0 not in view.size and can_slice(view)
 
@@ -321,7 +321,7 @@ def pays_to_draw_instances(
 
 
 def instance_ns(view: View, n_triangles: int, share: float) -> float:
-    """Return about how long an instance takes whose box covers a share of the picture."""
+    """Return about how long an instance takes if its box covers a share of the picture."""
     costs, n_pixels = cost_table(), share * view.size[0] * view.size[1]
     row_ns, sample_ns, _ = costs.work_ids
     n_rows = n_triangles * max(1.0, math.sqrt(2 * n_pixels / n_triangles))

@@ -80,7 +80,7 @@ class ClusteredMesh:
         return float(is_beyond.mean()) if len(some) else 0.0
 
     def route(self, sink: Sink) -> ClusterRoute:
-        """Return how a picture of the mesh is drawn, which counts as one."""
+        """Return how a picture of the mesh is drawn, and count that picture."""
         clusters = self.clusters
         survey = self.survey(SURVEYED_OF_SAMPLES if self._view.sampling.n_samples > 1 else SURVEYED)
         found = choices.cluster_route(self._view, sink, clusters, survey, self.find_beyond)
@@ -186,7 +186,7 @@ class ClusteredMesh:
     ) -> list[Callable[..., engine.SnappedMesh]]:
         """Return a maker of the mesh as each sample sees it; those that (S, H, W) ids show are snapped once.
 
-        Where other triangles are asked for, too, all are snapped.
+        Where other triangles are needed, too, all are snapped.
         """
         common = cache(lambda: self.part(ids))
         whole = cache(lambda: self.part(np.arange(self.clusters.n_triangles, dtype=np.int32)))

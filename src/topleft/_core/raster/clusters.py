@@ -35,12 +35,12 @@ class Backoff:
         self._n_left = self._n_refused = 0
 
     def is_over(self) -> bool:
-        """Tell whether to find out, for one picture more."""
+        """Tell whether to try the clusters with this picture."""
         self._n_left -= 1
         return self._n_left < 0
 
     def note(self, *, pays: bool) -> None:
-        """Note whether the look paid."""
+        """Note whether the clusters paid."""
         self._n_refused = 0 if pays else min(3, self._n_refused + 1)
         self._n_left = 2**self._n_refused if self._n_refused else 0
 
@@ -102,7 +102,7 @@ class Clusters:
 
     @cached_property
     def meshlets(self) -> Meshlets:
-        """The same triangles in meshlets, made when they are first asked for (`pays_to_grow` in `choices.py`)."""
+        """The same triangles in meshlets, made on first access (`pays_to_grow` in `choices.py`)."""
         return Meshlets(self)
 
     @property
@@ -114,7 +114,7 @@ class Clusters:
         return len(self.engine)
 
     def is_look_due(self) -> bool:
-        """Tell whether it is to be found out how much this picture hides, and note that it is."""
+        """Tell whether to measure how much this picture hides, and note that it is measured."""
         is_due = self.n_pictures - self.hidden_at >= PICTURES_A_LOOK
         if is_due:
             self.hidden_at = self.n_pictures

@@ -177,7 +177,7 @@ class Costs:
 
     @property
     def thread_ns(self) -> float:
-        """The least work of a thread: so many times as much as waking it."""
+        """The least work of a thread, a multiple of the time to wake it."""
         return self.thread_wakes * self.wake
 
     def vertex_ns(self, kind: str, dtype: str) -> float:
@@ -221,7 +221,7 @@ _table: Costs | None = None
 
 
 def cost_table() -> Costs:
-    """Return the costs in use: of this machine where they have been measured, read once; else those that ship."""
+    """Return the costs in use, read once: those measured on this machine, else the shipped ones."""
     return use_costs(load_costs()) if _table is None else _table
 
 
@@ -239,7 +239,7 @@ def cache_file() -> Path:
 
 
 def load_costs() -> Costs:
-    """Return the costs of this machine, or those that ship if none, or none that can be used, have been measured."""
+    """Return the measured costs of this machine, or the shipped ones if there are none that can be used."""
     try:
         if not cache_file().is_file():
             return Costs()

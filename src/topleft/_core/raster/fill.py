@@ -339,7 +339,7 @@ def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_strai
     Raises
     ------
     ValueError
-        If the option is unknown, or light is asked for and the colours are no uint8.
+        If the option is unknown, or it is light and the colours are no uint8.
     """
     is_linear = parse(Resolve, "resolve", resolve) is Resolve.LINEAR
     if is_linear and colors.dtype != np.uint8:

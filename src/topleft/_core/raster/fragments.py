@@ -101,14 +101,14 @@ class SeenSamples(NamedTuple):
 
 
 def as_read(planes: NDArray[Any], kind: npt.DTypeLike) -> NDArray[Any]:
-    """Planes as kernels read them: as they are, if that is so."""
+    """Planes as kernels read them: copied only if need be."""
     return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
 
 
 class Fragments:
     """The visibility buffer that `rasterize` returns.
 
-    Attributes, and samples but the first, are computed when they are asked for, from the `triangles` that were passed
+    Attributes, and all samples but the first, are computed on first access, from the `triangles` that were passed
     in, and for clip space from the `vertices` too: do not change those arrays before.
 
     Attributes
@@ -200,7 +200,7 @@ class Fragments:
         return [(self._n_vertices, self._n_triangles)]
 
     def _parts_of(self, i: int, mesh: Any) -> Any:  # noqa: ARG002
-        """Return mesh `i` as it was drawn: itself, but for a lens."""
+        """Return mesh `i` as it was drawn: itself, unless a lens cuts it."""
         return mesh
 
     def _seen(self) -> SeenSamples:
@@ -668,7 +668,7 @@ class Fragments:
 
 
 def as_sample(i: object, n: int) -> int:
-    """Return which of n samples a number means, the last for -1."""
+    """Return the index of a sample, of n; -1 is the last."""
     if not isinstance(i, int | np.integer):
         raise TypeError(f"sample takes the number of a sample, or a texture and uv, got {shown(i)} alone")
     if not -n <= i < n:

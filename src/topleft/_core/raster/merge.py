@@ -33,7 +33,7 @@ def merge(
     depth_test: DepthTestOption | None = "less",
     threads: int | None = None,
 ) -> tuple[I32, F32]:
-    """Return the visibility buffer of all triangles, of those that shares of them were drawn to.
+    """Return the visibility buffer of all triangles from the buffers of shares of them.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ class PointFragments(Fragments):
         Raises
         ------
         ValueError
-            If the number of rows is not that of the points, or derivatives are asked for.
+            If the number of rows is not that of the points, or with `derivatives`.
         """
         if derivatives:
             raise ValueError("derivatives are those of triangles: a point has one value")
@@ -205,7 +205,7 @@ def draw_points(
     *,
     is_farthest: bool = False,
 ) -> PointFragments:
-    """`points`, of checked options, on the memory given; larger sizes than there can be are the largest."""
+    """`points`, of checked options, on the memory given; larger sizes are cut to the largest."""
     (width, height), n_samples = view.size, view.sampling.n_samples
     check_fits((n_samples, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n_samples, height, width), np.int32)

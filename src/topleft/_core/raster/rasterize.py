@@ -77,7 +77,7 @@ def draw(
 
 
 def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height: int, n_parts: int) -> list[int]:
-    """Draw as `draw` does: each part a slice of the triangles into its rows, then those that others list for it."""
+    """Draw as `draw` does: each thread a slice of the triangles into its rows, then those that others list for it."""
     mesh, n = snapped.mesh, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
     starts = [n * i // n_parts for i in range(n_parts + 1)]
@@ -135,7 +135,7 @@ def draw_area(
 
 
 def refuse_many(view: View, verb: str) -> None:
-    """Raise an error where a pixel needs one triangle, and areas or squares are of many."""
+    """Raise an error for areas or squares where a pixel needs one triangle."""
     if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
         raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center' and 'msaa2' to 'msaa16'")
 
@@ -256,7 +256,7 @@ def draw_fragments(
     frags = draw_clusters(memory, vertices, view, options)
     if frags is not None:
         return frags.drawn_from(corners)
-    if view.sampling.n_samples > 1:  # which are drawn from the snapped mesh when they are asked for
+    if view.sampling.n_samples > 1:  # samples are drawn from the snapped mesh on first access
         memory = MemoryOf(memory, "samples")
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     if names is not None:
@@ -269,7 +269,7 @@ Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
 
 
 def draw_labels(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
-    """Draw ids of triangles at depth 0, which is written when it is asked for."""
+    """Draw ids of triangles at depth 0; depth is written on first access."""
     with canvas_of(memory, "triangle", options.ids_out, view.size[::-1], np.int32) as (ids, canvas):
         draw(memory, snapped, view, drawing, canvas)
     return Fragments(ids, options.background, snapped.mesh, snapped.n_vertices, snapped.n_triangles)

@@ -77,7 +77,7 @@ class Snapped:
 
 
 def refuse_changed() -> NoReturn:
-    """Raise the error for an index that was none of a vertex while it was drawn, and now is."""
+    """Raise the error for an index that was out of range while it was drawn, and now is not."""
     raise IndexError(
         "triangles must hold indices of vertices while they are drawn, got some that did not, and now do: nobody may "
         "write to them during a call"
@@ -116,7 +116,7 @@ def snap_mesh(
 
 
 def snap_to_cover(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, out: object) -> Snapped:
-    """Take arrays as `snap_mesh` does, for a picture that asks nothing but which samples are covered.
+    """Take arrays as `snap_mesh` does, for a picture of coverage alone.
 
     On a fine grid float lanes draw the snapped vertices as they do vertices that are not snapped: the same picture.
     """
@@ -257,7 +257,7 @@ def exact_mesh(
 
 
 def take_points(memory: Memory, given: MeshArrays, n: int, *, must_check: bool) -> tuple[NDArray[np.float64], int]:
-    """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was looked at."""
+    """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was checked."""
     points, source = given.points, given.source
     is_same = points.dtype == np.float64
     if not n or (is_same and not must_check):

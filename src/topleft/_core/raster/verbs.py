@@ -242,7 +242,7 @@ def rasterize(
         Depth where nothing is; +inf, or -inf with "greater", unless given.
     out : (ndarray of int32, ndarray of float32), each of shape (H, W), (H, W, S), (B, H, W) or (B, H, W, S), optional
         Where ids and depth go, of S samples and B poses; either may be None. Without an array for it, the depth of
-        vertices (V, 2) is made when it is asked for: ids alone take half the time.
+        vertices (V, 2) is made on first access: ids alone take half the time.
 
     Returns
     -------

@@ -54,7 +54,7 @@ class Static(Protocol):
         """Its triangles (T, 3)."""
 
     def find_clusters(self) -> Clusters | None:
-        """Return its clusters, where it is drawn often enough to have them; this is one time more."""
+        """Return its clusters, if it is drawn often enough to have them, and count this draw."""
 
 
 class WindowOptions(TypedDict, total=False):
@@ -121,7 +121,7 @@ class View:
     sides_by_material: bool = True
     """Whether materials say which sides are drawn: no `cull` was given."""
     is_split: bool = False
-    """Whether samples are kept once where a pixel shows one triangle, for shading: all else is drawn when asked for."""
+    """Whether a pixel of one triangle keeps its samples once, for shading; other samples are drawn on first access."""
     is_exact: bool = False
     """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 
@@ -214,7 +214,7 @@ class View:
 
 @lru_cache(maxsize=256, typed=True)
 def kept_view(size: tuple[int, int], why_snapped: str | None, **options: Any) -> View:
-    """A view whose options were checked before, a tenth of a small picture's time."""
+    """A view with options that were checked before; a check takes a tenth of a small picture's time."""
     return View._parse(size, cast(ViewOptions, options), why_snapped)
 
 
