@@ -76,6 +76,13 @@ def test_plane_without_end_repeats_its_texture_each_two_units():
     assert mesh.uv[:, 1].tolist() == [0, 0, 1, 1]
 
 
+def test_texture_that_repeats_runs_down_from_the_top_of_the_mesh():
+    """OpenGL's t = down (1 - v) + shift runs down, and v = 1 - t."""
+    mesh = shapes.laid(shapes.plane((1, 1), 50), 3, 2, -0.5)
+    assert mesh.uv[:, 0].tolist() == [-0.5, 2.5, 2.5, -0.5]
+    assert mesh.uv[:, 1].tolist() == [-0.5, -0.5, 1.5, 1.5]
+
+
 def test_directions_lie_in_the_square_that_opengl_has_for_them():
     """Rows 0 to 5 of squares: +x, -x, +y, -y, +z, -z; in +x what is up has the smaller t."""
     cube = shapes.on_cube(shapes.primitive(shapes.BOX, (1, 1, 1), QUALITY), texels=1000)
@@ -205,6 +212,18 @@ def test_geoms_that_move_move(renderer):
     after = renderer.render()
     assert not np.array_equal(before, after)
     renderer.scene.geoms[1].pos[:] = -0.7, 0, 0.5
+    assert_same(renderer.render(), before)
+
+
+def test_geoms_that_change_their_look_are_drawn_anew(renderer):
+    before = renderer.render()
+    renderer.scene.geoms[1].rgba[:] = 0, 1, 0, 1
+    after = renderer.render()
+    assert before[24, 22, 0] > after[24, 22, 0]
+    assert before[24, 22, 1] < after[24, 22, 1]
+    renderer.scene.geoms[1].size[:] = 0.2
+    assert not np.array_equal(after, renderer.render())
+    renderer.scene.geoms[1].rgba[:], renderer.scene.geoms[1].size[:] = (1, 0, 0, 1), 0.5
     assert_same(renderer.render(), before)
 
 

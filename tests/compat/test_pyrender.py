@@ -152,6 +152,27 @@ def test_points_hide_what_is_behind_them_and_are_hidden():
     assert np.unique(depth.round(4)).tolist() == [2, 3]
 
 
+LINES = {"LINES": (0, 1), "LINE_STRIP": (1, 2), "LINE_LOOP": (2, 3)}
+
+
+@pytest.mark.parametrize(("mode", "n_lines"), LINES.values(), ids=LINES)
+def test_lines_are_a_pixel_wide_and_hidden_by_what_is_before_them(mode, n_lines):
+    """Of three corners: one line, two, or three, the first of which is level; red turns to green along it."""
+    corners = [[-0.5, 0.01, 0], [0.5, 0.01, 0], [0, 1, 0]]
+    kind = [pr.GLTF.LINES, pr.GLTF.LINE_STRIP, pr.GLTF.LINE_LOOP][mode]
+    lines = pr.Primitive(corners, mode=kind, color_0=np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]))
+    color, depth = draw(scene_of(lines, bg_color=[0, 0, 0, 1]))
+    row = color[23]
+    seen = np.flatnonzero(depth[23])
+    assert 14 <= len(seen) <= 16
+    assert np.abs(depth[23, seen] - 3).max() < 2e-5
+    assert row[seen[0], 0] > row[seen[0], 1]
+    assert row[seen[-1], 0] < row[seen[-1], 1]
+    assert (depth[18, 20:44] > 0).sum() == n_lines - 1
+    wall = pr.Primitive(np.array(WALL) + [0, 0, 1], indices=QUAD)
+    assert_same(draw(scene_of(lines, wall))[0], draw(scene_of(wall))[0])
+
+
 @pytest.mark.parametrize("smooth", [True, False])
 def test_mesh_of_trimesh_has_its_faces_with_normals_of_vertices_or_of_faces(smooth):
     own = ball_like(level=1)

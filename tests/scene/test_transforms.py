@@ -35,3 +35,28 @@ def test_transforms_of_a_scene_are_checked(change, message):
     scene = tl.Scene([tl.Mesh(*tl.scenes.icosphere(0))] * n)
     with pytest.raises(ValueError, match=message):
         scene.with_transforms(change)
+
+
+def test_moved_instances_know_whether_they_are_mirrored():
+    cube = tl.Mesh(*tl.scenes.cube())
+    turns = np.random.default_rng(0).normal(size=(20, 3, 3))
+    places = np.tile(np.eye(4), (20, 1, 1))
+    places[:, :3, :3] = turns
+    moved = tl.Scene([cube] * 20).with_transforms(places)
+    assert [one.is_mirrored for one in moved] == [tl.Instance(cube, place).is_mirrored for place in places]
+    assert 0 < sum(one.is_mirrored for one in moved) < 20
+
+
+def test_sides_that_are_known_of_a_scene_hold_where_it_stands_mirrored():
+    """A triangle with one side: seen from the front, from behind, and mirrored both ways."""
+    one = tl.Material(double_sided=False)
+    triangle = tl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], materials=[one])
+    scene = tl.Scene([triangle, (triangle, np.diag([-1, 1, 1, 1]))])
+    camera = tl.Camera.look_at((0, 0, 4), (0, 0, 0))
+    first = tl.rasterize_mesh(scene, camera, (32, 32)).mask.sum()
+    turned = np.stack([np.diag([-1.0, 1, -1, 1]), np.diag([1.0, 1, -1, 1])])
+    moved = scene.with_transforms(turned)
+    assert tl.rasterize_mesh(moved, camera, (32, 32)).mask.sum() == 0
+    swapped = scene.with_transforms([np.diag([-1.0, 1, 1, 1]), np.eye(4)])
+    assert tl.rasterize_mesh(swapped, camera, (32, 32)).mask.sum() == first > 0
+    assert tl.rasterize_mesh(moved, camera, (32, 32), cull="none").mask.sum() == first

@@ -45,9 +45,9 @@ def view_of(pose: npt.ArrayLike) -> F64:
 def dots_along(segments: F64, clip_from_world: F64, size: tuple[int, int]) -> tuple[F64, npt.NDArray[np.intp]]:
     """Points on segments (N, 2, 3), at most half a pixel apart in a picture, and the segment of each.
 
-    What lies outside the picture has none.
+    What lies outside the picture has none. Segments may have more numbers than x, y and z, which points get, too.
     """
-    ends = product(np.concatenate([segments, np.ones((len(segments), 2, 1))], axis=2), clip_from_world.T)
+    ends = product(np.concatenate([segments[..., :3], np.ones((len(segments), 2, 1))], axis=2), clip_from_world.T)
     first, last = np.zeros(len(segments)), np.ones(len(segments))
     for axis in range(3):
         for side in (-1, 1):  # Liang and Barsky, 1984
@@ -91,7 +91,7 @@ def over(picture: U8, table: bytes, background: Any) -> U8:
         Its alpha counts as that of a colour: what is drawn is laid over it.
     """
     alpha = picture[..., 3]
-    found = np.frombuffer(bytearray(picture.tobytes().translate(table)), np.uint8).reshape(picture.shape)
+    found = np.frombuffer(bytearray(np.ascontiguousarray(picture)).translate(table), np.uint8).reshape(picture.shape)
     found[..., 3] = 255
     behind = np.broadcast_to(np.asarray(background, np.uint8), picture.shape)
     np.copyto(found.view(np.uint32), np.ascontiguousarray(behind).view(np.uint32), where=(alpha == 0)[..., None])

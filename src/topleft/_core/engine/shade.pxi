@@ -57,6 +57,18 @@ cdef void copy_floats(float *out, values, int n) except *:
         out[k] = values[k]
 
 
+cdef void turn(double *way, const double[:, :] view) noexcept:
+    """Multiply by the first three rows and columns."""
+    cdef double[3] given = [way[0], way[1], way[2]]
+    cdef double total
+    cdef Py_ssize_t i, j
+    for i in range(3):
+        total = 0.0
+        for j in range(3):
+            total = total + view[i, j] * given[j]
+        way[i] = total
+
+
 cdef class ShadingTable:
     """`tl_shading`; keeps the arrays that it points to alive."""
 
@@ -155,20 +167,101 @@ cdef class ShadingTable:
         self.headlight.kind, self.headlight.falloff = <tl_light_kind>2, 0.0
         self.shading.lights, self.shading.n_lights = &self.headlight, 1
 
-    def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]):
-        """Take rows (kind, at, color, falloff, axis, cone_scale, cone_offset)."""
+    @cython.cdivision(True)  # IEEE: no number where there is none
+    def set_lights(self, const double[:, ::1] lights, const double[:, :] world_from_mesh, const double[:, :] view,
+                   const double[:] center, bint is_in_eye_space, float ambient):
+        """Take lights as they are in the world or in eye space, and light from all sides.
+
+        Parameters
+        ----------
+        lights
+            Rows (kind, x, y, z, falloff, red, green, blue, direction of a spot (3), cone scale, cone offset, whether it
+            is in eye space).
+        world_from_mesh, view
+            (4, 4): where the mesh stands; to eye space, from the mesh.
+        center
+            The origin of the shading space, in its own axes.
+        is_in_eye_space
+            Whether these are those of eye space, otherwise of the mesh.
+        """
+        cdef Py_ssize_t n = lights.shape[0], i, j, k
+        cdef double[4][8] rows
+        cdef double[3] at, way
+        cdef double scale, total
         cdef tl_light *light
-        cdef int k
-        self.lights = np.zeros(max(1, len(lights)) * sizeof(tl_light), np.uint8)
+        cdef bint in_eye, is_far
+        self.lights = np.zeros(max(1, n) * sizeof(tl_light), np.uint8)
         light = <tl_light *>&self.lights[0]
-        for k, (kind, at, color, falloff, axis, scale, offset) in enumerate(lights):
-            light[k].kind, light[k].falloff = <tl_light_kind><int>kind, falloff
-            copy_floats(light[k].at, at, 3)
-            copy_floats(light[k].color, color, 3)
-            copy_floats(light[k].axis, axis, 3)
-            light[k].cone_scale, light[k].cone_offset = scale, offset
-        copy_floats(self.shading.ambient, ambient, 3)
-        self.shading.lights, self.shading.n_lights = light, len(lights)
+        # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
+        scale = 1.0 if is_in_eye_space else cube_root(fabs(determinant_of(world_from_mesh)))
+        for i in range(4):
+            for j in range(4):
+                rows[i][j] = world_from_mesh[i, j]
+        invert(rows, 4)
+        for k in range(n):
+            in_eye, is_far = lights[k, 13] != 0.0, lights[k, 0] == 0.0
+            for i in range(3):
+                at[i], way[i] = lights[k, 1 + i], lights[k, 8 + i]
+            if not in_eye:
+                for i in range(3):
+                    total = 0.0
+                    for j in range(3):
+                        total = total + rows[i][4 + j] * lights[k, 1 + j]
+                    at[i] = total + rows[i][7] * (0.0 if is_far else 1.0)
+                    total = 0.0
+                    for j in range(3):
+                        total = total + rows[i][4 + j] * lights[k, 8 + j]
+                    way[i] = total
+            if is_far:
+                self.direct(at, view, in_eye, is_in_eye_space)
+            elif in_eye:
+                for i in range(3):
+                    at[i] = at[i] - self.rays.rows[8][i]
+                self.from_eye(at)
+                for i in range(3):
+                    at[i] = at[i] / self.rays.scale
+            else:
+                if is_in_eye_space:
+                    turn(at, view)
+                    for i in range(3):
+                        at[i] = at[i] + view[i, 3]
+                for i in range(3):
+                    at[i] = at[i] - center[i]
+            if way[0] != 0.0 or way[1] != 0.0 or way[2] != 0.0:
+                self.direct(way, view, in_eye, is_in_eye_space)
+            light[k].kind, light[k].falloff = <tl_light_kind><int>lights[k, 0], <float>(lights[k, 4] * (scale * scale))
+            for i in range(3):
+                light[k].at[i], light[k].color[i], light[k].axis[i] = <float>at[i], <float>lights[k, 5 + i], <float>way[i]
+            light[k].cone_scale, light[k].cone_offset = <float>lights[k, 11], <float>lights[k, 12]
+        for i in range(3):
+            self.shading.ambient[i] = ambient
+        self.shading.lights, self.shading.n_lights = light, <int>n
+
+    cdef void from_eye(self, double *way) noexcept:
+        """Turn what is in eye space to shading space, but for the scale."""
+        cdef double[3] given = [way[0], way[1], way[2]]
+        cdef double total
+        cdef Py_ssize_t i, j
+        for i in range(3):
+            total = 0.0
+            for j in range(3):
+                total = total + self.rays.rows[5 + j][i] * given[j]
+            way[i] = total
+
+    @cython.cdivision(True)
+    cdef void direct(self, double *way, const double[:, :] view, bint in_eye, bint is_in_eye_space) noexcept:
+        """Make a direction of the mesh, or of eye space, a unit vector of shading space."""
+        cdef double total = 0.0
+        cdef Py_ssize_t i
+        if in_eye or is_in_eye_space:
+            if not in_eye:
+                turn(way, view)
+            self.from_eye(way)
+        for i in range(3):
+            total = total + way[i] * way[i]
+        total = sqrt(total)
+        for i in range(3):
+            way[i] = way[i] / total
 
     def set_surroundings(self, Surroundings surroundings):
         """Take the light that comes from all around."""

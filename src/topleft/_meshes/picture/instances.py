@@ -45,7 +45,7 @@ VERTICES_AT_ONCE = 1 << 20
 MOST_PIXELS_OF_PART = 1 << 30
 
 #: cull codes of a view (tl_cull) for an instance that mirrors.
-MIRRORED = {0: 0, 1: 2, 2: 1}
+MIRRORED = np.array([0, 2, 1], np.int32)
 
 
 #: The second mirror of mirrored instances that stand in eye space.
@@ -212,16 +212,18 @@ class PlacedScene:
     @cached_property
     def _sides(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
         """The `tl_cull` of each instance, and which have triangles with two sides beside others with one."""
+        view, key = self._view, (self._view.cull, self._view.sides_by_material)
+        known: dict[Any, Any] = self.whole.known if self._material is None else {}
+        if key not in known:  # which holds wherever the scene stands, but for what is mirrored
+            sides: NDArray[np.int32] = np.full(len(self.scene), view.cull, np.int32)
+            is_mixed = np.zeros(len(sides), np.bool_)
+            for _, _, at in self.whole.looks(self._material) if view.sides_by_material else ():
+                sides[at], is_single = self._sides_of(self.whole[at[0]])
+                is_mixed[at] = is_single is not None
+            known[key] = sides, is_mixed
+        culls, is_mixed = known[key]
         is_mirrored = np.array([one.is_mirrored for one in self.scene.instances], np.bool_)
-        culls = np.where(is_mirrored, MIRRORED[self._view.cull], self._view.cull).astype(np.int32)
-        is_mixed = np.zeros(len(culls), np.bool_)
-        for _, _, at in self.whole.looks(self._material) if self._view.sides_by_material else ():
-            cull, is_single = self._sides_of(self.whole[at[0]])
-            if cull != self._view.cull:
-                culls[at] = np.where(is_mirrored[at], MIRRORED[cull], cull)
-            if is_single is not None:
-                is_mixed[at] = True
-        return culls, is_mixed
+        return (np.where(is_mirrored, MIRRORED[culls], culls) if is_mirrored.any() else culls), is_mixed
 
     def _sides_of(self, whole: Instance) -> tuple[int, NDArray[np.uint8] | None]:
         """The `tl_cull` of an instance that is no mirror; 1 for each triangle with one side, where others have two."""
@@ -242,7 +244,7 @@ class PlacedScene:
 
     def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
         """Return an instance snapped; only the part with some triangles, if its mesh is drawn in clusters."""
-        if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
+        if self.scene[i].mesh.has_clusters and self._can_cluster(Sink.NEAREST):
             return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i)
 
@@ -259,7 +261,7 @@ class PlacedScene:
         if is_single is not None:
             back = CULL_CODES[Cull.FRONT if is_mirrored else Cull.BACK]
             single_sided = is_single if self.bent is None else is_single[self.bent[i].source], back
-        cull = MIRRORED[cull] if is_mirrored else cull
+        cull = int(MIRRORED[cull]) if is_mirrored else cull
         transform, static = self._clip_from_objects[i], one.mesh if self._may_cluster else None
         return self._view.but(transform=transform, cull=cull, single_sided=single_sided, static=static)
 

@@ -220,6 +220,18 @@ def material_row(one: Material, mesh: Mesh, surface: Surface, back_side: float) 
     return color, back, side, (one.specular,) * 3, shininess, surface.is_unlit or one.unlit, cutoff, compiled, full
 
 
+def light_rows(lights: Sequence[Light]) -> F64:
+    """Rows (N, 14) as `ShadingTable.set_lights` takes them."""
+    rows = []
+    for one in lights:
+        color = [one.intensity * c for c in light_of(one.color)[:3]]
+        spot = *(one.direction or (0.0, 0.0, 0.0)), *one.cone
+        rows.append(
+            (LIGHT_CODES[LightKind(one.kind)], *one.at, one.falloff, *color, *spot, one.space is LightSpace.EYE)
+        )
+    return np.array(rows, np.float64).reshape(-1, 14)
+
+
 class ShadingInputs:
     """The numbers of one instance in a picture, as the kernels read them.
 
@@ -279,15 +291,13 @@ class ShadingInputs:
         """Have the opacity of the surface in the alpha of the picture; all materials are full."""
         self.shading.set_wants_opacity()
 
-    def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64) -> None:
-        """Take the lights, in shading space; `world_from_mesh`: (4, 4), where the mesh stands."""
+    def set_lights(self, lights: F64 | None, ambient: float, world_from_mesh: F64) -> None:
+        """Take `light_rows`, in shading space; `world_from_mesh`: (4, 4), where the mesh stands."""
         if lights is None:
             self.shading.set_headlight(TO_HEADLIGHT, max(0.0, 1 - ambient), ambient)
-            return
-        # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
-        scale = 1.0 if self.is_in_eye_space else engine.cube_root(abs(engine.determinant(world_from_mesh[:3, :3])))
-        place = engine.inverse(world_from_mesh), scale
-        self.shading.set_lights([self._light(light, place) for light in lights], (ambient,) * 3)
+        else:
+            place = world_from_mesh, self.view, self.mesh.center
+            self.shading.set_lights(lights, *place, self.is_in_eye_space, ambient)
 
     def set_environment(self, environment: Environment | None, world_from_mesh: F64) -> None:
         """Take the environment, or the default one, which only metallic surfaces mirror.
@@ -303,33 +313,6 @@ class ShadingInputs:
         texels, table = own.levels or (None, None)
         diffuse = 0.0 if environment is None else 1.0
         self.shading.set_surroundings(engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
-
-    def _light(self, light: Light, place: tuple[F64, float]) -> tuple[Any, ...]:
-        """The row of a light; `place`: mesh from world, and how long the unit of the mesh is."""
-        rays, at = self.rays, np.array(light.at)
-        way = np.zeros(3) if light.direction is None else np.array(light.direction)
-        in_eye_space, (mesh_from_world, scale) = light.space is LightSpace.EYE, place
-        falloff = float(light.falloff * (scale * scale))  # as bright as it is in the world
-        if not in_eye_space:
-            at = engine.product(mesh_from_world, np.array([*light.at, light.kind != LightKind.DIRECTIONAL]))[:3]
-            way = way if light.direction is None else engine.product(mesh_from_world[:3, :3], way)
-        if light.kind is LightKind.DIRECTIONAL:
-            at = self._direction(at, in_eye_space)
-        elif in_eye_space:
-            at = engine.product(rays.eye_from.T, at - rays.origin) / rays.scale
-        else:
-            in_space = engine.product(self.view[:3, :3], at) + self.view[:3, 3] if self.is_in_eye_space else at
-            at = in_space - self.mesh.center
-        axis = way if light.direction is None else self._direction(way, in_eye_space)
-        color = tuple(light.intensity * c for c in light_of(light.color)[:3])
-        return LIGHT_CODES[LightKind(light.kind)], at, color, falloff, axis, *light.cone
-
-    def _direction(self, way: F64, in_eye_space: bool) -> F64:
-        """A direction of the world, or of eye space, in shading space: a unit vector."""
-        if in_eye_space or self.is_in_eye_space:
-            way = way if in_eye_space else engine.product(self.view[:3, :3], way)
-            way = engine.product(self.rays.eye_from.T, way)
-        return way / engine.length(way)
 
     def set_picture(self, show: int, matcap: Texture | None, background: Color) -> None:
         """Take the kind of picture, its matcap and its background."""

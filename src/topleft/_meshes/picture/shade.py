@@ -37,7 +37,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import ShadingInputs, Surface, material_row
+from topleft._meshes.picture.look import ShadingInputs, Surface, light_rows, material_row
 from topleft.typing import ShadingOption
 
 MIN_PX_PER_THREAD = 1 << 14
@@ -184,8 +184,9 @@ class Lit:
         if self.n_triangles and all(size):
             self.subpixel_bits = shown[0].snapped.subpixel_bits
             finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
+            lights = None if options.lights is None else light_rows(options.lights)
             tables = [
-                look_of(one, view, camera, size, options, finds_inverse_w=finds_inverse_w).shading
+                look_of(one, view, camera, size, options, lights, finds_inverse_w=finds_inverse_w).shading
                 for one, view in zip(shown, views_of(shown, camera), strict=True)
             ]
             self.scene = scene_of_tables(shown, tables)
@@ -261,10 +262,11 @@ def look_of(
     camera: Camera,
     size: tuple[int, int],
     options: ShadingOptions,
+    lights: F64 | None,
     *,
     finds_inverse_w: bool,
 ) -> ShadingInputs:
-    """The kernels' inputs of an instance that is seen by `view`, eye from object."""
+    """The kernels' inputs of an instance that is seen by `view`, eye from object, in lights of `light_rows`."""
     mesh = shown.mesh
     material = shown.material if options.material is None else options.material
     own = mesh.materials if material is None else (material,)
@@ -277,7 +279,7 @@ def look_of(
         options.environment is not None or options.shows_opacity,
     )
     look = ShadingInputs(shown.snapped, mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
-    look.set_lights(options.lights, options.ambient, shown.place)
+    look.set_lights(lights, options.ambient, shown.place)
     if options.environment is not None or any(one.is_metallic_rough for one in own):
         look.set_environment(options.environment, shown.place)
     if options.shows_opacity:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property, partial
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -115,10 +115,10 @@ class Instance:
         vars(instance).update(vars(self), mesh=mesh)
         return instance
 
-    def at(self, transform: F64) -> Instance:
+    def at(self, transform: F64, *, is_mirrored: bool) -> Instance:
         """Return the same mesh by another matrix, which has been checked."""
         instance = object.__new__(Instance)
-        vars(instance).update({name: vars(self)[name] for name in ("mesh", "name", "material")}, transform=transform)
+        vars(instance).update(vars(self), transform=transform, is_mirrored=is_mirrored)
         return instance
 
     @cached_property
@@ -240,6 +240,11 @@ class Scene:
             found.setdefault(id(instance.mesh), []).append(i)
         return {key: (self.instances[at[0]].mesh, np.array(at, np.intp)) for key, at in found.items()}
 
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What has been found out of meshes and materials, wherever they stand: `with_transforms` keeps it."""
+        return {}
+
     def looks(self, material: Material | None) -> list[tuple[Mesh, Material | None, npt.NDArray[np.intp]]]:
         """The different meshes, each with this material or that of its instances, and which instances these are."""
         if material is not None or all(one.material is None for one in self.instances):
@@ -306,18 +311,17 @@ class Scene:
         if not (placed[:, 3] == [0, 0, 0, 1]).all():
             raise ValueError("the last row of each of transforms must be [0, 0, 0, 1]")
         placed.flags.writeable = False
-        x, y, z = np.moveaxis(placed[:, :3, :3], 2, 0)
-        volume, largest = (
-            np.abs((x * np.cross(y, z)).sum(axis=1)),
-            np.abs(placed[:, :3, :3]).max(axis=(1, 2), initial=0),
-        )
-        for i in np.flatnonzero(volume <= 1e-12 * largest**3):  # the others are regular, far beyond rounding
-            check_regular(f"transforms[{i}]", placed[i])
+        (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(placed[:, :3, :3], 0, 2)
+        volumes = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)  # as engine.determinant has them
+        largest = np.abs(placed[:, :3, :3]).max(axis=(1, 2), initial=0)
+        for k in np.flatnonzero(np.abs(volumes) <= 1e-12 * largest**3):  # the others are regular, far beyond rounding
+            check_regular(f"transforms[{k}]", placed[k])
         scene = object.__new__(Scene)
-        instances = tuple(one.at(matrix) for one, matrix in zip(self.instances, placed, strict=True))
+        parts = zip(self.instances, placed, (volumes < 0).tolist(), strict=True)
+        instances = tuple(one.at(matrix, is_mirrored=is_mirrored) for one, matrix, is_mirrored in parts)
         vars(scene).update(instances=instances, transforms=placed)
         kept = {"first_ids": self.first_ids, "meshes": self.meshes, "boxes": self.boxes, "backoff": self.backoff}
-        vars(scene).update(kept)
+        vars(scene).update(kept, known=self.known)
         return scene
 
     def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:

@@ -43,17 +43,15 @@ class Looks:
     def __init__(self, model: Any) -> None:
         self.model = model
         self.made: dict[tuple[Any, ...], tl.Material] = {}
-        self.textures: dict[tuple[Any, ...], tl.Texture] = {}
+        self.textures: dict[int, tl.Texture] = {}
         self.plain = tl.Material(double_sided=False), tl.Material()
         found = [k for k in range(model.ntex) if model.tex_type[k] == TEXTURE_SKYBOX]
         self.sky = skybox(self, found[0]) if found else None
 
     def of(self, geom: Any, opacity: float, gloss: float, *, is_double: bool) -> tl.Material:
         """The material of a geom, with or without a back that shows; opacity and highlights are times a number."""
-        texture, repeat = self.texture_of(geom), tuple(geom.texrepeat.tolist())
         rgba = (*geom.rgba[:3].tolist(), float(geom.rgba[3]) * opacity)
-        scale = self.scale_of(geom, texture, repeat)
-        key = (rgba, geom.emission, geom.specular * gloss, geom.shininess, texture, scale, is_double)
+        key = (rgba, geom.emission, geom.specular * gloss, geom.shininess, self.texture_of(geom), is_double)
         if key not in self.made:
             if len(self.made) >= MOST_LOOKS:
                 self.made.clear()
@@ -61,13 +59,13 @@ class Looks:
         return self.made[key]
 
     def make(
-        self, rgba: Any, emission: float, specular: float, shininess: float, texture: int, scale: Any, is_double: bool
+        self, rgba: Any, emission: float, specular: float, shininess: float, texture: int, is_double: bool
     ) -> tl.Material:
         """The material of these numbers; emission is that of the colour.
 
         Highlights are white, and a texture darkens them by its mean: MuJoCo's own multiplies them by each texel.
         """
-        laid = None if texture < 0 else self.texture(texture, scale)
+        laid = None if texture < 0 else self.texture(texture)
         specular = specular if laid is None else specular * float(laid.image[..., :3].mean()) / 255
         color = np.clip(rgba[:3], 0, 1)
         glow = tuple((max(emission, 0.0) * color).tolist())
@@ -93,35 +91,34 @@ class Looks:
         texture = self.texture_of(geom)
         return texture if texture >= 0 and self.model.tex_type[texture] != TEXTURE_2D else None
 
-    def scale_of(self, geom: Any, texture: int, repeat: Any) -> Any:
-        """How often a flat texture repeats along u and v, and how far it is shifted."""
+    def laying_of(self, geom: Any) -> tuple[float, float, float] | None:
+        """How often a flat texture repeats along u and v of a geom, and how far it is shifted; None of others."""
+        texture, repeat, is_uniform = self.texture_of(geom), geom.texrepeat.tolist(), geom.texuniform
         if texture < 0 or self.model.tex_type[texture] != TEXTURE_2D:
             return None
-        sizes, is_uniform = geom.size.tolist(), geom.texuniform
+        sizes = geom.size.tolist()
         if geom.texid < 0:
             repeat, is_uniform = self.model.mat_texrepeat[geom.matid].tolist(), self.model.mat_texuniform[geom.matid]
-        own = [
+        across, down = [
             (times if times > 0 else 1.0) * (size if is_uniform and size > 0 else 1.0)
-            for times, size in zip(repeat, sizes, strict=False)
+            for times, size in zip(repeat, sizes[:2], strict=True)
         ]
         is_endless = geom.type == shapes.PLANE and min(sizes[:2]) <= 0
-        return (*own, -0.5 if is_endless else 0.0)
+        return across, down, -0.5 if is_endless else 0.0
 
-    def texture(self, k: int, scale: Any) -> tl.Texture:
-        """A texture of the model; `scale`: as of `scale_of`, or None in the squares of a cube."""
-        if (k, scale) not in self.textures:
+    def texture(self, k: int) -> tl.Texture:
+        """A texture of the model; those of cubes end at the rims of their squares."""
+        if k not in self.textures:
             model, encoding = self.model, "srgb" if self.model.tex_colorspace[k] == SRGB else "linear"
             n = int(model.tex_nchannel[k])
             shape = int(model.tex_height[k]), int(model.tex_width[k]), n
             first = int(model.tex_adr[k])
             image = np.asarray(model.tex_data[first : first + shape[0] * shape[1] * n]).reshape(shape)
             image = image[..., :3] if n >= 3 else np.repeat(image[..., :1], 3, axis=2)
-            look: dict[str, Any] = {"filter": "bilinear", "wrap": "clamp"}
-            if scale is not None:  # t of OpenGL runs down: t = times (1 - v) + shift, and v = 1 - t
-                across, down, shift = scale
-                look = {"transform": [[across, 0, shift], [0, down, 1 - down - shift]]}
-            self.textures[k, scale] = tl.Texture(image, encoding=encoding, **look)  # type: ignore[arg-type]
-        return self.textures[k, scale]
+            is_flat = model.tex_type[k] == TEXTURE_2D
+            look: dict[str, Any] = {} if is_flat else {"filter": "bilinear", "wrap": "clamp"}
+            self.textures[k] = tl.Texture(image, encoding=encoding, **look)  # type: ignore[arg-type]
+        return self.textures[k]
 
     def laid_on_cube(self, mesh: tl.Mesh, geom: Any, k: int) -> tl.Mesh:
         """The mesh with coordinates in the squares of a cube texture; directions are those of the unit shape."""
@@ -141,9 +138,7 @@ def skybox(looks: Looks, k: int) -> tl.Mesh:
     box = shapes.primitive(shapes.BOX, (1.0, 1.0, 1.0), (4, 4))
     cube = shapes.on_cube(box, (1, 1, 1), *looks.squares_of(k))
     points = cube.vertices[:, [0, 2, 1]] * [1, -1, 1]  # x of the texture is x, z is its y, and -y its z
-    return tl.Mesh(
-        points, cube.triangles, uv=cube.uv, materials=[tl.Material(texture=looks.texture(k, None), unlit=True)]
-    )
+    return tl.Mesh(points, cube.triangles, uv=cube.uv, materials=[tl.Material(texture=looks.texture(k), unlit=True)])
 
 
 def lights_of(scene: Any) -> tuple[list[tl.Light], float, float]:

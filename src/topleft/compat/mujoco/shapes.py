@@ -162,6 +162,13 @@ def plane(half: tuple[float, float], reach: float) -> tl.Mesh:
     return tl.Mesh(points, [[0, 1, 2], [0, 2, 3]], np.tile([0.0, 0, 1], (4, 1)), uv=corners * scale + shift)
 
 
+def laid(mesh: tl.Mesh, across: float, down: float, shift: float) -> tl.Mesh:
+    """The mesh with a texture that repeats so often; t of OpenGL runs down: t = down (1 - v) + shift, and v = 1 - t."""
+    assert mesh.uv is not None
+    uv = mesh.uv.astype(np.float64) * [across, down] + [shift, 1 - down - shift]
+    return tl.Mesh(mesh.vertices, mesh.triangles, mesh.normals, uv=uv, crease=mesh.crease)
+
+
 def asset(model: Any, i: int) -> tl.Mesh:
     """A mesh of a model: its own for 2 k, its convex hull for 2 k + 1."""
     k, is_hull = divmod(i, 2)

@@ -1,11 +1,12 @@
 """The calls of pyrender, drawn by topleft: ``from topleft.compat import pyrender``.
 
 `OffscreenRenderer(w, h).render(scene, flags)` returns colours and depth as pyrender does, without OpenGL, a display or
-a GPU, and where pyrender is not installed. Depth, ids, culling, blending, textures and metallic-rough materials are
-drawn; shadows, wireframes, lines, normals as lines and text are not, and the viewer is missing.
+a GPU, and where pyrender is not installed. Depth, ids, culling, blending, textures, metallic-rough materials, points
+and lines are drawn; shadows, wireframes, normals as lines and text are not, and the viewer is missing.
 """
 
-from topleft.compat.pyrender.graph import Mesh, Node, Primitive, Scene
+from topleft.compat.pyrender.graph import Node, Scene
+from topleft.compat.pyrender.meshes import Mesh, Primitive
 from topleft.compat.pyrender.renderer import OffscreenRenderer
 from topleft.compat.pyrender.values import (
     GLTF,

@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 import topleft as tl
-from topleft.compat._arrays import F64, U8, light_of_bytes, over, product, srgb_bytes, view_of
-from topleft.compat.pyrender.graph import Node, Primitive, Scene, material_drawn
+from topleft.compat._arrays import F64, U8, dots_along, light_of_bytes, over, product, srgb_bytes, view_of
+from topleft.compat.pyrender.graph import Node, Scene
+from topleft.compat.pyrender.meshes import Primitive, material_drawn
 from topleft.compat.pyrender.values import GLTF, DirectionalLight, Light, RenderFlags, SpotLight
 
 F32 = npt.NDArray[np.float32]
@@ -128,9 +129,7 @@ class Shot:
         is_seg = bool(self.flags & RenderFlags.SEG)
         placed = [one for one in self.scene.placed() if not is_seg or one[0] in (seg_node_map or {})]
         triangles = [one for one in placed if one[1].mode >= GLTF.TRIANGLES and len(one[1].triangles())]
-        clouds = [one for one in placed if one[1].mode == GLTF.POINTS and len(one[1].positions)]
-        if any(GLTF.POINTS < one[1].mode < GLTF.TRIANGLES for one in placed):
-            warnings.warn("topleft.compat.pyrender draws no lines", stacklevel=3)
+        clouds = [one for one in placed if one[1].mode < GLTF.TRIANGLES and len(one[1].positions)]
         has_color = not is_seg and not self.flags & RenderFlags.DEPTH_ONLY
         layers = ("color", "depth") if has_color else ("instance", "depth") if is_seg else ("depth",)
         if not triangles:
@@ -210,10 +209,14 @@ class Shot:
         ]
 
     def _of_points(self, own: Primitive, pose: F64, layers: tuple[str, ...]) -> Any:
-        cloud = own.drawn()
-        assert isinstance(cloud, tl.Points)
         camera = tl.Camera(product(self.camera.view, pose), self.camera.projection)
-        sized = tl.Points(cloud.positions, cloud.colors, size=self.point_size, shape="square")
+        if own.mode == GLTF.POINTS:
+            cloud = own.drawn()
+            assert isinstance(cloud, tl.Points)
+            sized = tl.Points(cloud.positions, cloud.colors, size=self.point_size, shape="square")
+        else:  # a pixel wide
+            dots, _ = dots_along(own.segments(), camera.clip_from_world(self.size), self.size)
+            sized = tl.Points(dots[:, :3], srgb_bytes(dots[:, 3:]), size=1, shape="square")
         return tl.render_layers(sized, camera, self.size, layers=layers)
 
 
