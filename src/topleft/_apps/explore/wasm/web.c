@@ -201,8 +201,8 @@ static int group_equal(const void *rows, int n_words, int n, int32_t **first, in
     return n;
 }
 
-/* Makes vertices one that are equal, colours (n, 4) and all, if there are any, in their order, and names them in the triangles.
- * Returns how many are left, or WEB_FULL. */
+/* Makes vertices one that are equal, and whose colours (n, 4) are, if there are any, in their order, and names them in
+ * the triangles.  Returns how many are left, or WEB_FULL. */
 static int merge_vertices(void *vertices, int is_f64, uint8_t *colors, int n, int32_t *triangles, int n_triangles)
 {
     const int n_bytes = is_f64 ? 24 : 12, n_words = n_bytes / 4 + (colors != NULL);
@@ -234,7 +234,7 @@ static int merge_vertices(void *vertices, int is_f64, uint8_t *colors, int n, in
     return n_groups;
 }
 
-/* The places of a mesh: its vertices, those that are equal but for their colours as one; and the triangles of places. */
+/* The places of a mesh: its vertices, those that are equal but for their colours as one; and triangles of places. */
 typedef struct {
     tl_source points;
     const int32_t *triangles, *of_vertex; /* of_vertex NULL: each vertex is a place */
@@ -316,7 +316,7 @@ static int crease_normals(double least_cosine)
     return 0;
 }
 
-/* What a file says of vertices: sRGB and opacity, and vectors; NULL where it does not; and the light of an sRGB value. */
+/* What a file says of vertices: sRGB and opacity, and vectors; NULL where it does not; and the light of sRGB values. */
 typedef struct {
     uint8_t *colors;
     const double *normals;
@@ -384,8 +384,8 @@ int web_cut(const double *points, const int64_t *corners, const int64_t *n_corne
     return n_cut;
 }
 
-/* Takes the mesh to the scene by a matrix, clip from object space, row by row of the type of its vertices, seen in a picture of this size.
- * Returns 0 or WEB_FULL. */
+/* Takes the mesh to the scene by a matrix, clip from object space, row by row, of the type of its vertices, seen in a
+ * picture of this size.  Returns 0 or WEB_FULL. */
 WEB_EXPORT(web_view_mesh) int web_view_mesh(const void *matrix, int is_affine, int width, int height, int cull)
 {
     take(mesh.triangles, mesh.n_triangles, cull, TL_METHOD_AUTO);
