@@ -92,7 +92,7 @@ def study_of(record: Record) -> Study:
 
 
 def parts_of(record: Record) -> dict[str, Callable[[Record], str | None]]:
-    """Return what the markers of a page stand for; those of other studies stay."""
+    """Return the parts of a page by their markers; those of other studies stay."""
     return {name: lambda _: None for study in STUDIES.values() for name in study.parts} | dict(study_of(record).parts)
 
 
@@ -119,14 +119,14 @@ def charts(arguments: argparse.Namespace) -> None:
 
 
 def document(arguments: argparse.Namespace) -> None:
-    """Replace what stands between the markers of a page."""
+    """Replace the text between the markers of a page."""
     record = json.loads(arguments.file.read_text())
     text = arguments.page.read_text(encoding="utf-8")
     write_text(arguments.page, with_parts(text, record, parts_of(record)))
 
 
 def print_names(_: argparse.Namespace) -> None:
-    """Print what there is."""
+    """Print the lists of cases and peers."""
     for name, case in CASES.items():
         print(f"{name:22} {case.task}")
     for name, what in PEERS.items():

@@ -30,7 +30,7 @@ typedef struct {
 
 #define TL_VIEW_BLOCK 16
 
-/* A height grid and who looks over it. */
+/* A height grid and an observer. */
 typedef struct {
     const double *heights; /* (height, width), NaN where there is none */
     int64_t width;

@@ -87,7 +87,7 @@ static cpu_words ask_cpu(void)
 
 static int has(unsigned word, unsigned bits) { return (word & bits) == bits; }
 
-/* Each probe asks for all that its unit is compiled with in setup.py. */
+/* Each probe tests for all extensions that its unit is compiled with in setup.py. */
 static int cpu_has_simd128(void) { return has(ask_cpu().ecx_1, bit_SSSE3 | bit_SSE4_1 | bit_POPCNT); }
 
 static int cpu_has_avx2(void)

@@ -32,8 +32,9 @@ typedef struct {
     int64_t n, n_columns;
 } tl_grad_sums;
 
-/* The numbers that a triangle sums up of where pixels lie; and of attributes, up to TL_FEW_COLUMNS. */
-enum { TL_SUMS_OF_POINTS = 16, TL_SUMS_OF_VALUES = 12, TL_FEW_COLUMNS = 4 };
+/* The numbers that a triangle sums up of where pixels lie, or of three attributes; and of each three attributes more.
+ * And attributes of float32 that are computed in float32. */
+enum { TL_SUMS_OF_POINTS = 16, TL_SUMS_OF_THREE = 12, TL_FEW_COLUMNS = 4 };
 
 /* Gradients of where pixels lie in triangles.  g_db may be NULL. */
 typedef struct {
@@ -51,8 +52,15 @@ typedef struct {
     const void *rast, *rast_db;
     void *out, *out_da; /* (height, width, n_columns), (height, width, 2 n_wanted) or NULL */
     void *g_rast, *g_rast_db;
-    tl_grad_sums *faces; /* by triangle, the last TL_SUMS_OF_VALUES columns: scratch */
 } tl_grad_values;
+
+/* Attributes of float32 backward, at once to the vertices: `out` of values is a gradient, its last two are NULL. */
+typedef struct {
+    tl_grad_values values;
+    const int32_t *corners; /* (n_triangles, 3): the row of the attributes of each corner */
+    tl_grad_sums *faces; /* by triangle, TL_SUMS_OF_POINTS columns and TL_SUMS_OF_THREE for each three more: scratch */
+    tl_grad_sums *vertices, *attr;
+} tl_grad_colors;
 
 /* A texture with its halvings, and where it is looked at.  Backward `out` is a gradient, and the last are written. */
 typedef struct {
@@ -95,7 +103,7 @@ typedef struct {
     const void *target;  /* (height, width, n_columns) */
     double scale;        /* gradients are those of the sum of squares times half of it */
     void *scratch;       /* TL_LOSS_WINDOW rows of pixels of 8 + 4 n_columns numbers */
-    tl_grad_sums *faces; /* by triangle, columns for points and for values: scratch */
+    tl_grad_sums *faces; /* by triangle, as those of tl_grad_colors: scratch */
     tl_grad_sums *of_points, *of_edges, *of_attr;
 } tl_grad_loss;
 

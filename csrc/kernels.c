@@ -39,6 +39,7 @@
 #include "blend/blend.c"
 #include "blend/fill_shapes.c"
 #include "grad/area_vjp.c"
+#include "grad/colors.c"
 #include "grad/edges.c"
 #include "grad/loss.c"
 #include "grad/outline.c"
@@ -164,6 +165,7 @@ const tl_kernels TL_KERNELS = {
     .grad_points_vjp = grad_points_vjp,
     .grad_values = grad_values,
     .grad_values_vjp = grad_values_vjp,
+    .grad_colors_vjp = grad_colors_vjp,
     .grad_texels = grad_texels,
     .grad_texels_vjp = grad_texels_vjp,
     .grad_outline = grad_outline,

@@ -394,8 +394,8 @@ typedef struct tl_kernels {
     void (*grad_points)(const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
                         void *rast_db);
 
-    /* The gradients of vertices from those of `rast` and `rast_db`, summed in a band.  Returns, as the next two do,
-     * the number of a triangle that does not exist, or -1. */
+    /* The gradients of vertices from those of `rast` and `rast_db`, summed in a band.  Returns, as those of values and
+     * of colors do, the number of a triangle that does not exist, or -1. */
     int64_t (*grad_points_vjp)(const tl_grad_view *view, const tl_grad_points *points);
 
     /* Attributes in a band, and their slopes. */
@@ -403,6 +403,9 @@ typedef struct tl_kernels {
 
     /* Their gradients: sums by row of attributes, and those of `rast` and `rast_db`. */
     int64_t (*grad_values_vjp)(const tl_grad_view *view, const tl_grad_values *values, tl_grad_sums *sums);
+
+    /* The sums of both by vertex and by row of attributes at once, of float32. */
+    int64_t (*grad_colors_vjp)(const tl_grad_view *view, const tl_grad_colors *colors);
 
     /* A texture at the pixels of a band. */
     void (*grad_texels)(const tl_grad_view *view, const tl_grad_texture *texture);

@@ -28,7 +28,7 @@ PEER_LETTERS = {
     "llvmpipe": "Ll", "opencv": "Cv", "pillow": "Pi", "deodr": "De", "datashader": "Da", "skia": "Sk", "cairo": "Ca",
     "skimage": "Si", "agg": "Ag", "aggdraw": "Ad", "blend2d": "Bl",
 }  # fmt: skip
-"""What stands in the marker of a peer."""
+"""The text in the marker of a peer."""
 PEER_LOOK: dict[str, Any] = {"marker": "s", "ms": 10.5, "mfc": "#FFFBE6", "mec": "#8A1C1C", "mew": 1}
 SAMPLING_LABELS = {"center": "1", "msaa2": "2", "msaa4": "4", "msaa8": "8", "msaa16": "16", "area": "area"}
 
@@ -163,7 +163,7 @@ def finish(figure: Figure, axes: list[Axes], y_label: str) -> None:
 
 
 def draw_front(axis: Axes, points: list[Point]) -> None:
-    """Draw the border of what no method does better: faster to the left, more exact below."""
+    """Draw the border that no method passes: faster to the left, more exact below."""
     front = list(pareto_front(points))
     if not front:
         return

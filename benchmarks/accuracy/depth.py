@@ -28,7 +28,7 @@ RATIOS = (100, 10_000, 1_000_000)
 """Far over near."""
 BITS = tuple(range(2, 31))
 DISTANCE_BITS = 12
-"""With 11 bits of a quarter of a pixel and 30 of the gap: 53, what float64 has."""
+"""With 11 bits of a quarter of a pixel and 30 of the gap: 53, as float64 has."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def clip_scene(sheets: Sheets, frame_px: int, is_reversed: bool) -> tuple[F64, N
 
 
 def shows_behind_as(keep: Callable[[F64, F64], NDArray[Any]]) -> Count:
-    """Return the count for a format: `keep` turns screen weights (M, 3) and corner depths (M, 3) into what is kept."""
+    """Return the count for a format: `keep` turns screen weights (M, 3) and corner depths (M, 3) into kept numbers."""
 
     def count(sheets: Sheets, frame_px: int, pixels: Pixels) -> int:  # noqa: ARG001
         i_cell, weights = pixels
@@ -152,7 +152,7 @@ FORMATS: dict[str, Count] = {
     "16-bit integer": shows_behind_as(as_integer(16)),
     "float32 arithmetic": shows_behind_as(in_float32),
 }
-"""The first two are what the library draws, float32 that is rounded once; the others are made by NumPy."""
+"""The library draws the first two, float32 that is rounded once; the others are made by NumPy."""
 
 
 def measure_depth(options: Options) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def measure_family(family: Family, options: Options) -> Rows:
 def measure_no_snap(options: Options) -> Rows:
     """Return `no_snap`: the errors of vertices that are not snapped, family by family, and the time beside 8 bits.
 
-    The ratio of calls that take turns does not depend on what else the machine does, so rows of another time than
+    The ratio of calls that take turns does not depend on other work of the machine, so rows of another time than
     those of `coverage` stand beside them.
     """
     rows = []
@@ -59,7 +59,7 @@ def measure_no_snap(options: Options) -> Rows:
 
 
 def measure_masks(family: Family, timed: Triangles, facts: dict[str, Any], options: Options, folder: Path) -> Rows:
-    """Return `coverage`, `pure` and `peers`; methods and peers take turns, adds to `facts` what was compared."""
+    """Return `coverage`, `pure` and `peers`; methods and peers take turns, adds the scene to `facts`."""
     chosen = entries(options.methods)
     peers = Peers(folder)
     try:
@@ -112,7 +112,7 @@ def count_errors(
 
 
 def mask_calls(chosen: Sequence[Entry], scene: Triangles, options: Options) -> list[partial[Any]]:
-    """Return what draws the mask of the scene, entry by entry."""
+    """Return the functions that draw the mask of the scene, entry by entry."""
     import topleft as tl
 
     rasterizer = tl.Rasterizer((options.frame_px, options.frame_px), threads=1)

@@ -18,7 +18,7 @@ FRAME_PX = 2048
 
 
 def near_centres(vertices: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return vertices of which each lies within three float64 steps of the nearest half pixel."""
+    """Return vertices that each lie within three float64 steps of the nearest half pixel."""
     moved = np.round(vertices * 2) / 2
     for _ in range(3):
         moved = np.nextafter(moved, rng.choice([-np.inf, 0.0, np.inf], moved.shape))
@@ -35,7 +35,7 @@ def compare(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> tupl
 
 
 def run(n_edge_px: int) -> int:
-    """Compare so many edge pixels or more, print what was found, return the wrong ones."""
+    """Compare so many edge pixels or more, print the counts, return the wrong ones."""
     names = [(name, hostile) for name in FAMILIES for hostile in (False, True)]
     n_seen, n_wrong = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
     seed = 0

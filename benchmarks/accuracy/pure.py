@@ -1,6 +1,6 @@
-"""The pure twins of the methods, in Python and NumPy: what the exact reference and readable code cost.
+"""The pure twins of the methods, in Python and NumPy: the cost of the exact reference and of readable code.
 
-A twin is timed on few triangles in a small frame, and must draw there what its kernel draws; so its error is that of
+A twin is timed on few triangles in a small frame, and must draw the pixels of its kernel there; so its error is that of
 the kernel, which is counted on many.
 """
 
@@ -19,7 +19,7 @@ FRAME_PX = 512
 
 @dataclass(frozen=True)
 class Twin:
-    """Pure code for what `entry` draws."""
+    """Pure code for the picture of `entry`."""
 
     name: str
     entry: Entry
@@ -50,7 +50,7 @@ TWINS = (
 
 
 def check(twin: Twin, scene: Triangles, size: tuple[int, int]) -> None:
-    """See that a twin draws what its kernel draws.
+    """Check that a twin draws the pixels of its kernel.
 
     Raises
     ------

@@ -36,7 +36,7 @@ def equilateral(n: int, area_px: float, frame_px: int, seed: int = 11) -> Triang
 
 
 def measure_sizes(options: Options) -> dict[str, Any]:
-    """Return `sizes`: a row for each method and area, at the usual precision; and `memory`: what a fill must cost."""
+    """Return `sizes`: a row for each method and area, at the usual precision; and `memory`: the cost of a fill."""
     import topleft as tl
 
     size = (options.frame_px, options.frame_px)

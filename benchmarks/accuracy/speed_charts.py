@@ -48,7 +48,7 @@ def chart_depth(record: Record) -> Figure:
 
 
 def chart_sizes(record: Record) -> Figure:
-    """Return chart (d): time per triangle by its area, a line for each method, and what memory takes."""
+    """Return chart (d): time per triangle by its area, a line for each method, and the time of memory."""
     figure, axis = plt.subplots(figsize=(9, 5.6), layout="constrained")
     rows = [row for row in record["sizes"] if "/" not in row["method"]]
     for name in dict.fromkeys(row["method"] for row in rows):

@@ -16,7 +16,7 @@ Table = tuple[list[str], list[list[str]]]
 
 
 def speed_facts_text(record: Record) -> str:
-    """What the figures belong to."""
+    """The origin of the figures."""
     options = record["options"]
     return f"{machine_text(record)}; medians of {options['rounds']} rounds."
 
@@ -61,7 +61,7 @@ def sizes_rows(record: Record) -> Table:
 
 
 def memory_text(record: Record) -> str:
-    """What memory does in the same run."""
+    """The speed of memory in the same run."""
     memory = record["memory"]
     return (
         f"Memory, measured in the same run: `memset` of the frame's {memory['frame_bytes'] / 1e6:.0f} MB sets "

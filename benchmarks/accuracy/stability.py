@@ -1,7 +1,7 @@
 """A mesh that tiles the frame: gaps, overdraw, and how much of the picture changes when it is touched.
 
 Out: for every method and precision the pixels that were missed, drawn more than once, or given to a wrong triangle, and
-the pixels whose triangle changes when vertices move or triangles change places, beside those of the exact picture.
+the pixels that change their triangle when vertices move or triangles change places, beside those of the exact picture.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Touched(NamedTuple):
 
     scene: Triangles
     ids: NDArray[np.int32]
-    """What each of its triangles was called before."""
+    """The former index of each triangle."""
     shift_px: int = 0
     """How far the picture must be shifted back, in x and y."""
 
@@ -70,7 +70,7 @@ def touch(change: str, scene: Triangles, frame_px: int, seed: int = 5) -> Touche
 
 
 def measure_stability(chosen: Sequence[Entry], frame_px: int, scale: float = 1.0) -> dict[str, Any]:
-    """Return `mesh`, `stability` of a record: what was drawn, and a row for the exact picture and for each entry."""
+    """Return `mesh`, `stability` of a record: the scene, and a row for the exact picture and for each entry."""
     import topleft as tl
     from topleft import scenes
 

@@ -1,4 +1,4 @@
-"""The accuracy record: time beside error for every method, and what else is charted; measured part by part.
+"""The accuracy record: time beside error for every method, and the rows of other charts; measured part by part.
 
 Out: a record for JSON. A part that is measured again replaces its rows; the rest of the record stays.
 """
@@ -52,7 +52,7 @@ MEASURES: Mapping[str, Callable[[Options], Record]] = {
     "scaling": measure_scaling,
     "tutorial": measure_tutorial,
 }
-"""What measures each part: it returns lists of rows, and objects of facts, by name."""
+"""The function that measures each part; it returns lists of rows, and objects of facts, by name."""
 
 
 def run_accuracy(
@@ -124,7 +124,7 @@ def run(arguments: argparse.Namespace, save: Save) -> Record:
 
 
 def text_of(rows: Callable[..., Any], *more: Any) -> Callable[[Record], str]:
-    """Return what makes the table of some rows."""
+    """Return the function that makes the table of some rows."""
     return lambda record: table_text(*rows(record, *more))
 
 
@@ -146,7 +146,7 @@ PARTS: Mapping[str, Callable[[Record], str]] = {
     "tutorial": text_of(speed_tables.tutorial_rows),
     "tutorial-ratio": speed_tables.tutorial_text,
 }
-"""What the markers `<!-- table: NAME -->` of a page stand for."""
+"""The parts of a page by their markers `<!-- table: NAME -->`."""
 
 
 def lines(record: Record) -> Iterator[str]:

@@ -18,7 +18,7 @@ Table = tuple[list[str], list[list[str]]]
 
 
 def facts_text(record: Record) -> str:
-    """What the figures of charts (a) and (b) and of the mesh belong to."""
+    """The origin of the figures of charts (a) and (b) and of the mesh."""
     options, mesh = record["options"], record["mesh"]
     families = "; ".join(
         f"{family['name']}, {family['what']}: {family['n_timed']:,} timed, errors over {family['n_edge_px']:,} "
@@ -152,7 +152,7 @@ def skipped_text(record: Record) -> str:
 
 
 def changes_text(_: Record) -> str:
-    """What the columns of the mesh say."""
+    """The meaning of the mesh's columns."""
     missed = "*missed*, *overdrawn*: pixels that no triangle of the mesh draws, or that are drawn more than once"
     far = f"*far*: the same with the mesh {FAR_PX:,} px from the origin, in x and y; `-` beyond the method's range"
     wrong = "*wrong*: pixels that do not show the triangle that the exact picture shows"

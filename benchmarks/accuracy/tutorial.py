@@ -19,7 +19,7 @@ from benchmarks.scenes.families import Entry, Triangles, entries
 
 COPIES = 100
 CLOCK_MS = 1e-6
-"""What clocks tell apart."""
+"""The resolution of clocks."""
 QUOTED = {"bresenham_scanline": 520, "point_in_triangle": 480}
 """Pictures a second, as one tutorial reports them; its window's call that sets a point takes most of that time."""
 
@@ -62,6 +62,6 @@ def measure_tutorial(options: Options) -> dict[str, Any]:
 
 
 def per_second(call_ms: float, fill_ms: float) -> dict[str, float]:
-    """Pictures a second: by calls, and by fills alone, whose difference may be lost in the noise."""
+    """Pictures a second: by calls, and by fills alone; their difference may be lost in the noise."""
     fill_ms = max(fill_ms, CLOCK_MS)
     return {"calls": float(f"{1e3 / call_ms:.3g}"), "fills": float(f"{1e3 / fill_ms:.3g}")}

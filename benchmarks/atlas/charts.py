@@ -43,7 +43,7 @@ def draw_charts(record: Record, folder: Path) -> list[Path]:
 
 
 def charts(record: Record) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Yield what draws a figure for each family of pixels, and one for those with depth."""
+    """Yield the function that draws a figure for each family of pixels, and one for those with depth."""
     for facts in record["families"]:
         if facts["name"] not in DEPTH_FAMILIES:
             yield facts["name"], partial(chart_family if len(facts["axes"]) == 1 else chart_pair, record, facts)
@@ -64,7 +64,7 @@ def maps_of(record: Record, facts: Row) -> list[Row]:
 
 
 def chart_family(record: Record, facts: Row) -> Figure:
-    """Return the heat maps of a family with one parameter: what shows wrongly, what is not drawn once."""
+    """Return the heat maps of a family with one parameter: wrong triangles, and pixels not drawn once."""
     rows = maps_of(record, facts)
     n_steps = len(facts["n_px"])
     (what,) = facts["axes"]

@@ -1,4 +1,4 @@
-"""Families of scenes with clip space or depth, which only the production methods take, and what they make of them.
+"""Families of scenes with clip space or depth, which only the production methods take, and their errors on them.
 
 In: vertices in clip space, or pixels with depth. Out: as `measure.py`, and how far depths are from those of the planes
 through the snapped vertices, in units in the last place of float32. Scenes are the same bits on every machine.
@@ -35,7 +35,7 @@ I32 = NDArray[np.int32]
 
 SIZE = (32, 32)
 PLANE_ERROR = Fraction(1, 2**35)
-"""Of the largest |z| of a triangle: what a depth may be off by before it is rounded (docs/design/rules.md, rule 8)."""
+"""The error of a depth before it is rounded, by the largest |z| of a triangle (docs/design/rules.md, rule 8)."""
 
 
 class DepthScene(NamedTuple):
@@ -58,7 +58,7 @@ class DepthFaults(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """What a method drew: ids, depths, how many triangles cover each centre."""
+    """The result of a method: ids, depths, how many triangles cover each centre."""
 
     ids: I32
     depth: NDArray[np.float32]
@@ -72,7 +72,7 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True)
 class DepthFamily(Family):
-    """A family with depth: what judges a picture that was drawn with so many bits."""
+    """A family with depth: its judge of a picture that was drawn with so many bits."""
 
     judge: Callable[[DepthScene, Picture, int | str], DepthFaults] = field(kw_only=True)
 
@@ -316,7 +316,7 @@ DEPTH_FAMILIES = {
 
 
 def measure_depth(family: DepthFamily, names: Sequence[str]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return what was drawn, and a map for each of the engine's rows, as `measure.map_family`."""
+    """Return the scenes, and a map for each of the engine's rows, as `measure.map_family`."""
     cells: dict[str, list[list[DepthFaults | str]]] = {name: [] for name in names}
     n_px = []
     for _, values in walk(family):

@@ -39,7 +39,7 @@ class Triptych(NamedTuple):
 
 
 def sheets() -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Yield what draws a sheet of scenes for each group of families."""
+    """Yield the function that draws a sheet of scenes for each group of families."""
     for name, families in SHEETS.items():
         found = [own for scene in FAILURE_SCENES.values() if scene.family in families for own in triptychs(scene)]
         if found:
@@ -120,7 +120,7 @@ def draw_values(axis: Axes, values: NDArray[np.int32], kind: str) -> None:
 
 
 def draw_difference(axis: Axes, expected: NDArray[np.int32], got: NDArray[np.int32], kind: str) -> None:
-    """Mark what is missing with a minus, what is too much with a plus, other triangles with a cross."""
+    """Mark missing pixels with a minus, surplus ones with a plus, other triangles with a cross."""
     for i, j in np.argwhere(expected != got).tolist():
         if kind == "wrong" and expected[i, j] >= 0 and got[i, j] >= 0:
             color, sign = OTHER, "x"
@@ -132,7 +132,7 @@ def draw_difference(axis: Axes, expected: NDArray[np.int32], got: NDArray[np.int
 
 
 def edges_in_window(scene: FailureScene) -> Iterator[Segment]:
-    """Yield what of the edges lies in the window and its margin, by Liang and Barsky's cut in fractions."""
+    """Yield the parts of edges in the window and its margin, by Liang and Barsky's cut in fractions."""
     points = [[Fraction(c) - o for c, o in zip(p, scene.origin, strict=True)] for p in scene.points]
     edges = {tuple(sorted((t[k], t[(k + 1) % 3]))) for t in scene.triangles for k in range(3)}
     for a, b in sorted(edges):

@@ -44,7 +44,7 @@ def measure(entry: Entry, exact: Exact) -> Faults | str:
 
 
 def faults_of_bounds(sampling: str, counts: NDArray[Any], exact: Exact) -> Faults:
-    """Return what bounds tell: outer counts hold those of the centres, inner ones are within; whole layers count."""
+    """Check bounds: outer counts hold those of the centres, inner ones lie within; whole layers count."""
     n = exact.scene.copies
     centers = exact.picture("8").count * n
     is_broken = (counts < centers if sampling == "outer" else counts > centers) | (counts % n != 0)
@@ -52,7 +52,7 @@ def faults_of_bounds(sampling: str, counts: NDArray[Any], exact: Exact) -> Fault
 
 
 def map_family(family: Family, rows: Sequence[Entry]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return what was drawn, and the map of each entry."""
+    """Return the scenes, and the map of each entry."""
     cells: dict[str, list[list[Any]]] = {entry.name: [] for entry in rows}
     n_edge_px = []
     for _, values in walk(family):

@@ -104,7 +104,7 @@ def heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class Shrinker:
-    """What a smaller scene must still do."""
+    """The failure that a smaller scene must keep."""
 
     def __init__(self, failure: Failure, value: Any) -> None:
         self.failure, self.value = failure, value
@@ -114,7 +114,7 @@ class Shrinker:
         claims = find_method(failure.entry.method).claims
         is_exact = claims.exact and not claims.overdraws_shared_edges
         self.is_middle = failure.entry.snap == "px" and failure.kind != "wrong" and not is_exact
-        """Whether vertices stay in the middle of their pixels, so that the snap is not what fails."""
+        """Whether vertices stay in the middle of their pixels, so that the failure is not the snap's."""
 
     def faults(self, scene: PixelScene) -> NDArray[np.bool_]:
         """Return the pixels that count: inside the mesh, if the failure is to be one between triangles."""
@@ -210,7 +210,7 @@ def simpler(value: float, least: int) -> Iterator[float]:
 
 
 def windows(scene: PixelScene, is_fault: NDArray[np.bool_]) -> Iterator[PixelScene]:
-    """Yield what lies in small windows round pixels that are at fault."""
+    """Yield the triangles in small windows round wrong pixels."""
     for row, column in np.argwhere(is_fault)[:20].tolist():
         at = (max(0, scene.origin[0] + column - WINDOW_PX // 2), max(0, scene.origin[1] + row - WINDOW_PX // 2))
         corners = scene.vertices[scene.triangles] - at
@@ -230,13 +230,13 @@ def compact(scene: PixelScene) -> PixelScene:
 
 
 def got_of(scene: PixelScene, entry: Entry, kind: str) -> Got:
-    """Return what a method draws of it."""
+    """Return the picture of a method."""
     drawn = draw_labels(entry, scene) if kind == "wrong" else draw_counts(entry, scene)
     return Got(entry.method, entry.bits, rows_of(drawn))
 
 
 def keep_scene(failure: Failure, value_name: str, scene: PixelScene, bits: int) -> FailureScene:
-    """Return what is kept of a shrunk scene; without a value it needs nothing but a mesh."""
+    """Return the conditions of a shrunk scene; without a value it only has to be a mesh."""
     scene, exact = compact(scene), Exact(compact(scene))
     expected = exact.labels() if failure.kind == "wrong" else exact.picture().count
     family = failure.family if value_name else EVERYDAY

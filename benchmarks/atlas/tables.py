@@ -35,7 +35,7 @@ def steps_of(facts: Row) -> list[str]:
 
 
 def families_text(record: Record) -> str:
-    """What was drawn."""
+    """The families of scenes."""
     rows = []
     for facts in record["families"]:
         axes = "; ".join(f"{what}: {values[0]} to {values[-1]}" for what, values in facts["axes"].items())
@@ -60,7 +60,7 @@ def first_text(record: Record) -> str:
 
 
 def first_cell(row: Row, steps: list[str]) -> str:
-    """Gaps, overdraw, wrong pixels, refusal: the first value of each, what comes at once first."""
+    """Gaps, overdraw, wrong pixels, refusal: the first value of each, those that come at once first."""
     found = []
     for field, word in (("gaps", "**gaps**"), ("overdrawn", "overdraws"), ("wrong", "wrong")):
         step = next((i for i, count in enumerate(row[field]) if count), None)
@@ -73,7 +73,7 @@ def first_cell(row: Row, steps: list[str]) -> str:
 
 
 def production_text(record: Record) -> str:
-    """What the engine makes of every family: the worst of all steps."""
+    """The errors of the engine on every family: the worst of all steps."""
     rows = []
     for facts in record["families"]:
         for row in (
@@ -136,4 +136,4 @@ PARTS: dict[str, Callable[[Record], str]] = {
     "not-applicable": not_applicable_text,
     "scenes": scenes_text,
 }
-"""What the markers `<!-- table: NAME -->` of the page stand for."""
+"""The parts of the page by their markers `<!-- table: NAME -->`."""

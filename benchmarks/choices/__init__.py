@@ -1,1 +1,1 @@
-"""What the planner chooses beside what it could have; docs/measured/choices.md and planner.md."""
+"""The choices of the planner beside their alternatives; docs/measured/choices.md and planner.md."""

@@ -1,4 +1,4 @@
-"""Builds of the library with other constants: what the kernels choose for each triangle, against other thresholds.
+"""Builds of the library with other constants: the kernels' choices for each triangle, against other thresholds.
 
 The sources are copied, a `#define` replaced, the copy is built, and imported beside the library in the same process.
 """

@@ -1,4 +1,4 @@
-"""What is chosen before a draw, beside what could have been: time of both in turns, on many scenes, with the same bits.
+"""The choices before a draw, beside their alternatives: time of both in turns, on many scenes, with the same bits.
 
 In: scenes of `scenes.py`, ways of `ways.py`. Out: a record with a row for each scene and choice.
 """
@@ -41,7 +41,7 @@ class Options:
 
 
 def run_choices(options: Options, record: Record | None = None, save: Save = forget) -> Record:
-    """Return a record, or what was measured anew in it; `save` gets it after each scene.
+    """Return a record, or the rows that were measured anew; `save` gets it after each scene.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def run_choices(options: Options, record: Record | None = None, save: Save = for
 
 
 def makers_of(options: Options) -> dict[str, Callable[[Scene], Ways]]:
-    """Return what gives the ways of a scene, for each choice that is wanted."""
+    """Return the function that gives the ways of a scene, for each choice in question."""
     wanted = list(options.choices) or [*CHOICES, *BUILDS]
     makers = {name: CHOICES[name] for name in wanted if name in CHOICES}
     for name in wanted:
@@ -76,7 +76,7 @@ def makers_of(options: Options) -> dict[str, Callable[[Scene], Ways]]:
 
 
 def chosen_scenes(options: Options) -> Iterator[Scene]:
-    """Give the scenes whose names begin as asked."""
+    """Give the scenes with names that begin so."""
     for scene in scenes(options.scale):
         if not options.scenes or scene.label.startswith(tuple(options.scenes)):
             yield scene
@@ -112,7 +112,7 @@ def measure_choice(choice: str, scene: Scene, ways: Ways, options: Options) -> d
 def by_other(own: NDArray[np.float64], took: NDArray[np.float64], choice: str) -> list[float]:
     """Return the quartiles of the ratios of the rounds; for threads the ratio of the least times is the middle one.
 
-    What else runs on the machine takes a thread away from some rounds, and CPU time does not leave that out.
+    Other programs on the machine take a thread away from some rounds, and CPU time does not leave that out.
     """
     ratios = quartiles(own[: len(took)] / took)
     return [ratios[0], digits(own.min() / took.min()), ratios[2]] if choice in THREADED else ratios
@@ -128,7 +128,7 @@ def with_rows(record: dict[str, Any] | None, rows: list[dict[str, Any]]) -> dict
 
 
 def key_of(row: dict[str, Any]) -> tuple[str, ...]:
-    """Return what tells rows apart."""
+    """Return the key of a row."""
     return row["choice"], row["scene"], row["verb"], row["sampling"]
 
 

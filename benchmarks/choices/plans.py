@@ -1,4 +1,4 @@
-"""What plans say and take: estimated beside measured time, the time of `tl.plan`, and what drawing with one saves."""
+"""Plans: estimated beside measured time, the time of `tl.plan`, and the time that drawing with one saves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.harness.turns import digits
 from benchmarks.harness.ways import Way, take_rounds
 
 PLANNED = ("mesh 1k", "mesh 10k", "mesh 100k", "mesh 100k float64 int64", "mesh 1M", "one large", "ten in 64x64")
-"""Scenes whose plans are timed."""
+"""Scenes for timing plans."""
 
 OUTPUTS = {"rasterize": ("triangle", "depth"), "coverage": ("coverage",), "overdraw": ("overdraw",), "fill": ("color",)}
 
@@ -44,7 +44,7 @@ def measure_estimates(options: Options) -> list[dict[str, Any]]:
 
 
 def measure_plans(options: Options) -> list[dict[str, Any]]:
-    """Return what a plan takes, and `rasterize` with it and without, for some scenes and both widths of indices."""
+    """Return the time of a plan, and of `rasterize` with it and without, for some scenes and both widths of indices."""
     rows = []
     for scene in chosen_scenes(options):
         if scene.name not in PLANNED or (scene.verb, scene.sampling) != ("rasterize", "center"):

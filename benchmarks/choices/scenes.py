@@ -1,4 +1,4 @@
-"""Scenes that choices are measured on: geometry of many kinds, and what is asked of it."""
+"""Scenes that choices are measured on: geometry of many kinds, and the calls on it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from topleft.scenes import large_triangle
 
 @dataclass(frozen=True)
 class Scene:
-    """Arrays, a picture, and what is asked for."""
+    """Arrays, a picture, and a call."""
 
     name: str
     kind: str
@@ -37,7 +37,7 @@ class Scene:
 
     @property
     def label(self) -> str:
-        """Geometry and what is asked of it."""
+        """The geometry and the call in words."""
         asked = self.verb if self.sampling == "center" else f"{self.verb} {self.sampling}"
         return f"{self.name}, {asked}"
 
@@ -130,7 +130,7 @@ MOST_TRIANGLES = 400_000
 
 
 def scenes(scale: float = 1.0) -> Iterator[Scene]:
-    """Give every geometry with what is asked of it, those of one geometry one after the other."""
+    """Give every geometry with its calls, those of one geometry one after the other."""
     for scene in geometries(scale):
         n = len(scene.arrays[1])
         for verb, sampling in ASKED + (ASKED_OF_SOME if n <= MOST_TRIANGLES else ()):

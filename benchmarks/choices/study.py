@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="build the library with other constants there unless it is, and measure it")  # fmt: skip
     add_number(parser, "--repeats", "rounds", "rounds")
     add_scale(parser)
-    add_out(parser, "what it holds and is not measured stays")
+    add_out(parser, "rows in it that are not measured stay")
 
 
 def run(arguments: argparse.Namespace, save: Save) -> Record:
@@ -30,6 +30,6 @@ def run(arguments: argparse.Namespace, save: Save) -> Record:
 
 
 STUDY = Study(
-    "choices", "measure what the planner chooses beside what it could have chosen", add_arguments, run, tables.lines,
+    "choices", "measure the planner's choices beside their alternatives", add_arguments, run, tables.lines,
     tables.PARTS, "benchmarks.choices.charts",
 )  # fmt: skip

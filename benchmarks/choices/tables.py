@@ -13,7 +13,7 @@ from benchmarks.report.tables import facts_text, table_text
 Row = dict[str, Any]
 
 NEAR, FAR = 1.15, 1.5
-"""What the mean over scenes, and any scene, may be."""
+"""The limits of the mean over scenes, and of any scene."""
 
 
 def lines(record: Record) -> Iterator[str]:
@@ -58,12 +58,12 @@ def ways_text(rows: list[Row]) -> str:
 
 
 def label_of(row: Row) -> str:
-    """Name a scene and what is asked of it."""
+    """Name a scene and its call."""
     return f"{row['scene']}, {asked_of(row)}"
 
 
 def asked_of(row: Row) -> str:
-    """Name what is asked of a scene."""
+    """Name the call of a scene."""
     return str(row["verb"]) if row["sampling"] == "center" else f"{row['verb']} {row['sampling']}"
 
 
@@ -104,12 +104,12 @@ def by_measured(row: Row) -> float:
 
 
 def plans_text(record: Record) -> str:
-    """What a plan takes, and what drawing with one saves."""
+    """The time of a plan, and the time that drawing with one saves."""
     rows = [
         [row["scene"], f"{row['n_triangles']:,}", row["indices"], f"{row['plan_ms']:.3g}", f"{row['without_ms']:.3g}",
          f"{row['with_ms']:.3g}", f"{row['saves_us']:.1f}"]
         for row in record["plans"]
-        if row["n_triangles"] >= 1000  # what smaller ones save is lost in noise
+        if row["n_triangles"] >= 1000  # the savings of smaller ones are lost in noise
     ]  # fmt: skip
     head = ["scene", "triangles", "indices", "`tl.plan` ms", "`rasterize` ms", "with `plan=` ms", "saves us"]
     return table_text(head, rows)
@@ -122,6 +122,6 @@ PARTS: Mapping[str, Callable[[Record], str]] = {
     "plan-estimates": estimates_text,
     "plan-overhead": plans_text,
 }
-"""What the markers of the page stand for."""
+"""The parts of the page by their markers."""
 
 NEEDS = {"plan-estimates": "estimates", "plan-overhead": "plans"}

@@ -33,7 +33,7 @@ FAR_PX = 2**24
 
 
 def drawing(scene: Scene, *, library: Any = tl, **changes: Any) -> Draw:
-    """Return what draws a scene on memory that is kept."""
+    """Return the function that draws a scene on memory that is kept."""
     vertices, triangles = changes.pop("arrays", None) or scene.arrays
     return verb_of(scene, picture_of(library, scene.size), vertices, triangles, (), scene.asked(**changes))
 
@@ -149,7 +149,7 @@ def of_samples(scene: Scene) -> Ways:
 
 
 def drawing_shares(scene: Scene) -> Draw:
-    """Return what draws the samples of all pixels as the verb does, without its checks."""
+    """Return the function that draws the samples of all pixels as the verb does, without its checks."""
     memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
 
     def draw_shares() -> Picture:
@@ -162,7 +162,7 @@ def drawing_shares(scene: Scene) -> Draw:
 
 
 def drawing_every_sample(scene: Scene) -> Draw:
-    """Return what draws a mask for each sample and averages them."""
+    """Return the function that draws a mask for each sample and averages them."""
     memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
     n, shape = view.sampling.n_samples, scene.size[::-1]
 
@@ -225,7 +225,7 @@ def of_sums(scene: Scene) -> Ways:
 
 
 def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
-    """Return what adds areas, in 64 bits at once if wanted."""
+    """Return the function that adds areas, in 64 bits at once if wanted."""
     memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
     width, height = scene.size
 
@@ -250,7 +250,7 @@ def of_memory(scene: Scene) -> Ways:
 
 
 def drawing_on(memory: Memory, scene: Scene) -> Draw:
-    """Return what draws as the verb does, on a memory."""
+    """Return the function that draws as the verb does, on a memory."""
     options, arrays = scene.asked(), scene.arrays
     if scene.verb == "fill":
         style = Style("auto", None, "replace", "straight", "values")

@@ -1,1 +1,1 @@
-"""What measures: processes, turns, records."""
+"""The tools of measurement: processes, turns, records."""

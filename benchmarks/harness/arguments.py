@@ -56,7 +56,7 @@ def add_names(parser: argparse.ArgumentParser, flag: str, field: str, what: str,
 
 
 def add_scale(parser: argparse.ArgumentParser, what: str = "of triangles and frames") -> None:
-    """Add the scale of what is measured."""
+    """Add the scale of the scenes."""
     parser.add_argument("--scale", type=float, metavar="X", help=f"{what} (%(default)s)")
 
 

@@ -38,7 +38,7 @@ class Contestant:
 
     @property
     def name(self) -> str:
-        """What the table calls it."""
+        """Its name in the table."""
         words = [self.peer, *filter(None, (self.isa, self.way))]
         words += [f"{self.threads} threads"] if self.threads > 1 else []
         return " ".join(words + ([f"on {self.case.name}"] if self.is_beside else []))
@@ -56,7 +56,7 @@ class Contestant:
 def choose(
     case: Case, beside: Case | None, peers: Sequence[str], isas: Sequence[str], threads: Sequence[int]
 ) -> tuple[list[Contestant], list[dict[str, str]]]:
-    """Who takes part in a case, and who does not, with the reason. The first one is what all are compared with."""
+    """Who takes part in a case, and who does not, with the reason. All are compared with the first one."""
     ways = load_peer(OURS).WAYS.get(case.task, (None,))
     chosen = [Contestant(OURS, n, case, isa, way=way) for n in threads for isa in isas for way in ways]
     if beside is not None:
@@ -84,7 +84,7 @@ class SkippedError(Exception):
 
 @dataclass
 class Child:
-    """The process of a contestant, and what it has measured."""
+    """The process of a contestant, and its measurements."""
 
     contestant: Contestant
     process: subprocess.Popen[bytes]
@@ -135,7 +135,7 @@ class Child:
         self.cpu_shares.append(answer["cpu_share"])
 
     def picture(self, folder: Path) -> dict[str, np.ndarray]:
-        """What it draws."""
+        """Its result."""
         names = self.ask(TURN_TIMEOUT_S, do="picture", folder=str(folder))["names"]
         return {name: np.load(folder / f"{name}.npy") for name in names}
 

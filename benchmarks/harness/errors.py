@@ -15,13 +15,13 @@ from benchmarks.scenes.cases import Scene
 from topleft.methods.reference.integers import ExactPicture, areas
 
 AREA_ROUNDING = 1e-9
-"""What sums of areas are off by at most."""
+"""The largest error of sums of areas."""
 
 OTHER_SURFACE = 1e-4
 """Window depth: far more than the rounding of any peer's depth buffer."""
 
 Picture = dict[str, NDArray[Any]]
-"""What a contestant drew: any of "triangle" (H, W) int32, "depth" float32, "mask" bool, "color" (H, W, 3) uint8."""
+"""The result of a contestant: any of "triangle" (H, W) int32, "depth" float32, "mask" bool, "color" (H, W, 3) uint8."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Error:
 
 
 def compare(picture: Picture, exact: Picture) -> Error | AreaError:
-    """Count wrong pixels: ids where there are ids, else colours, else what is covered; areas: see `area_error`.
+    """Count wrong pixels: ids where there are ids, else colours, else coverage; areas: see `area_error`.
 
-    With depth and no ids, a pixel whose depth is off by more than `OTHER_SURFACE` is wrong too: another triangle shows.
-    The largest difference of depth is over the pixels that both cover; with ids, over those whose ids agree.
+    With depth and no ids, a pixel with depth off by more than `OTHER_SURFACE` is wrong too: another triangle shows.
+    The largest difference of depth is over the pixels that both cover; with ids, over those with equal ids.
     """
     if "area" in exact:
         return area_error(picture, exact["area"])

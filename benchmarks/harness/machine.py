@@ -1,4 +1,4 @@
-"""What a figure belongs to: machine, versions, commit."""
+"""The origin of a figure: machine, versions, commit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ IMAGES = ROOT / "docs" / "images"
 
 
 def describe(*distributions: str) -> dict[str, Any]:
-    """What figures belong to: date, machine, commit, instruction set, versions of topleft, NumPy and distributions."""
+    """The origin of figures: date, machine, commit, instruction set, versions of topleft, NumPy and distributions."""
     import topleft as tl
 
     return {

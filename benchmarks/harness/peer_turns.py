@@ -18,7 +18,7 @@ from benchmarks.scenes.cases import Case, Scene
 from benchmarks.scenes.families import Triangles
 
 MASK_TASKS = ("mask", "labels", "depth-2d")
-"""What shows which pixels are covered, as far as a peer does it, the cheapest first."""
+"""The outputs of a peer that show coverage, the cheapest first."""
 SMOOTH_TASKS = ("smooth",)
 
 
@@ -69,7 +69,7 @@ class Peers:
         return {name: turn_of_child(child) for name, child in self.children.items()}
 
     def facts(self) -> dict[str, str]:
-        """What each gives, with its version."""
+        """The outputs of each, with its version."""
         return {
             name: f"{load_peer(name).DISTRIBUTION} {child.facts['version']}, {child.facts['gives']}"
             for name, child in self.children.items()

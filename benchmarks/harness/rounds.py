@@ -23,7 +23,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Options:
-    """What to run and how."""
+    """The options of a run."""
 
     scenes: Sequence[str]
     peers: Sequence[str]
@@ -170,7 +170,7 @@ def summarize(child: Child, first: Child, error: dict[str, Any] | None) -> dict[
 
 
 def summarize_yardstick(yardstick: Yardstick, children: list[Child]) -> dict[str, Any]:
-    """Figures of a yardstick, and what ours are in multiples of it: the shortest call of a turn over its figure."""
+    """Figures of a yardstick, and ours in multiples of it: the shortest call of a turn over its figure."""
     theirs = np.array(yardstick.times_ms)
     ratios = {
         child.contestant.name: float(np.median(np.array([min(turn) for turn in child.turns]) / theirs))

@@ -20,7 +20,7 @@ SLOW_MS, SLOW_ROUNDS = 1000.0, 2
 def turn_of(call: Callable[[], object], clock: Clock = time.thread_time) -> Turn:
     """Return the turn of a call in this process; unless told otherwise, time is that of the thread on its CPU.
 
-    What others do on that CPU does not count, so this is for calls that run on one thread.
+    Other work on that CPU does not count, so this is for calls that run on one thread.
     """
 
     def turn(seconds: float) -> list[float]:

@@ -22,7 +22,7 @@ HOPELESS = 4.0
 
 @dataclass(frozen=True)
 class Way:
-    """A way to draw: its name, what draws, and the choices and costs that are forced."""
+    """A way to draw: its name, its function, and the choices and costs that are forced."""
 
     name: str
     draw: Draw
@@ -38,7 +38,7 @@ Ways = list[Way]
 
 
 def answers_of(name: str, draw: Draw, **forced: Any) -> list[Any]:
-    """Return what a choice of the library answers while something is drawn."""
+    """Return the answers of a choice of the library during a draw."""
     found: list[Any] = []
     asked = getattr(choices, name)
 

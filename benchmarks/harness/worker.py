@@ -24,7 +24,7 @@ from benchmarks.scenes.cases import Scene
 WARM_CALLS, WARM_SECONDS = 3, 2.0
 MAX_CALLS = 10_000
 CLOCKS = {"wall": perf_counter, "cpu": process_time}
-"""The time that passes, or what all threads of the process spend on their CPUs."""
+"""The time that passes, or the CPU time of all threads of the process."""
 
 
 def main() -> int:

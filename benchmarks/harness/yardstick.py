@@ -57,7 +57,7 @@ class Yardstick:
         self.times_ms.append(self.read(self.run(), case))
 
     def run(self) -> str:
-        """What the program prints."""
+        """The output of the program."""
         pin = (lambda: os.sched_setaffinity(0, self.pinned_to)) if self.pinned_to else None
         try:
             done = subprocess.run(
@@ -71,7 +71,7 @@ class Yardstick:
         return done.stdout
 
     def read(self, text: str, case: Case) -> float:
-        """The figure for a case in what the program printed, ms."""
+        """The figure for a case in the output of the program, ms."""
         for found in self.pattern.finditer(text):
             groups = found.groupdict()
             if groups.get("scene") is None or groups["scene"] in (case.name, *case.aliases):

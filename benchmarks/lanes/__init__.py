@@ -1,1 +1,1 @@
-"""Kernels without Python: what each instruction set gains over scalar, here, in WebAssembly and on aarch64."""
+"""Kernels without Python: the gain of each instruction set over scalar, here, in WebAssembly and on aarch64."""

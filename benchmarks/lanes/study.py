@@ -43,7 +43,7 @@ NODE = f"node --no-warnings {ROOT / 'tests/portable/run_wasi.mjs'}"
 
 @dataclass(frozen=True)
 class Way:
-    """A compiled program: a set on a machine; the first of a machine is what its others are compared with."""
+    """A compiled program: a set on a machine; the others of a machine are compared with the first."""
 
     machine: str
     isa: str

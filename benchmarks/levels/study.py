@@ -35,7 +35,7 @@ FOV_Y_DEG = 40.0
 
 @dataclass(frozen=True)
 class Options:
-    """What to measure."""
+    """The options of a run."""
 
     meshes: tuple[str, ...] = ()
     n_triangles: int = 10_000_000
@@ -66,7 +66,7 @@ def subjects(options: Options) -> Iterator[tuple[str, tl.Mesh]]:
 
 
 def find_levels(name: str, mesh: tl.Mesh, folder: Path | None) -> tuple[tl.Levels, float]:
-    """Return levels, of an earlier run if they are kept, and what making them took: seconds of CPU time."""
+    """Return levels, of an earlier run if they are kept, and the CPU time of making them, seconds."""
     if folder is None:
         return make_levels(mesh)
     path = folder / f"{name}-{len(mesh.triangles)}.npz"
@@ -87,7 +87,7 @@ def make_levels(mesh: tl.Mesh) -> tuple[tl.Levels, float]:
 
 
 def measure_mesh(name: str, mesh: tl.Mesh, levels: tl.Levels, times: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return what all levels of a mesh take, and how far they are off, at each height."""
+    """Return the times of all levels of a mesh, and their errors, at each height."""
     extent = extent_of(mesh)
     views = []
     for height_px, own in zip(HEIGHTS_PX, times, strict=True):
@@ -120,7 +120,7 @@ def camera_at(mesh: tl.Mesh, extent: float, height_px: int) -> tl.Camera:
 
 
 def draw_times(mesh: tl.Mesh, levels: tl.Levels, rounds: int) -> list[dict[str, Any]]:
-    """Return what `rasterize` takes at each height, on memory that is kept, one thread, in turns; milliseconds.
+    """Return the time of `rasterize` at each height, on memory that is kept, one thread, in turns; milliseconds.
 
     `turns_ms`: of each level, from arrays; `clustered_ms`: of the mesh as one that is drawn again, in clusters.
     """

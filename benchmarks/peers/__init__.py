@@ -2,8 +2,8 @@
 
 A peer file has
 
-    MODULE         what has to be importable
-    DISTRIBUTION   what pip calls it
+    MODULE         the module to import
+    DISTRIBUTION   its name for pip
     TASKS          the tasks of `scenes.cases.TASKS` that it can do
     prepare(scene, threads) -> Drawing
 
@@ -47,9 +47,9 @@ BROKEN = "broken"
 
 @dataclass(frozen=True)
 class Drawing:
-    """A scene made ready: `draw` is what is timed, `picture` gives what it drew.
+    """A scene made ready: `draw` is timed, `picture` gives its result.
 
-    `gives` tells in a word or two what one call of `draw` leaves in arrays, `untimed` what happened before.
+    `gives` names the arrays that one call of `draw` leaves, `untimed` the work before it.
     """
 
     draw: Callable[[], object]

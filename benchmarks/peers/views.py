@@ -121,7 +121,7 @@ def draw_by_llvmpipe(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
 
 
 def open_vtk_window(scene: Scene, renderer: Any, window: Any) -> Any:
-    """Make a window off screen; return the camera, whose projection is the matrix of the scene."""
+    """Make a window off screen; return the camera; its projection is the matrix of the scene."""
     import vtk
 
     window.SetOffScreenRendering(True)

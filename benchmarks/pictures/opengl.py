@@ -1,4 +1,4 @@
-"""The light of topleft in GLSL: what docs/design/shading.md says, drawn by OpenGL on Mesa's llvmpipe.
+"""The light of topleft in GLSL, by docs/design/shading.md, drawn by OpenGL on Mesa's llvmpipe.
 
 In: a scene of `scenes.py`. Out: its picture and its ids. Shares no code with the kernels or with
 `ShadingInputs`.
@@ -301,7 +301,7 @@ def uniforms(scene: PictureScene) -> dict[str, Any]:
 
 
 def full_uniforms(material: tl.Material, environment: tl.Environment | None, view: np.ndarray) -> dict[str, Any]:
-    """What metallic-rough materials need, maps, and what is all around: a sky over a ground."""
+    """The inputs of metallic-rough materials, maps, and the environment: a sky over a ground."""
     is_metallic = material.metallic is not None or material.roughness is not None
     around = environment or DEFAULT_ENVIRONMENT
     sky, ground = around.colors
@@ -323,7 +323,7 @@ def full_uniforms(material: tl.Material, environment: tl.Environment | None, vie
 
 
 def kind_of(options: dict[str, Any]) -> int:
-    """What lights: the headlight, lights, or a matcap."""
+    """The light: the headlight, lights, or a matcap."""
     if options.get("shading") == "matcap":
         return 2
     return 0 if options.get("lights") is None and options.get("environment") is None else 1

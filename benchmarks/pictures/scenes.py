@@ -18,19 +18,19 @@ SIZE = (320, 256)
 
 @dataclass(frozen=True, eq=False)
 class PictureScene:
-    """What to draw.
+    """A scene to draw.
 
     Parameters
     ----------
     what : str
         For the reader of the table.
     mesh : Mesh
-        In the world, with at most one material: what OpenGL draws.
+        In the world, with at most one material, for OpenGL.
     camera : Camera
     options : dict
         Further options of `tl.render`.
     placed : Scene, optional
-        What topleft draws instead: the same triangles as instances.
+        For topleft instead: the same triangles as instances.
     own_level : bool
         Whether the shader computes the level of detail, instead of OpenGL.
     """
@@ -259,7 +259,7 @@ def metal() -> PictureScene:
 
 
 def metallic() -> PictureScene:
-    """Metal and what is none side by side, smooth and rough, with occlusion and emission, under lights and a sky."""
+    """Metal and non-metal side by side, smooth and rough, with occlusion and emission, under lights and a sky."""
     vertices, triangles = tl.scenes.shape("torus")
     material = tl.Material(
         texture=tl.Texture(tiles(16), "bilinear"),

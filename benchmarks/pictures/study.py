@@ -73,7 +73,7 @@ def run_pictures(names: list[str], folder: Path | None = None) -> Record:
 
 
 def compare_outlines(draw_peer: Callable[[PictureScene], tuple[np.ndarray, np.ndarray]]) -> dict[str, Any]:
-    """Count what `compare` does of outlines, over views of the `headlight` scene from all sides."""
+    """Count the pixels of outlines as `compare` does, over views of the `headlight` scene from all sides."""
     first = SCENES["headlight"]()
     cameras = tl.viewpoints(first.mesh, N_VIEWS, aspect=SIZE[0] / SIZE[1])
     rows = []
@@ -98,7 +98,7 @@ def count_outline(is_covered: np.ndarray) -> int:
 
 
 def outline_px(scene: PictureScene, triangle: int) -> np.ndarray:
-    """The corners (N, 2) float64 of a triangle in pixels, not snapped: what the near plane leaves of it."""
+    """The corners (N, 2) float64 of a triangle in pixels, not snapped, after the near plane."""
     mesh, (width, height) = scene.mesh, SIZE
     clip = np.c_[mesh.vertices[mesh.triangles[triangle]], np.ones(3)] @ scene.camera.clip_from_world(SIZE).T
     distance = clip[:, 2] + clip[:, 3]
@@ -113,7 +113,7 @@ def outline_px(scene: PictureScene, triangle: int) -> np.ndarray:
 
 
 def compare(ours: Drawn, theirs: Drawn, outline_of: Callable[[int], np.ndarray]) -> dict[str, Any]:
-    """Count what differs.
+    """Count the differences.
 
     Parameters
     ----------

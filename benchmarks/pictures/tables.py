@@ -17,7 +17,7 @@ def lines(record: Record) -> Iterator[str]:
 
 
 def facts_text(record: Record) -> str:
-    """What was drawn with what."""
+    """The versions of both renderers."""
     width, height = record["size"]
     switches = ", ".join(f"`{name}={value}`" for name, value in record["environment"].items())
     return (
@@ -39,7 +39,7 @@ def differences_text(record: Record) -> str:
 
 
 def outlines_text(record: Record) -> str:
-    """What differs over many views."""
+    """The differences over many views."""
     facts = record["outlines"]
     return (
         f"`headlight` from {facts['n_views']} sides has {facts['n_outline']:,} pixels on outlines. "
@@ -55,7 +55,7 @@ def sheets_text(record: Record) -> str:
 
 
 def sheet_text(row: Record) -> str:
-    """One of them, with what is in it."""
+    """One of them, with its description."""
     address = f"../images/pictures-{row['scene']}.png"
     return f"![{row['scene']}, {row['what']}: topleft, llvmpipe, difference]({address})"
 
@@ -66,4 +66,4 @@ PARTS: Mapping[str, Callable[[Record], str]] = {
     "outlines": outlines_text,
     "sheets": sheets_text,
 }
-"""What the markers of the page stand for."""
+"""The parts of the page by their markers."""

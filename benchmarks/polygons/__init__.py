@@ -1,1 +1,1 @@
-"""Polygons beside what mask people use: time, wrong pixels, lines to write."""
+"""Polygons beside other programs for masks: time, wrong pixels, lines to write."""

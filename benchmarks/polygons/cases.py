@@ -14,7 +14,7 @@ TASKS = ("mask", "labels", "area", "table")
 
 @dataclass(frozen=True)
 class PolygonCase:
-    """Polygons, each of a list of rings, and what is asked of them."""
+    """Polygons, each of a list of rings, and the output to make."""
 
     name: str
     task: str
@@ -42,7 +42,7 @@ def gon(size: tuple[int, int], n: int, *, with_hole: bool = False) -> list[list[
 
 
 def star(size: tuple[int, int], n: int) -> list[list[F64]]:
-    """One ring of n corners whose noise is 3 px."""
+    """One ring of n corners with noise of 3 px."""
     rng = np.random.default_rng(0)
     angles = np.linspace(0, 2 * np.pi, n, endpoint=False)
     radius = size[0] * (0.366 + 0.085 * np.sin(9 * angles)) + rng.normal(0, 3, n)

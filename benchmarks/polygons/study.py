@@ -1,6 +1,6 @@
 """The study of polygons: every painter in turns on each case, one process, with its wrong pixels beside the time.
 
-What is right comes from topleft's scalar kernels by another way (a polygon at a time, the mask of each one), which the
+The right result is by topleft's scalar kernels in another way (a polygon at a time, the mask of each one), which the
 tests hold against integers; of areas, from the table of the scalar kernels. A pixel is wrong where an area is off by
 more than 1e-6.
 """
@@ -27,7 +27,7 @@ from benchmarks.report.study import Study
 
 @dataclass(frozen=True)
 class Options:
-    """What to run and how."""
+    """The options of a run."""
 
     cases: tuple[str, ...] = tuple(CASES)
     painters: tuple[str, ...] = tuple(PAINTERS)
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--repeats", "repeats", "rounds")
     parser.add_argument("--seconds", type=float, metavar="S", help="how long a turn is, at least a call")
     parser.add_argument("--slow", dest="slow_s", type=float, metavar="S", help="calls that take longer are timed once")
-    parser.add_argument("--clock", choices=tuple(CLOCKS), help="what is measured: cpu is the time of the process")
+    parser.add_argument("--clock", choices=tuple(CLOCKS), help="the clock: cpu is the time of the process")
     add_out(parser)
 
 
@@ -82,7 +82,7 @@ def measure(case: PolygonCase, options: Options, record: Record) -> None:
             start = clock()
             made = calls[name]()
             took = clock() - start
-            if took > options.slow_s:  # what comes first may be slow for other reasons
+            if took > options.slow_s:  # the first call may be slow for other reasons
                 start = clock()
                 made = calls[name]()
                 took = min(took, clock() - start)
@@ -111,7 +111,7 @@ def measure(case: PolygonCase, options: Options, record: Record) -> None:
 
 
 def right_picture(polygons: list[list[Any]], case: PolygonCase) -> Any:
-    """Return what must be there."""
+    """Return the expected result."""
     import topleft as tl
     from topleft._core import engine
 
@@ -176,7 +176,7 @@ def table(record: Record) -> Iterator[str]:
 
 
 def lines(record: Record) -> Iterator[str]:
-    """What is printed: machine, instruction set, threads, and the table."""
+    """The printed lines: machine, instruction set, threads, and the table."""
     yield facts(record)
     yield ""
     yield from table(record)

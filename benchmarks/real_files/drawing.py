@@ -1,6 +1,6 @@
 """Draws files, one after the other, as `topleft render` draws them: the other end of the study's pipe.
 
-In: paths. Out: what came of each: an outcome, the line that was printed, seconds, and a small picture.
+In: paths. Out: for each an outcome, the line that was printed, seconds, and a small picture.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ THUMBNAIL = 192
 
 def serve(pipe: Connection, picture: Path, up: str) -> None:
     """Draw the files that the pipe names until it says None."""
-    warnings.simplefilter("ignore")  # what is wrong is read from the command's own line
+    warnings.simplefilter("ignore")  # errors are read from the command's own line
     pipe.send({"ready": True})
     while (path := pipe.recv()) is not None:
         pipe.send(draw(path, picture, up))
 
 
 def draw(path: Path, picture: Path, up: str = "y") -> dict[str, Any]:
-    """What comes of a file.
+    """Draw a file and return its outcome.
 
     Returns
     -------
     dict
-        `outcome`: "drawn", "refused" or "crashed"; `line`: what the command printed, without the name of the file;
+        `outcome`: "drawn", "refused" or "crashed"; `line`: the output of the command, without the name of the file;
         of what is drawn `n_triangles`, `n_points`, `load_s` (`tl.load`), `command_s` (all of `topleft render`), and
         `covered`: the share of the pixels that are not background.
     """
@@ -70,15 +70,15 @@ def draw(path: Path, picture: Path, up: str = "y") -> dict[str, Any]:
 
 
 def shortened(text: str, path: Path) -> str:
-    """A line of the command without what all lines begin with, and without the folder of the file."""
+    """A line of the command without the common beginning, and without the folder of the file."""
     line = " ".join(text.split()).removeprefix("topleft: ")
-    if not line.startswith("cannot"):  # what a mesh lacks begins with its file
+    if not line.startswith("cannot"):  # warnings begin with their file
         line = line.replace(f"{str(path)!r}: ", "")
     return line.replace(str(path), path.name).replace(str(path.parent), "")
 
 
 def facts(path: Path) -> dict[str, Any]:
-    """What is in a file, and how long `tl.load` takes."""
+    """The contents of a file, and the time of `tl.load`."""
     import topleft as tl
 
     start = time.perf_counter()

@@ -1,6 +1,6 @@
-"""Draws all files of folders, and writes a page: what is drawn, refused or warned of, how long it takes, and sheets.
+"""Draws all files of folders, and writes a page: outcomes, warnings, times, and sheets.
 
-In: folders of files, of which none is part of the project. Out: a record, and a folder with a page and contact sheets.
+In: folders of files that are no part of the project. Out: a record, and a folder with a page and contact sheets.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SUFFIXES = (
     ".gltf", ".glb", ".vrm", ".obj", ".ply", ".stl", ".stl_ascii", ".off", ".3mf", ".dae", ".zae", ".amf", ".xyz",
     ".svg", ".dxf", ".binvox",
 )  # fmt: skip
-"""Of what is drawn unless `--suffix` says otherwise."""
+"""The files that are drawn unless `--suffix` is given."""
 
 START_SECONDS = 60
 
@@ -56,7 +56,7 @@ class Painter(AbstractContextManager["Painter"]):
             raise ValueError("the process that draws did not start")
 
     def draw(self, path: Path) -> dict[str, Any]:
-        """What comes of a file; see `drawing.draw`."""
+        """The outcome of a file; see `drawing.draw`."""
         self._pipe.send(path)
         try:
             if self._pipe.poll(self._seconds):
@@ -102,7 +102,7 @@ def run_real_files(
     Parameters
     ----------
     folders : dict
-        By what they are called: a repository and its commit, say.
+        By their names: a repository and its commit, say.
     out : path
     seconds : float
         How long a file may take.

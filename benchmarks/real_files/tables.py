@@ -30,7 +30,7 @@ def folders(record: Record) -> dict[str, list[Row]]:
 
 
 def summary(record: Record) -> str:
-    """A row a folder: files, what came of them, and seconds."""
+    """A row a folder: files, their outcomes, and seconds."""
     rows = []
     every = folders(record)
     for label, of_folder in [*every.items(), *([("all", record["files"])] if len(every) > 1 else [])]:
@@ -64,7 +64,7 @@ def lines_of(record: Record, outcome: str, n_most: int | None = None) -> str:
 
 
 def kinds_of(line: str, file: str, outcome: str) -> Iterator[str]:
-    """The parts of a line, without what differs from file to file."""
+    """The parts of a line that are the same from file to file."""
     for part in filter(None, line.split("; ")) if outcome == "drawn" else [line]:
         text = part.replace(repr(Path(file).name), "FILE").replace("`", "'").replace("|", "/")
         if outcome == "drawn":
@@ -115,7 +115,7 @@ def suffixes(record: Record) -> str:
 
 
 def lines(record: Record) -> Iterator[str]:
-    """What is printed."""
+    """The printed lines."""
     yield summary(record)
     yield ""
     yield lines_of(record, "crashed")

@@ -1,1 +1,1 @@
-"""How records are shown, and what every study has to offer."""
+"""How records are shown, and the interface of studies."""

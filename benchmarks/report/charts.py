@@ -82,6 +82,6 @@ def count_text(value: float) -> str:
 
 
 def draw_grid(axis: Axes) -> None:
-    """Draw what all charts have."""
+    """Draw the common parts of charts."""
     axis.grid(which="major", color="0.88", lw=0.6)
     axis.set_axisbelow(True)

@@ -11,12 +11,12 @@ MARKED = re.compile(r"(<!-- table: ([\w-]+) -->\n)(.*?)(<!-- end -->)", re.DOTAL
 
 
 def with_parts(text: str, record: Record, parts: Mapping[str, Callable[[Record], str | None]]) -> str:
-    """Return a page with what stands between its markers made anew, by `parts`; what they give None for stays.
+    """Return a page with the text between its markers made anew by `parts`; a part that gives None stays.
 
     Raises
     ------
     ValueError
-        If the page has no marker or an unknown one, or the record lacks what one needs.
+        If the page has no marker or an unknown one, or the record lacks rows of one.
     """
 
     def made(found: re.Match[str]) -> str:

@@ -13,7 +13,7 @@ from benchmarks.harness.records import Record, Save
 
 @dataclass(frozen=True)
 class Study:
-    """What is measured together."""
+    """Cases that are measured together."""
 
     kind: str
     """Of its record; and the command."""
@@ -26,9 +26,9 @@ class Study:
     Raises a ValueError for arguments that are refused.
     """
     lines: Callable[[Record], Iterable[str]]
-    """What is printed of a record."""
+    """The printed lines of a record."""
     parts: Mapping[str, Callable[[Record], str | None]] = field(default_factory=dict)
-    """What the markers `<!-- table: NAME -->` of its pages stand for; None: of another record than this one."""
+    """The parts of its pages by their markers `<!-- table: NAME -->`; None: of another record than this one."""
     charts: str | None = None
     """The module that draws its charts; it needs matplotlib."""
 

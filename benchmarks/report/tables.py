@@ -1,4 +1,4 @@
-"""Markdown: tables, numbers, and what figures belong to."""
+"""Markdown: tables, numbers, and the origin of figures."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def commit_text(facts: dict[str, Any]) -> str:
 
 
 def facts_text(record: dict[str, Any]) -> str:
-    """What was measured with what."""
+    """The machine, the commit and the versions of a record."""
     machine, versions = record["machine"], record["versions"]
     return (
         f"{machine['cpu']}, {machine['cpus']} CPUs; topleft {versions['topleft']} at {commit_text(record)}, "

@@ -26,7 +26,7 @@ def scenes_of(record: Record, names: list[str]) -> list[Scene]:
 
 
 def own_run(scene: Scene, isa: str, n_threads: int = 1, name: str | None = None) -> Run | None:
-    """What topleft took for the scene itself; `name`: for the one beside it."""
+    """The time of topleft for the scene itself; `name`: for the one beside it."""
     wanted = {"peer": OURS, "scene": name or scene["scene"], "isa": isa, "threads": n_threads}
     return next((run for run in scene["runs"] if run.items() >= wanted.items()), None)
 
@@ -53,7 +53,7 @@ def yardstick_text(scene: Scene, run: Run | None) -> str:
 
 
 def own_cells(scene: Scene, isas: list[str]) -> list[str]:
-    """A time for each instruction set, what the first one gains by a second thread, and it over a program in C."""
+    """A time for each instruction set, the first one's gain by a second thread, and it over a program in C."""
     alone = [own_run(scene, isa) for isa in isas]
     gain = ratio_text(alone[0], own_run(scene, isas[0], 2))
     return [*map(time_text, alone), gain, yardstick_text(scene, alone[0])]
@@ -65,7 +65,7 @@ def own_head(isas: list[str]) -> list[str]:
 
 
 def facts_text(record: Record) -> str | None:
-    """What the figures belong to."""
+    """The origin of the figures."""
     if not scenes_of(record, [*MESHES, *STREWN, *FILLS]):
         return None
     machine, options = record["machine"], record["options"]
@@ -127,4 +127,4 @@ PARTS: dict[str, Callable[[Record], str | None]] = {
     "strewn": rows_text(STREWN),
     "fills": rows_text(FILLS),
 }
-"""What the markers `<!-- table: NAME -->` of the page stand for."""
+"""The parts of the page by their markers `<!-- table: NAME -->`."""

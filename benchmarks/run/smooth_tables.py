@@ -14,7 +14,7 @@ Run = dict[str, Any]
 
 TASK = "smooth-fill"
 SINGLES, SEAMS = "smooth-singles", "smooth-seams"
-"""Scenes whose pictures are compared with exact areas."""
+"""Scenes for pictures that are compared with exact areas."""
 
 
 def timed_scenes(record: Record) -> list[dict[str, Any]]:
@@ -28,7 +28,7 @@ def find_run(scene: dict[str, Any], name: str) -> Run | None:
 
 
 def facts_text(record: Record) -> str:
-    """What the figures belong to, and who is missing."""
+    """The origin of the figures, and the missing contestants."""
     machine, options = record["machine"], record["options"]
     runs = {run["peer"]: run for scene in timed_scenes(record) for run in scene["runs"]}
     versions = ", ".join(f"{name} {run['version']}" for name, run in runs.items())
@@ -54,7 +54,7 @@ def times_text(record: Record) -> str:
 
 
 def column(scene: dict[str, Any]) -> str:
-    """What a scene is called in a table."""
+    """The name of a scene in a table."""
     return scene["scene"].removeprefix("smooth-")
 
 
@@ -108,4 +108,4 @@ PARTS: dict[str, Callable[[Record], str | None]] = {
     "smooth-ratios": if_measured(ratios_text),
     "smooth-errors": if_measured(errors_text),
 }
-"""What the markers `<!-- table: NAME -->` of the page stand for."""
+"""The parts of the page by their markers `<!-- table: NAME -->`."""

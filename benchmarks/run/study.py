@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, save: Save) -> Record:
-    """Measure what the arguments ask for, checked."""
+    """Measure the cases of the arguments, checked."""
     import topleft as tl
 
     available = tl.build_info()["isa_available"]

@@ -1,1 +1,1 @@
-"""What is drawn."""
+"""The scenes."""

@@ -1,4 +1,4 @@
-"""Vertices and triangles of many kinds, without a camera: what the scenes of several studies are made of."""
+"""Vertices and triangles of many kinds, without a camera: the parts of scenes in several studies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The registry of cases: which scene is drawn, in which number format, and what is asked for.
+"""The registry of cases: the scene, the number format, and the outputs of each.
 
 Scenes come from `topleft.scenes`; this file names them and gives them a camera. Output: a `Scene` of plain arrays,
 the same for every contestant, which travels to the children as files.
@@ -37,7 +37,7 @@ ARRAYS = ("vertices", "triangles", "transform", "colors", "views", "normals")
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn: arrays, and what is asked for.
+    """A scene: arrays, and the outputs to make.
 
     With many views `views` (N, 4, 4) are the eye from object of each, and `transform` is the clip from eye of all.
     """
@@ -71,7 +71,7 @@ class Scene:
 
     @classmethod
     def load(cls, folder: Path) -> Scene:
-        """Read what `save` wrote."""
+        """Read the files of `save`."""
         facts = json.loads((folder / "scene.json").read_text())
         arrays = {name: np.load(folder / f"{name}.npy") for name in ARRAYS if (folder / f"{name}.npy").exists()}
         return cls(task=facts["task"], size=tuple(facts["size"]), cull=facts["cull"], **arrays)

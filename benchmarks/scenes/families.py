@@ -15,7 +15,7 @@ BITS = (0, 4, 8, 12, 16)
 NO_SNAP = "exact"
 FRAME_PX = 2048
 CELL_MARGIN_PX = 6
-"""Between triangles in cells: what any method draws beyond an edge stays clear of the neighbours."""
+"""Between triangles in cells: pixels that any method draws beyond an edge stay clear of the neighbours."""
 
 
 @dataclass(frozen=True)

@@ -169,13 +169,13 @@ def run_pytorch3d(folder: Path, options: argparse.Namespace) -> list[Record]:
 
 
 def run_custom_rasterizer(folder: Path, options: argparse.Namespace) -> list[Record]:
-    """Faces and weights by the kernel of Hunyuan3D for the CPU, whose compiled module lies in the folder."""
+    """Faces and weights by the kernel of Hunyuan3D for the CPU; its compiled module lies in the folder."""
     sys.path.insert(0, str(folder))
     import torch
 
     from topleft.compat import custom_rasterizer
 
-    kernel = import_module("custom_rasterizer_kernel")  # after PyTorch, whose libraries it needs
+    kernel = import_module("custom_rasterizer_kernel")  # after PyTorch: it needs its libraries
     torch.set_num_threads(1)
     rows: list[Record] = []
     for n, size in zip(SIZES, (256, 512, 1024), strict=True):
@@ -217,7 +217,7 @@ def run_texture_baker(folder: Path, options: argparse.Namespace) -> list[Record]
 
 
 def compare_faces(theirs: Any, ours: Any) -> Record:
-    """Pixels whose face, counted from 1, differs, and by what the weights of 99 % of the others are off."""
+    """The number of pixels with another face, counted from 1, and the error of weights in 99 % of the others."""
     (ids, weights), (own_ids, own_weights) = ([np.asarray(part) for part in parts] for parts in (theirs, ours))
     same = (ids == own_ids) & (ids > 0)
     row: Record = {"pixels": int((ids > 0).sum()), "differ": int((ids != own_ids).sum())}

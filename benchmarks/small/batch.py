@@ -39,7 +39,7 @@ TASKS = ("views", "views-png")
 
 @dataclass(frozen=True)
 class Options:
-    """What to run and how."""
+    """The options of a run."""
 
     peers: Sequence[str] = PEERS
     threads: Sequence[int] = (1, 2)
@@ -180,6 +180,6 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
 
 
 PARTS: dict[str, Callable[[Record], str | None]] = {"batch-facts": facts_text, "batch": views_text}
-"""What the markers `<!-- table: NAME -->` of the page stand for."""
+"""The parts of the page by their markers `<!-- table: NAME -->`."""
 
 STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", add_arguments, run, lines, PARTS)

@@ -144,7 +144,7 @@ def compare_model(mujoco: Any, model: Any, options: argparse.Namespace) -> Recor
 
 
 def draw(mujoco: Any, renderer: Any, data: Any, mode: str, shadows: bool) -> np.ndarray:
-    """What a renderer draws of a mode, after an update of its scene."""
+    """The picture of a renderer in a mode, after an update of its scene."""
     renderer.disable_depth_rendering()
     renderer.disable_segmentation_rendering()
     if mode != "color":

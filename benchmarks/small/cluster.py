@@ -1,4 +1,4 @@
-"""What a Dask cluster costs, and the unit costs of plans: a job, a merged pixel, a triangle by itself.
+"""The costs of a Dask cluster, and the unit costs of plans: a job, a merged pixel, a triangle by itself.
 
 `python -m benchmarks cluster` starts a scheduler and a worker of one thread, each a process, hands them so many tiny
 jobs from a generator, and notes the client's resident memory on the way: it must not grow with their number. Then one
@@ -61,7 +61,7 @@ def client_of_processes() -> Iterator[Any]:
 
 
 def resident_bytes() -> int:
-    """What of this process is in memory now."""
+    """The resident memory of this process."""
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
@@ -161,4 +161,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--chunk", type=int, metavar="N", help="jobs of a task (as the plan says)")
 
 
-STUDY = Study("cluster", "what a Dask cluster costs: time of a job, memory of the client", add_arguments, run, lines)
+STUDY = Study("cluster", "costs of a Dask cluster: time of a job, memory of the client", add_arguments, run, lines)

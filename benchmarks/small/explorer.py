@@ -1,4 +1,4 @@
-"""The explorer in a headless browser: the first picture, frames a second, and what is lost between engine and screen.
+"""The explorer in a headless browser: the first picture, frames a second, and the loss between engine and screen.
 
 `topleft explore FILE.ply` is started as a reader would; Chromium, already open, loads its page. The mesh turns by
 itself in a frame of 1280x720, a question for each frame, the next one asked when the last one is here. Figures of time

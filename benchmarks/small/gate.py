@@ -2,7 +2,7 @@
 
 Both are built in folders of their own.  Instructions are those of one call of each scene, after one that warms up, on
 AVX2 (callgrind knows no AVX-512), and do not vary from run to run by more than a few thousand.  Time is that of the
-thread on the widest instruction set, call by call in turns: median of the ratios.  What takes 3 % more is named.
+thread on the widest instruction set, call by call in turns: median of the ratios.  Calls that take 3 % more are named.
 
 As a program by itself (`python -m benchmarks.small.gate`) this file draws: a scene for each name on standard input.
 """
@@ -86,7 +86,7 @@ def scenes() -> dict[str, Callable[[], object]]:
 def serve() -> None:
     """Draw the scene of each name that is read, twice for a name after "count", and tell the milliseconds.
 
-    The two calls of "count" stand between calls of `getpriority`, at which callgrind writes what it has counted.
+    The two calls of "count" stand between calls of `getpriority`, at which callgrind writes its counts.
     """
     calls = scenes()
     for draw in calls.values():
@@ -124,7 +124,7 @@ class Drawer:
         self.answer()
 
     def answer(self, question: str = "") -> str:
-        """Return what the process says, after a question."""
+        """Return the answer of the process to a question."""
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         if question:
@@ -176,7 +176,7 @@ def count_instructions(folder: Path, names: list[str]) -> dict[str, int]:
         found = {}
         for i, name in enumerate(names):
             drawer.answer(f"count {name}")
-            # Dump 2i + 2 holds what came between the two calls of getpriority.
+            # Dump 2i + 2 holds the counts between the two calls of getpriority.
             text = Path(f"{out}.{2 * i + 2}").read_text(encoding="utf-8")
             found[name] = int(re.findall(r"^(?:totals|summary): (\d+)", text, re.MULTILINE)[-1])
         drawer.process.kill()
@@ -228,7 +228,7 @@ def ratios(row: dict[str, list]) -> tuple[float | None, float]:
 
 
 def lines(record: Record) -> Iterator[str]:
-    """The table, and what got slower."""
+    """The table, and the calls that got slower."""
     rows, slower = [], []
     for row in record["rows"]:
         more, longer = ratios(row)

@@ -1,4 +1,4 @@
-"""What memory a process keeps after thousands of calls, and of calls that fail. `python -m benchmarks growth`."""
+"""Memory that a process keeps after thousands of calls, and of calls that fail. `python -m benchmarks growth`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
 
 N_FIRST = 500
-"""Calls before the first look: what is imported or kept once is no growth."""
+"""Calls before the first look: imports, and memory that is kept once, are no growth."""
 
 SIZE = (96, 64)
 LARGE = (4000, 3000)
@@ -78,7 +78,7 @@ def calls() -> dict[str, tuple[Callable[[], Any], Callable[[], Any]]]:
 
 
 def resident_bytes() -> int:
-    """Memory of the process that is there, once what is no longer used is collected."""
+    """Resident memory of the process, after garbage is collected."""
     gc.collect()
     tl.release_memory()
     return int(Path("/proc/self/statm").read_text().split()[1]) * getpagesize()
@@ -105,7 +105,7 @@ def growth(call: Callable[[], Any], n: int, *, fails: bool) -> tuple[int, int]:
 
 
 def rasterizer_bytes() -> tuple[int, int]:
-    """Return by how much a Rasterizer of a large picture grows the process, and what of that stays when it goes."""
+    """Return the growth of the process by a Rasterizer of a large picture, and the part that stays without it."""
     triangles = np.tile(np.array([[0, 1, 2]], np.int32), (20_000, 1))
     scene = np.array([[0.0, 0, 0], [4000, 0, 0], [0, 3000, 0]]), triangles
     before = resident_bytes()

@@ -2,7 +2,7 @@
 
 Instances of a blob stand in rows, one behind the other; the first picture sorts the mesh and is not counted. Those of a
 smaller blob are strewn far away, where most are smaller than a pixel. The mapped mesh is of blobs in a grid, written to
-a temporary folder; its memory is that of the process without what is mapped.
+a temporary folder; its memory is that of the process without mapped files.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ PARTS: dict[str, Callable[[Record], str | None]] = {
     "instances-facts": facts_text,
     "instances": lambda record: "\n".join(lines(record)),
 }
-"""What the markers `<!-- table: NAME -->` of the page stand for."""
+"""The parts of the page by their markers `<!-- table: NAME -->`."""
 
 STUDY = Study(
     "instances", "time thousands of instances, and a mesh from a memory map", add_arguments, run, lines, PARTS

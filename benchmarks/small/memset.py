@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
 
 
 def lines(record: Record) -> list[str]:
-    """What the pattern of a yardstick reads."""
+    """The line for the pattern of a yardstick."""
     return [f"{case}: {ms:.4f} ms" for case, ms in record["ms"].items()]
 
 

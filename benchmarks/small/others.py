@@ -273,7 +273,7 @@ def open3d_rays(vertices: NDArray[Any], triangles: NDArray[Any], cameras: Sequen
 
 
 def latitudes(n: int) -> tuple[tuple[NDArray[Any], NDArray[Any]], NDArray[Any]]:
-    """A ball of 2 n^2 triangles whose chart is a rectangle."""
+    """A ball of 2 n^2 triangles with a rectangle as its chart."""
     polar, azimuth = np.meshgrid(np.linspace(0, np.pi, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij")
     points = [np.sin(polar) * np.cos(azimuth), np.cos(polar), np.sin(polar) * np.sin(azimuth)]
     corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1, 1)

@@ -1,6 +1,6 @@
 """Times calls that do the same work in several ways, in turns: one table of studies, one record, one way to print it.
 
-A study yields scenes; each has a name and its calls, the first of which the others are held against. Times are CPU
+A study yields scenes; each has a name and its calls; the first one is compared with the others. Times are CPU
 times of the process, one thread unless a call says otherwise.
 """
 
@@ -69,11 +69,11 @@ SAMPLES: dict[str, tuple[str, str | None]] = {
     "msaa4, ids of samples": ("msaa4", "samples_triangle"),
     "msaa4, and depths": ("msaa4", "samples_depth"),
 }
-"""The sampling, and what is read of the result, by name."""
+"""The sampling, and the part of the result that is read, by name."""
 
 
 def samples_beside_one() -> Scenes:
-    """Ids and depth of several samples a pixel beside one: meshes whose back faces are culled, and soup."""
+    """Ids and depth of several samples a pixel beside one: meshes with back faces culled, and soup."""
     import topleft as tl
 
     def read(draw: Callable[[], object], name: str | None) -> object:
@@ -119,7 +119,7 @@ def fresh_beside_kept() -> Scenes:
 
 
 def layers_beside_picture() -> Scenes:
-    """Each layer of a view beside its picture: a mesh of 70,000 triangles at 512x512; each call draws what it needs."""
+    """Each layer of a view beside its picture: a mesh of 70,000 triangles at 512x512; calls share nothing."""
     import topleft as tl
     from topleft._meshes.picture.layers import LAYERS
 
@@ -232,7 +232,7 @@ def unsnapped_beside_snapped() -> Scenes:
 
 @dataclass(frozen=True)
 class Pairs:
-    """A row of the table: what is timed, how often, and how long a turn is, seconds; 0: one call."""
+    """A row of the table: the call, the number of turns, and the length of a turn, seconds; 0: one call."""
 
     scenes: Callable[[], Scenes]
     help: str
@@ -259,7 +259,7 @@ def add_arguments(pairs: Pairs, parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of a study."""
     parser.add_argument("--rounds", type=positive, default=pairs.rounds, metavar="N", help="(%(default)s)")
     parser.add_argument(
-        "--scene", nargs="+", default=[""], metavar="WORD", help="only scenes whose name has one of these"
+        "--scene", nargs="+", default=[""], metavar="WORD", help="only scenes with one of these in the name"
     )
     add_out(parser)
 

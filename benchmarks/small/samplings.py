@@ -64,7 +64,7 @@ def draw_panel(axis: Axes, sampling: str) -> None:
 
 
 def number(value: float, sampling: str) -> str:
-    """What is written into a pixel: 1, the covered samples of all, or the area, cut off after three digits."""
+    """The text of a pixel: 1, the covered samples of all, or the area, cut off after three digits."""
     n = Sampling(sampling).n_samples
     if value == 1:
         return "1"

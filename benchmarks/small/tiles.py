@@ -34,7 +34,7 @@ PEERS = ("topleft", "topleft, exact", "rasterio", "gdal_rasterize", "datashader"
 
 
 def write_mesh(folder: Path, n_triangles: int, side: int) -> None:
-    """Write a planar mesh, a grid whose points are moved by up to 0.3 of its step, as two .npy files, in blocks."""
+    """Write a planar mesh, a grid with points moved by up to 0.3 of its step, as two .npy files, in blocks."""
     n = max(1, round((n_triangles / 2) ** 0.5))
     step = side / n
     vertices = np.lib.format.open_memmap(folder / "v.npy", "w+", np.float64, ((n + 1) ** 2, 2))
@@ -84,7 +84,7 @@ def write_zarr(folder: Path, side: int) -> dict[str, float]:
 
 
 def one_window(folder: Path, side: int) -> Callable[[], None]:
-    """What draws a window of 4096 x 4096 in memory by `rasterize`: of the triangles in it alone, into one array."""
+    """Return a draw of a window of 4096 x 4096 in memory by `rasterize`: of its triangles alone, into one array."""
     import topleft as tl
 
     vertices, triangles = mesh_of(folder)
@@ -189,14 +189,14 @@ DRAWN: dict[str, Callable[[np.ndarray, np.ndarray, int], np.ndarray]] = {
     "datashader, Dask": partial(datashader_labels, n_parts=4),
 }  # fmt: skip
 
-#: What a program took by itself, where making its input is no part of its time.
+#: The time of a program by itself, where making its input is no part of its time.
 OWN_TIME: dict[str, float] = {}
 
 
 def draw_peer(name: str, folder: Path, side: int) -> dict[str, float]:
     """Draw with one program, and count the pixels that differ from the exact rule."""
     vertices, triangles = map(np.array, mesh_of(folder))
-    DRAWN[name](vertices, triangles[:4], 64)  # imports, and what compiles at its first call
+    DRAWN[name](vertices, triangles[:4], 64)  # imports, and compilation at the first call
     begin = time.perf_counter()
     labels = DRAWN[name](vertices, triangles, side)
     seconds = OWN_TIME.get(name, time.perf_counter() - begin)
@@ -231,7 +231,7 @@ def in_process(way: str, folder: Path, side: int) -> dict[str, float]:
 
 
 def predict(folder: Path, side: int, n_triangles: int) -> dict[str, dict[str, float]]:
-    """Unit costs of an eighth of the work, what they say of the whole, and what that takes; the fastest of three."""
+    """Unit costs of an eighth of the work, their estimate for the whole, and its time; the fastest of three."""
     small, large = folder / "small", folder / "large"
     eighth = round(side / 8**0.5)
     for place, n, length in ((small, n_triangles // 8, eighth), (large, n_triangles, side)):
@@ -299,7 +299,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--triangles", type=int, default=20_000_000, metavar="N", help="about so many (%(default)s)")
     parser.add_argument("--side", type=int, default=40_000, metavar="N", help="of the raster, pixels (%(default)s)")
     parser.add_argument("--peers", action="store_true", help="beside other programs, the raster as a whole in memory")
-    parser.add_argument("--predict", action="store_true", help="measure an eighth of the work, and check what it says")
+    parser.add_argument(
+        "--predict", action="store_true", help="measure an eighth of the work, and check the estimate of the whole"
+    )
     parser.add_argument("--folder", metavar="DIR", help="where mesh and store go for the time (the system's)")
 
 

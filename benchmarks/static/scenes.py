@@ -32,7 +32,7 @@ LOOKED_THROUGH = 100_000
 
 @dataclass(frozen=True)
 class StaticScene:
-    """A mesh or instances of one, how it is looked at, and what is asked for."""
+    """A mesh or instances of one, its view, and its call."""
 
     model: str
     kind: str
@@ -48,7 +48,7 @@ class StaticScene:
 
     @property
     def label(self) -> str:
-        """What is drawn, and how."""
+        """The scene and its call in words."""
         asked = [self.verb, *([self.sampling] if self.sampling != "center" else [])]
         width, height = self.size
         return f"{self.model}, {self.view}, cull {self.cull}, {' '.join(asked)}, {width}x{height}"
@@ -60,7 +60,7 @@ class StaticScene:
 
     @cached_property
     def camera(self) -> tl.Camera:
-        """What looks at it."""
+        """The camera."""
         return self.look(self.arrays, self.size)
 
     def fresh(self) -> tl.Mesh | tl.Scene:
@@ -71,7 +71,7 @@ class StaticScene:
 
 @lru_cache(maxsize=1)
 def made(make: Callable[[], Arrays]) -> Arrays:
-    """Return what a maker makes; that of the last one is kept."""
+    """Return the result of a maker; that of the last one is kept."""
     return make()
 
 
@@ -83,7 +83,7 @@ def shifted(place: Sequence[float]) -> NDArray[np.float64]:
 
 
 def share_in_view(points: NDArray[np.float64], triangles: NDArray[Any], clip: NDArray[np.float64]) -> float:
-    """Return the share of triangles whose corners are not all beyond one plane of the frustum; some of many."""
+    """Return the share of triangles that no plane of the frustum excludes; some of many."""
     some = triangles[:: max(1, len(triangles) // LOOKED_THROUGH)]
     corners = points[some].astype(np.float64) @ clip[:, :3].T + clip[:, 3]
     x, y, z, w = np.moveaxis(corners, -1, 0)
@@ -92,7 +92,7 @@ def share_in_view(points: NDArray[np.float64], triangles: NDArray[Any], clip: ND
 
 
 def looking(eye: Sequence[float], target: Sequence[float] = (0, 0, 0), fov_y_deg: float = 45.0) -> Look:
-    """Return what gives a camera that depends on nothing."""
+    """Return the maker of a fixed camera."""
     camera = tl.Camera.look_at(eye, target, fov_y_deg=fov_y_deg, **DEPTHS)
     return lambda *_: camera
 

@@ -1,4 +1,4 @@
-"""Static scenes, drawn in clusters beside whole: time of both in turns, with the same bits, and what the clusters cost.
+"""Static scenes, drawn in clusters beside whole: time of both in turns, with the same bits, and costs of clusters.
 
 In: scenes of `scenes.py`. Out: a record with a row for each scene and one for each mesh.
 
@@ -67,7 +67,7 @@ class Options:
 
 @dataclass
 class ClusterCounts:
-    """What became of clusters, added up over instances and samples."""
+    """The fates of clusters, added up over instances and samples."""
 
     n: int = 0
     n_in_view: int = 0
@@ -85,7 +85,7 @@ class ClusterCounts:
 
 @dataclass
 class CountedEngine:
-    """The engine of a mesh in clusters, which adds up what it draws."""
+    """The engine of a mesh in clusters, which counts the clusters that it draws."""
 
     engine: Any
     counts: ClusterCounts
@@ -105,7 +105,7 @@ class CountedEngine:
 
 @contextmanager
 def counting(counts: ClusterCounts) -> Iterator[None]:
-    """Count the clusters of what is drawn, while the context lasts."""
+    """Count the clusters of draws, while the context lasts."""
 
     class CountedScene(ClusteredMesh):
         def __init__(self, clusters: Clusters, view: Any, first_id: int = 0) -> None:
@@ -225,7 +225,7 @@ def grow(planned: Way) -> bool:
 
 
 def measure_model(scene: StaticScene) -> Row:
-    """Return what the clusters of a mesh take."""
+    """Return the time and memory of a mesh's clusters."""
     points, triangles = scene.arrays
     took = [cpu_ms(lambda: Clusters(points, triangles, 1)) for _ in range(3)]
     tracemalloc.start()
@@ -244,7 +244,7 @@ def measure_model(scene: StaticScene) -> Row:
 
 
 def run_static(options: Options, record: Record | None = None, save: Save = forget) -> Record:
-    """Return a record, or what was measured anew in it; `save` gets it after each scene."""
+    """Return a record, or the rows that were measured anew; `save` gets it after each scene."""
     rows: list[Row] = []
     models: list[Row] = []
     for scene in chosen_scenes(options):
@@ -257,7 +257,7 @@ def run_static(options: Options, record: Record | None = None, save: Save = forg
 
 
 def chosen_scenes(options: Options) -> Iterator[StaticScene]:
-    """Give the scenes whose labels begin as asked."""
+    """Give the scenes with labels that begin so."""
     wanted = tuple(options.scenes)
     return (scene for scene in scenes(options.scale, options.files) if not wanted or scene.label.startswith(wanted))
 
@@ -272,7 +272,7 @@ def with_rows(record: Record | None, rows: list[Row], models: list[Row]) -> Reco
 
 
 def key_of(row: Row) -> tuple[Any, ...]:
-    """Return what tells rows apart."""
+    """Return the key of a row."""
     return *(row[name] for name in ("model", "view", "cull", "sampling", "verb")), *row["size"]
 
 
@@ -291,7 +291,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mesh", dest="files", nargs="+", type=Path, metavar="FILE", help="closed meshes to draw, too")
     add_number(parser, "--repeats", "rounds", "rounds")
     add_scale(parser)
-    add_out(parser, "what it holds and is not measured stays")
+    add_out(parser, "rows in it that are not measured stay")
 
 
 def run(arguments: argparse.Namespace, save: Save) -> Record:

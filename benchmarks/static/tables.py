@@ -63,7 +63,7 @@ def faster(row: Row) -> float:
 
 
 def label_of(row: Row) -> str:
-    """Name a scene and what is asked of it."""
+    """Name a scene and its call."""
     parts = [row["model"], row["view"]]
     parts += [f"cull {row['cull']}"] if row["cull"] != "none" else []
     parts += [row["sampling"]] if row["sampling"] != "center" else []
@@ -101,7 +101,7 @@ def cell_of(row: Row | None) -> str:
 
 
 def details_text(record: Record, wanted: Callable[[Row], bool]) -> str:
-    """Times of both ways, and what became of the clusters."""
+    """Times of both ways, and the fates of the clusters."""
     rows = [
         [label_of(row), f"{row['n_triangles']:,}", f"{row['whole_ms'][1]:.3g}", f"{row['ms'][1]:.3g}",
          f"{faster(row):.2f}", "{:.2f} to {:.2f}".format(*row["faster"][::2]), *shares_of(row), paid_after(record, row)]
@@ -114,7 +114,7 @@ def details_text(record: Record, wanted: Callable[[Row], bool]) -> str:
 
 
 def shares_of(row: Row) -> list[str]:
-    """Return percent of the clusters by what became of them; of a mesh that was drawn whole, nothing."""
+    """Return percent of the clusters by their fates; of a mesh that was drawn whole, nothing."""
     if not row["is_clustered"]:
         return ["-"] * 4
     return [f"{100 * row['shares'][name]:.0f} %" for name in ("outside", "turned", "hidden", "drawn")]
@@ -132,7 +132,7 @@ def paid_after(record: Record, row: Row) -> str:
 
 
 def models_text(record: Record) -> str:
-    """What clusters take: time, memory, and pictures of the whole mesh in the same time."""
+    """The costs of clusters: time, memory, and pictures of the whole mesh in the same time."""
     rows = []
     for model in record["models"]:
         own = [row for row in record["rows"] if row["model"] == model["model"] and row["kind"] != "instances"]
@@ -164,7 +164,7 @@ def firsts_of(row: Row) -> list[float]:
 
 
 def kept_whole_text(record: Record) -> str:
-    """Scenes that are drawn whole though clusters are there or could be, and what clusters would do."""
+    """Scenes that are drawn whole though clusters are there or could be, and the times with clusters."""
     rows = [
         [label_of(row), f"{row['whole_ms'][1]:.3g}", f"{faster(row):.2f}", f"{row['clusters_faster'][1]:.2f}"]
         for row in record["rows"]
@@ -208,4 +208,4 @@ PARTS: Mapping[str, Callable[[Record], str]] = {
     "static-models": models_text,
     "static-first": first_text,
 }
-"""What the markers of the page stand for."""
+"""The parts of the page by their markers."""

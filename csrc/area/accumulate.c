@@ -24,7 +24,7 @@
 #define TL_RUN_LANES (4 * TL_LANES)
 #define TL_SUM_UNIT (1.0f / (1 << TL_AREA_BITS))
 
-/* Sums are unsigned, but for those just below 0. */
+/* Sums are unsigned, except those just below 0. */
 TL_INLINE vf area_of_sums(vi sums, int is_clamped)
 {
     const vi one = vi_set1(1 << TL_AREA_BITS);
@@ -54,7 +54,7 @@ TL_INLINE vi left_sum(int32_t *row, vi *seen)
     return vi_set1((int32_t)(uint32_t)sum);
 }
 
-/* The sums of the next TL_LANES cells, the first n are pixels.  Cells right of the window may hold anything,
+/* The sums of the next TL_LANES cells; the first n are pixels.  Cells right of the window may hold anything,
  * as the same edges are moved there by different widths. */
 TL_INLINE vi accumulate_lanes(int32_t *cells, int64_t n, vi *carry, vi *seen)
 {

@@ -39,7 +39,7 @@ TL_INLINE void put_band(blend_state *b, int64_t n_rows, int64_t at, open_run *ru
     }
 }
 
-/* `b` is ready for the window, but for where it draws. */
+/* `b` is ready for the window, except for where it draws. */
 static int64_t blend_large_shapes(blend_state *b)
 {
     const tl_canvas *canvas = b->canvas;

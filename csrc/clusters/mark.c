@@ -9,7 +9,7 @@
 #include "lanes/lanes.h"
 
 #define TL_MARKED 512    /* ids that are looked at together */
-#define TL_MARK_AHEAD 16 /* triangles that are asked for before their turn: 1.5 times as fast beyond the caches */
+#define TL_MARK_AHEAD 16 /* triangles that are prefetched before their turn: 1.5 times as fast beyond the caches */
 
 /* Lists the ids of triangles among n that differ from the one before them; returns how many. */
 static int list_new_ids(const int32_t *ids, int n, int64_t n_triangles, vi *before, int32_t *listed)

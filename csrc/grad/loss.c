@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/colors.c"
 #include "grad/edges.c"
 #include "grad/pixels.h"
 #include "grad/points.c"
@@ -111,22 +112,35 @@ static double compare_rows(const tl_grad_view *view, const tl_grad_loss *l, cons
     return sum;
 }
 
+/* The gradient of a picture of attributes; of float32 at once to the vertices. */
+static tl_grad_colors colors_of(const tl_grad_view *view, const tl_grad_loss *l, const loss_windows *w)
+{
+    return (tl_grad_colors){.values = {.attr = l->attr,
+                                       .n_attr = l->n_attr,
+                                       .n_columns = l->n_columns,
+                                       .rast = window_of(w, WINDOW_RAST),
+                                       .out = window_of(w, WINDOW_G_COLOR),
+                                       .g_rast = window_of(w, WINDOW_G_RAST)},
+                            .corners = view->tri,
+                            .faces = l->faces,
+                            .vertices = l->of_points,
+                            .attr = l->of_attr};
+}
+
 static void pull_rows(const tl_grad_view *view, const tl_grad_loss *l, const loss_windows *w)
 {
     tl_grad_edges e = l->edges;
-    const tl_grad_values values = {.attr = l->attr,
-                                   .n_attr = l->n_attr,
-                                   .n_columns = l->n_columns,
-                                   .rast = window_of(w, WINDOW_RAST),
-                                   .out = window_of(w, WINDOW_G_COLOR),
-                                   .g_rast = window_of(w, WINDOW_G_RAST),
-                                   .faces = l->faces};
-    const tl_grad_points points = {.rast = values.rast, .g_rast = values.g_rast, .faces = l->faces};
-    e.rast = values.rast, e.color = window_of(w, WINDOW_COLOR);
-    e.g_out = window_of(w, WINDOW_G_OUT), e.g_color = values.out;
+    const tl_grad_colors colors = colors_of(view, l, w);
+    const tl_grad_values *values = &colors.values;
+    e.rast = values->rast, e.color = window_of(w, WINDOW_COLOR);
+    e.g_out = window_of(w, WINDOW_G_OUT), e.g_color = values->out;
     smooth_rows(view, &e, l->of_edges);
-    pull_value_rows(view, &values, l->of_attr);
-    pull_point_rows(view, &points);
+    if (!view->is_f64) {
+        pull_colors(view, &colors);
+        return;
+    }
+    pull_value_rows(view, values, l->of_attr);
+    pull_point_rows(view, &(tl_grad_points){.rast = values->rast, .g_rast = values->g_rast, .faces = l->faces});
 }
 
 /* See kernels.h. */
@@ -149,11 +163,14 @@ static double grad_loss(const tl_grad_view *view, const tl_grad_loss *l)
         n_drawn = to_draw, n_compared = to_compare;
         slide_windows(&w, end - 1, n_drawn);
     }
-    const tl_grad_points points = {.faces = l->faces, .vertices = l->of_points};
-    close_points(view, &points);
-    close_values(view, &(tl_grad_values){.n_attr = l->n_attr, .n_columns = l->n_columns, .faces = l->faces},
-                 l->of_attr);
-    leave_band(l->faces);
+    if (view->is_f64) {
+        close_points(view, &(tl_grad_points){.faces = l->faces, .vertices = l->of_points});
+        leave_band(l->faces);
+        leave_band(l->of_attr);
+    } else {
+        const tl_grad_colors colors = colors_of(view, l, &w);
+        close_colors(view, &colors);
+    }
     leave_band(l->of_edges);
     return sum;
 }

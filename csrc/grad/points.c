@@ -20,6 +20,7 @@
 #include "grad/pixels.h"
 #include "grad/spans.h"
 #include "lanes/lanes.h"
+#include "lanes/quads.h"
 
 /* A triangle about a pixel. */
 typedef struct {
@@ -276,6 +277,8 @@ typedef struct {
     double u, v, zw, db[4];
 } point_gradients;
 
+#define TL_ALMOST_ONE (1.0f - 0x1p-20f) /* weights of float32 whose sum is below it are not clamped */
+
 /* What a row of pixels sums up. */
 typedef struct {
     double a[4], a_x[4]; /* gradients of a_k and of z/w, and times X */
@@ -357,120 +360,155 @@ TL_INLINE void pull_depth(const grad_triangle *t, const double *sums, double by_
     }
 }
 
-/* Gradients of the corners of a triangle from its sums: q_k = v_i x v_j. */
-static void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices, int is_f64)
+/* Adds gradients of the corners of a triangle, from those of q_k = v_i x v_j about x, y, of z_k and of w_k. */
+TL_INLINE void pull_corners(const grad_triangle *t, double by_q[3][3], double x, double y, const double *g_z,
+                            const double *g_w, double **to)
 {
-    grad_triangle t;
-    double *to[3], g[3][3] = {{0}}, by_q[3][3], g_z[3], g_w[3];
-    load_seen_triangle(view, id, sums[0], sums[1], &t, is_f64);
-    corner_sums(view, vertices, id, to);
-    pull_depth(&t, sums, by_q, g_z, g_w);
+    double g[3][3] = {{0}};
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         const double *d = by_q[k];
-        g[i][0] += t.y[j] * d[2] - t.w[j] * d[1], g[i][1] += t.w[j] * d[0] - t.x[j] * d[2];
-        g[i][2] += t.x[j] * d[1] - t.y[j] * d[0];
-        g[j][0] += d[1] * t.w[i] - d[2] * t.y[i], g[j][1] += d[2] * t.x[i] - d[0] * t.w[i];
-        g[j][2] += d[0] * t.y[i] - d[1] * t.x[i];
+        g[i][0] += t->y[j] * d[2] - t->w[j] * d[1], g[i][1] += t->w[j] * d[0] - t->x[j] * d[2];
+        g[i][2] += t->x[j] * d[1] - t->y[j] * d[0];
+        g[j][0] += d[1] * t->w[i] - d[2] * t->y[i], g[j][1] += d[2] * t->x[i] - d[0] * t->w[i];
+        g[j][2] += d[0] * t->y[i] - d[1] * t->x[i];
     }
     for (int k = 0; k < 3; k++) {
         to[k][0] += g[k][0], to[k][1] += g[k][1], to[k][2] += g_z[k];
-        to[k][3] += g[k][2] + g_w[k] - (sums[0] * g[k][0] + sums[1] * g[k][1]);
+        to[k][3] += g[k][2] + g_w[k] - (x * g[k][0] + y * g[k][1]);
     }
 }
 
-/* Gradients of a_k, in units of the total, and of z/w, at the pixels of a span: a row of four each. */
-TL_INLINE void pull_span(const tl_grad_view *view, grad_span *s, const float *g_rast)
+/* Gradients of the corners of a triangle from its sums. */
+static void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices, int is_f64)
 {
-    const vi order = order_of_quads();
-    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), z_most = vf_set1((float)view->z_most);
-    for (int i = 0; i * TL_LANES < s->n; i++) {
-        const span_lanes p = lanes_of_span(s, i, order, 1);
-        const lane_points at = points_of_lanes(&p);
-        const vf u = within_one(at.u), v = within_one(at.v), sum = vf_add(u, v);
-        const vm is_kept[2] = {vf_eq(u, at.u), vf_eq(v, at.v)}, is_over = vf_lt(one, sum);
-        vf g[4], out[4];
-        load_some_quads(g_rast + 4 * p.x, p.n, g);
-        if (vm_any(vm_or(is_over, vm_and_not(vm_all(), vm_and(is_kept[0], is_kept[1]))))) {
-            const vf scale = vf_div(one, vf_max(sum, one)), both = vf_fma(g[0], u, vf_mul(g[1], v));
-            const vf g_sum = vf_select(is_over, vf_mul(vf_mul(both, scale), scale), zero);
-            for (int k = 0; k < 2; k++)
-                g[k] = vf_select(is_kept[k], vf_sub(vf_mul(g[k], scale), g_sum), zero);
-        }
-        const vf total = vf_fma(g[0], at.u, vf_mul(g[1], at.v));
-        out[0] = vf_mul(vf_sub(g[0], total), at.inverse), out[1] = vf_mul(vf_sub(g[1], total), at.inverse);
-        out[2] = vf_mul(vf_sub(zero, total), at.inverse);
-        out[3] = vf_select(vm_and(vf_ge(z_most, at.zw), vf_ge(at.zw, vf_sub(zero, z_most))), g[2], zero);
-        for (int k = 0; k < 4; k++)
-            out[k] = vf_select(p.is_shown, out[k], zero);
-        store_some_quads(s->rows + 4 * p.x, TL_LANES, out);
+    grad_triangle t;
+    double *to[3], by_q[3][3], g_z[3], g_w[3];
+    load_seen_triangle(view, id, sums[0], sums[1], &t, is_f64);
+    corner_sums(view, vertices, id, to);
+    pull_depth(&t, sums, by_q, g_z, g_w);
+    pull_corners(&t, by_q, sums[0], sums[1], g_z, g_w, to);
+}
+
+/* The sums of the triangle of a run, about its first pixel where they begin. */
+TL_INLINE double *begun_sums(const tl_grad_view *view, tl_grad_sums *faces, const grad_span *s, int r)
+{
+    double *sums = sums_of(faces, s->ids[r]);
+    if (sums[FACE_BEGUN] == 0.0) {
+        sums[0] = middle_at(view, 0, s->first + s->begins[r]), sums[1] = middle_at(view, 1, s->row);
+        sums[FACE_BEGUN] = 1.0;
+    }
+    return sums;
+}
+
+/* Adds what some pixels of a run have summed up, as it is and times their number, in units of what the total is at the
+ * run's first pixel; `last`: what the fourth number counts by. */
+TL_INLINE void add_moments(const tl_grad_view *view, const grad_span *s, int r, int first, double last,
+                           const double *begins, double *moments, vq4 sum, vq4 sum_x)
+{
+    const double inverse = s->inverses[r], step = 2.0 * view->scale[0];
+    const double x = middle_at(view, 0, s->first + s->begins[r] + first) - begins[0];
+    const double y = middle_at(view, 1, s->row) - begins[1];
+    const four unit = {inverse, inverse, inverse, last};
+    const four whole = __builtin_convertvector(vq4_fold(sum), four) * unit;
+    const four by_x = __builtin_convertvector(vq4_fold(sum_x), four) * unit;
+    TL_FOUR(moments) += by_x * step + whole * x;
+    TL_FOUR(moments + 4) += whole * y;
+    TL_FOUR(moments + 8) += whole;
+}
+
+/* Sets the quads of runs: u, v, z/w and the total. */
+TL_INLINE void set_point_quads(grad_span *s)
+{
+    for (int r = 0; r < s->n_runs; r += TL_LANES) {
+        const vf begin[4] = {vf_load(s->numbers[POINT_U] + r), vf_load(s->numbers[POINT_V] + r),
+                             vf_load(s->numbers[POINT_ZW] + r), vf_set1(1.0f)};
+        const vf step[4] = {vf_load(s->numbers[POINT_U_X] + r), vf_load(s->numbers[POINT_V_X] + r),
+                            vf_load(s->numbers[POINT_ZW_X] + r), vf_load(s->numbers[POINT_TOTAL_X] + r)};
+        set_quads(s, 0, r, begin), set_quads(s, 1, r, step);
     }
 }
 
-/* Adds the rows of the runs of a span to the sums of their triangles. */
-TL_INLINE void close_span(const tl_grad_view *view, const grad_span *s, const double *inverses, tl_grad_sums *faces)
+/* Whether weights and z/w of a pixel lie well within what they are clamped to. */
+TL_INLINE int is_unclamped(const float *rast, float z_most)
 {
-    static const float columns[TL_SUMMED] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const double y = middle_at(view, 1, s->row);
-    for (int r = 0; r < s->n_runs; r++) {
-        const double step = 2.0 * view->scale[0], scale[4] = {inverses[r], inverses[r], inverses[r], 1.0};
-        double a[4] = {0}, a_x[4] = {0};
-        if (s->ids[r] < 0)
-            continue;
-        for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) { /* some at a time, in float32 */
-            const int n = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
-            float sum[4], sum_x[4];
-            sum_fours(s->rows + 4 * i, n, sum);
-            sum_weighed_fours(s->rows + 4 * i, columns, 1, n, sum_x);
-            for (int k = 0; k < 4; k++)
-                a[k] += (double)sum[k];
-            for (int k = 0; k < 4; k++)
-                a_x[k] += (double)sum_x[k] + (double)(i - s->begins[r]) * (double)sum[k];
+    return rast[0] > 0.0f && rast[1] > 0.0f && rast[0] + rast[1] < TL_ALMOST_ONE && rast[2] < z_most &&
+           rast[2] > -z_most;
+}
+
+/* Adds the gradients at the pixels of a run, none of which is clamped. */
+TL_INLINE void pull_run_of_points(const tl_grad_view *view, const grad_span *s, int r, const float *g_rast,
+                                  double *sums)
+{
+    const run_plane plane = plane_of_run(s, r);
+    const vq4 zero = vq4_all(vq_set1(0.0f));
+    const int n = s->begins[r + 1] - s->begins[r];
+    for (int first = 0; first < n; first += TL_SUMMED) {
+        vq4 sum = zero, sum_x = zero;
+        for (int i = 0; i < TL_SUMMED && first + i < n; i += 4) {
+            const vq4 at = plane_at_pixels(&plane, first + i), inverse = vq4_inverse_of_last(at);
+            const vq4 g = vq4_load(g_rast + 4 * (first + i), n - first - i, 4);
+            const vq4 product = vq4_mul(g, vq4_mul(at, inverse));
+            const vq4 total = vq4_add(TL_VQ4_PERMUTE(product, 0, 0, 0, 0), TL_VQ4_PERMUTE(product, 1, 1, 1, 1));
+            const vq4 of_a = vq4_mul(vq4_sub(TL_VQ4_BLEND(g, zero, 12), total), inverse);
+            const vq4 h = vq4_first(TL_VQ4_BLEND(of_a, TL_VQ4_PERMUTE(g, 2, 2, 2, 2), 8), n - first - i);
+            sum = vq4_add(sum, h), sum_x = vq4_add(sum_x, vq4_mul(h, columns_from(i)));
         }
-        for (int k = 0; k < 4; k++)
-            a[k] *= scale[k];
-        for (int k = 0; k < 4; k++)
-            a_x[k] *= scale[k] * step;
-        close_row(a, a_x, middle_at(view, 0, s->first + s->begins[r]), y, sums_of(faces, s->ids[r]));
+        add_moments(view, s, r, first, 1.0, sums, sums + FACE_X, sum, sum_x);
     }
+}
+
+/* The gradients at the pixels of a run in float64. */
+TL_INLINE void pull_points_of(const tl_grad_view *view, const tl_grad_points *p, const pixel_run *run, int has_db,
+                              int is_f64)
+{
+    grad_triangle t;
+    row_sums s;
+    const double x = middle_at(view, 0, run->column), y = middle_at(view, 1, run->row);
+    memset(&s, 0, sizeof s);
+    load_seen_triangle(view, run->id, x, y, &t, is_f64);
+    for (int64_t i = 0; i < run->n; i++) {
+        const int64_t at = 4 * (run->at + i);
+        point_gradients g = {get_real(p->g_rast, at, is_f64),
+                             get_real(p->g_rast, at + 1, is_f64),
+                             get_real(p->g_rast, at + 2, is_f64),
+                             {0}};
+        for (int c = 0; has_db && c < 4; c++)
+            g.db[c] = get_real(p->g_db, at + c, is_f64);
+        pull_point(view, &t, &g, 2.0 * view->scale[0] * (double)i, has_db, &s);
+    }
+    double *sums = sums_of(p->faces, run->id);
+    close_row(s.a, s.a_x, x, y, sums);
+    for (int k = 0; k < 3; k++)
+        sums[FACE_X + k] += s.q[0][k], sums[FACE_Y + k] += s.q[1][k];
 }
 
 static int64_t pull_points_in_lanes(const tl_grad_view *view, const tl_grad_points *p)
 {
     grad_span s = TL_BEFORE_SPANS(view);
-    double inverses[TL_GRAD_ROOM] = {0};
     while (next_grad_span(view, &(id_rows){.rast = p->rast}, view->n_vertices, &s)) {
-        set_point_numbers(view, &s, inverses);
-        pull_span(view, &s, (const float *)p->g_rast + 4 * (s.row * view->width + s.first));
-        close_span(view, &s, inverses, p->faces);
+        set_point_numbers(view, &s, s.inverses);
+        set_point_quads(&s);
+        for (int r = 0; r < s.n_runs; r++) {
+            const pixel_run run = run_of_span(view, &s, r);
+            const float *rast = (const float *)p->rast + 4 * run.at, z_most = (float)view->z_most;
+            if (run.id < 0)
+                continue;
+            if (is_unclamped(rast, z_most) && is_unclamped(rast + 4 * (run.n - 1), z_most))
+                pull_run_of_points(view, &s, r, (const float *)p->g_rast + 4 * run.at,
+                                   begun_sums(view, p->faces, &s, r));
+            else
+                pull_points_of(view, p, &run, 0, 0);
+        }
     }
     return s.bad_id;
 }
 
 TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p, int has_db, int is_f64)
 {
-    grad_triangle t;
     pixel_run run = before_shown(view);
-    while (next_shown(view, p->rast, view->n_vertices, &run, is_f64)) {
-        row_sums s;
-        const double x = middle_at(view, 0, run.column), y = middle_at(view, 1, run.row);
-        memset(&s, 0, sizeof s);
-        load_seen_triangle(view, run.id, x, y, &t, is_f64);
-        for (int64_t i = 0; i < run.n; i++) {
-            const int64_t at = 4 * (run.at + i);
-            point_gradients g = {get_real(p->g_rast, at, is_f64),
-                                 get_real(p->g_rast, at + 1, is_f64),
-                                 get_real(p->g_rast, at + 2, is_f64),
-                                 {0}};
-            for (int c = 0; has_db && c < 4; c++)
-                g.db[c] = get_real(p->g_db, at + c, is_f64);
-            pull_point(view, &t, &g, 2.0 * view->scale[0] * (double)i, has_db, &s);
-        }
-        double *sums = sums_of(p->faces, run.id);
-        close_row(s.a, s.a_x, x, y, sums);
-        for (int k = 0; k < 3; k++)
-            sums[FACE_X + k] += s.q[0][k], sums[FACE_Y + k] += s.q[1][k];
-    }
+    while (next_shown(view, p->rast, view->n_vertices, &run, is_f64))
+        pull_points_of(view, p, &run, has_db, is_f64);
     return run.bad_id;
 }
 

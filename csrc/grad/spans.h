@@ -16,6 +16,7 @@
 #include "topleft.h"
 #include "grad/pixels.h"
 #include "lanes/lanes.h"
+#include "lanes/quads.h"
 
 #define TL_GRAD_SPAN 256 /* pixels */
 #define TL_GRAD_ROOM (TL_GRAD_SPAN + 2 * TL_MAX_LANES)
@@ -33,7 +34,8 @@ typedef struct {
     _Alignas(64) int32_t begins[TL_GRAD_ROOM];
     _Alignas(64) int32_t corners[3][TL_GRAD_ROOM];
     _Alignas(64) float numbers[TL_RUN_NUMBERS][TL_GRAD_ROOM];
-    _Alignas(64) float rows[4 * TL_GRAD_ROOM]; /* four numbers a pixel, to be summed up */
+    _Alignas(64) float planes[2][4 * TL_GRAD_ROOM]; /* quads of runs, at quad_of_run: at the first pixel, and steps */
+    _Alignas(64) double inverses[TL_GRAD_ROOM];
 } grad_span;
 
 /* Where the ids of pixels stand: rows of them, to which first_id is added; or, unless it is NULL, `rast`. */
@@ -216,22 +218,48 @@ TL_INLINE vf from_begin(const span_lanes *p)
     return vf_from_vi(vi_sub(vi_add(p->pixel, vi_set1(p->x)), vi_pick(p->span->begins + p->first, p->run)));
 }
 
-/* Sums of rows of four numbers, TL_SUMMED at most; and of these times a weight each, one every `stride`. */
-TL_INLINE void sum_fours(const float *rows, int n, float *sum)
+/* A run of a span. */
+TL_INLINE pixel_run run_of_span(const tl_grad_view *view, const grad_span *s, int r)
 {
-    float a[4] = {0};
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < 4; k++)
-            a[k] += rows[4 * i + k];
-    memcpy(sum, a, sizeof a);
+    const int64_t column = s->first + s->begins[r];
+    return (pixel_run){.id = s->ids[r],
+                       .row = s->row,
+                       .column = column,
+                       .at = s->row * view->width + column,
+                       .n = s->begins[r + 1] - s->begins[r]};
 }
-TL_INLINE void sum_weighed_fours(const float *rows, const float *weights, int stride, int n, float *sum)
+
+/* Where the quads of a run stand. */
+TL_INLINE int quad_of_run(int r) { return 4 * (r / TL_LANES * TL_LANES + vi_quad_slot(r % TL_LANES)); }
+
+/* Sets the quads of runs from r on. */
+TL_INLINE void set_quads(grad_span *s, int plane, int r, const vf *columns)
 {
-    float a[4] = {0};
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < 4; k++)
-            a[k] += rows[4 * i + k] * weights[stride * i];
-    memcpy(sum, a, sizeof a);
+    vi bits[4];
+    for (int k = 0; k < 4; k++)
+        bits[k] = vi_bits_of_vf(columns[k]);
+    vi_store_quads((int32_t *)s->planes[plane] + 4 * r, bits);
 }
+
+/* Four pixels of a plane, x pixels after the first one of its run. */
+typedef struct {
+    vq4 begin, step;
+} run_plane;
+
+TL_INLINE run_plane plane_of_run(const grad_span *s, int r)
+{
+    const int at = quad_of_run(r);
+    return (run_plane){vq4_all(vq_load(s->planes[0] + at)), vq4_all(vq_load(s->planes[1] + at))};
+}
+TL_INLINE vq4 columns_from(int x) { return vq4_add(vq4_pixels(), vq4_all(vq_set1((float)x))); }
+TL_INLINE vq4 plane_at_pixels(const run_plane *p, int x)
+{
+    return vq4_add(p->begin, vq4_mul(p->step, columns_from(x)));
+}
+
+/* Four float64 that belong together: nothing takes or returns them, since not every instruction set has them. */
+typedef double four __attribute__((vector_size(32)));
+typedef double four_there __attribute__((vector_size(32), aligned(8), may_alias));
+#define TL_FOUR(p) (*(four_there *)(p))
 
 #endif

@@ -12,6 +12,7 @@
 #include "grad/pixels.h"
 #include "grad/spans.h"
 #include "lanes/lanes.h"
+#include "lanes/quads.h"
 
 /* First numbers of the attributes of the corners of a triangle. */
 TL_INLINE void attr_rows(const tl_grad_view *view, int32_t id, int64_t n_columns, int64_t *rows)
@@ -194,6 +195,12 @@ TL_INLINE void pull_slopes(const tl_grad_values *v, const pixel_run *run, const 
     }
 }
 
+/* Adds what a run has summed up of an attribute, times u, times v and as it is, to its corners. */
+TL_INLINE void add_to_corners(double **to, int64_t column, double by_u, double by_v, double whole)
+{
+    to[0][column] += by_u, to[1][column] += by_v, to[2][column] += whole - by_u - by_v;
+}
+
 /* The gradients that n attributes from `first` on give at the pixels of a run; those of `rast` are added. */
 TL_INLINE void pull_run(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, int64_t first, int n,
                         int64_t n_columns, double **to, int is_f64)
@@ -216,10 +223,8 @@ TL_INLINE void pull_run(const tl_grad_values *v, const pixel_run *run, const int
         put_real(v->g_rast, 4 * at, g_u, is_f64);
         put_real(v->g_rast, 4 * at + 1, g_v, is_f64);
     }
-    for (int c = 0; c < n; c++) {
-        to[0][first + c] += sum[c][0], to[1][first + c] += sum[c][1];
-        to[2][first + c] += sum[c][2] - sum[c][0] - sum[c][1];
-    }
+    for (int c = 0; c < n; c++)
+        add_to_corners(to, first + c, sum[c][0], sum[c][1], sum[c][2]);
 }
 
 TL_INLINE int64_t pull_values(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int is_f64)
@@ -242,108 +247,64 @@ TL_INLINE int64_t pull_values(const tl_grad_view *view, const tl_grad_values *v,
     return run.bad_id;
 }
 
-/* Gradients of `rast` at the pixels of a span; and those of n attributes, a row of four each. */
-TL_INLINE void pull_value_span(grad_span *s, const float *g_out, float *g_rast, int n)
+/* Those of n attributes of float32 at the pixels of a run, TL_SUMMED at most summed up in float32. */
+TL_INLINE void pull_quads(const tl_grad_values *v, const pixel_run *run, const grad_span *s, int r, int n, double **to)
 {
-    const vi order = order_of_quads();
-    const vf zero = vf_set1(0.0f);
-    for (int i = 0; i * TL_LANES < s->n; i++) {
-        const span_lanes p = lanes_of_span(s, i, order, 1);
-        float column[TL_MAX_LANES];
-        vf g[4] = {zero, zero, zero, zero}, out[4] = {zero, zero, zero, zero};
-        if (n == 4)
-            load_some_quads(g_out + n * p.x, p.n, g);
-        else
-            load_some_columns(g_out + n * p.x, n, p.n, g);
-        for (int c = 0; c < n; c++) {
-            if (n < 4 && TL_LANES > 1) {
-                vf_store(column, g[c]);
-                g[c] = vf_pick(column, order);
-            }
-            for (int k = 0; k < 2; k++)
-                out[k] = vf_fma(g[c], pick_number(&p, 3 * c + 1 + k), out[k]);
+    const float *attr = (const float *)v->attr, *rast = (const float *)v->rast + 4 * run->at;
+    const float *g_out = (const float *)v->out + n * run->at;
+    float *g_rast = (float *)v->g_rast + 4 * run->at;
+    const vq last = vq_load_some(attr + n * (int64_t)s->corners[2][r], n);
+    const vq4 of_u = vq4_all(vq_load_some(attr + n * (int64_t)s->corners[0][r], n) - last);
+    const vq4 of_v = vq4_all(vq_load_some(attr + n * (int64_t)s->corners[1][r], n) - last);
+    const vq4 zero = vq4_all(vq_set1(0.0f));
+    for (int64_t first = 0; first < run->n; first += TL_SUMMED) {
+        vq4 by_u = zero, by_v = zero, whole = zero;
+        for (int64_t i = first; i < first + TL_SUMMED && i < run->n; i += 4) {
+            const vq4 g = vq4_load(g_out + n * i, run->n - i, n), at = vq4_load(rast + 4 * i, run->n - i, 4);
+            const vq4 g_uv = TL_VQ4_BLEND(vq4_sum(vq4_mul(g, of_u)), vq4_sum(vq4_mul(g, of_v)), 2);
+            vq4_store(g_rast + 4 * i, TL_VQ4_BLEND(g_uv, zero, 12), run->n - i, 4);
+            by_u = vq4_add(by_u, vq4_mul(g, TL_VQ4_PERMUTE(at, 0, 0, 0, 0)));
+            by_v = vq4_add(by_v, vq4_mul(g, TL_VQ4_PERMUTE(at, 1, 1, 1, 1)));
+            whole = vq4_add(whole, g);
         }
-        for (int k = 0; k < 2; k++)
-            out[k] = vf_select(p.is_shown, out[k], zero);
-        for (int c = n; c < 4; c++)
-            g[c] = zero;
-        store_some_quads(g_rast + 4 * p.x, p.n, out);
-        store_some_quads(s->rows + 4 * p.x, p.n, g);
+        const vq sum_u = vq4_fold(by_u), sum_v = vq4_fold(by_v), sum = vq4_fold(whole);
+        for (int c = 0; c < n; c++)
+            add_to_corners(to, c, (double)sum_u[c], (double)sum_v[c], (double)sum[c]);
     }
 }
 
-/* Where a triangle sums up attributes: those of each times u, times v, and as they are. */
-TL_INLINE double *value_sums(tl_grad_sums *faces, double *sums) { return sums + faces->n_columns - TL_SUMS_OF_VALUES; }
-
-/* Adds the rows of the runs of a span to the sums of their triangles, some at a time in float32. */
-TL_INLINE void close_value_span(const grad_span *s, const float *rast, tl_grad_sums *faces)
-{
-    for (int r = 0; r < s->n_runs; r++) {
-        if (s->ids[r] < 0)
-            continue;
-        double *to = value_sums(faces, sums_of(faces, s->ids[r]));
-        for (int i = s->begins[r]; i < s->begins[r + 1]; i += TL_SUMMED) {
-            const int n = s->begins[r + 1] - i < TL_SUMMED ? s->begins[r + 1] - i : TL_SUMMED;
-            float sum[3][4];
-            sum_weighed_fours(s->rows + 4 * i, rast + 4 * i, 4, n, sum[0]);
-            sum_weighed_fours(s->rows + 4 * i, rast + 4 * i + 1, 4, n, sum[1]);
-            sum_fours(s->rows + 4 * i, n, sum[2]);
-            for (int k = 0; k < 3; k++)
-                for (int c = 0; c < 4; c++)
-                    to[4 * k + c] += (double)sum[k][c];
-        }
-    }
-}
-
-TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, int n)
+TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int n)
 {
     grad_span s = TL_BEFORE_SPANS(view);
-    while (next_value_span(view, v, &s, n)) {
-        const int64_t at = s.row * view->width + s.first;
-        pull_value_span(&s, (const float *)v->out + n * at, (float *)v->g_rast + 4 * at, n);
-        close_value_span(&s, (const float *)v->rast + 4 * at, v->faces);
-    }
+    clear_band(view, v->g_rast, 4);
+    while (next_grad_span(view, &(id_rows){.rast = v->rast}, v->n_attr, &s))
+        for (int r = 0; r < s.n_runs; r++) {
+            const pixel_run run = run_of_span(view, &s, r);
+            double *to[3];
+            if (run.id < 0)
+                continue;
+            corner_sums(view, sums, run.id, to);
+            pull_quads(v, &run, &s, r, n, to);
+        }
     return s.bad_id;
-}
-
-/* Whether attributes are summed up by triangle first. */
-TL_INLINE int sums_by_face(const tl_grad_view *view, const tl_grad_values *v)
-{
-    return !view->is_f64 && has_few_values(v) && v->n_columns <= TL_FEW_COLUMNS && !v->out_da;
 }
 
 static int64_t pull_value_rows(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
-    switch (sums_by_face(view, v) ? v->n_columns : 0) {
-    case 1: return pull_values_in_lanes(view, v, 1);
-    case 2: return pull_values_in_lanes(view, v, 2);
-    case 3: return pull_values_in_lanes(view, v, 3);
-    case 4: return pull_values_in_lanes(view, v, 4);
+    switch (!view->is_f64 && has_few_values(v) && !v->out_da ? v->n_columns : 0) {
+    case 1: return pull_values_in_lanes(view, v, sums, 1);
+    case 2: return pull_values_in_lanes(view, v, sums, 2);
+    case 3: return pull_values_in_lanes(view, v, sums, 3);
+    case 4: return pull_values_in_lanes(view, v, sums, 4);
     default: return view->is_f64 ? pull_values(view, v, sums, 1) : pull_values(view, v, sums, 0);
     }
-}
-
-/* Ends a band: from sums of triangles to those of their corners. */
-static void close_values(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
-{
-    for (int64_t i = 0; sums_by_face(view, v) && i < v->faces->n; i++) {
-        const double *of = value_sums(v->faces, v->faces->sums + v->faces->n_columns * i);
-        double *to[3];
-        corner_sums(view, sums, v->faces->rows[i], to);
-        for (int64_t c = 0; c < v->n_columns; c++) {
-            to[0][c] += of[c], to[1][c] += of[4 + c];
-            to[2][c] += of[8 + c] - of[c] - of[4 + c];
-        }
-    }
-    leave_band(sums);
 }
 
 /* See kernels.h. */
 static int64_t grad_values_vjp(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
     const int64_t bad_id = pull_value_rows(view, v, sums);
-    close_values(view, v, sums);
-    leave_band(v->faces);
+    leave_band(sums);
     return bad_id;
 }
 

@@ -4,7 +4,7 @@
 
 #include "lanes/lanes.h"
 
-/* The angle with tangent y / x, of y >= 0 and an x that is positive but for rounding; 0 of 0 and 0.  The quotient
+/* The angle with tangent y / x, of y >= 0 and an x that is positive up to rounding; 0 of 0 and 0.  The quotient
  * is turned back by 0, 45 or 90 degrees to within tan(22.5 degrees) of 0, where the polynomial is within 2^-56 of
  * atan(q) / q. */
 TL_INLINE vd angle_of(vd y, vd x)

@@ -126,7 +126,7 @@ static void make_ear_boxes(ear_face *f, int32_t k, keyed *pairs, int64_t *room)
     }
 }
 
-/* Takes a corner out of the list of those that its blocker blocks. */
+/* Takes a corner out of the list of its blocker. */
 static void unblock(ear_face *f, int32_t i)
 {
     if (f->blocker[i] < 0)

@@ -6,7 +6,7 @@
  * the surface than its middle by more than its radius, either.  Where neither is near enough to the known
  * distance, the piece is cut along the sides of the triangle that is nearest to its middle: the part above that one
  * is judged by it, the rest by others.  Where that does not help, the piece is halved.  A bound holds wherever the cuts
- * are, and whichever triangle judges: those that did last are asked before the tree.
+ * are, and whichever triangle judges: the last ones are tried before the tree.
  *
  * Based on: M. Tang, M. Lee, Y. J. Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009;
  * M. Guthe, P. Borodin, R. Klein, Fast and Accurate Hausdorff Distance Calculation between Meshes, 2005 (branch and

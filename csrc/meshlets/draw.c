@@ -1,4 +1,4 @@
-/* Draws meshlets: from the list of those that a view shows to ids and depths, band by band, a batch at a time.
+/* Draws meshlets: from the list of visible ones to ids and depths, band by band, a batch at a time.
  * In: meshlets, a view, the list.  Out: the target's buffers; the names of triangles that are still to be drawn.
  *
  * The window is cleared 64 rows at a time from the top, and a meshlet is drawn as soon as all of its rows are clear:

@@ -80,7 +80,7 @@ TL_INLINE void fill_pixel(const value_plane *p, int64_t col, row_start at, int i
         ((double *)row)[col] = value;
 }
 
-/* How many pixels ahead the plane is asked for: it lies in a distant cache, and its number is known. */
+/* How many pixels ahead the plane is prefetched: it lies in a distant cache, and its number is known. */
 #define TL_PLANES_AHEAD 32
 
 /* Small triangles: a pixel at a time from listed planes, without a branch that depends on where a triangle ends. */

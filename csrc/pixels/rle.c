@@ -64,7 +64,7 @@ static void find_changes(const tl_run_source *s, int64_t first_byte, int64_t n, 
     }
 }
 
-/* Appends the runs of a window, but for those of the background, to a table of *n with room for n_room; `rows` has
+/* Appends the runs of a window, except those of the background, to a table of *n with room for n_room; `rows` has
  * TL_RLE_LINE * height numbers.  Returns whether there was room for all. */
 static int list_column_runs(const tl_run_source *s, int32_t *rows, tl_run *runs, int64_t n_room, int64_t *n)
 {

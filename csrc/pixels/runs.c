@@ -78,7 +78,7 @@ typedef struct {
     /* the light is the grey of srgb.c: per channel the line and the root of its colour */
     int is_grey;
     float grey_line[3], grey_root[3];
-    int has_far_texels; /* some are asked for before they are read */
+    int has_far_texels; /* some are prefetched */
     int is_plain;       /* edge functions and normals of vertices are all that runs need */
     int n_runs, n_special;
     float most_shortest;    /* of RUN_SHORTEST of the runs that set_plain_runs has set, INFINITY of others */
@@ -705,7 +705,7 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
 
 /* With fewer triangles asking saves nothing: shading takes 1.02 times as long with 300,000, 1.1 to 1.2 with 120,000. */
 #define TL_FETCHED_TRIANGLES 500000
-#define TL_FETCH_RUNS 32 /* how many runs before its turn the rows of a run's corners are asked for */
+#define TL_FETCH_RUNS 32 /* how many runs before its turn the rows of a run's corners are prefetched */
 
 /* Indices are not checked yet: addresses, and no pointers. */
 TL_INLINE void fetch_row(const void *rows, uintptr_t n_bytes, int32_t row)
@@ -919,7 +919,7 @@ TL_INLINE vf weighed(const shaded_lanes *p, int c0, int c1, int c2)
     return vf_fma(p->e[0], pick(p, c0), vf_fma(p->e[1], pick(p, c1), vf_mul(p->e[2], pick(p, c2))));
 }
 
-/* The lanes of vector i of the span that begins at `column`, and their edge functions; but for those of special
+/* The lanes of vector i of the span that begins at `column`, and their edge functions; except those of special
  * runs. */
 TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column, vi *e, vi *sum)
 {

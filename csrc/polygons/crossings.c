@@ -22,7 +22,7 @@
 #define TL_FEW_ROWS \
     6 /* edges of so many rows are walked a vector at a time; longer ones by a vector of rows: 4 and 8 are slower */
 
-#define TL_EDGES_TO_PAUSE 4096 /* after which it is asked whether to go on; a multiple of TL_LANES */
+#define TL_EDGES_TO_PAUSE 4096 /* between two polls for cancelling; a multiple of TL_LANES */
 
 /* Rows [top, bottom) of a picture of some width, and where pixels are sampled. */
 typedef struct {

@@ -149,7 +149,7 @@ TL_INLINE vi begin_cells(int32_t *row)
 }
 
 /* Appends the cells of a row that are not 0 to a table of n entries, and clears them; returns how many there are then.
- * Boxes of polygons are small: to ask which cells hold something costs more than to add them. */
+ * Boxes of polygons are small: to find which cells hold something costs more than to add them. */
 TL_INLINE int64_t pack_row(int is_long, int32_t *cells, vi carry, int64_t width, int64_t index, void *indices,
                            float *areas, int64_t n)
 {
@@ -339,7 +339,7 @@ static int64_t share_stack(area_state *s, const tl_polygons *p, share_output *ou
     return n;
 }
 
-/* Clears the rows of a job but for the box, which is written over. */
+/* Clears the rows of a job except the box, which is written over. */
 static void clear_beside(const tl_share_job *job, const tl_polygon_box *box, int is_written)
 {
     for (int64_t row = job->top; row < job->bottom; row++) {

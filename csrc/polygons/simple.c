@@ -150,7 +150,7 @@ TL_INLINE direction edge_direction(const simple_search *s, int64_t a, int64_t b)
                        polygon_y(s->p, s->is_wide, b) - polygon_y(s->p, s->is_wide, a)};
 }
 
-/* Widens the directions [low, high] by one more, no branch but for parallel ones.  Returns 0 when no half plane holds
+/* Widens the directions [low, high] by one more, no branch but of parallel ones.  Returns 0 when no half plane holds
  * them all. */
 TL_INLINE int widen_directions(direction *low, direction *high, direction d)
 {
@@ -516,7 +516,7 @@ static int compare_rings(const tl_polygons *p, int is_wide, int64_t polygon, int
     if (!is_free(&s, s.nodes + root))
         return 0;
     s.n_left = TL_COMPARED_NODES * n_points + (1 << 16);
-    for (int64_t k = 0; k < n_rings; k++) { /* neighbours ask the same nodes */
+    for (int64_t k = 0; k < n_rings; k++) { /* neighbours read the same nodes */
         const int32_t ring = s.nodes[roots[k].i].ring;
         const int64_t first = p->rings[r0 + ring];
         const int winding = n_rings == 1 ? 0 : wound_by(&s, s.nodes + root, ring, first);

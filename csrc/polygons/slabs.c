@@ -28,7 +28,7 @@
 #define TL_FEW_EDGES 64
 #define TL_EDGES_OF_CROSSING 16
 
-#define TL_CROSSINGS_TO_POLL 256 /* after which it is asked whether to go on; a power of two */
+#define TL_CROSSINGS_TO_POLL 256 /* between two polls for cancelling; a power of two */
 
 /* A piece that passes the slab. */
 typedef struct {

@@ -238,7 +238,7 @@ TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const 
     flush_queue_rows(s, g, sink);
 }
 
-/* As start_fixed, but for squares and several samples, and for the shares of a picture. */
+/* As start_fixed, for squares and several samples, and for the slices of a picture. */
 TL_INLINE void start_slice(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                            tl_slice *slice, tl_sink sink)
 {

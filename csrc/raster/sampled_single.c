@@ -1,7 +1,7 @@
 /* Sampled single: one triangle by itself, at all samples of a pixel.
  * In: vertex records.  Out: bits of samples.
  *
- * The rows of a large triangle are the same for all samples but for their ends: the pixels between these are stored as
+ * The rows of a large triangle are the same for all samples except their ends: the pixels between these are stored as
  * whole words, and two words at each end are put together from the spans of the samples, a vector of rows at a time.
  * Rows with ends more than two words wide, or that some samples miss, are put together word by word. */
 #ifndef TL_SAMPLED_SINGLE_C

@@ -20,7 +20,7 @@
 #define TL_SMALL_BOX 4
 #define TL_MIDDLE_BOX 16
 #define TL_BIT_COLS 31                                         /* of a row that vi_bit_ranges has at a time */
-#define TL_BLOCK_COLS (TL_LANES == 4 ? TL_BIT_COLS : TL_LANES) /* of a row that is drawn at a time, but for masks */
+#define TL_BLOCK_COLS (TL_LANES == 4 ? TL_BIT_COLS : TL_LANES) /* of a row that is drawn at a time, except in masks */
 #define TL_MAX_BOX_PX 62                                       /* rows.c: row ends in float32 are exact up to here */
 #define TL_QUEUE 256
 
@@ -93,7 +93,7 @@ typedef struct {
     vf xy;                         /* X * Y */
     vf from_x[3], from_y[3], band; /* of boxes of up to 4x4: points from the first sample, and the band of samples */
     vi sample;                     /* the first sample: row * stride_px + column */
-    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
+    vm live;                       /* lanes with a triangle that has an area and is not culled */
     vm turned;                     /* corners 1 and 2 have changed places in e, dx and dy */
     vm to_turn;                    /* and are still to do so in x and y */
     vm on_grid;                    /* e, dx and dy are exact, in units of their own */
@@ -264,7 +264,7 @@ TL_INLINE void fetch_rows(const void *rows, size_t n_bytes, const int32_t *corne
         __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[k] * n_bytes));
 }
 
-/* The same of triangles in a list, and the rows of indices of those that come after them. */
+/* The same of triangles in a list, and the rows of indices of the next ones. */
 TL_INLINE void fetch_listed(const void *rows, size_t n_bytes, const int32_t *triangles, const int32_t *ids)
 {
     for (int k = 0; k < TL_LANES; k++) {

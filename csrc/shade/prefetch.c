@@ -31,7 +31,7 @@ typedef struct {
     started_lanes lanes[TL_STARTED];
 } started_span;
 
-/* Whether its texels are asked for: they are many, and found by the first set of uv as it is. */
+/* Whether its texels are prefetched: they are many, and found by the first set of uv as it is. */
 TL_INLINE int is_far(const tl_texture *t)
 {
     return t->filter != TL_FILTER_NEAREST && !t->uv_set && !t->has_transform &&

@@ -49,7 +49,7 @@ TL_ONCE void shade_grey(const shade_runs *s, int n, int64_t column, int32_t *pix
             put_shaded(pixels + x, s->visible[i], n - x, grey_word(s, vf_load(light + x)));
 }
 
-/* Fills a span with the background, and asks for the ids and the pixels of the row below it. */
+/* Fills a span with the background, and prefetches the ids and the pixels of the row below it. */
 TL_INLINE void start_span(int32_t *pixels, int32_t word, int n, const int32_t *ids, int64_t to_next)
 {
     for (int x = 0; to_next && x < n; x += 16) {

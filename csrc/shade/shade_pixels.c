@@ -26,7 +26,7 @@ static void set_special_edges(shaded_lanes *p)
     }
 }
 
-/* The lanes of vector i of the span that begins at `column`, and their edge functions as float32, but for those of
+/* The lanes of vector i of the span that begins at `column`, and their edge functions as float32, except those of
  * special runs. */
 TL_INLINE void find_most_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {

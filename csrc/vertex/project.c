@@ -62,7 +62,7 @@ static inline void set_projected(const double *p, const tl_view *view, int was_c
 {
     double z = view->zero_to_one ? p[2] / p[3] : (p[2] / p[3] + 1.0) * 0.5;
     if (was_cut && view->near_clip)
-        z = z < 0.0 ? 0.0 : z; /* a cut lies on its plane but for rounding */
+        z = z < 0.0 ? 0.0 : z; /* a cut lies on its plane up to rounding */
     if (was_cut && view->far_clip)
         z = z > 1.0 ? 1.0 : z;
     out[0] = (p[0] / p[3] + 1.0) * view->half_width_px;

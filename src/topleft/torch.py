@@ -47,6 +47,7 @@ from topleft._torch.operators import (
     draw_ids,
     each,
     halves_across,
+    interpolate_colors,
     interpolate_values,
     joined,
     look_up,
@@ -324,6 +325,9 @@ def interpolate(
         raise ValueError(f"rast_db must have shape {tuple(rast.shape)} when diff_attrs is given, got {got}")
     given, points_of, slopes = same_dtype(attr, (rast, len(tri)), rast_db if wanted else None)
     attrs = given if given.ndim == 3 else given[None]
+    source = source_of(rast, points_of, tri)
+    if source is not None and not wanted and attrs.dtype == torch.float32:
+        return interpolate_colors(attrs, points_of, tri, *source), attrs.new_empty((*rast.shape[:3], 0))
     out, out_da = interpolate_values(attrs, points_of, tri, slopes, wanted)
     return out, out_da
 
@@ -672,7 +676,17 @@ def points(
 ) -> tuple[Tensor, Tensor]:
     """Return `rast` and `rast_db` of ids (B, H, W) with row 0 on top."""
     rast, rast_db = points_of_ids(pos, tri, ids, ranges, glctx.output_db)
+    if ranges is None and rast.requires_grad and not torch.compiler.is_compiling():
+        rast.topleft_source = pos, tri
     return rast, rast_db if grad_db else rast_db.detach()
+
+
+def source_of(rast: Tensor, used: Tensor, tri: Tensor) -> tuple[Tensor, Tensor] | None:
+    """Return the vertices and triangles that a `rast` was drawn from; None where that is not known."""
+    if torch.compiler.is_compiling() or used is not rast:
+        return None
+    source: tuple[Tensor, Tensor] | None = getattr(rast, "topleft_source", None)
+    return source if source and len(source[1]) == len(tri) else None
 
 
 def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> None:

@@ -253,6 +253,50 @@ def files_of_meshes():
     }  # fmt: skip
 
 
+def files_with_colors_and_normals():
+    """Names and bytes: vertices that share a place and differ in colour, in bytes, 16 bits and floats; normals."""
+    rng = np.random.default_rng(6)
+    points = (rng.integers(0, 3, (30, 3)) / 7).astype(np.float32)
+    corners, normals = rng.integers(0, 30, (50, 3)).astype("<i4"), rng.normal(size=(30, 3)).astype(np.float32)
+    colors = rng.integers(0, 256, (30, 3), np.uint8)
+    faces = b"".join(b"\3" + row.tobytes() for row in corners)
+
+    def ply(kind, columns):
+        head = f"ply\nformat binary_little_endian 1.0\nelement vertex 30\n{kind}element face 50\n"
+        rows = b"".join(b"".join(column[i].tobytes() for column in columns) for i in range(30))
+        return (head + "property list uchar int vertex_indices\nend_header\n").encode() + rows + faces
+
+    xyz = "".join(f"property float {axis}\n" for axis in "xyz")
+    rgb, wide, real = (
+        "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
+        for kind in ("uchar", "ushort", "float")
+    )
+    own = "".join(f"property float n{axis}\n" for axis in "xyz")
+    text = "ply\nformat ascii 1.0\nelement vertex 30\n" + xyz + own + rgb + "element face 50\n"
+    text += "property list uchar int vertex_indices\nend_header\n"
+    text += "".join(" ".join(map(str, (*p, *n, *c))) + "\n" for p, n, c in zip(points, normals, colors, strict=True))
+    text += "".join(f"3 {a} {b} {c}\n" for a, b, c in corners)
+    line = "".join(
+        f"v {x!r} {y!r} {z!r} {r / 255!r} {g / 255!r} {b / 255!r}\n"
+        for (x, y, z), (r, g, b) in zip(points.astype(float).tolist(), colors.tolist(), strict=True)
+    )
+    vn = "".join(f"vn {x!r} {y!r} {z!r}\n" for x, y, z in normals.astype(float).tolist())
+    plain = "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in corners.tolist())
+    same = "".join("f " + " ".join(f"{i + 1}//{i + 1}" for i in row) + "\n" for row in corners.tolist())
+    other = "".join(
+        "f " + " ".join(f"{i + 1}//{(7 * i + k) % 30 + 1}" for k, i in enumerate(row)) + "\n"
+        for row in corners.tolist()
+    )
+    return {
+        "bytes.ply": ply(xyz + rgb, (points, colors)),
+        "wide.ply": ply(xyz + wide, (points, colors.astype("<u2") * 251)),
+        "floats.ply": ply(xyz + real, (points, (colors / np.float32(255)).astype("<f4"))),
+        "normals.ply": ply(xyz + own, (points, normals)), "both.ply": text.encode(),
+        "colors.obj": (line + plain).encode(), "same.obj": (line + vn + same).encode(),
+        "other.obj": (line + vn + other).encode(),
+    }  # fmt: skip
+
+
 #: Nodes that show a mesh twice: moved by a chain of nodes, and by a matrix.
 MOVED = [
     {"mesh": 0, "matrix": [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0.5, 0, 4, -3, 1, 1]},
@@ -332,10 +376,13 @@ def test_views_of_the_first_mesh_are_those_of_python(ask):
     check_meshes(ask, [{"do": "mesh.draw", **view} for view in views_of(24, np.random.default_rng(1))])
 
 
-@pytest.mark.parametrize("name", files_of_meshes())
+MESH_FILES = files_of_meshes() | files_with_colors_and_normals()
+
+
+@pytest.mark.parametrize("name", MESH_FILES)
 def test_views_of_a_file_are_those_of_python(ask, tmp_path, name):
     path = tmp_path / name
-    path.write_bytes(files_of_meshes()[name])
+    path.write_bytes(MESH_FILES[name])
     check_meshes(ask, opened_and_drawn(name, path, views_of(12, np.random.default_rng(4))))
 
 

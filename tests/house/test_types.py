@@ -137,7 +137,7 @@ def folder(tmp_path_factory):
     made.joinpath("misspelt.py").write_text(misspelt()[0], encoding="utf-8")
     made.joinpath("mypy.ini").write_text(  # PyTorch itself takes a minute to check
         "[mypy]\nstrict = true\n[mypy-torch.*]\nfollow_imports = skip\nignore_missing_imports = true\n"
-        "[mypy-trimesh.*,PIL.*,scipy.*]\nignore_missing_imports = true\n", encoding="utf-8"
+        "[mypy-trimesh.*,PIL.*,scipy.*,gymnasium.*,dm_control.*]\nignore_missing_imports = true\n", encoding="utf-8"
     )  # fmt: skip
     made.joinpath("pyrightconfig.json").write_text(
         json.dumps(

@@ -250,6 +250,16 @@ def test_mtl_texture_of_a_mesh_without_coordinates_is_told(tmp_path, recwarn, fa
     assert [str(one.message) for one in recwarn] == [wanted] * n
 
 
+@pytest.mark.parametrize(("faces", "n"), [("f 1/1 2/2 3/3", 0), ("f 1 2 3", 1), ("usemtl plain\nf 1 2 3", 0)])
+def test_mtl_texture_of_faces_without_coordinates_beside_others_is_told(tmp_path, recwarn, faces, n):
+    picture(tmp_path, "a.png", np.zeros((1, 1, 3)))
+    (tmp_path / "a.mtl").write_text("newmtl m\nmap_Kd a.png\nnewmtl plain\nKd 1 0 0\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + SQUARE + f"usemtl m\nf 1/1 2/2 3/3\n{faces}\n")
+    tl.load(tmp_path / "a.obj")
+    wanted = f"{str(tmp_path / 'a.obj')!r}: textures not spread on faces without texture coordinates"
+    assert [str(one.message) for one in recwarn] == [wanted] * n
+
+
 def test_mtl_paths_of_other_machines_are_found_by_name(load, tmp_path):
     picture(tmp_path, "a.png", np.zeros((1, 1, 3)))
     for name in (r"C:\users\me\a.png", "/home/me/a.png", "../x/A.PNG", "./a.png"):

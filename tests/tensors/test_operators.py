@@ -78,6 +78,66 @@ def test_every_instruction_set_gives_the_same_bits(isa, edges):
     assert hashes[0] == hashes[1]
 
 
+def pulled(pos, tri, attr, rows, dtype=torch.float32, is_watched=False, size=(93, 130)):
+    """Gradients of vertices and attributes by `backward`; `rast` keeps its own where it is watched."""
+    given = [one.to(dtype, copy=True).requires_grad_() for one in (pos, attr)]
+    rast, _ = dr.rasterize(CTX, given[0], tri, size)
+    if is_watched:
+        rast.retain_grad()
+    out, _ = dr.interpolate(given[1], rast, rows)
+    (out * (1 + torch.sin(torch.arange(out.numel(), dtype=dtype)).reshape(out.shape))).sum().backward()
+    assert not is_watched or rast.grad is not None
+    return [one.grad for one in given]
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 7])
+def test_gradients_past_rast_are_those_through_it(isa, n):
+    pos, tri, _ = sphere(2, level=2)
+    attr, rows = 100 + torch.rand(9, n, generator=torch.Generator().manual_seed(n)), tri % 9
+    with on(isa):
+        past, through = pulled(pos, tri, attr, rows), pulled(pos, tri, attr, rows, is_watched=True)
+    with on("scalar"):
+        assert all(torch.equal(a, b) for a, b in zip(past, pulled(pos, tri, attr, rows), strict=True))
+    for one, other, exact in zip(past, through, pulled(pos, tri, attr, rows, torch.float64), strict=True):
+        size = exact.abs().max()
+        assert size > 1
+        assert (one - exact).abs().max() < 1e-6 * size
+        assert (other - exact).abs().max() < 1e-6 * size
+
+
+def test_gradients_past_rast_of_clamped_pixels_are_those_of_float64():
+    at = (
+        torch.arange(-8, 9, 4) / 9 + 1 / 9
+    )  # centres of pixels, and corners of triangles but for a thousandth of a pixel
+    shift = 2e-3 / 9 * (2 * torch.rand(25, 2, generator=torch.Generator().manual_seed(1)) - 1)
+    p = torch.cartesian_prod(at, at) + shift
+    w = 1 + p[:, 1:] / 4
+    pos, corner = (
+        torch.cat([p * w, 0.2 * p[:, :1], w], 1)[None],
+        (5 * torch.arange(4)[:, None] + torch.arange(4)).reshape(-1, 1),
+    )
+    tri = torch.cat([corner + torch.tensor([0, 1, 5]), corner + torch.tensor([1, 6, 5])])
+    rast, _ = dr.rasterize(CTX, pos.double(), tri, (9, 9))
+    assert ((rast[..., :2] == 0).any(-1) & (rast[..., 3] > 0)).sum() > 10
+    attr = torch.rand(25, 2, generator=torch.Generator().manual_seed(2))
+    exact = pulled(pos, tri, attr, tri, torch.float64, size=(9, 9))
+    for one, other in zip(pulled(pos, tri, attr, tri, size=(9, 9)), exact, strict=True):
+        assert (one - other).abs().max() < 1e-6 * other.abs().max()
+
+
+def test_gradient_of_rast_is_there_for_who_asks():
+    pos, tri, colours = sphere(level=1)
+    pos.requires_grad_()
+    rast, _ = dr.rasterize(CTX, pos, tri, (12, 14))
+    seen = []
+    (g,) = torch.autograd.grad(dr.interpolate(colours, rast, tri)[0].sum(), rast)
+    rast.register_hook(seen.append)
+    dr.interpolate(colours, rast, tri)[0].sum().backward()
+    assert g.any()
+    assert torch.equal(seen[0], g)
+
+
 def test_gradients_are_those_of_one_picture_after_the_other():
     pos, tri, colours = sphere(3)
     tex = torch.rand(1, 8, 8, 3, generator=torch.Generator().manual_seed(2))

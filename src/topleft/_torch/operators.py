@@ -190,6 +190,34 @@ def interpolate_vjp(
     return torch.from_numpy(g_attr), torch.from_numpy(g_rast), tensor_of(g_db, attr)
 
 
+@operator(
+    "(Tensor attr, Tensor rast, Tensor tri, Tensor pos, Tensor pos_tri) -> Tensor",
+    lambda attr, rast, tri, pos, pos_tri: attr.new_empty((*rast.shape[:3], attr.shape[2])),  # noqa: ARG005
+)
+def interpolate_colors(
+    attr: Tensor,
+    rast: Tensor,
+    tri: Tensor,
+    pos: Tensor,  # noqa: ARG001
+    pos_tri: Tensor,  # noqa: ARG001
+) -> Tensor:
+    """Return attributes, as `interpolate_values`; backward goes past `rast`, to the vertices that it was made of."""
+    return torch.from_numpy(tensors.values(grid_of(tri, rast, attr.shape[1]), numpy_of(attr), numpy_of(rast))[0])
+
+
+@operator(
+    "(Tensor attr, Tensor rast, Tensor tri, Tensor pos, Tensor pos_tri, Tensor g_out) -> (Tensor, Tensor)",
+    lambda attr, rast, tri, pos, pos_tri, g_out: (like(attr, attr), like(pos, pos)),  # noqa: ARG005
+)
+def colors_vjp(
+    attr: Tensor, rast: Tensor, tri: Tensor, pos: Tensor, pos_tri: Tensor, g_out: Tensor
+) -> tuple[Tensor, Tensor]:
+    """Return the gradients of `attr` and `pos`."""
+    grid, corners = grid_of(pos_tri, rast, pos.shape[1]), triangles_of(tri, attr.shape[1])
+    g_pos, g_attr = tensors.colors_vjp(grid, numpy_of(pos), numpy_of(attr), corners, numpy_of(rast), numpy_of(g_out))
+    return torch.from_numpy(g_attr), torch.from_numpy(g_pos)
+
+
 def look_of(
     levels: Sequence[Tensor], uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, how: int, beyond: int
 ) -> TexelLook:
@@ -343,6 +371,8 @@ def keep_points(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> No
 def pull_points(ctx: Any, g_rast: Tensor | None, g_db: Tensor | None) -> tuple[Any, ...]:
     """Return the gradients of what `points_of_ids` takes."""
     pos, tri, rast = ctx.saved_tensors
+    if g_rast is None and g_db is None:
+        return (None,) * 5
     return points_vjp(pos, tri, rast, filled(g_rast, rast.shape, rast), g_db), None, None, None, None
 
 
@@ -360,6 +390,30 @@ def pull_values(ctx: Any, g_out: Tensor | None, g_da: Tensor | None) -> tuple[An
     has_da = g_da is not None and len(ctx.wanted) > 0
     g_attr, g_rast, g_db = interpolate_vjp(attr, rast, tri, rast_db, ctx.wanted, given, g_da if has_da else None)
     return g_attr, g_rast, None, g_db if has_da else None, None
+
+
+def keep_colors(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
+    """Keep what `colors_vjp` and `interpolate_vjp` take."""
+    ctx.save_for_backward(*inputs)
+
+
+def pull_colors(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
+    """Return the gradients of what `interpolate_colors` takes: of `pos`, or of `rast` where somebody looks at it."""
+    attr, rast, tri, pos, pos_tri = ctx.saved_tensors
+    if rast.retains_grad or rast._backward_hooks or not is_wanted(pos):
+        g_attr, g_rast, _ = interpolate_vjp(attr, rast, tri, None, [], g_out, None)
+        return g_attr, g_rast, None, None, None
+    g_attr, g_pos = colors_vjp(attr, rast, tri, pos, pos_tri, g_out)
+    return g_attr, None, None, g_pos, None
+
+
+def is_wanted(tensor: Tensor) -> bool:
+    """Whether the backward that runs computes the gradient of a tensor."""
+    reaches: Any = torch._C._will_engine_execute_node
+    try:
+        return bool(reaches(torch.autograd.graph.get_gradient_edge(tensor).node))
+    except RuntimeError:  # a leaf that torch.autograd.grad was asked for
+        return True
 
 
 def keep_look(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
@@ -408,7 +462,8 @@ def pull_squares(ctx: Any, g_loss: Tensor, *_: Any) -> tuple[Any, ...]:
 squares.register_autograd(pull_squares, setup_context=keep_squares)
 points_of_ids.register_autograd(pull_points, setup_context=keep_points)
 interpolate_values.register_autograd(pull_values, setup_context=keep_values)
+interpolate_colors.register_autograd(pull_colors, setup_context=keep_colors)
 look_up.register_autograd(pull_look, setup_context=keep_look)
 smooth.register_autograd(pull_edges, setup_context=keep_edges)
-for vjp in (points_vjp, interpolate_vjp, look_up_vjp, smooth_vjp):
+for vjp in (points_vjp, interpolate_vjp, colors_vjp, look_up_vjp, smooth_vjp):
     vjp.register_autograd(once)

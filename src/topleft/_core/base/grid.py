@@ -36,7 +36,7 @@ class Grid:
         is at `y_min` (`origin="lower"`).
     crs : str, int or CRS, optional
         The coordinate reference system of the extent: "EPSG:25832", 25832, WKT, or that of pyproj, rasterio or
-        geopandas; kept as text. Files and xarray get it; polygons that say another one are refused.
+        geopandas; kept as text. Files and xarray get it; polygons with another one are refused.
     nodata : number, optional
         The value of empty pixels: the default of `nodata=` of `field`, `tiles` and `Overlap.means`, of `background=`
         of `polygons` with values, and of files.
@@ -115,7 +115,7 @@ class Grid:
         Parameters
         ----------
         subject : mesh
-            Whatever `as_mesh` takes; x and y of the points that its triangles use count.
+            Any value that `as_mesh` takes; x and y of the points that its triangles use.
         size : (width, height), optional
             How many pixels.
         pixel_size : float or (float, float), optional

@@ -153,7 +153,7 @@ def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The array and all its views own
     the memory until they are freed; then it waits for another array, `MAX_WAITING_BYTES` at most.
     """
-    n_bytes = _size(shape, dtype)
+    n_bytes = math.prod(shape) * np.dtype(dtype).itemsize
     if n_bytes < MIN_BLOCK_BYTES:
         return np.empty(shape, dtype)
     if n_bytes > sys.maxsize:
@@ -167,10 +167,9 @@ def fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> bool:
     A check of one array at a time is too weak: Linux refuses a single array larger than all memory, but gives two of
     half that size and ends the process when they are written.
     """
-    n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
-    if n_bytes >= MIN_CHECKED_BYTES:
+    if 16 * len(dtypes) * math.prod(shape) >= MIN_CHECKED_BYTES:  # no number takes more than 16
         try:
-            np.empty(n_bytes, np.uint8)
+            np.empty(sum(_size(shape, dtype) for dtype in dtypes), np.uint8)
         except (MemoryError, ValueError):
             return False
     return True

@@ -2,8 +2,7 @@
 
 MOST_LEVELS = TL_MOST_LEVELS
 SUMS_OF_POINTS = TL_SUMS_OF_POINTS
-SUMS_OF_VALUES = TL_SUMS_OF_VALUES
-FEW_COLUMNS = TL_FEW_COLUMNS
+SUMS_OF_THREE = TL_SUMS_OF_THREE
 IDS_ROOM = TL_IDS_ROOM
 LOSS_WINDOW = TL_LOSS_WINDOW
 
@@ -70,11 +69,10 @@ cdef class GradientView:
         return bad
 
     def values(self, attr: Array, const int32_t[::1] wanted, arrays: tuple[Array | None, ...],
-               GradientSums faces or None, GradientSums sums or None, int64_t first, int64_t end) -> int:
+               GradientSums sums or None, int64_t first, int64_t end) -> int:
         """Write rows of attributes (V, K); with sums, of their gradients. Returns as `points_vjp` does.
 
-        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for absent ones. `faces`, with
-        sums: scratch by triangle, SUMS_OF_VALUES columns, for FEW_COLUMNS at most.
+        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for absent ones.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_values v
@@ -89,9 +87,28 @@ cdef class GradientView:
                 bad = K.grad_values(&view, &v)
             return bad
         v.g_rast, v.g_rast_db = <void *>first_of(arrays[4]), <void *>first_of(arrays[5])
-        v.faces = &faces.sums
         with nogil:
             bad = K.grad_values_vjp(&view, &v, &sums.sums)
+        return bad
+
+    def colors_vjp(self, attr: Array, const int32_t[:, ::1] corners, rast: Array, g_out: Array,
+                   sums: tuple[GradientSums, GradientSums, GradientSums], int64_t first, int64_t end) -> int:
+        """Sum up gradients of vertices and of attributes (V, K) from those of a picture. Returns as `points_vjp` does.
+
+        `corners` (T, 3): rows of attributes. `sums`: scratch by triangle, SUMS_OF_POINTS columns, SUMS_OF_THREE more for
+        each three attributes after the third; by vertex; by row of `attr`.
+        """
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef tl_grad_colors c
+        cdef GradientSums faces = sums[0], vertices = sums[1], rows = sums[2]
+        cdef int64_t bad
+        memset(&c, 0, sizeof(c))
+        c.values.attr, c.values.n_attr, c.values.n_columns = first_of(attr), attr.shape[0], attr.shape[1]
+        c.values.rast, c.values.out = first_of(rast), <void *>first_of(g_out)
+        c.corners = &corners[0, 0] if corners.shape[0] else NULL
+        c.faces, c.vertices, c.attr = &faces.sums, &vertices.sums, &rows.sums
+        with nogil:
+            bad = K.grad_colors_vjp(&view, &c)
         return bad
 
     def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...],

@@ -117,10 +117,10 @@ def points(
     return rast, rast_db
 
 
-def faces_of(grid: PixelGrid, band: Band, n_columns: int, n_values: int) -> engine.GradientSums:
-    """Return room for sums by triangle: so many columns, plus those of values if these are few."""
-    more = engine.SUMS_OF_VALUES if 0 < n_values <= engine.FEW_COLUMNS else 0
-    return sums_of(len(grid.tri), n_columns + more, band, grid.width, "faces")
+def faces_of(grid: PixelGrid, band: Band, n_values: int = 0) -> engine.GradientSums:
+    """Return room for sums by triangle: of points, or of points and so many values at once."""
+    n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, n_values - 1) // 3)
+    return sums_of(len(grid.tri), n_columns, band, grid.width, "faces")
 
 
 def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
@@ -130,7 +130,7 @@ def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Ar
     def work(band: Band, sums: engine.GradientSums) -> int:
         i = band.picture
         slopes = None if g_db is None else g_db[i]
-        faces = faces_of(grid, band, engine.SUMS_OF_POINTS, 0)
+        faces = faces_of(grid, band)
         return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, faces, sums, band.first, band.end)
 
     grid.refuse(grid.bands.add_up(work, out, 3))
@@ -150,7 +150,7 @@ def values(
         i = band.picture
         slopes = (None, None) if rast_db is None else (rast_db[i], out_da[i])
         arrays = rast[i], slopes[0], out[i], slopes[1]
-        return view.values(of(attr, i), columns, arrays, None, None, band.first, band.end)
+        return view.values(of(attr, i), columns, arrays, None, band.first, band.end)
 
     grid.refuse(grid.bands.run(work))
     return out, out_da
@@ -175,11 +175,35 @@ def values_vjp(
         i = band.picture
         db, da, g = (None if one is None else one[i] for one in (rast_db, g_da, g_db))
         arrays = rast[i], db, g_out[i], da, g_rast[i], g
-        faces = faces_of(grid, band, 0, attr.shape[2])
-        return view.values(of(attr, i), columns, arrays, faces, sums, band.first, band.end)
+        return view.values(of(attr, i), columns, arrays, sums, band.first, band.end)
 
     grid.refuse(grid.bands.add_up(work, g_attr, 3))
     return g_attr, g_rast, g_db
+
+
+def colors_vjp(
+    grid: PixelGrid, pos: Array, attr: Array, corners: NDArray[np.int32], rast: Array, g_out: Array
+) -> tuple[Array, Array]:
+    """Return the gradients of `pos` and `attr`, float32, in one pass: what `values_vjp` and `points_vjp` give.
+
+    `corners` (T, 3) are the rows of `attr` that triangles have.
+    """
+    check_counted("attr", attr.shape[1:])
+    g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
+
+    def work(band: Band) -> tuple[list[engine.GradientSums], int]:
+        i = band.picture
+        faces, *sums = [
+            faces_of(grid, band, attr.shape[2]),
+            sums_of(pos.shape[1], 4, band, 3 * grid.width, "points"),
+            sums_of(attr.shape[1], attr.shape[2], band, 3 * grid.width),
+        ]
+        all_of_them = faces, sums[0], sums[1]
+        view = grid.view(of(pos, i))
+        return sums, view.colors_vjp(of(attr, i), corners, rast[i], g_out[i], all_of_them, band.first, band.end)
+
+    grid.refuse(max(grid.bands.add_up_all(work, [g_pos, g_attr]), default=-1))
+    return g_pos, g_attr
 
 
 @dataclass(frozen=True)
@@ -317,7 +341,7 @@ def squares(
 
     def work(band: Band) -> tuple[list[engine.GradientSums], float]:
         i, width = band.picture, grid.width
-        faces = faces_of(grid, band, engine.SUMS_OF_POINTS, n)
+        faces = faces_of(grid, band, n)
         sums = [
             sums_of(n_vertices, 4, band, 3 * width, "points"),
             sums_of(n_vertices, 4, band, 6 * width, "edges"),

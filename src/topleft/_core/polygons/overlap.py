@@ -76,7 +76,7 @@ class Overlap:
     )
 
     def __post_init__(self) -> None:
-        """Refuse arrays that are no table, whoever made them."""
+        """Refuse arrays that are no table."""
         n = len(self.pixels)
         for name, kinds in (("starts", "iu"), ("pixels", "iu"), ("areas", "f")):
             array = getattr(self, name)
@@ -130,9 +130,9 @@ class Overlap:
         )
 
     def sums(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
-        """Return the integral (P,) of a raster (H, W) over each polygon; pixels without data count as nothing.
+        """Return the integral (P,) of a raster (H, W) over each polygon; pixels without data count 0.
 
-        Which have none is told in `means`.
+        `means` says which pixels these are.
         """
         values = self._values_of(raster, nodata)
         return self._added(np.where(np.isnan(values), 0.0, values) * self.areas)
@@ -141,8 +141,8 @@ class Overlap:
         """Return the mean (P,) of a raster (H, W) over each polygon; pixels without data do not count.
 
         Pixels have no data where the raster is NaN or `nodata`, where a masked array is masked, and where a raster of
-        xarray or an open dataset of rasterio, of one band, has the number that it names itself. A polygon over none
-        but such pixels has the mean NaN.
+        xarray or an open dataset of rasterio, of one band, has its own number of no data. A polygon over such pixels
+        alone has the mean NaN.
         """
         return self._mean_of(self._values_of(raster, nodata))
 
@@ -176,7 +176,7 @@ class Overlap:
     def majorities(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
         """Return the number (P,) of a raster (H, W) that takes the largest area of each polygon; NaN without data.
 
-        Of numbers with the same area the least.
+        At equal areas the least number wins.
         """
         values, areas, starts = self._sorted(self._values_of(raster, nodata))
         result = np.full(len(self), np.nan)
@@ -199,8 +199,8 @@ class Overlap:
     ) -> npt.NDArray[np.float64]:
         """Return quantiles (P,), or (P, Q) of several, of a raster (H, W) over each polygon; NaN without data.
 
-        The least number of the raster up to which a share `q`, 0 to 1, of the polygon's area lies: 0.5, the median,
-        unless given; ``numpy.quantile(..., method="inverted_cdf", weights=)``.
+        The least number that a share `q`, 0 to 1, of the polygon's area does not exceed; the default 0.5 is the
+        median. Equal to ``numpy.quantile(..., method="inverted_cdf", weights=)``.
         """
         wanted = as_real("q", q)
         if wanted.ndim > 1 or not ((wanted >= 0) & (wanted <= 1)).all():
@@ -323,7 +323,7 @@ def overlap(
     triangles : array_like of integers, shape (T, 3), optional
         Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
     out : Overlap, optional
-        A table that is no longer needed: its memory is used again, where it is large enough.
+        A table that is no longer needed: its memory is used again, if it is large enough.
 
     Returns
     -------

@@ -23,7 +23,7 @@ from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.polygons.draw import add_shares, draw_labels, draw_mask
 from topleft._core.polygons.prepared import Frame, Prepared, prepare
 from topleft._core.polygons.rings import RingSet, as_rings
-from topleft._core.raster.rasterize import canvas_of, open_canvas
+from topleft._core.raster.rasterize import Canvas, canvas_of
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, sample_positions
 from topleft.typing import RuleOption, SamplingOption
 
@@ -64,16 +64,16 @@ def polygons(
     Parameters
     ----------
     rings : array_like (N, 2), list, tuple of arrays, or geometries
-        One ring of points; a list of rings, holes among them, which is one polygon; a list of such lists, which are
-        several. Or ``(coordinates, ring_offsets)``, one polygon, or ``(coordinates, ring_offsets, polygon_offsets)``,
+        One ring of points; a list of rings, holes among them: one polygon; a list of such lists: several polygons.
+        Or ``(coordinates, ring_offsets)``, one polygon, or ``(coordinates, ring_offsets, polygon_offsets)``,
         several, as in GeoArrow. Flat rings of COCO, ``[x, y, x, y, ...]``, stand for rings. Or shapely polygons, one or
         a sequence or a GeoSeries; the result of `shapely.to_ragged_array`; GeoJSON; anything with `__geo_interface__`.
         Rings close themselves, may run either way, and may cross and touch themselves and each other. Pixels, x right
         and y down, unless `size` is a `Grid`.
     size : (int, int) or Grid
-        Width and height of the picture in pixels; or the grid that the points are units of.
+        Width and height of the picture in pixels; or a grid: the points are then in its units.
     rule : "evenodd" or "nonzero"
-        Whether a point is inside that the rings wind round an odd number of times, or any number but 0.
+        A point is inside if the rings wind round it an odd number of times, or any number of times but 0.
     values : "index", number, or array_like (P,) or (P, C), optional
         The value of a pixel in a polygon: "index" its number, as int32; one number for all, or one for each, of any
         dtype; or a colour for each. Without it the result is a mask.
@@ -81,8 +81,8 @@ def polygons(
         The value of a pixel in no polygon. The default is -1 with ``values="index"``, with other values the `nodata` of
         the `Grid`, or 0.
     crs : str, int or CRS, optional
-        That of the points, which go to that of the `Grid` by pyproj. Unless given they are in the grid's, and a
-        GeoSeries or GeoDataFrame that says another one is refused.
+        The CRS of the points; pyproj takes them to that of the `Grid`. The default is the grid's, and a
+        GeoSeries or GeoDataFrame with another one is refused.
     sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16"; "area"; "outer" or "inner"
         A pixel is inside when its centre is. With several samples, and with exact areas, masks are the share of the
         pixel that lies inside of any polygon (with "area" the sum of the polygons' shares, at most 1), and colours
@@ -100,9 +100,9 @@ def polygons(
         For "area", "outer" and "inner": how often rings may cross or touch within the picture; fifty million
         take some 4 s. Where more than 64 edges pass a pixel side by side, it counts as well.
     threads : int or None
-        Never changes a bit.
+        The result is the same to the bit.
     out : ndarray of the result's dtype, shape (H, W) or (H, W, C), optional
-        Where the result goes. A fresh array costs its first touch, several times what drawing few polygons costs.
+        Where the result goes. The first write to a fresh array takes several times as long as drawing few polygons.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def polygons(
     Notes
     -----
     Each pixel on a border that two polygons share belongs to exactly one of them: a point on an edge lies to the right
-    of it, or below. Areas are exact but for one rounding to ``2**-24`` for each edge that passes the pixel.
+    of it, or below. Areas are exact except for one rounding to ``2**-24`` for each edge that passes the pixel.
 
     References
     ----------
@@ -157,12 +157,10 @@ def polygons(
         prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
         warn_if_apart(prepared, given, size)
         if how in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER):
-            result, canvas = open_canvas(FRESH, "mask", out, shape, np.bool_)  # without a context: that is 2 us of 40
-            if canvas.size:
-                draw_binary(prepared, canvas.view(np.uint8), how, is_nonzero=is_nonzero, assume_valid=assume_valid)
-            if canvas is not result:
-                result[...] = canvas
-            return result
+            mask = Canvas.of(FRESH, "mask", out, shape, np.bool_)  # without a context: that is 2 us of 40
+            if mask.canvas.size:
+                draw_binary(prepared, mask.canvas.view(np.uint8), how, is_nonzero=is_nonzero, assume_valid=assume_valid)
+            return mask.drawn()
         with canvas_of(FRESH, "share", out, shape, np.float32) as (result, canvas):
             if not canvas.size:
                 pass

@@ -373,7 +373,7 @@ class Fragments:
         Parameters
         ----------
         camera : Camera
-            Who looked.
+            The camera of the picture.
 
         Returns
         -------

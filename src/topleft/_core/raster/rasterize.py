@@ -106,20 +106,30 @@ def canvas_of(
 
     `keep`: pixels of `out` stay where nothing is drawn.
     """
-    result, canvas = open_canvas(memory, name, out, shape, dtype)
+    pair = result, canvas = Canvas.of(memory, name, out, shape, dtype)
     if keep and canvas is not result:
         canvas[...] = result
-    yield result, canvas
-    if canvas is not result:
-        result[...] = canvas
+    yield pair
+    pair.drawn()
 
 
-def open_canvas(
-    memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the array to return, and a contiguous aligned one: the same wherever that one is."""
-    result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    return result, result if result.flags.carray else empty(shape, dtype)
+class Canvas(NamedTuple):
+    """An array to return, and a contiguous aligned one to draw into: the same wherever that one is."""
+
+    result: NDArray[Any]
+    canvas: NDArray[Any]
+
+    @classmethod
+    def of(cls, memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type) -> Canvas:
+        """Take the caller's array, if there is one, or memory of that name."""
+        result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
+        return cls(result, result if result.flags.carray else empty(shape, dtype))
+
+    def drawn(self) -> NDArray[Any]:
+        """Return the picture, where it is to be."""
+        if self.canvas is not self.result:
+            self.result[...] = self.canvas
+        return self.result
 
 
 def draw_area(
@@ -265,9 +275,6 @@ def draw_fragments(
     return ROUTES[route](memory, snapped, view, options, drawing).drawn_from(corners)
 
 
-Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
-
-
 def draw_labels(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids of triangles at depth 0; depth is written on first access."""
     with canvas_of(memory, "triangle", options.ids_out, view.size[::-1], np.int32) as (ids, canvas):
@@ -279,24 +286,24 @@ def draw_flat(memory: Memory, snapped: Snapped, view: View, options: FragmentOpt
     """Draw ids of triangles that all lie at one depth, and write it where they are."""
     earlier_wins = choices.earlier_wins(options.test, has_depth=snapped.has_depth)
     flat_depth = choices.first_depth(snapped.given.points, has_depth=snapped.has_depth)
-    with buffers_of(memory, view, options) as ((ids, depth), (ids_canvas, depth_canvas)):
-        draw(memory, snapped, view, drawing, ids_canvas, earlier_wins=earlier_wins)
+    ids, depth = buffers_of(memory, view, options)
+    draw(memory, snapped, view, drawing, ids.canvas, earlier_wins=earlier_wins)
 
-        def set_depth(first: int, end: int) -> None:
-            n_rows, background = end - first, options.background
-            engine.set_flat_depth(ids_canvas, depth_canvas, first, n_rows, earlier_wins, flat_depth, background)
+    def set_depth(first: int, end: int) -> None:
+        n_rows, background = end - first, options.background
+        engine.set_flat_depth(ids.canvas, depth.canvas, first, n_rows, earlier_wins, flat_depth, background)
 
-        run_parts(set_depth, len(ids), drawing.n_threads)
-        view.mark("depth")
-    return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+    run_parts(set_depth, view.size[1], drawing.n_threads)
+    view.mark("depth")
+    return Fragments(ids.drawn(), depth.drawn(), snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
 
 def draw_depth(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids and depth, compared at each sample."""
-    with buffers_of(memory, view, options) as ((ids, depth), (ids_canvas, depth_canvas)):
-        draw(memory, snapped, view, drawing, ids_canvas, depth=depth_canvas)
-        lay_background(ids_canvas, depth_canvas, drawing.sink, options.background)
-    return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+    ids, depth = buffers_of(memory, view, options)
+    draw(memory, snapped, view, drawing, ids.canvas, depth=depth.canvas)
+    lay_background(ids.canvas, depth.canvas, drawing.sink, options.background)
+    return Fragments(ids.drawn(), depth.drawn(), snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
 
 def draw_samples(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
@@ -318,7 +325,7 @@ def draw_samples(memory: Memory, snapped: Snapped, view: View, options: Fragment
     return Fragments.of_samples(ids, depth, own.meshes, snapped.n_vertices, snapped.n_triangles)
 
 
-def planes_of(memory: Memory, view: View) -> Buffers:
+def planes_of(memory: Memory, view: View) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return ids and depth of all samples to draw into, (S, H, W)."""
     (width, height), n = view.size, view.sampling.n_samples
     shape = n, height, width
@@ -361,15 +368,15 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, options: Frag
         return None
     if view.sampling.n_samples > 1:
         return draw_cluster_samples(memory, mesh, view, options, sink, route)
-    with buffers_of(memory, view, options) as ((ids, depth), (ids_canvas, depth_canvas)):
-        bounds = memory.empty("bounds", engine.Target.bounds_shape(*ids_canvas.shape), np.float32)
-        target = engine.Target(sink, ids_canvas, depth_canvas, None, bounds=bounds)
-        if not mesh.draw(memory, target, route):
-            return None
-        mesh.note_hidden(target)
-        lay_background(ids_canvas, depth_canvas, sink, options.background)
+    ids, depth = buffers_of(memory, view, options)
+    bounds = memory.empty("bounds", engine.Target.bounds_shape(*ids.canvas.shape), np.float32)
+    target = engine.Target(sink, ids.canvas, depth.canvas, None, bounds=bounds)
+    if not mesh.draw(memory, target, route):
+        return None
+    mesh.note_hidden(target)
+    lay_background(ids.canvas, depth.canvas, sink, options.background)
     view.mark("draw")
-    return Fragments(ids, depth, mesh.part, len(clusters.points), clusters.n_triangles)
+    return Fragments(ids.drawn(), depth.drawn(), mesh.part, len(clusters.points), clusters.n_triangles)
 
 
 def draw_cluster_samples(
@@ -395,15 +402,10 @@ def draw_cluster_samples(
     return Fragments.of_samples(ids, depth, parts, len(clusters.points), clusters.n_triangles)
 
 
-@contextmanager
-def buffers_of(memory: Memory, view: View, options: FragmentOptions) -> Iterator[tuple[Buffers, Buffers]]:
-    """Give ids and depth to return, and contiguous ones to draw into, as `canvas_of` does."""
+def buffers_of(memory: Memory, view: View, options: FragmentOptions) -> tuple[Canvas, Canvas]:
+    """Return where ids and depth are drawn."""
     shape = view.size[::-1]
     if options.ids_out is None and options.depth_out is None:
         check_fits(shape, np.int32, np.float32)
-    ids, ids_canvas = open_canvas(memory, "triangle", options.ids_out, shape, np.int32)
-    depth, depth_canvas = open_canvas(memory, "depth", options.depth_out, shape, np.float32)
-    yield (ids, depth), (ids_canvas, depth_canvas)
-    for result, canvas in ((ids, ids_canvas), (depth, depth_canvas)):
-        if canvas is not result:
-            result[...] = canvas
+    ids = Canvas.of(memory, "triangle", options.ids_out, shape, np.int32)
+    return ids, Canvas.of(memory, "depth", options.depth_out, shape, np.float32)

@@ -42,7 +42,7 @@ def coverage(
     size : (int, int), or int for a square
         Width and height of the picture in pixels.
     out : ndarray of bool (float32 for several samples and "area"), shape (H, W), optional
-        Where the result goes. A fresh array costs its first touch, several times what drawing a small mesh costs.
+        Where the result goes. The first write to a fresh array takes several times as long as drawing a small mesh.
     **view
         * transform : array_like, shape (4, 4). Clip space from object space.
         * origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
@@ -58,8 +58,8 @@ def coverage(
           compare with: `topleft.methods.CLASSICS` names them, and docs/guide/methods.md tells where each of them fails.
         * cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
         * clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
-        * near_clip, far_clip : bool. Whether that plane cuts.
-        * threads : int or None. Never changes a bit.
+        * near_clip, far_clip : bool. Whether that plane clips.
+        * threads : int or None. The result is the same to the bit.
         * plan : Plan or None. Of `plan`, for the same triangles: saves their conversion and check, and notes the times.
 
     Returns
@@ -172,16 +172,16 @@ def fill(
         covers multiplies alpha, or is the share of the way from the old colour to the new. With several samples a pixel
         each sample is blended by itself.
     alpha : "straight" or "premultiplied"
-        Whether colours and picture, the last of 2 or 4 channels alpha, have been multiplied by it. "over" looks at it,
-        and "replace" where colours meet in a pixel, by area or in the mean of samples. Numbers that are no colours want
-        "premultiplied": all channels alike.
+        Whether colours and picture, the last of 2 or 4 channels alpha, have been multiplied by it. "over" uses alpha,
+        and "replace" where a pixel mixes colours, by area or in the mean of samples. Choose "premultiplied" for
+        numbers that are no colours: all channels are treated alike.
     resolve : "values" or "linear"
         With several samples a pixel ("msaa4", say) each pixel is the mean of its samples: of their values as they are,
         or, for uint8, of the light that sRGB values stand for (alpha, the last of 2 or 4 channels, as it is).
     dtype : dtype of integers, optional
         `colors` are labels, (T,) or (T, C), and so is the picture: a pixel has exactly the numbers of its triangle.
     out : ndarray of uint8, float32 or `dtype`, shape (H, W, C) or (H, W), optional
-        Is drawn over.
+        The picture to draw over.
 
     Returns
     -------
@@ -257,7 +257,7 @@ def rasterize(
     Raises
     ------
     ValueError, TypeError, IndexError
-        As in `coverage`; also a vertex in use with a depth that float32 cannot hold.
+        As in `coverage`; also for a vertex in use with a depth outside float32.
 
     Notes
     -----
@@ -306,12 +306,12 @@ def wireframe(
     Parameters
     ----------
     vertices, triangles, size, **view
-        As in `coverage`; `method` makes no difference. `cull` leaves out the edges that only culled triangles have,
-        and degenerate triangles.
+        As in `coverage`; `method` makes no difference. `cull` leaves out degenerate triangles, and edges of culled
+        triangles alone.
     depth : Fragments or ndarray of float32, shape (H, W), optional
         Hides lines: a pixel of a line is drawn where its depth is at most `depth_bias` behind the buffer's.
     depth_test : "less" or "greater"
-        Which depth is the nearer one.
+        Whether the smaller or the larger depth is nearer.
     depth_bias : float
         In units of depth. An edge lies on the surface that hides it, which falls away from the edge within the pixel:
         take the change of depth from pixel to pixel. The default suits window depth, 0 to 1 over the whole view.

@@ -65,7 +65,7 @@ class _Entry:
 
 
 def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[], Material]]:
-    """The materials of a library: functions, since the pictures of those that nobody uses are not read.
+    """The materials of a library: functions, so that pictures of unused ones are not read.
 
     Parameters
     ----------

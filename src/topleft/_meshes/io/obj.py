@@ -60,6 +60,10 @@ def read_obj(source: InputFile) -> list[Mesh]:
     materials, row_of_face = _materials(text, source)
     triangles, faces = triangulate(positions, corners[:, 0], n_corners)
     rows = None if row_of_face is None else row_of_face[faces]
+    if rows is not None and len(uv):
+        is_bare = (corners[:, 1] == NONE)[triangles].any(axis=1)
+        if not is_bare.all() and any(materials[row].texture is not None for row in np.unique(rows[is_bare])):
+            source.notes.add("textures not spread on faces without texture coordinates")
     has_normal = (corners[:, 2] != NONE)[triangles].all(axis=1)
     parts = []
     for with_normals in (True, False):

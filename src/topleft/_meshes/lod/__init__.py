@@ -1,1 +1,1 @@
-"""Levels of detail: coarser meshes, with bounds on how far they lie from the finest."""
+"""Levels of detail: coarser meshes, with bounds on their distance from the finest."""

@@ -140,7 +140,7 @@ def joined(first: Collapsed, second: Collapsed) -> Collapsed:
 def gather(points: F64, triangles: I32, n_wanted: int, *, least_flat: float = 0.0) -> Collapsed:
     """The mesh with points that share a cell of a grid made one of them; open borders stay as they are.
 
-    So do cells in which the surface is less flat than asked for: 0 for a closed surface, 1 for a plane.
+    So do cells with a surface less flat than `least_flat`: 0 for a closed surface, 1 for a plane.
 
     The package does not touch needles, which the poles of a globe are made of. Cells are a third of a side of the
     triangles that are wanted, so no shape is lost that those could show.

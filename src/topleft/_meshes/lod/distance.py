@@ -62,7 +62,7 @@ class TriangleTree:
     ----------
     points : (V, 3) float64
     triangles : (T, 3) int32
-        At least one. Vertices at one place should have one index: it is by them that neighbours are known.
+        At least one. Vertices at one place should have one index: neighbours are found by them.
     """
 
     def __init__(self, points: F64, triangles: I32) -> None:

@@ -1,10 +1,10 @@
 """Makes coarser levels of a mesh, each with a bound on its distance from the mesh.
 
-In: a mesh. Out: `Levels`. Edges are collapsed by another package (`collapse.py`); our part is that nothing is believed:
+In: a mesh. Out: `Levels`. Edges are collapsed by another package (`collapse.py`); here
 each level is measured against the surface that it stands for (`distance.py`).
 
 A vertex of a level takes the attributes of the point that is nearest to it on the triangles round the vertices that
-went into it. Other triangles may be nearer, across a seam or a thin wall: they have no say.
+went into it. Other triangles may be nearer, across a seam or a thin wall: they are not read.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Input: colours, or a picture of all directions. Output: the kernels' inputs.
 
 A picture is turned from its equirectangular form into an octahedron unfolded to a square. Level k is for surfaces of
 roughness k / 8: light averaged over the facets of GGX seen from straight above (normal, view and mirrored
-direction are one). The two that see least of it are means of 64 directions, from halvings as large as the part that a
+direction are one). The two of the least roughness are means of 64 directions, from halvings as large as the part that a
 direction stands for; the others are sums over all texels of a halving.
 
 Based on: Engelhardt, T. and C. Dachsbacher, "Octahedron Environment Maps", 2008; Karis, B., "Real Shading in Unreal

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from topleft._core.base.arrays import as_number, as_vector
@@ -169,7 +170,7 @@ class Material:
             if value is not None and not isinstance(value, Texture):
                 raise TypeError(f"{name} must be a Texture, got {type(value).__name__}")
 
-    @property
+    @cached_property
     def is_metallic_rough(self) -> bool:
         """Whether it is lit as a metallic-rough surface of glTF."""
         return self.metallic is not None or self.roughness is not None

@@ -250,7 +250,7 @@ class Mesh:
 
     @cached_property
     def clusters(self) -> Clusters:
-        """The triangles sorted into clusters, of which a view draws some; made at the first use.
+        """The triangles sorted into clusters, so that a view draws only some; made at the first use.
 
         That takes about as long as drawing the mesh some twenty times, and keeps a copy of it of about 30 bytes a
         triangle. Meshes that are drawn more than once ask for it themselves:

@@ -6,8 +6,8 @@ draws as the lens would show the mesh.
 Kernels do it (`csrc/mesh/bend.c`): where the lens bends no edge of a triangle by half of the tolerance, by a bound on
 its second derivative, the triangle is not looked at. Other edges are halved (in space) where their picture, at a
 quarter, half or three quarters of their length, is off by more than the tolerance from that of a straight edge
-there, its depth too, unless it is shorter than a pixel there, or where they span a large angle. That is a question to
-the edge alone, and triangles that share an edge share its ends: so they split it alike, and no gap opens.
+there, its depth too, unless it is shorter than a pixel there, or where they span a large angle. The test
+reads the edge alone, so triangles that share it split it alike, and no gap opens.
 """
 
 from __future__ import annotations
@@ -87,8 +87,7 @@ class BentMesh:
     Attributes
     ----------
     points_eye : (V', 3) float64
-        Eye space, for `Camera.clip_from_eye`. First the vertices of the mesh, as far as they are
-        used, then those of parts.
+        Eye space, for `Camera.clip_from_eye`. First the vertices of the mesh that are used, then those of parts.
     triangles : (T', 3) int32
         Rows of `points_eye`; triangles that the lens cannot see are left out.
     parts : SubdividedTriangles or None

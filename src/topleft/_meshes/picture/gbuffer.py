@@ -88,7 +88,7 @@ class GBuffer:
     look : dict
         Further options of `render`, for colours.
     camera_to : Camera, optional
-        Who looks when the flow ends.
+        The camera at the end of the flow.
     transforms_to : (N, 4, 4) float64, optional
         Where the instances are then.
     rasterizer : Rasterizer, optional

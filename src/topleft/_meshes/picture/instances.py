@@ -274,7 +274,7 @@ class PlacedScene:
         return self.scene[i].mesh.clusters, self.view_of(i), int(self._numbers[i])
 
     def groups(self) -> Iterator[tuple[int, PlacedScene]]:
-        """Yield parts of the scene whose triangles int32 counts from 1 on, each with where its own ids begin."""
+        """Yield the first id and the placed instances of each part of the scene that int32 can count from 1 on."""
         for first, group in self.scene.groups:
             placed = PlacedScene(
                 self._drawn._replace(scene=group, whole=group), self._view, with_depth=self._with_depth,

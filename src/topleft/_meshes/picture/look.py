@@ -56,7 +56,7 @@ class CameraRays:
     eye_from, origin : (3, 3) and (3,) float64
         Eye space from shading space: `eye_from @ p + origin` up to a scale.
     scale : float
-        How many units of eye space one of the shading space is.
+        Units of eye space in one of the shading space.
     distance_start, distance_scale : float
         The distance along the view: `start + scale * w`, or `start + scale * depth` without perspective.
     """

@@ -373,7 +373,7 @@ def shade_normals(
     camera : Camera
         That of the picture.
     turn : (3, 3) float64
-        From eye space to where the normals are wanted.
+        From eye space to the space of the result.
     threads : int, optional
         Never changes a bit.
 

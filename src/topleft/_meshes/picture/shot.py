@@ -51,5 +51,7 @@ class Shot:
 
     def within(self, tolerance: float, **options: Any) -> Shot:
         """Return the shot of the levels of detail that a tolerance in pixels allows; options as for `choose_detail`."""
+        if type(tolerance) is float and not tolerance:  # unless given
+            return self
         scene = detailed(self.scene, self.camera, self.size, tolerance, **options)
         return self if scene is self.scene else replace(self, scene=scene)

@@ -3,7 +3,7 @@
 Costs that decide are then scaled, a choice after the other, so that less time is lost than with the shipped costs,
 which are kept where this does not hold for other scenes.
 
-In: seeded scenes. Out: `Costs`, with how far off their estimates are for scenes that were not fitted.
+In: seeded scenes. Out: `Costs`, with the errors of their estimates for scenes that were not fitted.
 """
 
 from __future__ import annotations

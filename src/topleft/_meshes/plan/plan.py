@@ -95,7 +95,7 @@ class Plan:
     threads : int
         How many draw.
     costs : str
-        Where the estimates come from, and how far off they are.
+        The source of the estimates, and their errors.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Scenes: meshes that stand in one world, each placed by a matrix, as often as wanted.
 
-Input: meshes and matrices; or another subject, a path, say. Output: a `Scene`, or the `Mesh`,
-`Scene` or `Points` that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
+Input: meshes and matrices; or another subject, a path, say. Output: a `Scene`, or the `Mesh`, `Scene` or `Points`
+that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
 """
 
 from __future__ import annotations
@@ -265,7 +265,7 @@ class Scene:
 
     @cached_property
     def groups(self) -> tuple[tuple[int, Scene], ...]:
-        """The scene in parts whose triangles int32 can count from 1 on, each with the index of its first instance."""
+        """The scene in parts that int32 can count from 1 on, each with the index of its first instance."""
         groups = []
         for first, end in counted_ranges(self.first_ids):
             part = unchecked_scene(self.instances[first:end], transforms=self.transforms[first:end])
@@ -358,7 +358,7 @@ class Scene:
 
 
 def counted_ranges(first_ids: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]]:
-    """Yield the ranges of instances whose triangles int32 can count from 1 on, by where the ids of each begin."""
+    """Yield ranges of instances that int32 can count the triangles of, from 1 on, by the first id of each instance."""
     first = 0
     while first < len(first_ids) - 1:
         end = int(np.searchsorted(first_ids, first_ids[first] + INT32_MAX, side="right")) - 1

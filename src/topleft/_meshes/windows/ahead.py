@@ -21,9 +21,8 @@ Made = TypeVar("Made")
 def in_order(make: Callable[[Item], Made], items: Iterable[Item], n_threads: int, n_ahead: int = 0) -> Iterator[Made]:
     """Yield the results of a function for items, in their order, on so many threads.
 
-    At most `n_ahead` are begun before they are taken, twice as many as there are threads unless given. With
-    one thread it is the caller's, and nothing is begun ahead. In a forked child, where the threads are not, the caller
-    makes the rest.
+    At most `n_ahead` are begun before they are taken, twice as many as there are threads unless given. With one thread
+    it is the caller's, and nothing is begun ahead. In a forked child, which has no threads, the caller makes the rest.
     """
     if n_threads == 1:
         yield from map(make, items)

@@ -1,7 +1,7 @@
 """Polygons as a huge raster: the windows that each of them may touch, and the pixels of a window.
 
-Input: rings in pixels, of any number of polygons. Output: an index of windows and a `Painter`, for
-`Tiles` in the place of triangles; each window is the crop of the picture that `polygons` draws, to the bit.
+Input: rings in pixels, of any number of polygons. Output: an index of windows and a `Painter`, for `Tiles`
+in the place of triangles; each window is the crop of the picture that `polygons` draws, to the bit.
 """
 
 from __future__ import annotations

@@ -1,9 +1,12 @@
-// Reads meshes without Python: OBJ, PLY, STL and GLB, triangles and polygons, without colours, textures and normals, which
-// a note tells. A broken file gets the sentence that Python's readers have.
-// In: bytes and a name. Out: {vertices: Float32Array or Float64Array (3 n), polygons or triangles, isSplit, lacks: [text]};
-// triangles are an Int32Array (3 t), polygons lists of vertices; isSplit: equal vertices are apart where an edge is sharp.
+// Reads meshes without Python: OBJ, PLY, STL and GLB, triangles and polygons; of OBJ and PLY colours and normals of vertices,
+// too. What is left out a note tells. A broken file gets the sentence that Python's readers have.
+// In: bytes and a name. Out: {vertices: Float32Array or Float64Array (3 n), polygons or triangles, isSplit, lacks: [text],
+// colors: Uint8Array (4 n), normals: Float64Array (3 n)}; triangles are an Int32Array (3 t), polygons lists of vertices;
+// isSplit: equal vertices are apart where an edge is sharp.
 
-const NOT_HERE = "colours, textures, materials and normals of files are drawn by Python alone";
+import {rint} from "./pixels.js";
+
+const NOT_HERE = "textures, materials, opacity, colours of faces, and of GLB files colours and normals, are drawn by Python alone";
 
 class Broken extends Error {}
 const broken = (text) => {
@@ -51,28 +54,80 @@ function stlOfText(text) {
   return {vertices: Float64Array.from(numbers), triangles: Int32Array.from({length: numbers.length / 3}, (_, i) => i), lacks: []};
 }
 
+// Colours of bytes, 4 a vertex, of three or four columns; and whether all are opaque, as they are drawn here.
+function colorsOf(columns, scale) {
+  const colors = new Uint8Array(4 * columns[0].length).fill(255), byteOf = (value) => rint(Math.min(255, Math.max(0, (value || 0) * scale)));
+  columns.slice(0, 3).forEach((column, k) => column.forEach((value, i) => (colors[4 * i + k] = byteOf(value))));
+  return {colors, isOpaque: (columns[3] ?? []).every((value) => byteOf(value) === 255)};
+}
+const mostOf = (columns, least) => columns.reduce((high, column) => column.reduce((most, value) => value > most ? value : most, high), least);
+
+// Columns as rows.
+function together(columns, kind = Float64Array) {
+  const rows = new kind(columns.length * columns[0].length);
+  columns.forEach((column, k) => column.forEach((value, i) => (rows[columns.length * i + k] = value)));
+  return rows;
+}
+
 function readObj(bytes) {
   if (bytes.includes(0)) broken("it is not text");
-  const vertices = [], polygons = [], other = new Set();
+  const positions = [], colors = [], normals = [], faces = [], other = new Set();
+  let nUv = 0, leastWidth = Infinity;
   for (const line of new TextDecoder().decode(bytes).replace(/\\\r?\n/g, " ").split(/[\r\n]+/)) {
     const words = line.replace(/#.*/, "").trim().split(/\s+/);
     if (words[0] === "v") {
-      if (words.length < 4) broken(`its vertex ${vertices.length / 3 + 1} has ${words.length - 1} of 3 numbers`);
-      for (let k = 1; k < 4; k++) vertices.push(Number(words[k]));
-    } else if (words[0] === "f" || words[0] === "fo") {
-      const n = vertices.length / 3;
-      polygons.push(words.slice(1).map((word) => {
-        const index = /^-?\d+(?:\/-?\d*){0,2}$/.test(word) ? Number.parseInt(word, 10)
-          : broken(/^[-\d/]+$/.test(word) ? "a face of it is no list of indices" : "a number in it is none");
-        if (index === 0) broken("a face names v 0: they count from 1");
-        if (n + index < 0) broken("a face names a v line before the first");
-        return index < 0 ? n + index : index - 1;
+      if (words.length < 4) broken(`its vertex ${positions.length / 3 + 1} has ${words.length - 1} of 3 numbers`);
+      for (let k = 1; k < 4; k++) positions.push(Number(words[k]));
+      leastWidth = Math.min(leastWidth, words.length - 1);
+      if (leastWidth >= 6) colors.push(words.slice(4, 8).map(Number));
+    } else if (words[0] === "vn") normals.push([1, 2, 3].map((k) => Number(words[k] ?? 0)));
+    else if (words[0] === "vt") nUv++;
+    else if (words[0] === "f" || words[0] === "fo") {
+      const above = [positions.length / 3, nUv, normals.length];
+      faces.push(words.slice(1).map((word) => {
+        if (!/^-?\d+(?:\/-?\d*){0,2}$/.test(word)) broken(/^[-\d/]+$/.test(word) ? "a face of it is no list of indices" : "a number in it is none");
+        return word.split("/").map((text, k) => {
+          const index = Number.parseInt(text || "0", 10), key = ["v", "vt", "vn"][k];
+          if (index === 0 && k === 0) broken("a face names v 0: they count from 1");
+          if (index < 0 && above[k] + index < 0) broken(`a face names a ${key} line before the first`);
+          return index < 0 ? above[k] + index : index - 1;
+        });
       }));
-    } else if (["vt", "vn", "usemtl"].includes(words[0])) other.add(words[0]);
+    } else if (words[0] === "usemtl") other.add(words[0]);
   }
-  const n = vertices.length / 3, most = polygons.reduce((high, face) => face.reduce((a, b) => Math.max(a, b), high), -1) + 1;
+  const n = positions.length / 3, most = faces.reduce((high, face) => face.reduce((found, [v]) => Math.max(found, v), high), -1) + 1;
   if (most > n) broken(`a face names v ${most} of ${n}`);
-  return {vertices: Float64Array.from(vertices), polygons, lacks: other.size ? [NOT_HERE] : []};
+  const found = {vertices: Float64Array.from(positions), polygons: faces.map((face) => face.map(([v]) => v)), lacks: other.size || nUv ? [NOT_HERE] : []};
+  if (n && leastWidth >= 6) {
+    const columns = [0, 1, 2, 3].slice(0, leastWidth >= 7 ? 4 : 3).map((k) => Float64Array.from(colors, (row) => row[k]));
+    const {colors: own, isOpaque} = colorsOf(columns, mostOf(columns, -Infinity) <= 1 ? 255 : 1);
+    found.colors = own;
+    if (!isOpaque) found.lacks = [NOT_HERE];
+  }
+  const corners = faces.filter((face) => face.length > 2).flat();
+  if (!corners.some(([, , vn]) => vn >= 0)) return found;
+  if (corners.every(([, , vn]) => vn >= 0 && vn < normals.length)) return withNormals(found, faces, normals);
+  return {...found, lacks: [NOT_HERE]};
+}
+
+// Vertices that have one normal each: a row of positions, texture coordinates and normals that faces name together.
+function withNormals(found, allFaces, normals) {
+  const faces = allFaces.filter((face) => face.length > 2), corners = faces.flat(), hasUv = corners.some(([, vt]) => vt >= 0);
+  if (!hasUv && corners.every(([v, , vn]) => v === vn)) {
+    const n = found.vertices.length / 3;
+    return {...found, normals: Float64Array.from(Array.from({length: n}, (_, i) => normals[i % normals.length]).flat())};
+  }
+  const rows = new Map(), used = [];
+  const polygons = faces.map((face) => face.map(([v, vt = -1, vn]) => {
+    const key = `${v} ${hasUv ? vt : ""} ${vn}`;
+    if (!rows.has(key)) rows.set(key, used.push([v, vn]) - 1);
+    return rows.get(key);
+  }));
+  return {
+    ...found, polygons, vertices: Float64Array.from(used.flatMap(([v]) => Array.from(found.vertices.subarray(3 * v, 3 * v + 3)))),
+    normals: Float64Array.from(used.flatMap(([, vn]) => normals[vn])),
+    colors: found.colors && Uint8Array.from(used.flatMap(([v]) => Array.from(found.colors.subarray(4 * v, 4 * v + 4)))),
+  };
 }
 
 const TYPES = {
@@ -116,34 +171,64 @@ function numbersOf(bytes, {format, start}) {
   };
 }
 
+// A number as its type holds it: text may have others.
+const LIMITS = {Int8: [-128, 127], Uint8: [0, 255], Int16: [-32768, 32767], Uint16: [0, 65535], Int32: [-(2 ** 31), 2 ** 31 - 1], Uint32: [0, 2 ** 32 - 1]};
+function castTo([kind], value) {
+  if (!(kind in LIMITS)) return kind === "Float32" ? Math.fround(value) : value;
+  const [low, high] = LIMITS[kind];
+  return Math.trunc(Math.min(high, Math.max(low, value || 0)));
+}
+
+// Where the columns of one of several choices of names are, in the order of the names; null where none is there.
+function columnsOf(properties, choices) {
+  const found = choices.map((names) => names.map((name) => properties.findIndex((one) => one.name === name && !one.count)));
+  return found.find((columns) => !columns.includes(-1)) ?? null;
+}
+
+// The colours of vertices: bytes, 16 bits, or floats of 0 to 1.
+function plyColors(properties, columns) {
+  const at = columnsOf(properties, [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"]]);
+  if (!at) return null;
+  const prefix = properties[at[0]].name.slice(0, -3), alpha = columnsOf(properties, [[`${prefix}alpha`], ["alpha"]]) ?? [];
+  const [kind] = properties[at[0]].type, own = [...at, ...alpha].map((k) => columns[k]);
+  return colorsOf(own, kind === "Uint16" ? 1 / 257 : kind.startsWith("Float") && mostOf(own, 0) <= 1 ? 255 : 1);
+}
+
+// What the columns of the vertices are, and whether the file says more of them.
+function plyVertices(properties, columns) {
+  const axes = columnsOf(properties, [["x", "y", "z"]]), normals = columnsOf(properties, [["nx", "ny", "nz"]]);
+  const isNarrow = axes.every((k) => properties[k].type[0] === "Float32"), picked = (at) => at.map((k) => columns[k]);
+  const colors = plyColors(properties, columns), hasUv = columnsOf(properties, [["u", "v"], ["s", "t"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]]) !== null;
+  return {
+    vertices: together(picked(axes), isNarrow ? Float32Array : Float64Array), hasMore: hasUv || colors?.isOpaque === false,
+    ...normals && {normals: together(picked(normals))}, ...colors && {colors: colors.colors},
+  };
+}
+
 function readPly(bytes) {
-  const header = plyHeader(bytes), next = numbersOf(bytes, header);
-  let vertices = null, polygons = [], lacks = [];
+  const header = plyHeader(bytes), next = numbersOf(bytes, header), polygons = [];
+  let found = null, hasMore = false;
   for (const {name, n, properties} of header.elements) {
     const ended = () => broken(`it ends within its ${n} rows of ${name}`), take = (type) => next(type) ?? ended();
-    const axes = ["x", "y", "z"].map((axis) => properties.findIndex((one) => one.name === axis));
-    if (name === "vertex") {
-      if (axes.includes(-1)) broken("its vertices have no x, y and z");
-      const isWide = axes.some((k) => properties[k].type[0] === "Float64");
-      vertices = new (isWide ? Float64Array : Float32Array)(3 * Math.min(n, bytes.length));
-      if (properties.length > 3) lacks = [NOT_HERE];
-    }
+    const columns = name === "vertex" ? properties.map(() => new Float64Array(Math.min(n, bytes.length))) : null;
+    if (columns && !columnsOf(properties, [["x", "y", "z"]])) broken("its vertices have no x, y and z");
+    const takeList = (type, count) => {
+      const many = take(count);
+      if (!(many >= 0 && Number.isInteger(many))) broken(`a list of it has ${many} entries`);
+      return Array.from({length: Math.min(many, bytes.length)}, () => take(type));
+    };
     for (let i = 0; i < n; i++) {
-      properties.forEach((property, k) => {
-        if (!property.count) {
-          const value = take(property.type), axis = axes.indexOf(k);
-          if (name === "vertex" && axis >= 0) vertices[3 * i + axis] = value;
-          return;
-        }
-        const many = take(property.count);
-        if (!(many >= 0 && Number.isInteger(many))) broken(`a list of it has ${many} entries`);
-        const row = Array.from({length: Math.min(many, bytes.length)}, () => take(property.type));
-        if (name === "face" && /^vertex_ind/.test(property.name)) polygons.push(row);
+      properties.forEach(({name: own, type, count}, k) => {
+        const value = count ? takeList(type, count) : take(type);
+        if (columns && !count) columns[k][i] = castTo(type, value);
+        if (name === "face" && count && /^vertex_ind/.test(own)) polygons.push(value);
       });
     }
+    if (columns) found = plyVertices(properties, columns);
+    if (name === "face") hasMore ||= properties.some((one) => /^texcoord|^texnumber|^(diffuse_)?red$/.test(one.name));
   }
-  if (!vertices) broken("it has no vertices");
-  return {vertices, polygons, lacks};
+  if (!found) broken("it has no vertices");
+  return {...found, polygons, lacks: hasMore || found.hasMore ? [NOT_HERE] : []};
 }
 
 // Binary glTF: the meshes of all nodes of the scene, placed by their matrices.

@@ -145,11 +145,13 @@ export class Kernels {
 
   // Takes a mesh: what was there before is gone. Returns its box, {ends}, the middle of that, {center}, as a number of the
   // vertices {origin}, and how far it reaches from there, {radius}.
-  takeMesh(vertices, triangles, leastCosine) {
+  // `colors` (Uint8Array, 4 n) with `decode`, the light of each value, and `normals` (Float64Array, 3 n) are those of a file.
+  takeMesh({vertices, triangles, colors, normals, decode}, leastCosine) {
     this.exports.web_release(this.start);
     this.isF64 = vertices instanceof Float64Array;
     const box = this.room(48), points = this.put(vertices), corners = this.put(triangles);
-    const n = this.check(this.exports.web_take_mesh(points, Number(this.isF64), vertices.length / 3, corners, triangles.length / 3, leastCosine, box));
+    const given = this.put(Uint32Array.of(...[colors, normals, colors && decode].map((array) => array ? this.put(array) : 0)));
+    const n = this.check(this.exports.web_take_mesh(points, Number(this.isF64), vertices.length / 3, corners, triangles.length / 3, leastCosine, given, box));
     this.counts = {n_vertices: n, n_triangles: triangles.length / 3};
     this.mesh = this.exports.web_used();
     const ends = this.get(Float64Array, box, 6), center = [0, 1, 2].map((k) => ends[k] / 2 + ends[3 + k] / 2);

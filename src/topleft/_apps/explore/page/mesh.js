@@ -19,7 +19,8 @@ function take(kernels, data, {polygons, ...file}, name) {
 
 // The kernels hold one mesh; what it was made of stays here.
 function taken(kernels, data, given, name) {
-  const cosine = given.isSplit ? -2 : cosineAndSine(data.mesh.crease)[0], bounds = kernels.takeMesh(given.vertices, given.triangles, cosine);
+  const cosine = given.isSplit ? -2 : cosineAndSine(data.mesh.crease)[0], decode = Float32Array.from(data.mesh.light_of_srgb);
+  const bounds = kernels.takeMesh({...given, decode}, cosine);
   return {name, lacks: given.lacks, bounds, counts: kernels.counts, given};
 }
 
@@ -57,7 +58,7 @@ function parse(given, data) {
 function lookOf(view, camera, data) {
   const {hasPerspective, eye, ray, eyeFrom} = raysOf(camera, shown.bounds.origin, view.size), {light, material} = data.mesh;
   const toLight = [0, 1, 2].map((i) => eyeFrom.reduce((sum, row, k) => sum + row[i] * light.to[k], 0));
-  const numbers = [...eye, ...ray.flat(), ...eyeFrom.flat(), ...toLight, light.color, light.ambient, ...material.color, material.specular, material.shininess, 0, 0, 0, 0];
+  const numbers = [...eye, ...ray.flat(), ...eyeFrom.flat(), ...toLight, light.color, light.ambient, ...(shown.given.colors ? [1, 1, 1] : material.color), material.specular, material.shininess, 0, 0, 0, 0];
   const look = new Uint8Array(4 * numbers.length + 20), [red, green, blue] = view.background ?? [0, 0, 0], isOpaque = "background" in view;
   numbers.splice(-4, 4, ...[red, green, blue].map((value) => data.mesh.light_of_srgb[value]), isOpaque ? 1 : 0);
   new Float32Array(look.buffer, 0, numbers.length).set(numbers);

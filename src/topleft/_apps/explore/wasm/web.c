@@ -178,61 +178,122 @@ static struct {
     int32_t *normal_of_corner;
     float *face_normals;
     uint8_t *is_turned; /* NULL: of no triangle */
+    float *colors;      /* (n, 4), or NULL */
+    const float *decode;
 } mesh;
 
-/* Makes vertices that are equal one, in their order, and names them in the triangles.  Returns how many are left. */
-static int merge_vertices(void *vertices, int is_f64, int n, int32_t *triangles, int n_triangles)
+/* Groups of equal rows of words: the first row of each, in their order, and the group of each row, as coincident of
+ * topleft._meshes.model.mesh has them; both NULL where many hashes meet.  Returns how many, or WEB_FULL. */
+static int group_equal(const void *rows, int n_words, int n, int32_t **first, int32_t **group)
 {
-    const int n_bytes = is_f64 ? 24 : 12;
     int table_bits = 4;
     while ((int64_t)1 << table_bits < 2 * (int64_t)n)
         table_bits++;
+    int32_t *table = web_room((size_t)4 << table_bits);
+    *first = web_room(4 * (size_t)n), *group = web_room(4 * (size_t)n);
+    if (!table || !*first || !*group)
+        return WEB_FULL;
+    memset(table, 0xff, (size_t)4 << table_bits);
+    const int64_t n_groups = K.group_rows(rows, n_words, n, table_bits, table, *first, *group);
+    if (n_groups >= 0)
+        return (int)n_groups;
+    *first = *group = NULL;
+    return n;
+}
+
+/* Makes vertices one that are equal, colours (n, 4) and all, if there are any, in their order, and names them in the triangles.
+ * Returns how many are left, or WEB_FULL. */
+static int merge_vertices(void *vertices, int is_f64, uint8_t *colors, int n, int32_t *triangles, int n_triangles)
+{
+    const int n_bytes = is_f64 ? 24 : 12, n_words = n_bytes / 4 + (colors != NULL);
+    uint8_t *rows = vertices;
+    int32_t *first, *group;
     for (int i = 0; i < 3 * n; i++) /* no -0 */
         if (is_f64)
             ((double *)vertices)[i] += 0.0;
         else
             ((float *)vertices)[i] += 0.0f;
-    const size_t table_bytes = (size_t)4 << table_bits;
-    int32_t *table = web_room(table_bytes), *first = web_room(4 * (size_t)n), *group = web_room(4 * (size_t)n);
-    if (!table || !first || !group)
-        return WEB_FULL;
-    memset(table, 0xff, table_bytes);
-    const int64_t n_groups = K.group_rows(vertices, n_bytes / 4, n, table_bits, table, first, group);
-    if (n_groups < 0)
-        return n; /* many hashes meet: they stay apart */
-    for (int64_t i = 0; i < n_groups; i++)
+    if (colors) {
+        if (!(rows = web_room((size_t)n * 4 * (size_t)n_words)))
+            return WEB_FULL;
+        for (int64_t i = 0; i < n; i++) {
+            memcpy(rows + 4 * n_words * i, (uint8_t *)vertices + n_bytes * i, (size_t)n_bytes);
+            memcpy(rows + 4 * n_words * i + n_bytes, colors + 4 * i, 4);
+        }
+    }
+    const int n_groups = group_equal(rows, n_words, n, &first, &group);
+    if (n_groups < 0 || !first)
+        return n_groups;
+    for (int64_t i = 0; i < n_groups; i++) {
         memmove((uint8_t *)vertices + n_bytes * i, (uint8_t *)vertices + (int64_t)n_bytes * first[i], (size_t)n_bytes);
+        if (colors)
+            memmove(colors + 4 * i, colors + 4 * (int64_t)first[i], 4);
+    }
     for (int i = 0; i < 3 * n_triangles; i++)
         triangles[i] = group[triangles[i]];
-    return (int)n_groups;
+    return n_groups;
+}
+
+/* The places of a mesh: its vertices, those that are equal but for their colours as one; and the triangles of places. */
+typedef struct {
+    tl_source points;
+    const int32_t *triangles, *of_vertex; /* of_vertex NULL: each vertex is a place */
+} web_places;
+
+static int find_places(web_places *places)
+{
+    const size_t n_bytes = mesh.source.scalar == TL_F64 ? 24 : 12;
+    const uint8_t *vertices = mesh.source.data;
+    int32_t *first, *group;
+    *places = (web_places){mesh.source, mesh.triangles, NULL};
+    if (!mesh.colors)
+        return 0;
+    const int n = group_equal(vertices, (int)n_bytes / 4, (int)mesh.source.n, &first, &group);
+    if (n < 0 || !first || n == mesh.source.n)
+        return n < 0 ? n : 0;
+    uint8_t *points = web_room(n_bytes * (size_t)n);
+    int32_t *corners = web_room(12 * (size_t)mesh.n_triangles);
+    if (!points || !corners)
+        return WEB_FULL;
+    for (int i = 0; i < n; i++)
+        memcpy(points + n_bytes * (size_t)i, vertices + n_bytes * (size_t)first[i], n_bytes);
+    for (int64_t i = 0; i < 3 * (int64_t)mesh.n_triangles; i++)
+        corners[i] = group[mesh.triangles[i]];
+    places->points.data = points, places->points.n = n;
+    places->triangles = corners, places->of_vertex = group;
+    return 0;
 }
 
 /* The normals of vertices and of corners at edges that bend by more than the crease angle, as creased_normals of
  * topleft._meshes.model.normals has them.  Returns 0 or WEB_FULL. */
 static int crease_normals(double least_cosine)
 {
-    const size_t n = (size_t)mesh.n_triangles, n_vertices = (size_t)mesh.source.n;
-    double *normals = web_room(24 * n), *angles = web_room(24 * n);
-    int32_t *starts = web_room(4 * (n_vertices + 1)), *corners = web_room(12 * n), *groups = web_room(12 * n);
-    int32_t *n_groups = web_room(4 * n_vertices), *group_starts = web_room(4 * (n_vertices + 1));
-    double *of_vertices = web_room(24 * n_vertices);
-    if (!normals || !angles || !starts || !corners || !groups || !n_groups || !group_starts || !of_vertices)
+    web_places places;
+    if (find_places(&places))
         return WEB_FULL;
-    K.face_angles(&mesh.source, mesh.triangles, 0, mesh.n_triangles, normals, angles);
-    K.list_corners(mesh.triangles, mesh.n_triangles, mesh.source.n, starts, corners);
+    const size_t n = (size_t)mesh.n_triangles, n_places = (size_t)places.points.n;
+    double *normals = web_room(24 * n), *angles = web_room(24 * n);
+    int32_t *starts = web_room(4 * (n_places + 1)), *corners = web_room(12 * n), *groups = web_room(12 * n);
+    int32_t *n_groups = web_room(4 * n_places), *group_starts = web_room(4 * (n_places + 1));
+    double *of_places = web_room(24 * n_places);
+    float *rows = places.of_vertex ? web_room(16 * n_places) : mesh.normals;
+    if (!normals || !angles || !starts || !corners || !groups || !n_groups || !group_starts || !of_places || !rows)
+        return WEB_FULL;
+    K.face_angles(&places.points, places.triangles, 0, mesh.n_triangles, normals, angles);
+    K.list_corners(places.triangles, mesh.n_triangles, places.points.n, starts, corners);
     size_t most = 0;
-    for (size_t i = 0; i < n_vertices; i++)
+    for (size_t i = 0; i < n_places; i++)
         if ((size_t)(starts[i + 1] - starts[i]) > most)
             most = (size_t)(starts[i + 1] - starts[i]);
-    const tl_fans fans = {mesh.triangles, starts, corners, normals, angles, least_cosine};
+    const tl_fans fans = {places.triangles, starts, corners, normals, angles, least_cosine};
     uint64_t *room = web_room(40 * most);
     if (!room)
         return WEB_FULL;
-    K.find_creases(&fans, 0, mesh.source.n, room, groups, n_groups);
+    K.find_creases(&fans, 0, places.points.n, room, groups, n_groups);
     group_starts[0] = 0;
-    for (size_t i = 0; i < n_vertices; i++)
+    for (size_t i = 0; i < n_places; i++)
         group_starts[i + 1] = group_starts[i] + n_groups[i];
-    const int32_t n_more = group_starts[n_vertices];
+    const int32_t n_more = group_starts[n_places];
     double *of_groups = web_room(24 * ((size_t)n_more + 1));
     if (!of_groups)
         return WEB_FULL;
@@ -240,43 +301,61 @@ static int crease_normals(double least_cosine)
                                 .groups = groups,
                                 .own_triangles = mesh.triangles,
                                 .first_row = mesh.source.n,
-                                .of_vertices = of_vertices,
+                                .of_vertices = of_places,
                                 .of_groups = of_groups,
                                 .row_of_corner = n_more ? mesh.normal_of_corner : NULL};
-    K.sum_creases(&fans, &creases, 0, mesh.source.n);
-    tl_source rows = {.data = of_vertices, .scalar = TL_F64, .n_components = 3, .n = mesh.source.n};
-    K.unit_vectors(&rows, NULL, 0, rows.n, NULL, mesh.normals);
-    rows.data = of_groups, rows.n = n_more;
-    K.unit_vectors(&rows, NULL, 0, rows.n, NULL, mesh.normals + 4 * mesh.source.n);
+    K.sum_creases(&fans, &creases, 0, places.points.n);
+    tl_source vectors = {.data = of_places, .scalar = TL_F64, .n_components = 3, .n = places.points.n};
+    K.unit_vectors(&vectors, NULL, 0, vectors.n, NULL, rows);
+    for (int64_t i = 0; places.of_vertex && i < mesh.source.n; i++)
+        memcpy(mesh.normals + 4 * i, rows + 4 * (int64_t)places.of_vertex[i], 16);
+    vectors.data = of_groups, vectors.n = n_more;
+    K.unit_vectors(&vectors, NULL, 0, vectors.n, NULL, mesh.normals + 4 * mesh.source.n);
     if (!n_more)
         mesh.normal_of_corner = NULL;
     return 0;
 }
 
-/* Takes float32 or float64 vertices (n, 3) and triangles whose indices were checked; both are changed where vertices are equal.
- * With a cosine below -1 equal vertices stay apart, and all edges between triangles that share vertices are smooth.
- * Writes the box round the triangles, low and high.  Returns how many vertices are left, or WEB_FULL. */
+/* What a file says of vertices: sRGB and opacity, and vectors; NULL where it does not; and the light of an sRGB value. */
+typedef struct {
+    uint8_t *colors;
+    const double *normals;
+    const float *decode;
+} web_attributes;
+
+/* Takes float32 or float64 vertices (n, 3) and triangles whose indices were checked; all are changed where vertices are
+ * equal.  With normals, or with a cosine below -1, equal vertices stay apart; with the second, all edges between
+ * triangles that share vertices are smooth.  Writes the box round the triangles, low and high.  Returns how many
+ * vertices are left, or WEB_FULL. */
 WEB_EXPORT(web_take_mesh)
 int web_take_mesh(void *vertices, int is_f64, int n, int32_t *triangles, int n_triangles, double least_cosine,
-                  double *box)
+                  const web_attributes *given, double *box)
 {
     const size_t t = (size_t)n_triangles, most_rows = (size_t)n + 3 * t;
     memset(&mesh, 0, sizeof mesh);
     mesh.normals = web_room(16 * most_rows), mesh.normal_of_corner = web_room(12 * t);
     mesh.face_normals = web_room(16 * t), mesh.is_turned = web_room(t);
+    mesh.colors = given->colors ? web_room(16 * (size_t)n) : NULL, mesh.decode = given->decode;
     const uintptr_t before = used;
-    if (!mesh.normals || !mesh.normal_of_corner || !mesh.face_normals || !mesh.is_turned)
+    if (!mesh.normals || !mesh.normal_of_corner || !mesh.face_normals || !mesh.is_turned ||
+        (given->colors && !mesh.colors))
         return WEB_FULL;
-    const int left = least_cosine < -1.0 ? n : merge_vertices(vertices, is_f64, n, triangles, n_triangles);
+    const int is_kept = given->normals || least_cosine < -1.0;
+    const int left = is_kept ? n : merge_vertices(vertices, is_f64, given->colors, n, triangles, n_triangles);
     used = before;
     if (left < 0)
         return left;
     mesh.source = (tl_source){.data = vertices, .scalar = is_f64 ? TL_F64 : TL_F32, .n_components = 3, .n = left};
     mesh.triangles = triangles, mesh.n_triangles = n_triangles;
-    const int status = crease_normals(least_cosine);
+    if (given->colors)
+        K.color_rows(given->colors, 4, 0, left, mesh.colors);
+    if (given->normals) {
+        const tl_source vectors = {.data = given->normals, .scalar = TL_F64, .n_components = 3, .n = n};
+        K.unit_vectors(&vectors, NULL, 0, n, NULL, mesh.normals);
+        mesh.normal_of_corner = NULL;
+    } else if (crease_normals(least_cosine))
+        return WEB_FULL;
     used = before;
-    if (status)
-        return status;
     K.face_normals(&mesh.source, triangles, 0, n_triangles, NULL, mesh.face_normals);
     K.find_turned(&mesh.source, triangles, 0, n_triangles, mesh.normals,
                   mesh.normal_of_corner ? mesh.normal_of_corner : triangles, mesh.is_turned);
@@ -370,6 +449,8 @@ static void set_look(const web_look *look, tl_shading *s, tl_material *material,
                       .positions = mesh.source.data,
                       .is_f64 = mesh.source.scalar == TL_F64,
                       .is_turned = look->is_flat ? NULL : mesh.is_turned,
+                      .colors = mesh.colors,
+                      .decode = mesh.decode,
                       .front_side = 1,
                       .materials = material,
                       .n_materials = 1,

@@ -1,0 +1,217 @@
+/* Attributes of float32 at pixels backward, at once to vertices and attributes: what values.c and points.c give one
+ * after the other, in one pass over the pixels, without the gradient of `rast`.
+ * In: `rast`, attributes, gradients of their picture.  Out: sums by vertex, sums by row of attributes.
+ *
+ * With a_k and the total as in points.c, an attribute is P / total, P = sum A_k a_k; here A_k are less that of the last
+ * corner.  So a triangle needs the sums of h = g / total and of h_total = -sum h P / total, as they are, times X and
+ * times Y: gradients of A_k are those of h with q_k, and those of a_k are sum A_k h + h_total. */
+#ifndef TL_GRAD_COLORS_C
+#define TL_GRAD_COLORS_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "grad/pixels.h"
+#include "grad/points.c"
+#include "grad/spans.h"
+#include "grad/values.c"
+#include "lanes/lanes.h"
+#include "lanes/quads.h"
+
+/* Where the sums of three attributes from `first` on stand: twelve. */
+TL_INLINE int64_t sums_of_three(int64_t first) { return FACE_X + first / 3 * TL_SUMS_OF_THREE; }
+
+/* Finds the rows of attributes of runs, which may be others than those of the points; what has none shows nothing. */
+TL_INLINE void find_color_rows(grad_span *s, const tl_grad_colors *p)
+{
+    const vi rows = vi_set1(clamped_to_int(p->values.n_attr));
+    for (int r = 0; r < s->n_runs; r += TL_LANES) {
+        const vi id = vi_load(s->ids + r), id_3 = vi_add(id, vi_add(id, id));
+        const vm wanted = vm_and(vm_first(s->n_runs - r), vi_gt(id, vi_set1(-1)));
+        vm found = wanted;
+        for (int k = 0; k < 3; k++) {
+            const vi row = vi_gather(wanted, p->corners + k, id_3);
+            found = vm_and(found, vi_gt_unsigned(rows, row));
+            vi_store(s->corners[k] + r, row);
+        }
+        for (int k = 0; k < TL_LANES && vm_any(vm_and_not(wanted, found)); k++)
+            if (vm_bits(vm_and_not(wanted, found)) >> k & 1)
+                s->bad_id = s->ids[r + k], s->ids[r + k] = -1;
+    }
+}
+
+/* Sets the quads of runs: planes of n attributes from `first` on, at most three, and the total. */
+TL_INLINE void set_color_quads(grad_span *s, const tl_grad_values *v, int64_t first, int n)
+{
+    const vf zero = vf_set1(0.0f);
+    for (int r = 0; r < s->n_runs; r += TL_LANES) {
+        const vm m = vm_and(vm_first(s->n_runs - r), vi_gt(vi_load(s->ids + r), vi_set1(-1)));
+        vf begin[4] = {zero, zero, zero, vf_set1(1.0f)},
+           step[4] = {zero, zero, zero, vf_load(s->numbers[POINT_TOTAL_X] + r)};
+        for (int c = 0; c < n; c++) {
+            vf at[3];
+            for (int k = 0; k < 3; k++) {
+                const vi row = vi_mul(vi_load(s->corners[k] + r), vi_set1((int32_t)v->n_columns));
+                at[k] = vf_of_bits(vi_gather(m, (const int32_t *)v->attr + first + c, row));
+            }
+            const vf by_u = vf_sub(at[0], at[2]), by_v = vf_sub(at[1], at[2]);
+            begin[c] =
+                vf_add(vf_mul(by_u, vf_load(s->numbers[POINT_U] + r)), vf_mul(by_v, vf_load(s->numbers[POINT_V] + r)));
+            step[c] = vf_add(vf_mul(by_u, vf_load(s->numbers[POINT_U_X] + r)),
+                             vf_mul(by_v, vf_load(s->numbers[POINT_V_X] + r)));
+        }
+        set_quads(s, 0, r, begin), set_quads(s, 1, r, step);
+    }
+}
+
+/* Gradients of n attributes, n_columns numbers a pixel, at four pixels; zeros beyond the n_pixels. */
+TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_t n_columns)
+{
+    float some[16] = {0};
+    if (n == n_columns)
+        return vq4_load(g_out, n_pixels, n);
+    for (int64_t k = 0; k < 4 && k < n_pixels; k++)
+        memcpy(some + 4 * k, g_out + n_columns * k, (size_t)n * sizeof *some);
+    return vq4_load(some, 4, 4);
+}
+
+/* Adds the gradients of n attributes at the pixels of a run, none of which is clamped. */
+TL_INLINE void pull_three(const tl_grad_view *view, const grad_span *s, int r, const float *g_out, int n,
+                          int64_t n_columns, const double *begins, double *moments)
+{
+    const run_plane plane = plane_of_run(s, r);
+    const vq4 zero = vq4_all(vq_set1(0.0f));
+    const int n_pixels = s->begins[r + 1] - s->begins[r];
+    for (int first = 0; first < n_pixels; first += TL_SUMMED) {
+        vq4 sum = zero, sum_x = zero;
+        for (int i = 0; i < TL_SUMMED && first + i < n_pixels; i += 4) {
+            const int n_left = n_pixels - first - i;
+            const vq4 at = plane_at_pixels(&plane, first + i), inverse = vq4_inverse_of_last(at);
+            const vq4 g = vq4_mul(load_gradients(g_out + n_columns * (first + i), n_left, n, n_columns), inverse);
+            const vq4 of_total = vq4_sub(zero, vq4_sum(vq4_mul(g, vq4_mul(at, inverse))));
+            const vq4 h = vq4_first(TL_VQ4_BLEND(g, of_total, 8), n_left);
+            sum = vq4_add(sum, h), sum_x = vq4_add(sum_x, vq4_mul(h, columns_from(i)));
+        }
+        add_moments(view, s, r, first, s->inverses[r], begins, moments, sum, sum_x);
+    }
+}
+
+/* The gradients at a run that is clamped somewhere, in float64, straight to the corners. */
+static void pull_clamped(const tl_grad_view *view, const tl_grad_colors *p, const pixel_run *run)
+{
+    const tl_grad_values *v = &p->values;
+    const double x = middle_at(view, 0, run->column), y = middle_at(view, 1, run->row);
+    double sums[FACE_X + 12] = {0}, *to[3];
+    int64_t rows[3];
+    grad_triangle t;
+    row_sums s;
+    memset(&s, 0, sizeof s);
+    load_seen_triangle(view, run->id, x, y, &t, 0);
+    for (int k = 0; k < 3; k++) {
+        rows[k] = v->n_columns * p->corners[3 * (int64_t)run->id + k];
+        to[k] = sums_of(p->attr, p->corners[3 * (int64_t)run->id + k]);
+    }
+    for (int64_t i = 0; i < run->n; i++) {
+        const float *rast = (const float *)v->rast + 4 * (run->at + i);
+        point_gradients g_point = {0};
+        for (int64_t c = 0; c < v->n_columns; c++) {
+            const double g = get_real(v->out, v->n_columns * (run->at + i) + c, 0);
+            double step[2];
+            attr_steps(v, rows, c, step, 0);
+            g_point.u += g * step[0], g_point.v += g * step[1];
+            add_to_corners(to, c, g * (double)rast[0], g * (double)rast[1], g);
+        }
+        pull_point(view, &t, &g_point, 2.0 * view->scale[0] * (double)i, 0, &s);
+    }
+    close_row(s.a, s.a_x, x, y, sums);
+    close_triangle(view, run->id, sums, p->vertices, 0);
+}
+
+/* The pixels of a band, but for what its triangles have summed up; n_columns: of the attributes, a constant for few. */
+TL_INLINE int64_t pull_color_rows(const tl_grad_view *view, const tl_grad_colors *p, int64_t n_columns)
+{
+    const tl_grad_values *v = &p->values;
+    grad_span s = TL_BEFORE_SPANS(view);
+    while (next_grad_span(view, &(id_rows){.rast = v->rast}, view->n_vertices, &s)) {
+        set_point_numbers(view, &s, s.inverses);
+        find_color_rows(&s, p);
+        for (int64_t c = 0; c < n_columns; c += 3) {
+            const int n = n_columns - c < 3 ? (int)(n_columns - c) : 3;
+            set_color_quads(&s, v, c, n);
+            for (int r = 0; r < s.n_runs; r++) {
+                const pixel_run run = run_of_span(view, &s, r);
+                const float *rast = (const float *)v->rast + 4 * run.at;
+                if (run.id < 0)
+                    continue;
+                if (is_unclamped(rast, INFINITY) && is_unclamped(rast + 4 * (run.n - 1), INFINITY)) {
+                    double *sums = begun_sums(view, p->faces, &s, r);
+                    pull_three(view, &s, r, (const float *)v->out + n_columns * run.at + c, n, n_columns, sums,
+                               sums + sums_of_three(c));
+                } else if (c == 0) {
+                    pull_clamped(view, p, &run);
+                }
+            }
+        }
+    }
+    return s.bad_id;
+}
+
+static int64_t pull_colors(const tl_grad_view *view, const tl_grad_colors *p)
+{
+    switch (p->values.n_columns) {
+    case 1: return pull_color_rows(view, p, 1);
+    case 3: return pull_color_rows(view, p, 3);
+    default: return pull_color_rows(view, p, p->values.n_columns);
+    }
+}
+
+/* Gradients of the corners of a triangle and of their attributes from its sums. */
+static void close_color_triangle(const tl_grad_view *view, const tl_grad_colors *p, int32_t id, const double *sums)
+{
+    const tl_grad_values *v = &p->values;
+    const double none[3] = {0};
+    double by_q[3][3] = {{0}}, *to[3];
+    int64_t rows[3];
+    grad_triangle t;
+    load_seen_triangle(view, id, sums[0], sums[1], &t, 0);
+    for (int k = 0; k < 3; k++) {
+        rows[k] = v->n_columns * p->corners[3 * (int64_t)id + k];
+        to[k] = sums_of(p->attr, p->corners[3 * (int64_t)id + k]);
+    }
+    for (int64_t c = 0; c < v->n_columns; c++) {
+        const double *m = sums + sums_of_three(c) + c % 3;
+        double step[2];
+        attr_steps(v, rows, c, step, 0);
+        for (int k = 0; k < 3; k++)
+            to[k][c] += t.q[k][0] * m[0] + t.q[k][1] * m[4] + t.q[k][2] * m[8];
+        for (int j = 0; j < 3; j++)
+            by_q[0][j] += step[0] * m[4 * j], by_q[1][j] += step[1] * m[4 * j];
+    }
+    for (int64_t c = 0; c < v->n_columns; c += 3)
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++)
+                by_q[k][j] += sums[sums_of_three(c) + 4 * j + 3];
+    corner_sums(view, p->vertices, id, to);
+    pull_corners(&t, by_q, sums[0], sums[1], none, none, to);
+}
+
+/* Ends a band: from sums of triangles to those of their corners. */
+static void close_colors(const tl_grad_view *view, const tl_grad_colors *p)
+{
+    for (int64_t i = 0; i < p->faces->n; i++)
+        close_color_triangle(view, p, p->faces->rows[i], p->faces->sums + p->faces->n_columns * i);
+    leave_band(p->faces);
+    leave_band(p->vertices);
+    leave_band(p->attr);
+}
+
+/* See kernels.h. */
+static int64_t grad_colors_vjp(const tl_grad_view *view, const tl_grad_colors *p)
+{
+    const int64_t bad_id = pull_colors(view, p);
+    close_colors(view, p);
+    return bad_id;
+}
+
+#endif
