@@ -137,7 +137,7 @@ def compare_model(mujoco: Any, model: Any, options: argparse.Namespace) -> Recor
     return {
         "size": size, "geoms": int(model.ngeom),
         "off": int(is_off.sum()), "off_inside": int((is_off & is_inside).sum()),
-        "depth": float(error.max(initial=0)), "depth_off": float((error > WANTED).mean()) if len(error) else 0.0,
+        "depth_error": float(error.max(initial=0)), "depth_off": float((error > WANTED).mean()) if len(error) else 0.0,
         "color": float(np.abs(theirs["color"].astype(int) - ours["color"]).mean()),
         **{mode: [1e3 * statistics.median(found) for found in times[mode]] for mode in MODES},
     }  # fmt: skip
@@ -192,7 +192,7 @@ def lines(record: Record) -> Iterator[str]:
         for row in record["mujoco"]["models"]:
             speed = [f"{row[mode][1]:.2f}, {row[mode][0] / row[mode][1]:.1f}" for mode in MODES]
             counts = [str(row[name]) for name in ("geoms", "off", "off_inside")]
-            rows.append([row["model"], *counts, f"{row['depth']:.1e}", *speed])
+            rows.append([row["model"], *counts, f"{row['depth_error']:.1e}", *speed])
         yield from table(head, rows)
     for name in ARRAY_CLIENTS:
         if name in record:

@@ -154,7 +154,7 @@ def renderer(monkeypatch):
         quality=SimpleNamespace(numslices=28, numstacks=16, offsamples=4),
         map=SimpleNamespace(znear=0.01, zfar=50.0),
     )
-    model = SimpleNamespace(vis=vis, stat=SimpleNamespace(extent=1.0), ntex=0)
+    model = SimpleNamespace(vis=vis, stat=SimpleNamespace(extent=1.0, center=np.zeros(3)), ntex=0)
     return Renderer(model, *SIZE[::-1])
 
 
@@ -167,6 +167,14 @@ def test_colors_add_up_in_the_numbers_of_the_picture(renderer):
     assert np.abs(over[2] - 255 * 0.5 * 0.6 - 255 * 0.5 * 0.48).max() <= 3
     assert np.abs(over[:2] - 255 * 0.5 * 0.48).max() <= 3
     assert picture[24, 22, 0] > 2 * picture[24, 22, 1]
+
+
+def test_light_that_falls_off_with_the_distance_is_as_bright_at_the_center(renderer):
+    """A lamp two units over the floor: 1 / (0.5 + 0.25 * 2) of 0.5 there, and 0.1 from all sides, on 0.8."""
+    lamp = {"type": 0, "pos": np.array([0, 0, 2], F), "cutoff": 180.0, "attenuation": np.array([0.5, 0.25, 0], F)}
+    renderer.scene.lights = [sun(**lamp)]
+    renderer.scene.ngeom = 1
+    assert np.abs(renderer.render()[24, 32].astype(int) - round(255 * 0.8 * 0.6)).max() <= 2
 
 
 def test_depth_is_the_distance_along_the_view_and_far_behind_everything(renderer):

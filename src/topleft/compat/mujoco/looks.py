@@ -141,8 +141,11 @@ def skybox(looks: Looks, k: int) -> tl.Mesh:
     return tl.Mesh(points, cube.triangles, uv=cube.uv, materials=[tl.Material(texture=looks.texture(k), unlit=True)])
 
 
-def lights_of(scene: Any) -> tuple[list[tl.Light], float, float]:
-    """The lights of a scene, the light from all sides, and how strong highlights are beside what matt surfaces send."""
+def lights_of(scene: Any, center: Any) -> tuple[list[tl.Light], float, float]:
+    """The lights of a scene, the light from all sides, and how strong highlights are beside what matt surfaces send.
+
+    Light that falls off with the distance itself falls off with its square as much at `center`, (3,).
+    """
     lights, ambient, n = [], 0.0, 0
     shine, matt = 0.0, 0.0
     for own in scene.lights[: scene.nlight]:
@@ -158,8 +161,10 @@ def lights_of(scene: Any) -> tuple[list[tl.Light], float, float]:
         if own.type == LIGHT_DIRECTIONAL:
             lights.append(tl.Light(-own.dir.astype(np.float64), color=color, intensity=strongest))
             continue
-        constant, _, square = own.attenuation.tolist()
-        constant = max(constant, 1e-6)
+        place = own.pos.astype(np.float64)
+        constant, linear, square = own.attenuation.tolist()
+        away = math.sqrt(((place - center) ** 2).sum())
+        constant, square = max(constant + linear * away / 2, 1e-6), square + linear / (2 * max(away, 1e-6))
         cone: dict[str, Any] = {}
         if own.cutoff <= 90:
             inner, outer = max(own.cutoff - 0.5, 0.0), max(float(own.cutoff), 0.01)
@@ -167,6 +172,5 @@ def lights_of(scene: Any) -> tuple[list[tl.Light], float, float]:
                 inner, outer = 0.0, min(outer, math.degrees(math.acos(max(1 - LIKE_A_POWER / own.exponent, 0.0))))
             cone = {"direction": own.dir.astype(np.float64), "inner_deg": inner, "outer_deg": outer}
         kind: Any = "spot" if cone else "point"
-        place = own.pos.astype(np.float64)
         lights.append(tl.Light(place, kind, color, strongest / constant, falloff=max(square, 0.0) / constant, **cone))
     return lights, ambient if n else AMBIENT, shine / matt if matt > 0 else 0.0

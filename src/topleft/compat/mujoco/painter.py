@@ -63,7 +63,7 @@ class Painter:
         """The picture (H, W, 3)."""
         camera, eye = camera_of(scene.camera, size)
         sky = self._sky_seen(scene, camera, size)
-        lights, ambient, gloss = lights_of(scene)
+        lights, ambient, gloss = lights_of(scene, self.model.stat.center)
         subject = self._subject(scene, [*scene.geoms[: scene.ngeom]], eye, gloss)
         if subject is None:
             return np.broadcast_to(np.asarray(sky, np.uint8), (*size[::-1], 4))[..., :3].copy()
