@@ -102,6 +102,22 @@ def test_depth_of_a_slope_is_that_of_its_plane(tmp_path):
     assert np.allclose(depth[depth > 0], expected[depth > 0], rtol=2e-4)  # vertices snap by 1/512 px
 
 
+def test_camera_is_that_of_from_intrinsics():
+    rng = np.random.default_rng(0)
+    pose = np.eye(4)
+    for _ in range(20):
+        pose[:3, :3], pose[:3, 3] = np.linalg.qr(rng.normal(size=(3, 3)))[0], 100 * rng.normal(size=3)
+        (fx, fy, cx, cy), size = rng.uniform(50, 900, 4).tolist(), (640, 480)
+        expected = tl.Camera.from_intrinsics(
+            [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], pose, size, near=10.0, far=99.0, pixel_center=0.5
+        )
+        found = bop.Renderer(*size)._camera(pose, (fx, fy, cx, cy), 10.0, 99.0)
+        assert (found.view == expected.view).all()
+        assert np.allclose(
+            found.projection, expected.projection, rtol=0, atol=2.0**-51 * abs(expected.projection).max()
+        )
+
+
 @pytest.mark.parametrize("shift", [(0, 0), (-60, 10), (45, -30), (0, 70)])
 def test_object_beyond_the_frame_is_cut_as_the_whole_picture_is(tmp_path, shift):
     path = ply(tmp_path, OCTAHEDRON, FACES)

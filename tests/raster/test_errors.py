@@ -178,6 +178,13 @@ def test_bad_option_raises(options, kind, message):
         tl.coverage(SQUARE, HALVES, SIZE, **options)
 
 
+def test_option_of_another_type_raises_after_an_equal_one_was_taken():
+    tl.coverage(SQUARE, HALVES, SIZE, subpixel_bits=8, threads=1)
+    for options in ({"subpixel_bits": 8.0, "threads": 1}, {"subpixel_bits": 8, "threads": 1.0}):
+        with raises(TypeError, "must be an integer"):
+            tl.coverage(SQUARE, HALVES, SIZE, **options)
+
+
 def test_bad_number_of_threads_in_the_environment_raises(monkeypatch):
     monkeypatch.setenv("TOPLEFT_NUM_THREADS", "many")
     with raises(ValueError, "TOPLEFT_NUM_THREADS must be a positive integer, got 'many'"):

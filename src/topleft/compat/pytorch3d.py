@@ -194,7 +194,6 @@ def rasterize_meshes(
     of = library_of(verts)
     places = detached(verts).astype(np.float64)
     ids = np.full((len(counts), height, width, faces_per_pixel), -1, np.int64)
-    half = np.array([max(width / height, 1.0), max(height / width, 1.0)])
     for own, first, n in zip(ids, np.cumsum(counts) - counts, counts, strict=True):
         if n:
             rows = np.asarray(faces[first : first + n])
