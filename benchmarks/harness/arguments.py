@@ -16,9 +16,10 @@ def option(default: Any, flags: str, help: str = "", **words: Any) -> Any:  # no
     return field(default=default, metadata={"flags": flags.split(), "words": {"help": help, **words}})
 
 
-def count(default: int, flag: str, help: str = "", metavar: str = "N", **words: Any) -> Any:  # noqa: A002
+def count(default: int | Sequence[int], flag: str, help: str = "", metavar: str = "N", **words: Any) -> Any:  # noqa: A002
     """A number from 1 on, or several."""
-    return option(default, flag, f"{help} (%(default)s)".strip(), type=positive, metavar=metavar, **words)
+    shown = default if isinstance(default, int) else " ".join(map(str, default))
+    return option(default, flag, f"{help} ({shown})".strip(), type=positive, metavar=metavar, **words)
 
 
 def fraction(default: float, flag: str, help: str, metavar: str = "S") -> Any:  # noqa: A002

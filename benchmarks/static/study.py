@@ -249,6 +249,8 @@ def run(options: StaticOptions, save: Save) -> Record:
         rows.append(measure_scene(scene, options))
         tell(row_text(rows[-1]))
         save(with_rows(record, rows, models))
+    if not rows:
+        raise ValueError(f"no scene begins with {' or '.join(options.scenes)}")
     return with_rows(record, rows, models)
 
 
