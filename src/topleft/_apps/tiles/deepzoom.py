@@ -126,13 +126,7 @@ def fill_blanks(raster: Tiles, store: DeepZoomStore, ground: U8) -> None:
 
 
 def painting(raster: Tiles) -> Callable[[Array], U8]:
-    """Return the function that makes colours of the pixels of a kind.
-
-    Raises
-    ------
-    ValueError
-        If the kind has no default colours.
-    """
+    """Return the function that makes colours of the pixels of a kind."""
     if raster.kind == "labels":
         return label_colors
     if raster.dtype == bool:

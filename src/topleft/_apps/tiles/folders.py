@@ -77,13 +77,7 @@ class Folder(ABC):
         """Remove a file, if it is there."""
 
     def check_own(self) -> None:
-        """Raise an error for a file that is no chunk of a raster.
-
-        Raises
-        ------
-        FileExistsError
-            If there is one.
-        """
+        """Raise an error for a file that is no chunk of a raster."""
         for name in self.names():
             if not is_own(name):
                 raise FileExistsError(f"{self.place(name)} was not written by topleft: move it, or write elsewhere")
@@ -292,13 +286,7 @@ def fingerprints_at(folder: DiskFolder, file: Path) -> list[tuple[object, str | 
 
 
 def write_own(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file.
-
-    Raises
-    ------
-    FileExistsError
-        If another program has written a file there meanwhile.
-    """
+    """Write a file, unless another program has written one there meanwhile."""
     if is_whole(path) and _mark_of(path) is None:
         raise FileExistsError(f"{path} was not written by topleft: move it, or write elsewhere")
     write_whole(path, write)
@@ -313,13 +301,7 @@ def _mark_of(path: Path) -> str | None:
 
 
 def check_space(folder: Path, n_bytes: int, what: str) -> None:
-    """Raise an error unless so many bytes are free where a folder is, or is to be.
-
-    Raises
-    ------
-    OSError
-        If they are not.
-    """
+    """Raise an error unless so many bytes are free where a folder is, or will be."""
     place = folder.absolute()
     while not place.exists():
         place = place.parent

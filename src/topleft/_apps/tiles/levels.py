@@ -192,13 +192,7 @@ def note_whole(store: TileStore, kept: set[tuple[int, int, int]], level: int, ro
 
 
 def check_whole(store: TileStore, there: list[npt.NDArray[np.bool_]]) -> None:
-    """Raise an error if a tile that was written to a disk is not there any more.
-
-    Raises
-    ------
-    FileNotFoundError
-        If so.
-    """
+    """Raise an error if a tile that was written to a disk is not there any more."""
     if not isinstance(store.folder, DiskFolder):
         return
     for level, blocks in enumerate(there):

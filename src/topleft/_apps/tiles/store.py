@@ -143,13 +143,7 @@ class TileStore(ABC):
         return whole
 
     def read(self, level: int, row: int, column: int) -> Array:
-        """Return the pixels of a block that was written.
-
-        Raises
-        ------
-        OSError
-            If a tile has been removed since, or is damaged.
-        """
+        """Return the pixels of a block that was written."""
         pixels = np.empty(self.shape_of(level, row, column), self.dtype)
         for r, c in self.tiles_of(level, row, column):
             own = pixels[self.location_of(r, c, row, column)]
@@ -166,13 +160,7 @@ class TileStore(ABC):
         return pixels
 
     def content(self, name: str) -> bytes:
-        """Return a tile as it is stored.
-
-        Raises
-        ------
-        FileNotFoundError
-            If it has been removed.
-        """
+        """Return a tile as it is stored."""
         found = self.folder.get(name)
         if found is None:
             raise self.gone(name)
@@ -211,15 +199,6 @@ def begin(
         The number of copies of all tiles on the disk at a time.
     prepare : function of an array
         Converts the pixels of a window to those of the file.
-
-    Raises
-    ------
-    ValueError
-        If `resume` finds another raster, or both options are set.
-    FileExistsError
-        If something is there and neither option is set, or topleft did not write it.
-    OSError
-        If the disk has no room.
     """
     if resume and overwrite:
         raise ValueError("resume=True goes on with what is there, overwrite=True replaces it: give one of them")

@@ -120,13 +120,7 @@ def gzipped(content: bytes) -> bytes:
 
 
 def check_halves(window: tuple[int, int], n_levels: int, size: tuple[int, int]) -> None:
-    """Raise an error unless windows of a raster of several have halves.
-
-    Raises
-    ------
-    ValueError
-        If not.
-    """
+    """Raise an error unless windows of a raster of several have halves."""
     if n_levels > 1 and any(w % 2 and w < length for w, length in zip(window, size, strict=True)):
         raise ValueError(f"window must have even sides for several levels, got {window[0]} x {window[1]}")
 

@@ -66,13 +66,7 @@ Rows = dict[str, Any]
 
 
 def read_ply(source: InputFile) -> list[Mesh]:
-    """The faces of a PLY file, in one mesh; none, and a cloud of its points, if it has none.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The faces of a PLY file, in one mesh; none, and a cloud of its points, if it has none."""
     content = source.content()
     order, elements, textures, start = _header(content)
     for element in elements:
@@ -139,11 +133,6 @@ def mapped_elements(path: Path) -> tuple[dict[str, Array], Array, dict[str, Arra
     """Numbers of the vertices by name (V,), the triangles (T, 3) and numbers of these (T,) of a binary file, mapped.
 
     None where faces are no triangles, or something else stands before them.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
     """
     with open(path, "rb") as file:
         order, elements, _, at = _header(file.read(MAX_HEADER_BYTES))

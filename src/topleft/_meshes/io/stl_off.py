@@ -28,13 +28,7 @@ HEAD = re.compile(rb"\s*((?:ST)?C?N?(4?)(n?)OFF)?(?=[\s\d]|$)", re.IGNORECASE)
 
 
 def read_stl(source: InputFile) -> list[Mesh]:
-    """The triangles of an STL file, in one mesh; none if it has none.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The triangles of an STL file, in one mesh; none if it has none."""
     content = source.content()
     n = int.from_bytes(content[80:84], "little") if len(content) >= N_HEADER_BYTES else 0
     n_bytes = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
@@ -53,13 +47,7 @@ def read_stl(source: InputFile) -> list[Mesh]:
 
 
 def mapped_corners(path: Path) -> np.ndarray[tuple[int, int], np.dtype[np.float32]] | None:
-    """The nine numbers of each triangle (T, 9) of a binary file, mapped; None of a text.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The nine numbers of each triangle (T, 9) of a binary file, mapped; None of a text."""
     n_file = path.stat().st_size
     with open(path, "rb") as file:
         header = file.read(N_HEADER_BYTES)
@@ -86,13 +74,7 @@ def _corners_of_text(content: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.
 
 
 def read_off(source: InputFile) -> list[Mesh]:
-    """The faces of an OFF file, in one mesh; none, and a cloud of its points, if it has none.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The faces of an OFF file, in one mesh; none, and a cloud of its points, if it has none."""
     content = re.sub(rb"#[^\r\n]*", b"", source.content()).replace(b"\r", b"\n")
     head = HEAD.match(content)
     if head is None:
