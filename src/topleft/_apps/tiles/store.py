@@ -11,11 +11,12 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from topleft._apps.tiles.folders import DiskFolder, Folder, check_space
+from topleft._apps.tiles.folders import Folder, check_space
 from topleft._core.base.array_types import Array
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ class TileStore(ABC):
         if self.missing(level, row, column) is not None:
             return False
         try:
-            if isinstance(self.folder, DiskFolder):
+            if self.folder.is_on_disk:
                 self.read(level, row, column)
         except OSError:
             return False
@@ -217,11 +218,11 @@ def begin(
         )
     folder = store.folder
     if resume and there:
-        if isinstance(folder, DiskFolder):
+        if folder.is_on_disk:
             folder.sweep()
         return True
-    if isinstance(folder, DiskFolder):
-        check_space(folder.path, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
+    if isinstance(folder.location, Path):
+        check_space(folder.location, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
     if there:
         folder.check_own()
         folder.remove()
