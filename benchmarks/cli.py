@@ -32,7 +32,6 @@ from benchmarks.small.explorer import STUDY as EXPLORER
 from benchmarks.small.gate import STUDY as GATE
 from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.instances import STUDY as INSTANCES
-from benchmarks.small.memset import STUDY as MEMSET
 from benchmarks.small.pairs import STUDIES as PAIRS
 from benchmarks.small.samplings import STUDY as SAMPLINGS
 from benchmarks.small.tiles import STUDY as TILES
@@ -41,7 +40,7 @@ from benchmarks.static.study import STUDY as STATIC
 STUDIES = {
     study.kind: study
     for study in (
-        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, MEMSET, GROWTH, POLYGONS,
+        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, GROWTH, POLYGONS,
         REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, CLIENTS, INSTANCES, *PAIRS,
     )
 }  # fmt: skip

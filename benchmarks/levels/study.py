@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
-from benchmarks.harness.arguments import add_number, options_of, set_options
+from benchmarks.harness.arguments import add_number, add_out, options_of, set_options
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
-from benchmarks.levels import page
+from benchmarks.levels import tables
 from benchmarks.report.study import Study
 from topleft._meshes.lod.detail import pixels_of_bound, window_of
 
@@ -40,8 +40,6 @@ class Options:
     meshes: tuple[str, ...] = ()
     n_triangles: int = 10_000_000
     rounds: int = 5
-    levels: Path | None = None
-    "Folder in which levels are kept from run to run."
 
 
 def run_levels(options: Options) -> dict[str, Any]:
@@ -50,7 +48,7 @@ def run_levels(options: Options) -> dict[str, Any]:
         "kind": "levels", **describe("fast-simplification"), "size": list(SIZE), "tolerance": TOLERANCE,
         "rounds": options.rounds, "meshes": [],
     }  # fmt: skip
-    found = [(name, mesh, *find_levels(name, mesh, options.levels)) for name, mesh in subjects(options)]
+    found = [(name, mesh, *make_levels(mesh)) for name, mesh in subjects(options)]
     times = [draw_times(mesh, levels, options.rounds) for _, mesh, levels, _ in found]  # all in one go
     for (name, mesh, levels, made_s), own in zip(found, times, strict=True):
         record["meshes"].append(measure_mesh(name, mesh, levels, own) | {"made_s": made_s})
@@ -63,21 +61,6 @@ def subjects(options: Options) -> Iterator[tuple[str, tl.Mesh]]:
     for path in options.meshes:
         yield Path(path).stem, tl.load(path)
     yield "blob", tl.Mesh(*tl.scenes.blob(options.n_triangles))
-
-
-def find_levels(name: str, mesh: tl.Mesh, folder: Path | None) -> tuple[tl.Levels, float]:
-    """Return levels, of an earlier run if they are kept, and the CPU time of making them, seconds."""
-    if folder is None:
-        return make_levels(mesh)
-    path = folder / f"{name}-{len(mesh.triangles)}.npz"
-    seconds = path.with_suffix(".seconds")
-    if path.exists() and seconds.exists():
-        return tl.Levels.load(path, mesh), float(seconds.read_text())
-    levels, made_s = make_levels(mesh)
-    folder.mkdir(parents=True, exist_ok=True)
-    levels.save(path)
-    seconds.write_text(repr(made_s))
-    return levels, made_s
 
 
 def make_levels(mesh: tl.Mesh) -> tuple[tl.Levels, float]:
@@ -166,20 +149,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mesh", dest="meshes", nargs="*", metavar="FILE", help="meshes besides the generated ones")
     add_number(parser, "--triangles", "n_triangles", "of the blob")
     add_number(parser, "--rounds", "rounds")
-    parser.add_argument("--json", dest="record", type=Path, metavar="FILE.json", help="the record")
-    parser.add_argument("--keep", dest="levels", type=Path, metavar="FOLDER",
-                        help="where levels are kept from run to run")  # fmt: skip
-    parser.add_argument("-o", "--out", type=Path, default=Path("docs"), metavar="FOLDER", help="(%(default)s)")
+    add_out(parser)
 
 
-def run(arguments: argparse.Namespace, save: Save) -> Record:
-    """Measure, write the page and its chart."""
-    record = run_levels(options_of(Options, arguments))
-    save(record)
-    page.write_page(record, arguments.out)
-    return record
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Measure."""
+    return run_levels(options_of(Options, arguments))
 
 
 STUDY = Study(
-    "levels", "measure levels of detail, and write their page: time beside error", add_arguments, run, page.lines
-)
+    "levels", "measure levels of detail: time beside error", add_arguments, run, tables.lines, tables.PARTS,
+    "benchmarks.levels.charts",
+)  # fmt: skip

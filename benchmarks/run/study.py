@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from benchmarks.harness.arguments import (
     add_names,
@@ -20,7 +19,6 @@ from benchmarks.harness.arguments import (
 from benchmarks.harness.contestants import known_peers
 from benchmarks.harness.records import Record, Save
 from benchmarks.harness.rounds import Options, run_cases
-from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick
 from benchmarks.peers import PEERS
 from benchmarks.report.study import Study
 from benchmarks.run import scene_tables, smooth_tables, tables
@@ -36,10 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_number(parser, "--repeats", "repeats", "rounds")
     parser.add_argument("--seconds", type=float, metavar="S", help="length of a turn, at least a call (%(default)s)")
     add_pin(parser)
-    parser.add_argument("--yardstick", action="append", default=[], metavar="[SCENE=]COMMAND")
-    parser.add_argument("--yardstick-pattern", action="append", default=[], metavar="REGEX",
-                        help="finds its figure; one for each yardstick, the last one for the rest")  # fmt: skip
-    parser.add_argument("--yardstick-folder", type=Path, metavar="FOLDER", help="where yardsticks run")
     parser.add_argument("--no-check", dest="check", action="store_false", help="leave the pictures uncompared")
     add_out(parser)
 
@@ -52,13 +46,8 @@ def run(arguments: argparse.Namespace, save: Save) -> Record:
     options = options_of(Options, arguments)
     refuse_unknown("--isa", options.isas, available)
     refuse_unknown("--peer", options.peers, known_peers())
-    patterns = arguments.yardstick_pattern or [DEFAULT_PATTERN]
-    patterns += [patterns[-1]] * (len(arguments.yardstick) - len(patterns))
-    yardsticks = list(zip(arguments.yardstick, patterns, strict=False))
-    for command, pattern in yardsticks:
-        Yardstick.parse(command, pattern, options.yardstick_folder, [])
     isas, scenes = options.isas or available[::-1], find_scenes(options.scenes)
-    return run_cases(replace(options, scenes=scenes, isas=isas, yardsticks=yardsticks), save)
+    return run_cases(replace(options, scenes=scenes, isas=isas), save)
 
 
 def find_scenes(names: Sequence[str]) -> list[str]:
