@@ -30,15 +30,7 @@ def is_client(executor: object) -> bool:
 
 
 def check_workers(client: Any) -> None:
-    """Look whether all workers have the package, of this version.
-
-    Raises
-    ------
-    MissingPackageError
-        If one has not.
-    TopleftError
-        If one has another version.
-    """
+    """Look whether all workers have the package, of this version."""
     from importlib.util import find_spec
 
     for worker, spec in client.run(find_spec, "topleft").items():

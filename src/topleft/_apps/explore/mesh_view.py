@@ -145,13 +145,7 @@ class MeshView:
 
     @classmethod
     def parse(cls, request: Request) -> MeshView:
-        """Return the view of a request, checked.
-
-        Raises
-        ------
-        ValueError, TypeError
-            If it makes no sense.
-        """
+        """Return the view of a request, checked."""
         given = {name: request[name] for name in cls.__dataclass_fields__ if name in request}
         if given.get("sampling") == AT_REST:
             given["sampling"] = "center" if "background" in request else "msaa4"
@@ -237,13 +231,7 @@ def shown_in(session: Session) -> Shown:
 
 
 def load_bytes(data: bytes | memoryview, name: str) -> tuple[Mesh, list[str]]:
-    """Return the mesh in the bytes of a file, and what it lacks; the end of the name tells the format.
-
-    Raises
-    ------
-    MeshError
-        As `topleft.load`, and for points.
-    """
+    """Return the mesh in the bytes of a file, and what it lacks; the end of the name tells the format."""
     suffix = Path(name).suffix.lower()
     if not suffix[1:].isalnum() or len(suffix) > 12:
         raise MeshError(f"the end of the name must tell the format, as in bunny.ply, got {name[-40:]!r}")

@@ -55,13 +55,7 @@ def pack(header: dict[str, Any], parts: list[memoryview]) -> bytes:
 
 
 def unpack(frame: bytes) -> Request:
-    """Return the question in a frame.
-
-    Raises
-    ------
-    ValueError
-        If it is not one.
-    """
+    """Return the question in a frame."""
     if len(frame) < 4:
         raise ValueError(f"a message must begin with the length of its header, got {len(frame)} bytes")
     (length,) = struct.unpack_from("<I", frame)
@@ -81,13 +75,7 @@ def unpack(frame: bytes) -> Request:
 
 
 def read_header(text: bytes | str) -> dict[str, Any]:
-    """Return the JSON object of a header.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or holds a number that JSON does not have.
-    """
+    """Return the JSON object of a header."""
 
     def refuse(constant: str) -> NoReturn:
         raise ValueError(f"numbers must be finite, got {constant}")

@@ -15,13 +15,7 @@ from topleft.errors import MissingPackageError
 
 
 def widget_of(content: Content) -> Any:
-    """Return the widget that shows a content.
-
-    Raises
-    ------
-    MissingPackageError
-        If anywidget is not installed.
-    """
+    """Return the widget that shows a content."""
     try:
         import anywidget
         import traitlets

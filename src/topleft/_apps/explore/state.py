@@ -99,13 +99,7 @@ class PixelState:
 
 
 def parse_state(given: object) -> PixelState:
-    """Return a state from the JSON object that a page or a link holds.
-
-    Raises
-    ------
-    ValueError, TypeError, IndexError
-        If a value is missing, unknown or out of range.
-    """
+    """Return a state from the JSON object that a page or a link holds."""
     if not isinstance(given, Mapping):
         raise TypeError(f"a state must be an object, got {type(given).__name__}")
     names = {one.name for one in fields(PixelState)}

@@ -53,15 +53,7 @@ CHOICES = ("layer", "sampling", "cull", "fov", "up", "spin")
 
 
 def write_static(folder: Path, content: Content) -> list[Path]:
-    """Write the page into a folder, which is made, and return what was written.
-
-    Raises
-    ------
-    MissingPackageError
-        If this installation has no kernels for WebAssembly.
-    OSError
-        If the folder cannot be written.
-    """
+    """Write the page into a folder, which is made, and return what was written."""
     page = files("topleft._apps.explore").joinpath("page")
     modules = {name: page.joinpath(name) for name in (f"topleft-{one}.wasm" for one in SETS)}
     if missing := [name for name, module in modules.items() if not module.is_file()]:

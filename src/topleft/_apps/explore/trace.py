@@ -109,12 +109,6 @@ def trace(
         Of a method that has any.
     origin : (x, y), pixels
         Where the window lies in the picture; the steps are those of the window.
-
-    Raises
-    ------
-    ValueError
-        As `topleft.overdraw`; for "auto", which draws many pixels at a time; and where there would be more than 40,000
-        steps.
     """
     size, found = as_size(size), find_method(method)
     if method not in TRACED:

@@ -11,11 +11,12 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from topleft._apps.tiles.folders import DiskFolder, Folder, check_space
+from topleft._apps.tiles.folders import Folder, check_space
 from topleft._core.base.array_types import Array
 
 if TYPE_CHECKING:
@@ -120,7 +121,7 @@ class TileStore(ABC):
         if self.missing(level, row, column) is not None:
             return False
         try:
-            if isinstance(self.folder, DiskFolder):
+            if self.folder.is_on_disk:
                 self.read(level, row, column)
         except OSError:
             return False
@@ -143,13 +144,7 @@ class TileStore(ABC):
         return whole
 
     def read(self, level: int, row: int, column: int) -> Array:
-        """Return the pixels of a block that was written.
-
-        Raises
-        ------
-        OSError
-            If a tile has been removed since, or is damaged.
-        """
+        """Return the pixels of a block that was written."""
         pixels = np.empty(self.shape_of(level, row, column), self.dtype)
         for r, c in self.tiles_of(level, row, column):
             own = pixels[self.location_of(r, c, row, column)]
@@ -166,13 +161,7 @@ class TileStore(ABC):
         return pixels
 
     def content(self, name: str) -> bytes:
-        """Return a tile as it is stored.
-
-        Raises
-        ------
-        FileNotFoundError
-            If it has been removed.
-        """
+        """Return a tile as it is stored."""
         found = self.folder.get(name)
         if found is None:
             raise self.gone(name)
@@ -211,15 +200,6 @@ def begin(
         The number of copies of all tiles on the disk at a time.
     prepare : function of an array
         Converts the pixels of a window to those of the file.
-
-    Raises
-    ------
-    ValueError
-        If `resume` finds another raster, or both options are set.
-    FileExistsError
-        If something is there and neither option is set, or topleft did not write it.
-    OSError
-        If the disk has no room.
     """
     if resume and overwrite:
         raise ValueError("resume=True goes on with what is there, overwrite=True replaces it: give one of them")
@@ -238,11 +218,11 @@ def begin(
         )
     folder = store.folder
     if resume and there:
-        if isinstance(folder, DiskFolder):
+        if folder.is_on_disk:
             folder.sweep()
         return True
-    if isinstance(folder, DiskFolder):
-        check_space(folder.path, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
+    if isinstance(folder.location, Path):
+        check_space(folder.location, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
     if there:
         folder.check_own()
         folder.remove()

@@ -41,13 +41,7 @@ def as_framed(subject: MeshLike | Scene | npt.ArrayLike) -> Framed:
 
 
 def points_to_frame(subject: Framed) -> F64:
-    """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points.
-
-    Raises
-    ------
-    ValueError
-        If there is no point, or one is not finite.
-    """
+    """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points."""
     if isinstance(subject, Points):
         points = np.asarray(subject.positions, np.float64)
     elif isinstance(subject, Scene):
@@ -106,11 +100,6 @@ def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
     """View and projection (4, 4) float64 of their product, up to its scale; the view turns and moves, nothing else.
 
     Without perspective the eye is put into the near plane, in the middle of the picture: no matrix tells where it is.
-
-    Raises
-    ------
-    ValueError
-        If the matrix is singular, is a pose, or its depth is not that of planes across the view.
     """
     name = "clip_from_world"
     check_regular(name, clip_from_world)
@@ -193,13 +182,7 @@ def _middle(axis: F64, z: F64, tan: float, distance: float) -> float:
 
 
 def view_matrix(eye: F64, target: F64, up: F64) -> F64:
-    """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`.
-
-    Raises
-    ------
-    ValueError
-        If eye and target coincide, or if `up` is zero or parallel to the view.
-    """
+    """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`."""
     forward = target - eye
     distance = engine.length(forward)
     if distance == 0:
@@ -224,13 +207,7 @@ def orbit_view(
     *,
     up: UpOption = "y",
 ) -> F64:
-    """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`.
-
-    Raises
-    ------
-    ValueError
-        If the elevation is outside -90 to 90 degrees or `up` is neither "y" nor "z".
-    """
+    """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`."""
     check_choice("up", up, get_args(UpOption))
     if not math.isfinite(as_number("azimuth_deg", azimuth_deg)):
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")

@@ -60,13 +60,7 @@ class Collapsed(NamedTuple):
 
 
 def collapser() -> Any:
-    """The package that collapses edges.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
+    """The package that collapses edges."""
     try:
         import fast_simplification  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError:

@@ -364,13 +364,7 @@ def extent_of(subject: Any) -> Extent:
 
 
 def values_of(name: str | os.PathLike[str], triangles: Any) -> Any:
-    """The values of a .npy file, or those that a mapped PLY file has of its vertices or faces by this name.
-
-    Raises
-    ------
-    ValueError
-        If there are none of this name.
-    """
+    """The values of a .npy file, or those that a mapped PLY file has of its vertices or faces by this name."""
     text = os.fspath(name)
     if text.endswith(".npy"):
         return mapped_npy(pathlib.Path(text))

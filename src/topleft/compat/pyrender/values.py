@@ -85,13 +85,7 @@ class Number:
 
 
 def as_vector(name: str, value: Any, n: int) -> F64:
-    """The numbers (n,) as float64.
-
-    Raises
-    ------
-    ValueError
-        If there are others.
-    """
+    """The numbers (n,) as float64."""
     array = np.asarray(value, np.float64) if value is not None else np.empty(0)
     if array.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
