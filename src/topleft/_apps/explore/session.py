@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from topleft import Mesh
 
+SCRIPTS = ("line.js", "elements.js", "mesh_part.js", "pixels_part.js", "race_part.js", "steps_part.js", "explore.js")
+"""The modules of the page, each behind those that it imports."""
+
 Request = dict[str, Any]
 """What a page asks: "do" names it; "parts" are the arrays that came along, as bytes."""
 
