@@ -107,37 +107,17 @@ WORDS = {
 
 @dataclass(frozen=True)
 class MeshView:
-    """What a page asks to see.
+    """What a page asks to see; lights, edges, sampling, tolerance and cull are those of `render`."""
 
-    Attributes
-    ----------
-    size : (int, int)
-        Pixels.
-    azimuth, elevation : float
-        Degrees, as for `Camera.framing`.
-    zoom : float
-        1: the sphere round the mesh just fits.
-    pan : (float, float)
-        Where the middle of the mesh lies, in half heights of the frame from its middle; right and up.
-    fov : float
-        Degrees from bottom to top; 0 is without perspective.
-    up : str
-        "y" or "z".
-    layer : str
-        One of `LAYERS`.
-    lights, edges, sampling, tolerance, cull
-        As for `render`; `lights` is a key of `LIGHTS`.
-    """
-
-    size: tuple[int, int]
-    azimuth: float = 35.0
+    size: tuple[int, int]  # pixels
+    azimuth: float = 35.0  # degrees, as for `Camera.framing`
     elevation: float = 20.0
-    zoom: float = 1.0
-    pan: tuple[float, float] = (0.0, 0.0)
-    fov: float = 40.0
+    zoom: float = 1.0  # 1: the sphere round the mesh just fits
+    pan: tuple[float, float] = (0.0, 0.0)  # of the middle of the mesh, in half heights of the frame; right and up
+    fov: float = 40.0  # degrees from bottom to top; 0 is without perspective
     up: str = "y"
-    layer: str = "smooth"
-    lights: str = "headlight"
+    layer: str = "smooth"  # one of `LAYERS`
+    lights: str = "headlight"  # one of `LIGHTS`
     edges: bool = False
     sampling: str = "center"
     tolerance: float = 0.0

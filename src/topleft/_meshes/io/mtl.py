@@ -65,17 +65,7 @@ class _Entry:
 
 
 def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[], Material]]:
-    """The materials of a library: functions, so that pictures of unused ones are not read.
-
-    Parameters
-    ----------
-    text : str
-        The library.
-    folder : Path
-        Where its pictures are.
-    source : InputFile
-        The mesh file, which gets the notes.
-    """
+    """The materials of a library: functions, so that pictures of unused ones are not read; `source` gets the notes."""
     entries: dict[str, _Entry] = {}
     own = _Entry()
     lines = text.replace("\\\n", " ").splitlines()
