@@ -384,19 +384,14 @@ def answer_pick(session: Session, request: Request) -> Reply:
     if level.uv is not None:
         rows.append(("uv", numbers(frags.interpolate(level.uv)[0, 0])))
     if level.materials:
-        of_triangle = level.material_of_triangle
-        rows.append(("material", material_text(level, 0 if of_triangle is None else int(of_triangle[i]))))
+        k = 0 if level.material_of_triangle is None else int(level.material_of_triangle[i])
+        rows.append(("material", f"{k}: {level.materials[k]!r}"[:300]))
     return Reply({**found, "rows": rows})
 
 
 def numbers(values: Iterable[float]) -> str:
     """Return numbers to five digits."""
     return ", ".join(f"{float(value):.5g}" for value in values)
-
-
-def material_text(mesh: Mesh, i: int) -> str:
-    """Return a material in one line."""
-    return f"{i}: {mesh.materials[i]!r}"[:300]
 
 
 def answer_plan(session: Session, request: Request) -> Reply:

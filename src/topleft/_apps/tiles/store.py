@@ -10,9 +10,9 @@ import struct
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -73,10 +73,6 @@ class TileStore(ABC):
     @abstractmethod
     def decoded(self, content: bytes) -> Array:
         """Return the pixels of a tile."""
-
-    def seen_from_elsewhere(self) -> Self:
-        """The same for processes that run in other folders."""
-        return replace(self, folder=self.folder.absolute())
 
     def n_tiles(self, level: int) -> tuple[int, int]:
         """Columns and rows of tiles of a level."""
