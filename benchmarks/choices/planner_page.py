@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
+from benchmarks.harness.arguments import option
 from benchmarks.harness.machine import PAGES
 from benchmarks.harness.records import Record, Save, write_text
 from benchmarks.report.pages import with_parts
@@ -35,21 +36,24 @@ def plans_text(record: Record) -> str:
     return "\n" + "\n".join(f"## {title}\n\n```\n{plan}\n```\n" for title, plan in record["plans"])
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-o", "--out", type=Path, default=PAGE, metavar="PAGE.md")
+@dataclass(frozen=True)
+class PlannerOptions:
+    """Where the page goes."""
+
+    out: Path = option(PAGE, "-o --out", type=Path, metavar="PAGE.md")
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: PlannerOptions, _: Save) -> Record:
     """Make the plans with the costs that ship, and write them into the page."""
     with TemporaryDirectory() as empty:
         os.environ["XDG_CACHE_HOME"] = empty
-        plans = [(title, tl.plan(*mesh, **options).measure().explain()) for title, mesh, options in scenes()]
+        plans = [(title, tl.plan(*mesh, **asked).measure().explain()) for title, mesh, asked in scenes()]
     record = {"kind": "planner", "plans": plans}
-    write_text(arguments.out, with_parts(PAGE.read_text(encoding="utf-8"), record, STUDY.parts))
+    write_text(options.out, with_parts(PAGE.read_text(encoding="utf-8"), record, STUDY.parts))
     return record
 
 
 STUDY = Study(
-    "planner", "write the plans of two scenes into their page", add_arguments, run,
+    "planner", "write the plans of two scenes into their page", PlannerOptions, run,
     lambda record: [plans_text(record)], {"plans": plans_text},
 )  # fmt: skip

@@ -10,30 +10,30 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.harness.arguments import Options, count, fraction, names, option, pinned
 from benchmarks.harness.contestants import Child, Contestant, SkippedError, choose
 from benchmarks.harness.errors import Picture, compare, draw_exact
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, forget, tell
+from benchmarks.peers import PEERS
 from benchmarks.scenes.cases import CASES, Case, Scene
 
 SCHEMA = 1
 
 
 @dataclass(frozen=True)
-class Options:
-    """The options of a run."""
-
-    scenes: Sequence[str]
-    peers: Sequence[str]
-    isas: Sequence[str]
-    threads: Sequence[int] = (1,)
-    repeats: int = 9
-    seconds: float = 0.1
-    pin: Sequence[int] = ()
-    check: bool = True
+class RunOptions(Options):
+    scenes: Sequence[str] = names("--scene", "cases, or beginnings of their names")
+    peers: Sequence[str] = names("--peer", "peers; all unless given, none: no names", tuple(PEERS), "*")
+    isas: Sequence[str] = names("--isa", "scalar, avx2, avx512; all unless given")
+    threads: Sequence[int] = count((1,), "--threads", nargs="+")
+    repeats: int = count(9, "--repeats", "rounds")
+    seconds: float = fraction(0.1, "--seconds", "length of a turn, at least a call")
+    pin: Sequence[int] = pinned()
+    check: bool = option(True, "--no-check", "leave the pictures uncompared", action="store_false")
 
 
-def run_cases(options: Options, save: Save = forget) -> Record:
+def run_cases(options: RunOptions, save: Save = forget) -> Record:
     """Measure, return the record that the report reads; `save` gets it after each scene, as far as it goes."""
     record: dict[str, Any] = {
         "schema": SCHEMA,
@@ -48,7 +48,7 @@ def run_cases(options: Options, save: Save = forget) -> Record:
     return record
 
 
-def run_case(case: Case, options: Options, folder: Path) -> Record:
+def run_case(case: Case, options: RunOptions, folder: Path) -> Record:
     """All contestants of one case."""
     beside = CASES[case.beside] if case.beside else None
     tell(f"{case.name}: scene")

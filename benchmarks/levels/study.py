@@ -5,9 +5,8 @@ The error is measured on masks, not taken from the bound: how far a sample that 
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
-from benchmarks.harness.arguments import add_number, add_out, options_of, set_options
+from benchmarks.harness.arguments import Options, count, option
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.levels import tables
@@ -34,15 +33,13 @@ FOV_Y_DEG = 40.0
 
 
 @dataclass(frozen=True)
-class Options:
-    """The options of a run."""
-
-    meshes: tuple[str, ...] = ()
-    n_triangles: int = 10_000_000
-    rounds: int = 5
+class LevelOptions(Options):
+    meshes: Sequence[str] = option((), "--mesh", "meshes besides the generated ones", nargs="*", metavar="FILE")
+    n_triangles: int = count(10_000_000, "--triangles", "of the blob")
+    rounds: int = count(5, "--rounds")
 
 
-def run_levels(options: Options) -> dict[str, Any]:
+def run(options: LevelOptions, _: Save) -> Record:
     """Return the record."""
     record: dict[str, Any] = {
         "kind": "levels", **describe("fast-simplification"), "size": list(SIZE), "tolerance": TOLERANCE,
@@ -55,7 +52,7 @@ def run_levels(options: Options) -> dict[str, Any]:
     return record
 
 
-def subjects(options: Options) -> Iterator[tuple[str, tl.Mesh]]:
+def subjects(options: LevelOptions) -> Iterator[tuple[str, tl.Mesh]]:
     """Give the meshes: a shape that ships, those of files, and a large blob."""
     yield "torus-knot", tl.Mesh(*tl.scenes.shape("torus-knot"))
     for path in options.meshes:
@@ -145,20 +142,7 @@ def outlines_px(one: Any, other: Any) -> float:
     return max(float(distance_transform_edt(~b)[a].max(initial=0.0)) for a, b in ways if b.any())
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options())
-    parser.add_argument("--mesh", dest="meshes", nargs="*", metavar="FILE", help="meshes besides the generated ones")
-    add_number(parser, "--triangles", "n_triangles", "of the blob")
-    add_number(parser, "--rounds", "rounds")
-    add_out(parser)
-
-
-def run(arguments: argparse.Namespace, _: Save) -> Record:
-    """Measure."""
-    return run_levels(options_of(Options, arguments))
-
-
 STUDY = Study(
-    "levels", "measure levels of detail: time beside error", add_arguments, run, tables.lines, tables.PARTS,
+    "levels", "measure levels of detail: time beside error", LevelOptions, run, tables.lines, tables.PARTS,
     "benchmarks.levels.charts",
 )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from benchmarks import cli
 from benchmarks.harness.errors import compare, draw_exact
-from benchmarks.harness.rounds import Options, run_cases
+from benchmarks.harness.rounds import RunOptions, run_cases
 from benchmarks.peers import PEERS, load_peer, why_not
 from benchmarks.report.tables import number
 from benchmarks.run import scene_tables, smooth_tables, tables
@@ -23,7 +23,7 @@ ISA = tl.build_info()["isa"]
 @pytest.fixture(scope="module")
 def record():
     """One short run: topleft and a contestant that draws nothing."""
-    return run_cases(Options(["tiny"], ["broken"], [ISA], repeats=2, seconds=0.001))
+    return run_cases(RunOptions(["tiny"], ["broken"], [ISA], repeats=2, seconds=0.001))
 
 
 def test_run_record_is_json_and_says_where_it_was_made(record):
@@ -51,7 +51,7 @@ def test_run_wrong_pixels_none_of_ours_all_of_the_broken_one(record):
 
 
 def test_scene_tables_show_a_mesh_and_leave_out_what_was_not_measured():
-    record = run_cases(Options(["blob-10k", "large-4k"], [], [ISA], repeats=1, seconds=0))
+    record = run_cases(RunOptions(["blob-10k", "large-4k"], [], [ISA], repeats=1, seconds=0))
     mesh, fills = scene_tables.meshes_text(record), scene_tables.PARTS["fills"](record)
     median = record["scenes"][0]["runs"][0]["median_ms"]
     assert f"| 10,000    | {number(median)}" in mesh.replace("!", "")
@@ -100,7 +100,7 @@ def test_peer_file_has_its_parts_without_the_peer(name):
 
 
 def test_contestant_that_fails_is_skipped_with_the_reason():
-    record = run_cases(Options(["tiny"], ["broken"], ["mmx"], repeats=1, seconds=0))
+    record = run_cases(RunOptions(["tiny"], ["broken"], ["mmx"], repeats=1, seconds=0))
     (skipped,) = record["scenes"][0]["skipped"]
     assert skipped["name"] == "topleft mmx"
     assert "TOPLEFT_ISA" in skipped["reason"]
