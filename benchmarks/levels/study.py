@@ -19,7 +19,7 @@ from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.levels import tables
 from benchmarks.report.study import Study
-from topleft._meshes.lod.detail import pixels_of_bound, window_of
+from topleft._meshes.lod.detail import ScreenError, window_of
 
 SIZE = (1920, 1080)
 HEIGHTS_PX = (1000, 300, 100, 30, 10)
@@ -78,7 +78,8 @@ def measure_mesh(name: str, mesh: tl.Mesh, levels: tl.Levels, times: list[dict[s
         masks = [mask_of(level.mesh, matrix, fineness, height_px) for level in levels]
         rows = []
         for level, mask, turns in zip(levels, masks, own["turns_ms"], strict=True):
-            bound_px = pixels_of_bound(matrix, SIZE, window_of(SIZE, None, (0, 0)), levels[0], level)
+            scale = ScreenError(matrix, SIZE, window_of(SIZE, None, (0, 0))).scale_of(None, levels[0], level)
+            bound_px = None if scale is None else level.bound * scale
             rows.append({"turns_ms": turns, "bound_px": bound_px, "error_px": outlines_px(masks[0], mask) / fineness})
         views.append({"height_px": height_px, "level": chosen.level, "resolution_px": 1 / fineness, "levels": rows,
                       "clustered_ms": own["clustered_ms"]})  # fmt: skip

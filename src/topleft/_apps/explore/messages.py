@@ -14,7 +14,6 @@ import struct
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from topleft._apps.explore.session import Reply, Request
 
@@ -35,13 +34,8 @@ def split(reply: Reply) -> tuple[dict[str, Any], list[memoryview]]:
         if array.dtype == np.bool_:
             array = array.view(np.uint8)
         arrays[name] = {"dtype": array.dtype.name, "shape": array.shape, "part": len(parts)}
-        parts.append(as_memory(array))
+        parts.append(array.reshape(-1).view(np.uint8).data)
     return {**reply.header, "arrays": arrays}, parts
-
-
-def as_memory(array: NDArray[Any]) -> memoryview:
-    """The bytes of an array, not copied."""
-    return array.reshape(-1).view(np.uint8).data
 
 
 def pack(header: dict[str, Any], parts: list[memoryview]) -> bytes:

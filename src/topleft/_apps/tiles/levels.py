@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -219,7 +219,7 @@ def _submitter(
     from topleft._apps.tiles.cluster import ClusterWriters, WriteJob
     from topleft._apps.tiles.dask_array import WindowJob
 
-    seen, writers = store.seen_from_elsewhere(), ClusterWriters(client)
+    seen, writers = replace(store, folder=store.folder.absolute()), ClusterWriters(client)
 
     def submit(_: int, row: int, column: int) -> Future[None]:
         return writers.submit(WriteJob(seen, WindowJob(raster, row, column), row, column, prepare))

@@ -10,9 +10,9 @@ import struct
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -48,28 +48,15 @@ def level_size(size: tuple[int, int], level: int) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class TileStore(ABC):
-    """Where the tiles of a raster go, and how a format encodes them.
-
-    Attributes
-    ----------
-    folder : Folder
-    size, window, tile : (width, height), pixels
-        Of the raster at level 0, of a block, of a tile.
-    channels : tuple of int
-    dtype : dtype
-        As stored.
-    empty : number or ndarray
-        The value of pixels without a triangle.
-    n_levels : int
-    """
+    """Where the tiles of a raster go, and how a format encodes them."""
 
     folder: Folder
-    size: tuple[int, int]
-    window: tuple[int, int]
-    tile: tuple[int, int]
+    size: tuple[int, int]  # (width, height) of level 0, pixels
+    window: tuple[int, int]  # of a block
+    tile: tuple[int, int]  # of a tile
     channels: tuple[int, ...]
-    dtype: np.dtype[Any]
-    empty: Any
+    dtype: np.dtype[Any]  # as stored
+    empty: Any  # the value of pixels without a triangle
     n_levels: int
 
     #: Whether tiles of the border are filled up to the size of others.
@@ -86,10 +73,6 @@ class TileStore(ABC):
     @abstractmethod
     def decoded(self, content: bytes) -> Array:
         """Return the pixels of a tile."""
-
-    def seen_from_elsewhere(self) -> Self:
-        """The same for processes that run in other folders."""
-        return replace(self, folder=self.folder.absolute())
 
     def n_tiles(self, level: int) -> tuple[int, int]:
         """Columns and rows of tiles of a level."""

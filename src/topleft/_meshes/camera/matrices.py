@@ -81,15 +81,7 @@ def box_corners(ends: F64) -> F64:
 
 
 def distance_to_fit(points: F64, tan_x: float, tan_y: float) -> float:
-    """The distance in front of the origin at which a camera has all points just inside its frame.
-
-    Parameters
-    ----------
-    points : (N, 3) float64
-        In eye axes, relative to the point that the camera looks at.
-    tan_x, tan_y : float
-        Tangents of half the fields of view.
-    """
+    """The distance at which a camera has all points (N, 3), in its axes, just inside a frame of two half tangents."""
     x, y, z = points.T
     needed = z + FRAMING_MARGIN * np.maximum(np.abs(x) / tan_x, np.abs(y) / tan_y)
     farthest = np.sqrt((points**2).sum(axis=1).max())

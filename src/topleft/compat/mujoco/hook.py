@@ -124,9 +124,7 @@ def install() -> None:
         sys.modules[name] = module = ModuleType(name)
         module.__getattr__ = partial(context_of_dm_control, word)  # type: ignore[method-assign]
     mujoco = import_module("mujoco")
-    calls: dict[str, Any] = {
-        own.__name__: own for own in (mjr_render, mjr_readPixels, mjr_resizeOffscreen, mjr_maxViewport)
-    }
+    calls: dict[str, Any] = {own.__name__: own for own in CALLS}
     calls |= dict.fromkeys(IGNORED, nothing) | dict.fromkeys(RENEWED, renew)
     calls |= {"MjrContext": MjrContext, "GLContext": GLContext, "Renderer": Renderer}
     for name, own in calls.items():

@@ -49,17 +49,7 @@ def whole(row: Tree, name: str, default: int | None = None) -> int:
 
 
 class Accessors:
-    """The arrays of a file by their index, each decoded once.
-
-    Parameters
-    ----------
-    tree : dict
-        The JSON.
-    blob : bytes, optional
-        The binary chunk of a GLB file.
-    source : InputFile
-        Where the buffers are.
-    """
+    """The arrays of a file by their index, each decoded once; `blob` is the binary chunk of a GLB."""
 
     def __init__(self, tree: Tree, blob: bytes | None, source: InputFile) -> None:
         self._tree = tree
