@@ -201,7 +201,7 @@ TL_INLINE int meet_pair(const meeting *m, int64_t x, int is_flipped, tl_met_pair
                                        : find_silhouette(m->view, e, &p->pair, &p->edge);
 }
 
-/* Blends the pixels of a pair in the band; backward adds the gradients of their colours, and of its edge to the sums. */
+/* Blends the pixels of a pair in the band; backward adds the gradients of their colours and of its edge. */
 TL_INLINE void blend_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_met_pair *p, tl_grad_sums *sums,
                           int is_f64)
 {

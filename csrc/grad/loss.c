@@ -1,5 +1,5 @@
-/* The mean squared difference of a picture from another one, and its gradients: attributes of float32, smooth edges, and
- * both backwards, in one pass over the rows of a band while they are in the cache.
+/* The mean squared difference of a picture from another one, and its gradients: attributes of float32, smooth edges,
+ * and both backwards, in one pass over the rows of a band while they are in the cache.
  * In: ids of a picture, a mesh with attributes, the other picture.  Out: a sum of squares; sums by vertex, attribute.
  *
  * A triangle that is seen is a face: planes in float64, about the first pixel that shows it and in units of its total
