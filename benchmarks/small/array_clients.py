@@ -5,7 +5,6 @@ Input: a checkout. Output: a row for each case: pixels that differ, how far valu
 
 from __future__ import annotations
 
-import argparse
 import os
 import statistics
 import sys
@@ -22,7 +21,7 @@ import topleft as tl
 from benchmarks.harness.records import Record
 from benchmarks.report.tables import table
 
-Client = Callable[[Path, argparse.Namespace], list[Record]]
+Client = Callable[[Path, Any], list[Record]]
 Draws = tuple[Callable[[], Any], Callable[[], Any]]
 
 SIZES = (5_000, 20_000, 80_000)
@@ -49,7 +48,7 @@ def timed(theirs: Callable[[], Any], ours: Callable[[], Any], rounds: int) -> Re
     return {"ms": [1e3 * statistics.median(found) for found in times]}
 
 
-def run_bop(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_bop(folder: Path, options: Any) -> list[Record]:
     """Objects in many poses by bop_toolkit's vispy renderer and by topleft, and their errors VSD."""
     os.environ.setdefault("EGL_PLATFORM", "surfaceless")
     os.environ.setdefault("LP_NUM_THREADS", "1")
@@ -75,7 +74,7 @@ def run_bop(folder: Path, options: argparse.Namespace) -> list[Record]:
     return rows
 
 
-def compare_poses(pose_error: Any, both: list[Any], n: int, poses: list[Any], options: argparse.Namespace) -> Record:
+def compare_poses(pose_error: Any, both: list[Any], n: int, poses: list[Any], options: Any) -> Record:
     """Pixels of masks that differ, depth that is off, errors VSD that differ, and the median time of a call."""
     row: Record = {"pixels": 0, "differ": 0, "beyond edges": 0, "off": 0.0, "vsd": 0.0}
     found: list[Record] = []
@@ -135,7 +134,7 @@ def write_ply(path: Path, n: int) -> None:
     path.write_bytes("\n".join(lines).encode() + points.tobytes() + faces.tobytes())
 
 
-def run_pytorch3d(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_pytorch3d(folder: Path, options: Any) -> list[Record]:
     """Expected values of the tests of PyTorch3D without blur, and spheres by its kernel for the CPU and by topleft."""
     sys.path.insert(0, str(folder))
     import torch
@@ -168,7 +167,7 @@ def run_pytorch3d(folder: Path, options: argparse.Namespace) -> list[Record]:
     return rows
 
 
-def run_custom_rasterizer(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_custom_rasterizer(folder: Path, options: Any) -> list[Record]:
     """Faces and weights by the kernel of Hunyuan3D for the CPU; its compiled module lies in the folder."""
     sys.path.insert(0, str(folder))
     import torch
@@ -192,7 +191,7 @@ def run_custom_rasterizer(folder: Path, options: argparse.Namespace) -> list[Rec
     return rows
 
 
-def run_texture_baker(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_texture_baker(folder: Path, options: Any) -> list[Record]:
     """Faces and weights of atlases by the kernel of Stable Fast 3D for the CPU, and by topleft."""
     import torch
 

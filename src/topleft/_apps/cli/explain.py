@@ -82,7 +82,7 @@ def add_plan_commands(commands: Any) -> None:
     add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
-    add("--threads", type=positive, default=None, metavar="N", help="(default: as many as pay)")
+    add("--threads", type=positive, metavar="N", help="(default: as many as pay)")
     add("--measure", action="store_true", help="draw it, and show the times of the stages")
     add("--json", action="store_true", help="numbers and sentences as JSON")
     calibrate = commands.add_parser("calibrate", help="measure this machine", description=run_calibrate.__doc__)

@@ -710,15 +710,7 @@ def as_camera(camera: object, name: str = "camera") -> Camera:
 
 
 def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: tuple[int, int]) -> Camera:
-    """The camera, or the three-quarter view of the subject in a picture of this size.
-
-    Raises
-    ------
-    TypeError
-        If the camera is none.
-    ValueError
-        If there is none, and nothing to frame.
-    """
+    """The camera, or the three-quarter view of the subject in a picture of this size."""
     if camera is not None:
         return as_camera(camera)
     if isinstance(subject, Mesh) and not len(subject.triangles):

@@ -225,22 +225,6 @@ def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: t
     return np.array([*ends[0], -ends[1][1], -ends[1][0]])
 
 
-def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level) -> float | None:
-    """The largest error of a visible point, pixels; None where that is unknown.
-
-    Parameters
-    ----------
-    matrix : (4, 4) float64
-        Clip from object.
-    viewport : (width, height), pixels
-    window : (4,) float64
-        The result of `window_of`.
-    original, level : Level
-    """
-    scale = engine.pixels_per_unit(matrix, viewport, window, np.stack([original.extent, level.extent]))
-    return None if scale is None else level.bound * scale
-
-
 def detailed(scene: Scene, camera: Camera, size: tuple[int, int], tolerance: float, **options: Any) -> Scene:
     """The scene as it is drawn within a tolerance; options as for `choose_detail`."""
     if not isinstance(options.get("material"), Material | None):

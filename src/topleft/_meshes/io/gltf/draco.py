@@ -179,13 +179,7 @@ def _row_bytes(rest: DracoBytes, bytes_of_decoder: int) -> int:
 
 
 def declared_by_draco(content: bytes) -> DracoSize:
-    """The sizes that a mesh declares, which it need not hold.
-
-    Raises
-    ------
-    MeshError
-        If it is no mesh of the version that glTF takes, or is cut off before its attributes.
-    """
+    """The sizes that a mesh declares, which it need not hold."""
     head = content[:11]
     if head[:5] != b"DRACO" or head[5:7] != b"\2\2" or len(head) < 11 or head[7] != 1:
         raise MeshError("what is compressed is no mesh of Draco 2.2")
