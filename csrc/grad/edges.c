@@ -147,20 +147,24 @@ TL_INLINE int64_t list_pairs(const tl_grad_edges *e, const int32_t *ids, const i
                              int32_t *columns)
 {
     const vi beyond = vi_set1(TL_NO_ID), none = vi_set1(-1);
-    int64_t n_found = 0;
+    int64_t n_listed = 0, n_found = 0;
     for (int64_t x = 0; x < n; x += TL_LANES) {
         const vi id = vi_load(ids + x), other = vi_load(others + x);
-        vm m = vm_and_not(vm_first(n - x), vi_eq(id, other));
-        m = vm_and(m, vm_and(vi_gt(id, beyond), vi_gt(other, beyond)));
-        if (!vm_any(m))
-            continue;
-        if (e->rule != TL_PAIR_STRAIGHT) {
-            const vi outlines = vi_or(vi_gather(vm_and(m, vi_gt(id, none)), e->outline, id),
-                                      vi_gather(vm_and(m, vi_gt(other, none)), e->outline, other));
-            m = vm_and(m, vi_gt(outlines, none)); /* both have corners */
-            m = vm_and_not(m, runs_on(e, m, id, other, outlines));
-        }
-        vi_compress(columns + n_found, m, vi_add(vi_iota(), vi_set1((int32_t)x)));
+        const vm differs = vm_and_not(vm_first(n - x), vi_eq(id, other));
+        const vm m = vm_and(differs, vm_and(vi_gt(id, beyond), vi_gt(other, beyond)));
+        vi_compress(columns + n_listed, m, vi_add(vi_iota(), vi_set1((int32_t)x)));
+        n_listed += __builtin_popcount(vm_bits(m));
+    }
+    if (e->rule == TL_PAIR_STRAIGHT)
+        return n_listed;
+    for (int64_t i = 0; i < n_listed; i += TL_LANES) { /* gathers have full vectors */
+        vm m = vm_first(n_listed - i);
+        const vi x = vi_load(columns + i), id = vi_gather(m, ids, x), other = vi_gather(m, others, x);
+        const vi outlines = vi_or(vi_gather(vm_and(m, vi_gt(id, none)), e->outline, id),
+                                  vi_gather(vm_and(m, vi_gt(other, none)), e->outline, other));
+        m = vm_and(m, vi_gt(outlines, none)); /* both have corners */
+        m = vm_and_not(m, runs_on(e, m, id, other, outlines));
+        vi_compress(columns + n_found, m, x);
         n_found += __builtin_popcount(vm_bits(m));
     }
     return n_found;

@@ -617,12 +617,9 @@ def photometric_loss(
     check("attr", attr, f"(V, {target.shape[3]}), with 1 or {len(pos)} before", fits)
     if loss not in get_args(LossOption):
         raise ValueError(f"loss must be 'l2', got {loss!r}")
-    rule, (height, width) = rule_of(edges), target.shape[1:3]
     across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
     mesh, values, wished = same_dtype(pos, attr if attr.ndim == 3 else attr[None], target.detach())
-    ids = draw_ids(pos.detach(), tri, None, height, width, glctx.threads or 0)
-    of_edges = [across.to(torch.int32), *outline(mesh.detach(), tri, across, height, width)]
-    found: Tensor = squares(mesh, tri, values, wished, ids, of_edges, int(rule), glctx.threads or 0)[0]
+    found: Tensor = squares(mesh, tri, values, wished, across, int(rule_of(edges)), glctx.threads or 0)[0]
     return found
 
 

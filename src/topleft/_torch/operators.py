@@ -326,29 +326,28 @@ def smooth_vjp(
 
 
 @operator(
-    "(Tensor pos, Tensor tri, Tensor attr, Tensor target, Tensor ids, Tensor[] outline, int rule, int threads)"
+    "(Tensor pos, Tensor tri, Tensor attr, Tensor target, Tensor across, int rule, int threads)"
     " -> (Tensor, Tensor, Tensor)",
-    lambda pos, tri, attr, target, ids, outline, rule, threads: (  # noqa: ARG005
+    lambda pos, tri, attr, target, across, rule, threads: (  # noqa: ARG005
         pos.new_empty(()),
         like(pos, pos),
         like(attr, attr),
     ),
 )
 def squares(
-    pos: Tensor,
-    tri: Tensor,
-    attr: Tensor,
-    target: Tensor,
-    ids: Tensor,
-    outline: Sequence[Tensor],
-    rule: int,
-    threads: int,
+    pos: Tensor, tri: Tensor, attr: Tensor, target: Tensor, across: Tensor, rule: int, threads: int
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return the mean squared difference from pictures, and the gradients of `pos` and `attr`."""
-    n_rows = min(pos.shape[1], attr.shape[1])
-    grid = replace(grid_of(tri, ids, n_rows), threads=threads_of(threads, ids.numel()))
-    edges = tensors.Outline(*map(numpy_of, outline))
-    loss, *gradients = tensors.squares(grid, EdgeRule(rule), edges, *map(numpy_of, (pos, ids, attr, target)))
+    height, width = target.shape[1:3]
+    n = threads_of(threads, height * width)
+    drawn = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, None)]
+    grid = replace(
+        grid_of(tri, target, min(pos.shape[1], attr.shape[1])), threads=threads_of(threads, target[..., 0].numel())
+    )
+    vertices = numpy_of(pos)
+    edges = tensors.outline_of(grid, vertices, numpy_of(across.to(torch.int32)))
+    ids = joined(drawn, (height, width))
+    loss, *gradients = tensors.squares(grid, EdgeRule(rule), edges, vertices, ids, numpy_of(attr), numpy_of(target))
     g_pos, g_attr = map(torch.from_numpy, gradients)
     return torch.tensor(loss, dtype=pos.dtype), g_pos, g_attr
 
@@ -455,7 +454,7 @@ def keep_squares(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> N
 def pull_squares(ctx: Any, g_loss: Tensor, *_: Any) -> tuple[Any, ...]:
     """Return the gradients of what `squares` takes."""
     g_pos, g_attr = ctx.saved_tensors
-    return g_loss * g_pos, None, g_loss * g_attr, None, None, [None] * 3, None, None
+    return g_loss * g_pos, None, g_loss * g_attr, None, None, None, None
 
 
 squares.register_autograd(pull_squares, setup_context=keep_squares)
