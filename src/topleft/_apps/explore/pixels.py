@@ -56,27 +56,13 @@ REPEATED_SECONDS = 0.05
 
 @dataclass(frozen=True)
 class MethodPicture:
-    """What one method draws of a state.
+    """What one method draws of a state."""
 
-    Attributes
-    ----------
-    owners : ndarray of int32, shape (H, W, S)
-        The triangle of each sample, -1 for none; 0 where only coverage is known.
-    counts : ndarray, shape (H, W, S)
-        How many triangles cover it; with areas, their sum.
-    shares : ndarray of float32, shape (H, W)
-        How much of each pixel is covered.
-    seconds : float
-        Of the call that says who owns each sample, or how much is covered.
-    notes : list of str
-        What was asked for that the method does not have.
-    """
-
-    owners: NDArray[np.int32]
-    counts: NDArray[Any]
-    shares: NDArray[np.float32]
-    seconds: float
-    notes: list[str] = field(default_factory=list)
+    owners: NDArray[np.int32]  # (H, W, S): the triangle of each sample, -1 for none; 0 where only coverage is known
+    counts: NDArray[Any]  # (H, W, S): how many triangles cover it; with areas, their sum
+    shares: NDArray[np.float32]  # (H, W): how much of each pixel is covered
+    seconds: float  # of the call that says who owns each sample, or how much is covered
+    notes: list[str] = field(default_factory=list)  # options that the method does not have
 
 
 def draw(state: PixelState, method: str) -> MethodPicture:

@@ -8,6 +8,8 @@ Structures and an Interpolant over Each Irregular Triangular Domain", SIGGRAPH 1
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -120,7 +122,7 @@ def field(
     if array.dtype.kind not in "fiub":
         raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
     is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
-    grid = _grid_of(polygons, size, pixel_size, extent, y)
+    grid = grid_of(size, pixel_size, extent, y, partial(extent_of, polygons))
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     points_px = grid.to_pixels(points)
     size = _window_of(grid, origin) if window is None else window
@@ -200,8 +202,8 @@ def height_map(
     points = _plane_points(polygons)
     if points.shape[1] != 3:
         raise ValueError(f"a height map needs points of shape (V, 3), got {points.shape}")
-    is_grid = isinstance(spacing, Grid)
-    grid = _grid_of(polygons, spacing, None, extent, y) if is_grid else _grid_of(polygons, None, spacing, extent, y)
+    size, pixel_size = (spacing, None) if isinstance(spacing, Grid) else (None, spacing)
+    grid = grid_of(size, pixel_size, extent, y, partial(extent_of, polygons))
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     points_px, heights = grid.to_pixels(points), points[:, 2].astype(np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
@@ -252,12 +254,13 @@ def _plane_points(polygons: Polygons) -> npt.NDArray[Any]:
     return points
 
 
-def _grid_of(polygons: Polygons, size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption) -> Grid:
+def grid_of(size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption, box: Callable[[], Extent]) -> Grid:
+    """The grid that is given, or the one round an extent: the box of a mesh unless given."""
     if isinstance(size, Grid):
         if extent is not None or pixel_size is not None or y != "up":
             raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")
         return size
-    return grid_around(extent_of(polygons) if extent is None else extent, size, pixel_size, y)
+    return grid_around(box() if extent is None else extent, size, pixel_size, y)
 
 
 def extent_around(mesh: MeshLike, extent: ExtentLike | None) -> ExtentLike:

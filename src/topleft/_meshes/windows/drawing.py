@@ -406,13 +406,7 @@ ON_GRIDS = ("field", "height_map")
 
 
 def painter_of(kind: str, grid: Grid | None, triangles: Triangles, values: Any, options: dict[str, Any]) -> Painter:
-    """Return the painter of a kind of raster.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If there is no such kind, the kind has no such option, or an option or the values do not fit.
-    """
+    """Return the painter of a kind of raster."""
     made = KINDS[kind]
     known = (*made.own, *VIEW_OPTIONS)
     unknown = sorted(options.keys() - set(known))
