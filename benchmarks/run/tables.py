@@ -23,8 +23,6 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     for scene in record["scenes"]:
         yield ""
         yield from scene_lines(scene)
-    yield ""
-    yield from summary_lines(record["scenes"])
 
 
 def scene_lines(scene: dict[str, Any]) -> Iterator[str]:
@@ -57,33 +55,6 @@ def is_crowded(run: dict[str, Any]) -> bool:
     """Whether the contestant had its CPUs for less than 90 % of the time; unknown in old records."""
     share = run.get("cpu_share")
     return share is not None and share < 0.9 * run["threads"]
-
-
-def summary_lines(scenes: list[dict[str, Any]]) -> Iterator[str]:
-    """A row for each scene and instruction set: more threads, the scene beside, the fastest peer."""
-    yield "## Summary"
-    yield "Medians, ms; ratios pair by pair."
-    yield "!: the CPU was shared. That lengthens calls of several ms and spares short ones: do not trust the ratios."
-    yield ""
-    rows = []
-    for scene in scenes:
-        own = [run for run in scene["runs"] if run["peer"] == "topleft" and run["scene"] == scene["scene"]]
-        n_threads = min((run["threads"] for run in own), default=1)
-        peers = [run for run in scene["runs"] if run["peer"] != "topleft" and run["threads"] == n_threads]
-        for run in (run for run in own if run["threads"] == n_threads):
-            same = [other for other in scene["runs"] if other.get("isa") == run["isa"] and other is not run
-                    and other.get("way") == run.get("way")]  # fmt: skip
-            threads = [f"{ratio(run, other):.2f} ({other['threads']})" for other in same
-                       if other["scene"] == run["scene"]]  # fmt: skip
-            beside = [f"{ratio(run, other):.2f}" for other in same
-                      if other["scene"] != run["scene"] and other["threads"] == n_threads]  # fmt: skip
-            best = min(peers, key=lambda peer: peer["median_ms"], default=None)
-            peer = f"{best['name']} ({best['gives']}) {ratio(best, run):.1f}" if best else ""
-            median = number(run["median_ms"]) + "!" * is_crowded(run)
-            lists = [", ".join(ratios) for ratios in (threads, beside)]
-            rows.append([scene["scene"], run["name"].removeprefix("topleft "), median, *lists, peer])
-    head = ["scene", "isa", "ms", "faster with (n) threads", "x scene beside", "fastest peer, x ours"]
-    yield from table(head, rows)
 
 
 def ratio(run: dict[str, Any], other: dict[str, Any]) -> float:

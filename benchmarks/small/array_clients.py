@@ -20,6 +20,7 @@ import numpy as np
 import topleft as tl
 from benchmarks.harness.records import Record
 from benchmarks.report.tables import table
+from benchmarks.scenes.arrays import write_ply
 
 Client = Callable[[Path, Any], list[Record]]
 Draws = tuple[Callable[[], Any], Callable[[], Any]]
@@ -63,7 +64,7 @@ def run_bop(folder: Path, options: Any) -> list[Record]:
     with tempfile.TemporaryDirectory() as folder_of_models:
         paths = {n: Path(folder_of_models, f"{n}.ply") for n in SIZES}
         for n, path in paths.items():
-            write_ply(path, n)
+            write_bumpy(path, n)
         for mode in ("depth", "rgb+depth"):
             both = [own.create_renderer(640, 480, "vispy", mode=mode) for own in (renderer, bop)]
             for n, path in paths.items():
@@ -117,21 +118,14 @@ def pose_of(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return R * np.linalg.det(R), rng.uniform([-60, -60, 400], [60, 60, 900])[:, None]
 
 
-def write_ply(path: Path, n: int) -> None:
+def write_bumpy(path: Path, n: int) -> None:
     """Write a bumpy object of about n triangles, 180 mm long, for the reader of bop_toolkit."""
     vertices, triangles = tl.scenes.blob(n)
     vertices = vertices * [60, 40, 90]
-    normals = tl.Mesh(vertices, triangles).vertex_normals()
-    colors = np.rint(127 + 127 * np.sin(vertices / 20)).astype(np.uint8)
-    points = np.zeros(len(vertices), [("place", "<f4", 3), ("normal", "<f4", 3), ("color", "u1", 3)])
-    points["place"], points["normal"], points["color"] = vertices, normals, colors
-    faces = np.zeros(len(triangles), [("n", "u1"), ("rows", "<i4", 3)])
-    faces["n"], faces["rows"] = 3, triangles
-    names = [("float", "x y z nx ny nz"), ("uchar", "red green blue")]
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
-    lines += [f"property {kind} {name}" for kind, own in names for name in own.split()]
-    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header\n"]
-    path.write_bytes("\n".join(lines).encode() + points.tobytes() + faces.tobytes())
+    normals = tl.Mesh(vertices, triangles).vertex_normals().T.astype("<f4")
+    colors = np.rint(127 + 127 * np.sin(vertices / 20)).astype(np.uint8).T
+    columns = zip(("nx", "ny", "nz", "red", "green", "blue"), (*normals, *colors), strict=True)
+    write_ply(path, vertices, triangles, **dict(columns))
 
 
 def run_pytorch3d(folder: Path, options: Any) -> list[Record]:

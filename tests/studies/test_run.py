@@ -65,7 +65,6 @@ def test_report_names_contestants_and_errors(record):
     text = "\n".join(tables.lines(record))
     assert f"| topleft {ISA} " in text
     assert "## tiny" in text
-    assert "## Summary" in text
 
 
 def test_run_command_writes_the_record(tmp_path, capsys):

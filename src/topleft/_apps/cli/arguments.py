@@ -229,7 +229,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         type=tolerance,
         default=0.0,
         metavar="PX",
-        help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)",
+        help="draw a coarser level of the mesh, its outline off by at most PX pixels (default 0: the mesh)",
     )
     add("--wireframe", action="store_true", help="draw the edges over it")
     add(

@@ -25,7 +25,7 @@ def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: the choice of each stage, its reason and its time."""
     mesh = MeshSource(options.mesh)()
     if isinstance(mesh, Points):
-        raise UsageError(f"{options.mesh!r} holds points, of which there is no plan")
+        raise UsageError(f"{options.mesh!r} holds points: plans are of triangles")
     orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
     camera = orbit(mesh, options.size)
     outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))
@@ -58,7 +58,7 @@ def run_calibrate(_: argparse.Namespace) -> int:
     costs = calibrate()
     before, after, n = costs.tuned
     print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual[1]:.1f}")
-    print(f"of {n} scenes not fitted, what is chosen takes {before:.3f} -> {after:.3f} times as long as the best")
+    print(f"of {n} scenes not fitted, choices take {before:.3f} -> {after:.3f} times as long as the best")
     return 0
 
 

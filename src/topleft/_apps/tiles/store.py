@@ -185,7 +185,7 @@ def begin(
         Converts the pixels of a window to those of the file.
     """
     if resume and overwrite:
-        raise ValueError("resume=True goes on with what is there, overwrite=True replaces it: give one of them")
+        raise ValueError("resume=True continues the store, overwrite=True replaces it: give one of them")
     for place, kept in there:
         if kept is None:
             raise FileExistsError(f"{place} was not written by topleft: move it, or write elsewhere")

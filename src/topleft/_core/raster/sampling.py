@@ -128,7 +128,7 @@ class SplitSamples:
         check_fits(shape, np.int32, np.float32)
         ids, depth = empty(shape, np.int32), empty(shape, np.float32)
         if draw_planes(self.drawn, self.sink, ids, depth, is_near=True):
-            raise IndexError("triangles must stay what they were drawn from until samples are asked for")
+            raise IndexError("triangles must not change until samples are read")
         lay_background(ids, depth, self.sink, self.background)
         return ids, depth
 

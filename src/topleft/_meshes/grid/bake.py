@@ -218,7 +218,7 @@ def chart_of(mesh: Mesh, size: tuple[int, int], rule: str, n_threads: int) -> Ch
         if not np.isfinite(uv[mesh.triangles]).all():
             raise ValueError("uv must be finite where triangles use them, got NaN or infinite ones")
         n_outside = np.count_nonzero(~is_inside[mesh.triangles].all(axis=1))
-        line = f"{n_outside} triangles leave the square of uv from 0 to 1: what lies outside is not baked"
+        line = f"{n_outside} triangles leave the square of uv from 0 to 1: their parts outside are not baked"
         warnings.warn(line, MeshWarning, stacklevel=3)
     points = np.ascontiguousarray(np.stack([uv[:, 0] * size[0], (1 - uv[:, 1]) * size[1]], axis=1))
     n_shared = int(

@@ -41,7 +41,7 @@ from topleft.errors import MeshError, MissingPackageError
 
 NO_TRIANGLES = {
     ".svg": "it holds curves in a plane",
-    ".dxf": "it is a drawing, of which only curves could be read",
+    ".dxf": "it is a drawing: only its curves could be read",
     ".binvox": "it holds voxels: make a mesh of them, by trimesh's VoxelGrid.marching_cubes say",
 }
 """Objects of trimesh that are no mesh."""

@@ -205,7 +205,7 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, ma
     if not len(mesh.triangles):
         return "it has no triangles"
     if camera.lens is not None:
-        return "a lens bends the picture by what no bound is known of"
+        return "no bound is known for the bend of the lens"
     if cull is not None and str(cull) != "none":
         return f"cull={str(cull)!r}: which way a triangle is turned has no bound"
     if any(has_holes(one, mesh) for one in (mesh.materials if material is None else (material,))):

@@ -75,7 +75,7 @@ def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None
     """Draw the scene that was rendered last into arrays, of whatever shape, whose first row is the lowest."""
     size = int(viewport.width), int(viewport.height)
     if con.rendered is None or con.painter is None or con.rendered[1] != size:
-        raise ValueError(f"viewport must have the size of what mjr_render drew last, got {size}")
+        raise ValueError(f"viewport must have the size of mjr_render's last picture, got {size}")
     scene, _, is_segmented = con.rendered
     if rgb is not None and not is_segmented:
         rgb.reshape(*size[::-1], 3)[:] = con.painter.colors(scene, size)[::-1]
