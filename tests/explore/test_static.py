@@ -7,6 +7,7 @@ import struct
 import subprocess
 from importlib.resources import files
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from topleft._apps.explore.static import LAYERS, N_SEEDS, SETS, write_static
 from topleft._apps.explore.trace import TRACED
 from topleft.methods import CLASSICS
 from topleft.scene_families import FAMILIES
+from topleft.typing import SamplingOption
 
 NODE = shutil.which("node")
 PAGE = files("topleft._apps.explore").joinpath("page")
@@ -39,7 +41,7 @@ DEEP = SQUARE | {
     "triangles": [[0, 3, 2], [1, 3, 4]],
 }
 FAR = SQUARE | {"vertices": [[-3e9, 2.0], [7.1, 1e10], [11.9, -5.5], [9.5, 9.5]]}
-SAMPLINGS = ("center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner")
+SAMPLINGS = get_args(SamplingOption)
 
 
 @pytest.fixture(scope="module")
@@ -208,13 +210,6 @@ def test_window_far_away_is_that_of_python(ask):
     far = 2**50
     state = SQUARE | {"vertices": [[x + far, y - far] for x, y in SQUARE["vertices"]], "origin": [far, -far]}
     check(ask, [{"do": "pixels.draw", "state": state | more} for more in ({"exact": True}, {"subpixel_bits": "exact"})])
-
-
-def test_edits_are_those_of_python(ask):
-    words = [("add", 0), ("split", 0), ("flip", 1), ("remove", 0), ("remove", 1), ("split", 7), ("flip", None)]
-    check(
-        ask, [{"do": "pixels.edit", "state": one, "what": w, "triangle": i} for w, i in words for one in (SQUARE, DEEP)]
-    )
 
 
 BAD_STATES = [
