@@ -13,8 +13,9 @@ from benchmarks.accuracy.study import STUDY as ACCURACY
 from benchmarks.atlas.study import STUDY as ATLAS
 from benchmarks.choices.planner_page import STUDY as PLANNER
 from benchmarks.choices.study import STUDY as CHOICES
+from benchmarks.harness.arguments import add_options, options_of
 from benchmarks.harness.machine import IMAGES
-from benchmarks.harness.records import Record, write_record, write_text
+from benchmarks.harness.records import Record, forget, write_record, write_text
 from benchmarks.lanes.study import STUDY as LANES
 from benchmarks.levels.study import STUDY as LEVELS
 from benchmarks.peers import PEERS
@@ -32,7 +33,6 @@ from benchmarks.small.explorer import STUDY as EXPLORER
 from benchmarks.small.gate import STUDY as GATE
 from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.instances import STUDY as INSTANCES
-from benchmarks.small.memset import STUDY as MEMSET
 from benchmarks.small.pairs import STUDIES as PAIRS
 from benchmarks.small.samplings import STUDY as SAMPLINGS
 from benchmarks.small.tiles import STUDY as TILES
@@ -41,7 +41,7 @@ from benchmarks.static.study import STUDY as STATIC
 STUDIES = {
     study.kind: study
     for study in (
-        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, MEMSET, GROWTH, POLYGONS,
+        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, GROWTH, POLYGONS,
         REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, CLIENTS, INSTANCES, *PAIRS,
     )
 }  # fmt: skip
@@ -65,7 +65,7 @@ def parser() -> argparse.ArgumentParser:
     for study in STUDIES.values():
         add = commands.add_parser(study.kind, help=study.help)
         add.set_defaults(action=functools.partial(measure, study))
-        study.add_arguments(add)
+        add_options(add, study.options)
 
     add = commands.add_parser("report", help="print tables again")
     add.set_defaults(action=report)
@@ -99,8 +99,8 @@ def parts_of(record: Record) -> dict[str, Callable[[Record], str | None]]:
 def measure(study: Study, arguments: argparse.Namespace) -> None:
     """Measure, write, print."""
     out = getattr(arguments, "record", None)
-    save = functools.partial(write_record, out) if out else lambda _: None
-    record = study.run(arguments, save)
+    save = functools.partial(write_record, out) if out else forget
+    record = study.run(options_of(study.options, arguments), save)
     save(record)
     print(*study.lines(record), sep="\n")
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 
 F64 = NDArray[np.float64]
 BOOL = NDArray[np.bool_]
@@ -155,7 +155,7 @@ FORMATS: dict[str, Count] = {
 """The library draws the first two, float32 that is rounded once; the others are made by NumPy."""
 
 
-def measure_depth(options: Options) -> dict[str, Any]:
+def measure_depth(options: AccuracyOptions) -> dict[str, Any]:
     """Return `depth`: a row for each format, near/far ratio and distance between the sheets."""
     frame_px = min(FRAME_PX, options.frame_px)
     pixels = covered(make_sheets(0, RATIOS[0], frame_px), frame_px)  # the same ones for all gaps and ratios

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.accuracy import pure
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 from benchmarks.harness.errors import coverage
 from benchmarks.harness.peer_turns import MASK_TASKS, SMOOTH_TASKS, Peers, smooth_coverage
 from benchmarks.harness.turns import spread, take_turns, turn_of
@@ -27,7 +27,7 @@ from topleft.methods.reference.integers import areas as exact_areas
 Rows = dict[str, list[dict[str, Any]]]
 
 
-def measure_family(family: Family, options: Options) -> Rows:
+def measure_family(family: Family, options: AccuracyOptions) -> Rows:
     """Return the rows of one family, by the name of the list that they belong to."""
     timed = strewn(family, max(1, int(family.n_timed * options.scale)), options.frame_px)
     facts: dict[str, Any] = {"name": family.name, "what": family.what}
@@ -38,7 +38,7 @@ def measure_family(family: Family, options: Options) -> Rows:
     return {"families": [facts], **rows}
 
 
-def measure_no_snap(options: Options) -> Rows:
+def measure_no_snap(options: AccuracyOptions) -> Rows:
     """Return `no_snap`: the errors of vertices that are not snapped, family by family, and the time beside 8 bits.
 
     The ratio of calls that take turns does not depend on other work of the machine, so rows of another time than
@@ -58,7 +58,9 @@ def measure_no_snap(options: Options) -> Rows:
     return {"no_snap": rows}
 
 
-def measure_masks(family: Family, timed: Triangles, facts: dict[str, Any], options: Options, folder: Path) -> Rows:
+def measure_masks(
+    family: Family, timed: Triangles, facts: dict[str, Any], options: AccuracyOptions, folder: Path
+) -> Rows:
     """Return `coverage`, `pure` and `peers`; methods and peers take turns, adds the scene to `facts`."""
     chosen = entries(options.methods)
     peers = Peers(folder)
@@ -87,7 +89,7 @@ def measure_masks(family: Family, timed: Triangles, facts: dict[str, Any], optio
 
 
 def count_errors(
-    family: Family, chosen: Sequence[Entry], peers: Peers, facts: dict[str, Any], options: Options
+    family: Family, chosen: Sequence[Entry], peers: Peers, facts: dict[str, Any], options: AccuracyOptions
 ) -> tuple[list[int], dict[str, int]]:
     """Return how many pixels each entry and each peer got wrong; frames are drawn until there is enough."""
     import topleft as tl
@@ -111,7 +113,7 @@ def count_errors(
     return wrong, wrong_of_peers
 
 
-def mask_calls(chosen: Sequence[Entry], scene: Triangles, options: Options) -> list[partial[Any]]:
+def mask_calls(chosen: Sequence[Entry], scene: Triangles, options: AccuracyOptions) -> list[partial[Any]]:
     """Return the functions that draw the mask of the scene, entry by entry."""
     import topleft as tl
 
@@ -119,7 +121,9 @@ def mask_calls(chosen: Sequence[Entry], scene: Triangles, options: Options) -> l
     return [partial(rasterizer.coverage, *entry.orient(scene), **entry.options()) for entry in chosen]
 
 
-def measure_twin(twin: pure.Twin, family: Family, rows: list[dict[str, Any]], options: Options) -> dict[str, Any]:
+def measure_twin(
+    twin: pure.Twin, family: Family, rows: list[dict[str, Any]], options: AccuracyOptions
+) -> dict[str, Any]:
     """Return the row of a pure twin: its own time, and the error of its kernel."""
     size = (pure.FRAME_PX, pure.FRAME_PX)
     cells = in_cells(family, 1, pure.FRAME_PX)
@@ -134,7 +138,7 @@ def measure_twin(twin: pure.Twin, family: Family, rows: list[dict[str, Any]], op
 
 
 def measure_antialiasing(
-    family: Family, timed: Triangles, facts: dict[str, Any], options: Options, folder: Path
+    family: Family, timed: Triangles, facts: dict[str, Any], options: AccuracyOptions, folder: Path
 ) -> list[dict[str, Any]]:
     """Return time and error of each way to sample: root of the mean squared error of coverage over edge pixels."""
     import topleft as tl

@@ -11,7 +11,7 @@ import time
 from functools import partial
 from typing import Any
 
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 from benchmarks.harness.turns import Turn, spread, take_turns, turn_of
 from benchmarks.scenes.cases import HD, blob_scene
 
@@ -31,7 +31,7 @@ def shortest_of(turn: Turn) -> Turn:
     return lambda seconds: [min(turn(seconds))]
 
 
-def measure_scaling(options: Options) -> dict[str, Any]:
+def measure_scaling(options: AccuracyOptions) -> dict[str, Any]:
     """Return `scaling`: a row for each number of triangles and of threads; different numbers of threads take turns."""
     import topleft as tl
 

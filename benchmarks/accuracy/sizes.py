@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 from benchmarks.harness.turns import take_turns, turn_of
 from benchmarks.scenes.families import Entry, Triangles, entries
 
@@ -35,7 +35,7 @@ def equilateral(n: int, area_px: float, frame_px: int, seed: int = 11) -> Triang
     return vertices.reshape(-1, 2), np.arange(3 * n, dtype=np.int32).reshape(n, 3)
 
 
-def measure_sizes(options: Options) -> dict[str, Any]:
+def measure_sizes(options: AccuracyOptions) -> dict[str, Any]:
     """Return `sizes`: a row for each method and area, at the usual precision; and `memory`: the cost of a fill."""
     import topleft as tl
 
@@ -62,7 +62,7 @@ def measure_sizes(options: Options) -> dict[str, Any]:
     return {"sizes": rows, "memory": measure_memory(options)}
 
 
-def measure_memory(options: Options) -> dict[str, float]:
+def measure_memory(options: AccuracyOptions) -> dict[str, float]:
     """Return how long a byte takes to be set: in a mask of the frame, and in more memory than caches hold."""
     mask = np.zeros((options.frame_px, options.frame_px), np.uint8)
     much = np.zeros(max(int(STREAM_BYTES * min(options.scale, 1)), 1), np.uint8)

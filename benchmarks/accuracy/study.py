@@ -5,7 +5,6 @@ Out: a record for JSON. A part that is measured again replaces its rows; the res
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -13,23 +12,14 @@ from typing import Any
 from benchmarks.accuracy import speed_tables, tables
 from benchmarks.accuracy.depth import measure_depth
 from benchmarks.accuracy.filling import measure_family, measure_no_snap
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 from benchmarks.accuracy.scaling import measure_scaling
 from benchmarks.accuracy.sizes import measure_sizes
 from benchmarks.accuracy.stability import measure_stability
 from benchmarks.accuracy.tutorial import measure_tutorial
 from benchmarks.harness import machine
-from benchmarks.harness.arguments import (
-    add_names,
-    add_number,
-    add_out,
-    add_scale,
-    options_of,
-    refuse_unknown,
-    set_options,
-)  # fmt: skip
+from benchmarks.harness.arguments import refuse_unknown
 from benchmarks.harness.records import Record, Save, forget, read_record, tell
-from benchmarks.peers import PEERS
 from benchmarks.report.study import Study
 from benchmarks.report.tables import table, table_text
 from benchmarks.scenes.families import FAMILIES, NO_SNAP, Entry, entries
@@ -43,7 +33,7 @@ def mesh_entries(methods: Sequence[str]) -> list[Entry]:
     return [*entries(methods), *own]
 
 
-MEASURES: Mapping[str, Callable[[Options], Record]] = {
+MEASURES: Mapping[str, Callable[[AccuracyOptions], Record]] = {
     **{name: partial(measure_family, family) for name, family in FAMILIES.items()},
     "no-snap": measure_no_snap,
     "mesh": lambda options: measure_stability(mesh_entries(options.methods), options.frame_px, options.scale),
@@ -55,9 +45,12 @@ MEASURES: Mapping[str, Callable[[Options], Record]] = {
 """The function that measures each part; it returns lists of rows, and objects of facts, by name."""
 
 
-def run_accuracy(
-    options: Options, parts: Sequence[str] = (), record: Record | None = None, save: Save = forget
-) -> Record:
+def run(options: AccuracyOptions, save: Save) -> Record:
+    """Measure all parts, or those that are named and no other of the record."""
+    return run_accuracy(options, read_record(options.record) if options.parts else None, save)
+
+
+def run_accuracy(options: AccuracyOptions, record: Record | None = None, save: Save = forget) -> Record:
     """Measure the named parts, all for none, and return the record with them; `save` gets it after each.
 
     Raises
@@ -65,16 +58,16 @@ def run_accuracy(
     ValueError
         If a part is unknown, or the record is of another machine, instruction set or version.
     """
-    chosen = list(parts) or list(MEASURES)
+    chosen = list(options.parts) or list(MEASURES)
     refuse_unknown("parts", chosen, MEASURES)
     entries(options.methods)  # unknown names are refused before anything is measured
-    run = machine.describe()
+    here = machine.describe()
     facts: Record = {
         "schema": SCHEMA,
         "kind": "accuracy",
-        "machine": {key: value for key, value in run["machine"].items() if key != "load"},
-        "versions": run["versions"],
-        "isa": run["isa"],
+        "machine": {key: value for key, value in here["machine"].items() if key != "load"},
+        "versions": here["versions"],
+        "isa": here["isa"],
         "options": {"rounds": options.rounds, "seconds": options.seconds, "frame_px": options.frame_px},
     }
     if record is None:
@@ -100,27 +93,6 @@ def replace_rows(old: list[Record], new: list[Record]) -> list[Record]:
     if not families <= set(order):
         return new
     return sorted(rows, key=lambda row: order.index(row.get("family", row.get("name"))))
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options(peers=list(PEERS)))
-    parser.add_argument("--part", nargs="+", metavar="NAME", default=[],
-                        help=f"measure these alone, leave the rest of FILE.json: {', '.join(MEASURES)}")  # fmt: skip
-    add_names(parser, "--method", "methods", "all that fill unless given")
-    add_names(parser, "--peer", "peers", "peers; all unless given, none: no names", "*")
-    add_number(parser, "--threads", "max_threads", "how far threads are charted")
-    add_number(parser, "--repeats", "rounds", "rounds")
-    parser.add_argument("--seconds", type=float, metavar="S", help="length of a turn, at least a call (%(default)s)")
-    add_number(parser, "--edge-pixels", "edge_px", "edge pixels to compare in each family, at least")
-    add_number(parser, "--frame", "frame_px", "side", "PX")
-    add_scale(parser, "of the numbers of triangles timed")
-    add_out(parser)
-
-
-def run(arguments: argparse.Namespace, save: Save) -> Record:
-    """Measure all parts, or those that are named."""
-    old = read_record(arguments.record) if arguments.part else None
-    return run_accuracy(options_of(Options, arguments), arguments.part, old, save)
 
 
 def text_of(rows: Callable[..., Any], *more: Any) -> Callable[[Record], str]:
@@ -167,6 +139,6 @@ def lines(record: Record) -> Iterator[str]:
 
 
 STUDY = Study(
-    "accuracy", "measure time beside error, and stability, of every method", add_arguments, run, lines, PARTS,
+    "accuracy", "measure time beside error, and stability, of every method", AccuracyOptions, run, lines, PARTS,
     "benchmarks.accuracy.charts",
 )  # fmt: skip

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.accuracy import pure
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 from benchmarks.accuracy.sizes import DEFAULT_BITS
 from benchmarks.harness.turns import take_turns, turn_of
 from benchmarks.scenes.families import Entry, Triangles, entries
@@ -34,7 +34,7 @@ def eleven_triangles(copies: int = 1) -> Triangles:
     return vertices, np.tile(triangles, (copies, 1))
 
 
-def measure_tutorial(options: Options) -> dict[str, Any]:
+def measure_tutorial(options: AccuracyOptions) -> dict[str, Any]:
     """Return `tutorial`: a row for each method and each pure twin."""
     import topleft as tl
     from topleft.scenes import TUTORIAL_SIZE

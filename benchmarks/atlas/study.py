@@ -2,33 +2,35 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.atlas import measure, shrink, tables
-from benchmarks.harness.arguments import add_names, add_out
+from benchmarks.harness.arguments import Options, names, option
 from benchmarks.harness.records import Record, Save, write_text
 from benchmarks.report.study import Study
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(methods=[], families=[])
-    add_names(parser, "--method", "methods", "rows; all unless given")
-    add_names(parser, "--family", "families", "families of scenes; all unless given")
-    parser.add_argument("--scenes", type=Path, metavar="FILE.json",
-                        help="shrink first failures and write them into src/topleft/failure_scenes.json")  # fmt: skip
-    add_out(parser)
+@dataclass(frozen=True)
+class AtlasOptions(Options):
+    methods: Sequence[str] = names("--method", "rows; all unless given")
+    families: Sequence[str] = names("--family", "families of scenes; all unless given")
+    scenes: Path | None = option(
+        None, "--scenes", "shrink first failures and write them into src/topleft/failure_scenes.json", type=Path,
+        metavar="FILE.json",
+    )  # fmt: skip
 
 
-def run(arguments: argparse.Namespace, save: Save) -> Record:
+def run(options: AtlasOptions, save: Save) -> Record:
     """Draw and compare, and shrink if wanted."""
-    record = measure.run_atlas(arguments.families, arguments.methods)
+    record = measure.run_atlas(options.families, options.methods)
     save(record)
-    if arguments.scenes:
-        write_text(arguments.scenes, shrink.scenes_text(shrink.shrink_all(record)))
+    if options.scenes:
+        write_text(options.scenes, shrink.scenes_text(shrink.shrink_all(record)))
     return record
 
 
 STUDY = Study(
-    "atlas", "map where each method fails", add_arguments, run, tables.lines, tables.PARTS, "benchmarks.atlas.charts"
+    "atlas", "map where each method fails", AtlasOptions, run, tables.lines, tables.PARTS, "benchmarks.atlas.charts"
 )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from benchmarks.choices.builds import BUILDS, is_concerned, load_builds, ways_with
 from benchmarks.choices.scenes import Scene, scenes
 from benchmarks.choices.ways import CHOICES, THREADED
-from benchmarks.harness.arguments import refuse_unknown
+from benchmarks.harness.arguments import Options, count, fraction, names, option, refuse_unknown, switch
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, forget, tell
 from benchmarks.harness.turns import digits, quartiles
@@ -25,22 +25,20 @@ from benchmarks.harness.ways import Ways, check_same_bits, take_rounds
 
 
 @dataclass(frozen=True)
-class Options:
-    """How much to do."""
-
-    choices: Sequence[str] = ()
-    """All of `CHOICES` and the builds for none."""
-    scenes: Sequence[str] = ()
-    """Beginnings of names; all for none."""
-    rounds: int = 7
-    seconds: float = 0.002
-    """Length of a turn, at least a call."""
-    scale: float = 1.0
-    builds: Path | None = None
-    """Where builds with other constants are kept; without it they are not measured."""
+class ChoiceOptions(Options):
+    choices: Sequence[str] = names("--choice", "measure these alone; all unless given")
+    scenes: Sequence[str] = names("--scene", "scenes, or beginnings of their names")
+    rounds: int = count(7, "--repeats", "rounds")
+    seconds: float = fraction(0.002, "--seconds", "length of a turn, at least a call")
+    scale: float = fraction(1.0, "--scale", "of triangles and frames", "X")
+    builds: Path | None = option(
+        None, "--builds", "build the library with other constants there unless it is, and measure it", type=Path,
+        metavar="FOLDER",
+    )  # fmt: skip
+    plans: bool = switch("--plans", "measure estimates and plans alone")
 
 
-def run_choices(options: Options, record: Record | None = None, save: Save = forget) -> Record:
+def run_choices(options: ChoiceOptions, record: Record | None = None, save: Save = forget) -> Record:
     """Return a record, or the rows that were measured anew; `save` gets it after each scene.
 
     Raises
@@ -64,7 +62,7 @@ def run_choices(options: Options, record: Record | None = None, save: Save = for
     return with_rows(record, rows)
 
 
-def makers_of(options: Options) -> dict[str, Callable[[Scene], Ways]]:
+def makers_of(options: ChoiceOptions) -> dict[str, Callable[[Scene], Ways]]:
     """Return the function that gives the ways of a scene, for each choice in question."""
     wanted = list(options.choices) or [*CHOICES, *BUILDS]
     makers = {name: CHOICES[name] for name in wanted if name in CHOICES}
@@ -75,14 +73,14 @@ def makers_of(options: Options) -> dict[str, Callable[[Scene], Ways]]:
     return makers
 
 
-def chosen_scenes(options: Options) -> Iterator[Scene]:
+def chosen_scenes(options: ChoiceOptions) -> Iterator[Scene]:
     """Give the scenes with names that begin so."""
     for scene in scenes(options.scale):
         if not options.scenes or scene.label.startswith(tuple(options.scenes)):
             yield scene
 
 
-def measure_choice(choice: str, scene: Scene, ways: Ways, options: Options) -> dict[str, Any] | None:
+def measure_choice(choice: str, scene: Scene, ways: Ways, options: ChoiceOptions) -> dict[str, Any] | None:
     """Return a row, None where there is nothing to choose."""
     if len(ways) < 2:
         return None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
-from benchmarks.choices.measure import Options, chosen_scenes, with_rows
+from benchmarks.choices.measure import ChoiceOptions, chosen_scenes, with_rows
 from benchmarks.choices.scenes import Scene
 from benchmarks.choices.ways import drawing, picture_of, verb_of
 from benchmarks.harness.turns import digits
@@ -25,12 +25,12 @@ def plan_of(scene: Scene, **changes: Any) -> tl.Plan:
     return tl.plan(*scene.arrays, scene.size, outputs=OUTPUTS[scene.verb], **scene.asked(**changes))
 
 
-def run_plans(options: Options, record: dict[str, Any] | None) -> dict[str, Any]:
+def run_plans(options: ChoiceOptions, record: dict[str, Any] | None) -> dict[str, Any]:
     """Return a record with estimates and plans measured anew."""
     return with_rows(record, []) | {"estimates": measure_estimates(options), "plans": measure_plans(options)}
 
 
-def measure_estimates(options: Options) -> list[dict[str, Any]]:
+def measure_estimates(options: ChoiceOptions) -> list[dict[str, Any]]:
     """Return estimated and measured milliseconds of every scene, on memory that is kept."""
     rows = []
     for scene in chosen_scenes(options):
@@ -43,7 +43,7 @@ def measure_estimates(options: Options) -> list[dict[str, Any]]:
     return rows
 
 
-def measure_plans(options: Options) -> list[dict[str, Any]]:
+def measure_plans(options: ChoiceOptions) -> list[dict[str, Any]]:
     """Return the time of a plan, and of `rasterize` with it and without, for some scenes and both widths of indices."""
     rows = []
     for scene in chosen_scenes(options):

@@ -1,30 +1,20 @@
 """Choices, and the ways that a scene could be drawn instead: each draws the same bits, in another time.
 
-A way forces a choice by `choices.forced`, by an option that the verbs have, or by calling the parts of the pipeline.
+A way forces a choice by `choices.forced`, or by an option that the verbs have.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import topleft as tl
 from benchmarks.choices.scenes import Scene
 from benchmarks.harness.ways import Draw, Picture, Way, Ways, answers_of
-from topleft._core import engine
-from topleft._core.base.memory import FRESH, SCRATCH, KeptMemory, Memory
-from topleft._core.base.options import Sink
-from topleft._core.raster import choices
 from topleft._core.raster.costs import cost_table
-from topleft._core.raster.fill import Style, draw_fill
-from topleft._core.raster.rasterize import draw, draw_coverage, draw_overdraw
-from topleft._core.raster.sampling import sample_positions, sum_areas
-from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 
 MSAA = ("msaa2", "msaa4", "msaa8", "msaa16")
@@ -42,12 +32,6 @@ def drawing(scene: Scene, *, library: Any = tl, **changes: Any) -> Draw:
 def picture_of(library: Any, size: tuple[int, int]) -> Any:
     """Return the one `Rasterizer` of a size: all ways draw into the same memory, wherever the system has put it."""
     return library.Rasterizer(size)
-
-
-@lru_cache(maxsize=1)
-def memory_of(_: tuple[int, int]) -> KeptMemory:
-    """Return the one memory of a size, for ways that call the parts of the pipeline."""
-    return KeptMemory()
 
 
 def verb_of(scene: Scene, owner: Any, vertices: Any, triangles: Any, size: tuple[Any, ...], options: Any) -> Draw:
@@ -105,13 +89,6 @@ def of_arithmetic(scene: Scene) -> Ways:
     ]
 
 
-def of_subpixel_bits(scene: Scene) -> Ways:
-    """Whole pixels with the bits that they do not need."""
-    if scene.kind != "whole pixels" or scene.sampling not in ("center", "area"):
-        return []
-    return [Way(f"{bits} bits", drawing(scene, subpixel_bits=bits)) for bits in (8, 0)]
-
-
 def of_clip(scene: Scene) -> Ways:
     """The search for cut triangles, where no vertex is outside of a plane."""
     if "transform" not in scene.options or scene.kind == "clip-crossing" or scene.sampling != "center":
@@ -139,45 +116,6 @@ def of_direct(scene: Scene) -> Ways:
     if scene.verb != "fill" or scene.sampling != "center":
         return []
     return other_than(scene, "is_direct", {True: "as they come", False: "labels first"})
-
-
-def of_samples(scene: Scene) -> Ways:
-    """Samples of all pixels at once, or only where an edge crosses them apart: against a picture a sample."""
-    if scene.verb != "coverage" or scene.sampling not in MSAA:
-        return []
-    return [Way("where edges cross", drawing_shares(scene)), Way("all samples", drawing_every_sample(scene))]
-
-
-def drawing_shares(scene: Scene) -> Draw:
-    """Return the function that draws the samples of all pixels as the verb does, without its checks."""
-    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
-
-    def draw_shares() -> Picture:
-        snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
-        shares = memory.empty("share", scene.size[::-1], np.float32)
-        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), shares)
-        return (shares,)
-
-    return draw_shares
-
-
-def drawing_every_sample(scene: Scene) -> Draw:
-    """Return the function that draws a mask for each sample and averages them."""
-    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
-    n, shape = view.sampling.n_samples, scene.size[::-1]
-
-    def draw_all() -> Picture:
-        snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
-        one = replace(view, sampling=View.parse(scene.size, {}).sampling)
-        count, mask = memory.empty("count", shape, np.uint8), memory.empty("mask", shape, np.bool_)
-        count.fill(0)
-        for x, y in sample_positions(n, view.grid_bits).tolist():
-            seen = replace(snapped, mesh=snapped.mesh.at_sample(x, y))
-            draw(memory, seen, one, choices.drawing(one, seen, Sink.MASK), mask)
-            np.add(count, mask.view(np.uint8), out=count)
-        return (np.multiply(count, np.float32(1 / n), out=memory.empty("share", shape, np.float32)),)
-
-    return draw_all
 
 
 def of_planes(scene: Scene) -> Ways:
@@ -217,48 +155,6 @@ def of_blended_bands(scene: Scene) -> Ways:
     return forcing(scene, "rows_to_blend", {"at once": whole, "in bands": bands})
 
 
-def of_sums(scene: Scene) -> Ways:
-    """Areas in 32 bits, tried first, or in 64."""
-    if scene.sampling != "area" or scene.verb != "coverage":
-        return []
-    return [Way("32 bits", drawing_sums(scene, is_wide=False)), Way("64 bits", drawing_sums(scene, is_wide=True))]
-
-
-def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
-    """Return the function that adds areas, in 64 bits at once if wanted."""
-    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
-    width, height = scene.size
-
-    def draw_areas() -> Picture:
-        snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
-        areas: NDArray[np.float32] = memory.empty("areas", (height, width), np.float32)
-        if is_wide:
-            cells = np.zeros(height * engine.area_stride(width), np.int64)
-            snapped.mesh.draw_area(areas, engine.as_bytes(cells), 0, height, True, True)
-        else:
-            sum_areas(memory, snapped.mesh, areas, 1, is_clamped=True)
-        return (areas,)
-
-    return draw_areas
-
-
-def of_memory(scene: Scene) -> Ways:
-    """Scratch that a thread keeps, or fresh memory; results are fresh either way."""
-    if scene.verb == "rasterize" or scene.sampling not in ("center", "area"):
-        return []
-    return [Way(name, drawing_on(memory, scene)) for name, memory in (("kept", SCRATCH), ("fresh", FRESH))]
-
-
-def drawing_on(memory: Memory, scene: Scene) -> Draw:
-    """Return the function that draws as the verb does, on a memory."""
-    options, arrays = scene.asked(), scene.arrays
-    if scene.verb == "fill":
-        style = Style("auto", None, "replace", "straight", "values")
-        return lambda: (draw_fill(memory, *arrays, scene.colors(), View.parse(scene.size, options), style, None),)
-    draw_verb = {"coverage": draw_coverage, "overdraw": draw_overdraw}[scene.verb]
-    return lambda: (draw_verb(memory, *arrays, View.parse(scene.size, options), None),)
-
-
 def of_threads(scene: Scene) -> Ways:
     """As many threads as are said to pay, or one, or two."""
     if scene.sampling not in ("center", "area") or scene.verb == "overdraw":
@@ -286,18 +182,14 @@ def of_array_threads(scene: Scene) -> Ways:
 CHOICES: Mapping[str, Callable[[Scene], Ways]] = {
     "method": of_method,
     "arithmetic": of_arithmetic,
-    "sub-pixel bits": of_subpixel_bits,
     "clip": of_clip,
     "divide": of_divide,
     "depth test": of_depth,
     "colours": of_direct,
-    "samples": of_samples,
     "planes": of_planes,
     "band size": of_bands,
     "sorting": of_sorting,
     "bands of colours": of_blended_bands,
-    "sums of areas": of_sums,
-    "memory": of_memory,
     "threads": of_threads,
     "shares": of_shares,
     "threads of arrays": of_array_threads,

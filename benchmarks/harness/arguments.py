@@ -1,14 +1,66 @@
-"""Arguments that several commands take, and how they become the options of a study."""
+"""Options of commands: the fields of a dataclass, each with the argument that sets it."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
-from dataclasses import fields
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-Options = TypeVar("Options")
+Kind = TypeVar("Kind")
+
+
+def option(default: Any, flags: str, help: str = "", **words: Any) -> Any:  # noqa: A002
+    """A field, and the words of `add_argument`; without flags the argument has a place."""
+    return field(default=default, metadata={"flags": flags.split(), "words": {"help": help, **words}})
+
+
+def count(default: int | Sequence[int], flag: str, help: str = "", metavar: str = "N", **words: Any) -> Any:  # noqa: A002
+    """A number from 1 on, or several."""
+    shown = default if isinstance(default, int) else " ".join(map(str, default))
+    return option(default, flag, f"{help} ({shown})".strip(), type=positive, metavar=metavar, **words)
+
+
+def fraction(default: float, flag: str, help: str, metavar: str = "S") -> Any:  # noqa: A002
+    """A number with a fraction: seconds, or a scale."""
+    return option(default, flag, f"{help} (%(default)s)", type=float, metavar=metavar)
+
+
+def names(flag: str, help: str, default: Sequence[str] = (), nargs: str = "+") -> Any:  # noqa: A002
+    """Names."""
+    return option(default, flag, help, nargs=nargs, metavar="NAME")
+
+
+def switch(flag: str, help: str) -> Any:  # noqa: A002
+    """A field that is False unless the flag is given."""
+    return option(False, flag, help, action="store_true")
+
+
+def pinned() -> Any:
+    """The CPUs that processes are pinned to."""
+    return option((), "--pin", "n threads: the first n of them", type=cpus, metavar="CPU[,CPU...]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The option of every study that keeps a record."""
+
+    record: Path | None = option(None, "-o --out", "the record", type=Path, metavar="FILE.json")
+
+
+def add_options(parser: argparse.ArgumentParser, kind: type) -> None:
+    """Declare the arguments of a kind of options."""
+    for own in fields(kind):
+        if own.metadata:
+            flags, words = own.metadata["flags"], own.metadata["words"]
+            named = {"dest": own.name} if flags else {}
+            parser.add_argument(*(flags or [own.name]), default=own.default, **named, **words)
+
+
+def options_of(kind: type[Kind], arguments: argparse.Namespace) -> Kind:
+    """Return the options that the arguments set."""
+    return kind(**{own.name: getattr(arguments, own.name) for own in fields(kind) if own.metadata})  # type: ignore[arg-type]
 
 
 def positive(text: str) -> int:
@@ -28,38 +80,3 @@ def refuse_unknown(what: str, names: Iterable[str], known: Iterable[str]) -> Non
     """Raise a ValueError for names that do not exist."""
     if unknown := [name for name in names if name not in known]:
         raise ValueError(f"{what} must be some of {', '.join(known)}, got {', '.join(unknown)}")
-
-
-def set_options(parser: argparse.ArgumentParser, options: Any) -> None:
-    """Make the fields of an options object the defaults of the arguments with their names."""
-    parser.set_defaults(**{field.name: getattr(options, field.name) for field in fields(options)})
-
-
-def options_of(kind: type[Options], arguments: argparse.Namespace) -> Options:
-    """Return an options object of the arguments with the names of its fields."""
-    return kind(**{field.name: getattr(arguments, field.name) for field in fields(kind)})  # type: ignore[arg-type]
-
-
-def add_out(parser: argparse.ArgumentParser, what: str = "the record") -> None:
-    """Add where the record goes."""
-    parser.add_argument("-o", "--out", dest="record", type=Path, metavar="FILE.json", help=what)
-
-
-def add_number(parser: argparse.ArgumentParser, flag: str, field: str, what: str = "", metavar: str = "N") -> None:
-    """Add a number from 1 on that goes into a field of the options."""
-    parser.add_argument(flag, dest=field, type=positive, metavar=metavar, help=f"{what} (%(default)s)".strip())
-
-
-def add_names(parser: argparse.ArgumentParser, flag: str, field: str, what: str, nargs: str = "+") -> None:
-    """Add names that go into a field of the options."""
-    parser.add_argument(flag, dest=field, nargs=nargs, metavar="NAME", help=what)
-
-
-def add_scale(parser: argparse.ArgumentParser, what: str = "of triangles and frames") -> None:
-    """Add the scale of the scenes."""
-    parser.add_argument("--scale", type=float, metavar="X", help=f"{what} (%(default)s)")
-
-
-def add_pin(parser: argparse.ArgumentParser) -> None:
-    """Add the CPUs that processes are pinned to."""
-    parser.add_argument("--pin", type=cpus, default=[], metavar="CPU[,CPU...]", help="n threads: the first n of them")

@@ -10,34 +10,30 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.harness.arguments import Options, count, fraction, names, option, pinned
 from benchmarks.harness.contestants import Child, Contestant, SkippedError, choose
 from benchmarks.harness.errors import Picture, compare, draw_exact
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, forget, tell
-from benchmarks.harness.yardstick import Yardstick, YardstickError
-from benchmarks.peers import OURS
+from benchmarks.peers import PEERS
 from benchmarks.scenes.cases import CASES, Case, Scene
 
 SCHEMA = 1
 
 
 @dataclass(frozen=True)
-class Options:
-    """The options of a run."""
-
-    scenes: Sequence[str]
-    peers: Sequence[str]
-    isas: Sequence[str]
-    threads: Sequence[int] = (1,)
-    repeats: int = 9
-    seconds: float = 0.1
-    pin: Sequence[int] = ()
-    yardsticks: Sequence[tuple[str, str]] = ()
-    yardstick_folder: Path = Path()
-    check: bool = True
+class RunOptions(Options):
+    scenes: Sequence[str] = names("--scene", "cases, or beginnings of their names")
+    peers: Sequence[str] = names("--peer", "peers; all unless given, none: no names", tuple(PEERS), "*")
+    isas: Sequence[str] = names("--isa", "scalar, avx2, avx512; all unless given")
+    threads: Sequence[int] = count((1,), "--threads", nargs="+")
+    repeats: int = count(9, "--repeats", "rounds")
+    seconds: float = fraction(0.1, "--seconds", "length of a turn, at least a call")
+    pin: Sequence[int] = pinned()
+    check: bool = option(True, "--no-check", "leave the pictures uncompared", action="store_false")
 
 
-def run_cases(options: Options, save: Save = forget) -> Record:
+def run_cases(options: RunOptions, save: Save = forget) -> Record:
     """Measure, return the record that the report reads; `save` gets it after each scene, as far as it goes."""
     record: dict[str, Any] = {
         "schema": SCHEMA,
@@ -52,7 +48,7 @@ def run_cases(options: Options, save: Save = forget) -> Record:
     return record
 
 
-def run_case(case: Case, options: Options, folder: Path) -> Record:
+def run_case(case: Case, options: RunOptions, folder: Path) -> Record:
     """All contestants of one case."""
     beside = CASES[case.beside] if case.beside else None
     tell(f"{case.name}: scene")
@@ -70,13 +66,8 @@ def run_case(case: Case, options: Options, folder: Path) -> Record:
             except SkippedError as reason:
                 skipped.append({"name": contestant.name, "reason": str(reason)})
                 tell(f"{case.name}: {contestant.name} sits out: {reason}")
-        yardsticks = [
-            Yardstick.parse(command, pattern, options.yardstick_folder, options.pin)
-            for command, pattern in options.yardsticks
-        ]
-        yardsticks = [yardstick for yardstick in yardsticks if yardstick.measures(case)]
         for i in range(options.repeats):
-            take_turns(case, children, yardsticks, options.seconds, skipped)
+            turn_of_each(children, options.seconds, skipped)
             tell(f"{case.name}: round {i + 1} of {options.repeats}")
         errors = check_pictures(children, scenes, folder, skipped) if options.check else {}
         tell(f"{case.name}: pictures compared")
@@ -94,26 +85,12 @@ def run_case(case: Case, options: Options, folder: Path) -> Record:
         "dtypes": [str(scene.vertices.dtype), str(scene.triangles.dtype)],
         "cull": scene.cull,
         "runs": [summarize(child, children[0], errors.get(child.contestant.name)) for child in children],
-        "yardsticks": [summarize_yardstick(yardstick, children) for yardstick in yardsticks if yardstick.times_ms],
         "skipped": skipped,
     }
 
 
-def take_turns(
-    case: Case, children: list[Child], yardsticks: list[Yardstick], seconds: float, skipped: list[dict[str, str]]
-) -> None:
-    """One round: each in turn. Who fails leaves both lists."""
-    turn_of_each(children, seconds, skipped)
-    for yardstick in list(yardsticks):
-        try:
-            yardstick.take_turn(case)
-        except YardstickError as reason:
-            skipped.append({"name": yardstick.command, "reason": str(reason)})
-            yardsticks.remove(yardstick)
-
-
 def turn_of_each(children: list[Child], seconds: float, skipped: list[dict[str, str]]) -> None:
-    """The turns of the contestants."""
+    """One round: each in turn. Who fails leaves the list."""
     for child in list(children):
         try:
             child.take_turn(seconds)
@@ -166,25 +143,6 @@ def summarize(child: Child, first: Child, error: dict[str, Any] | None) -> dict[
         "turn_medians_ms": medians.round(6).tolist(),
         "turn_minima_ms": minima.round(6).tolist(),
         "error": error,
-    }
-
-
-def summarize_yardstick(yardstick: Yardstick, children: list[Child]) -> dict[str, Any]:
-    """Figures of a yardstick, and ours in multiples of it: the shortest call of a turn over its figure."""
-    theirs = np.array(yardstick.times_ms)
-    ratios = {
-        child.contestant.name: float(np.median(np.array([min(turn) for turn in child.turns]) / theirs))
-        for child in children
-        if child.contestant.peer == OURS and len(child.turns) == len(theirs)
-    }
-    return {
-        "command": yardstick.command,
-        "pattern": yardstick.pattern.pattern,
-        "pinned_to": yardstick.pinned_to,
-        **spread(theirs),
-        "min_ms": float(theirs.min()),
-        "turns_ms": theirs.tolist(),
-        "ratios_of_minima": ratios,
     }
 
 

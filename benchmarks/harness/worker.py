@@ -90,13 +90,11 @@ def make_ready(order: dict[str, Any]) -> tuple[Drawing, dict[str, Any]]:
         "setup_ms": setup_ms,
         "version": version_of(peer.DISTRIBUTION),
         "peak_mb": (_peak_memory() - before) / 1e6 if before is not None else None,
-        "input_mb": sum(a.nbytes for a in (scene.vertices, scene.triangles)) / 1e6,
     }
     if order["peer"] == OURS:
         import topleft as tl
 
         facts["isa"] = tl.build_info()["isa"]
-        facts["compiler"] = tl.build_info()["compiler"]
     return drawing, facts
 
 

@@ -7,7 +7,6 @@ go in turns, and the least time of a scene counts; of aarch64, instructions do, 
 
 from __future__ import annotations
 
-import argparse
 import math
 import platform
 import shutil
@@ -17,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.harness.arguments import add_number, add_out, options_of, set_options
+from benchmarks.harness.arguments import Options, count, names
 from benchmarks.harness.machine import ROOT, describe
 from benchmarks.harness.records import Record, Save, tell
 from benchmarks.report.study import Study
@@ -56,10 +55,10 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Options:
-    repeats: int = 9
-    rounds: int = 3
-    scenes: Sequence[str] = ("all",)
+class LaneOptions(Options):
+    repeats: int = count(9, "--repeats", "calls of a scene in a turn")
+    rounds: int = count(3, "--rounds", "turns of each program")
+    scenes: Sequence[str] = names("--scene", "all unless given", ("all",))
 
 
 def ways_here() -> list[Way]:
@@ -114,9 +113,8 @@ def count_scene(command: list[str], plugin: Path, scene: str) -> tuple[float, st
     return (counts[1] - counts[0]) / 1e6, made
 
 
-def run(arguments: argparse.Namespace, save: Save) -> Record:
+def run(options: LaneOptions, save: Save) -> Record:
     """Measure."""
-    options = options_of(Options, arguments)
     record: Record = {"kind": "lanes", **describe(), "ways": [], "rows": []}
     rows: dict[tuple[str, str, str], list] = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -182,12 +180,4 @@ def mean_of(logs: list[float]) -> float:
     return math.exp(sum(logs) / len(logs))
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options())
-    add_number(parser, "--rounds", "rounds", "turns of each program")
-    add_number(parser, "--repeats", "repeats", "calls of a scene in a turn")
-    parser.add_argument("--scene", dest="scenes", nargs="+", metavar="NAME", help="all unless given")
-    add_out(parser)
-
-
-STUDY = Study("lanes", "kernels of each instruction set beside scalar's, without Python", add_arguments, run, lines)
+STUDY = Study("lanes", "kernels of each instruction set beside scalar's, without Python", LaneOptions, run, lines)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from benchmarks.report.charts import figure_bytes
+from benchmarks.report.charts import STYLE, write_chart
 
 COLORS = ("#000000", "#0072B2", "#009E73", "#E69F00", "#D55E00")
 """By height, near to far: M. Okabe and K. Ito, Color Universal Design, 2008."""
@@ -17,9 +18,9 @@ SMALLEST_PX = 0.02
 """Where errors stand that are nothing, on a logarithmic axis."""
 
 
-def chart_png(record: dict[str, Any]) -> bytes:
-    """Return the chart as PNG."""
-    return figure_bytes(partial(chart_levels, record), "png", dpi=140)
+def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
+    """Write the chart as PNG, return where it is."""
+    return [write_chart(partial(chart_levels, record), folder, "levels", "png", STYLE, 140)]
 
 
 def chart_levels(record: dict[str, Any]) -> Figure:

@@ -5,9 +5,8 @@ The error is measured on masks, not taken from the bound: how far a sample that 
 
 from __future__ import annotations
 
-import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,12 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
-from benchmarks.harness.arguments import add_number, options_of, set_options
+from benchmarks.harness.arguments import Options, count, option
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
-from benchmarks.levels import page
+from benchmarks.levels import tables
 from benchmarks.report.study import Study
-from topleft._meshes.lod.detail import pixels_of_bound, window_of
+from topleft._meshes.lod.detail import ScreenError, window_of
 
 SIZE = (1920, 1080)
 HEIGHTS_PX = (1000, 300, 100, 30, 10)
@@ -34,50 +33,31 @@ FOV_Y_DEG = 40.0
 
 
 @dataclass(frozen=True)
-class Options:
-    """The options of a run."""
-
-    meshes: tuple[str, ...] = ()
-    n_triangles: int = 10_000_000
-    rounds: int = 5
-    levels: Path | None = None
-    "Folder in which levels are kept from run to run."
+class LevelOptions(Options):
+    meshes: Sequence[str] = option((), "--mesh", "meshes besides the generated ones", nargs="*", metavar="FILE")
+    n_triangles: int = count(10_000_000, "--triangles", "of the blob")
+    rounds: int = count(5, "--rounds")
 
 
-def run_levels(options: Options) -> dict[str, Any]:
+def run(options: LevelOptions, _: Save) -> Record:
     """Return the record."""
     record: dict[str, Any] = {
         "kind": "levels", **describe("fast-simplification"), "size": list(SIZE), "tolerance": TOLERANCE,
         "rounds": options.rounds, "meshes": [],
     }  # fmt: skip
-    found = [(name, mesh, *find_levels(name, mesh, options.levels)) for name, mesh in subjects(options)]
+    found = [(name, mesh, *make_levels(mesh)) for name, mesh in subjects(options)]
     times = [draw_times(mesh, levels, options.rounds) for _, mesh, levels, _ in found]  # all in one go
     for (name, mesh, levels, made_s), own in zip(found, times, strict=True):
         record["meshes"].append(measure_mesh(name, mesh, levels, own) | {"made_s": made_s})
     return record
 
 
-def subjects(options: Options) -> Iterator[tuple[str, tl.Mesh]]:
+def subjects(options: LevelOptions) -> Iterator[tuple[str, tl.Mesh]]:
     """Give the meshes: a shape that ships, those of files, and a large blob."""
     yield "torus-knot", tl.Mesh(*tl.scenes.shape("torus-knot"))
     for path in options.meshes:
         yield Path(path).stem, tl.load(path)
     yield "blob", tl.Mesh(*tl.scenes.blob(options.n_triangles))
-
-
-def find_levels(name: str, mesh: tl.Mesh, folder: Path | None) -> tuple[tl.Levels, float]:
-    """Return levels, of an earlier run if they are kept, and the CPU time of making them, seconds."""
-    if folder is None:
-        return make_levels(mesh)
-    path = folder / f"{name}-{len(mesh.triangles)}.npz"
-    seconds = path.with_suffix(".seconds")
-    if path.exists() and seconds.exists():
-        return tl.Levels.load(path, mesh), float(seconds.read_text())
-    levels, made_s = make_levels(mesh)
-    folder.mkdir(parents=True, exist_ok=True)
-    levels.save(path)
-    seconds.write_text(repr(made_s))
-    return levels, made_s
 
 
 def make_levels(mesh: tl.Mesh) -> tuple[tl.Levels, float]:
@@ -98,7 +78,8 @@ def measure_mesh(name: str, mesh: tl.Mesh, levels: tl.Levels, times: list[dict[s
         masks = [mask_of(level.mesh, matrix, fineness, height_px) for level in levels]
         rows = []
         for level, mask, turns in zip(levels, masks, own["turns_ms"], strict=True):
-            bound_px = pixels_of_bound(matrix, SIZE, window_of(SIZE, None, (0, 0)), levels[0], level)
+            scale = ScreenError(matrix, SIZE, window_of(SIZE, None, (0, 0))).scale_of(None, levels[0], level)
+            bound_px = None if scale is None else level.bound * scale
             rows.append({"turns_ms": turns, "bound_px": bound_px, "error_px": outlines_px(masks[0], mask) / fineness})
         views.append({"height_px": height_px, "level": chosen.level, "resolution_px": 1 / fineness, "levels": rows,
                       "clustered_ms": own["clustered_ms"]})  # fmt: skip
@@ -161,25 +142,7 @@ def outlines_px(one: Any, other: Any) -> float:
     return max(float(distance_transform_edt(~b)[a].max(initial=0.0)) for a, b in ways if b.any())
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options())
-    parser.add_argument("--mesh", dest="meshes", nargs="*", metavar="FILE", help="meshes besides the generated ones")
-    add_number(parser, "--triangles", "n_triangles", "of the blob")
-    add_number(parser, "--rounds", "rounds")
-    parser.add_argument("--json", dest="record", type=Path, metavar="FILE.json", help="the record")
-    parser.add_argument("--keep", dest="levels", type=Path, metavar="FOLDER",
-                        help="where levels are kept from run to run")  # fmt: skip
-    parser.add_argument("-o", "--out", type=Path, default=Path("docs"), metavar="FOLDER", help="(%(default)s)")
-
-
-def run(arguments: argparse.Namespace, save: Save) -> Record:
-    """Measure, write the page and its chart."""
-    record = run_levels(options_of(Options, arguments))
-    save(record)
-    page.write_page(record, arguments.out)
-    return record
-
-
 STUDY = Study(
-    "levels", "measure levels of detail, and write their page: time beside error", add_arguments, run, page.lines
-)
+    "levels", "measure levels of detail: time beside error", LevelOptions, run, tables.lines, tables.PARTS,
+    "benchmarks.levels.charts",
+)  # fmt: skip

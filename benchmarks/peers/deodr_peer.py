@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.peers import Drawing
+from benchmarks.peers.views import deodr_scene, draw_by_deodr
 from benchmarks.scenes.cases import Scene
 
 MODULE, DISTRIBUTION = "deodr", "deodr"
@@ -14,8 +15,6 @@ TASKS = ("visibility", "depth-2d", "labels", "views", "views-png")
 def prepare(scene: Scene, threads: int) -> Drawing:
     """Labels are drawn as colours, float64, at one depth."""
     if scene.views is not None:
-        from benchmarks.peers.views import draw_by_deodr
-
         return draw_by_deodr(scene, threads)
     from deodr import differentiable_renderer as renderer
 
@@ -33,14 +32,8 @@ def prepare(scene: Scene, threads: int) -> Drawing:
         triangles = np.arange(3 * n_triangles, dtype=np.uint32).reshape(-1, 3)
         colors = np.repeat(np.arange(n_triangles)[::-1] + 1.0, 3)[:, None]
         n_vertices = len(z)
-    world = renderer.Scene2DBase(
-        faces=triangles, faces_uv=triangles, ij=np.ascontiguousarray(xy_px), depths=np.ascontiguousarray(z, np.float64),
-        textured=np.zeros(n_triangles, bool), uv=np.zeros((n_vertices, 2)), shade=np.zeros(n_vertices), colors=colors,
-        shaded=np.zeros(n_triangles, bool), edgeflags=np.zeros((n_triangles, 3), bool), height=height, width=width,
-        nb_colors=1, texture=np.zeros((0, 0, 1)), background_color=np.zeros(1), clockwise=False,
-        backface_culling=scene.cull == "back", strict_edge=True, perspective_correct=False,
-        integer_pixel_centers=False,
-    )  # fmt: skip
+    ij, depths = np.ascontiguousarray(xy_px), np.ascontiguousarray(z, np.float64)
+    world = deodr_scene(scene, triangles, n_vertices, ij=ij, depths=depths, colors=colors)
     image, depth = np.zeros((height, width, 1)), np.zeros((height, width))
 
     def draw() -> None:

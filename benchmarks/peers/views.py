@@ -136,24 +136,34 @@ def open_vtk_window(scene: Scene, renderer: Any, window: Any) -> Any:
     return camera
 
 
-def draw_by_vtk(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
-    """VTK: Gouraud or Phong as its mapper sees fit, a headlight, read back as RGB."""
+def vtk_actor(scene: Scene) -> Any:
+    """Return the mesh of a scene, with normals if it has them, culled as the scene says."""
     import vtk
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
-    width, height = scene.size
     points, cells, mesh = vtk.vtkPoints(), vtk.vtkCellArray(), vtk.vtkPolyData()
-    points.SetData(numpy_to_vtk(scene.vertices, deep=True))
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(scene.vertices, np.float32), deep=True))
     cells.SetData(3, numpy_to_vtkIdTypeArray(np.ascontiguousarray(scene.triangles, np.int64).reshape(-1), deep=True))
     mesh.SetPoints(points)
     mesh.SetPolys(cells)
-    mesh.GetPointData().SetNormals(numpy_to_vtk(scene.normals, deep=True))
+    if scene.normals is not None:
+        mesh.GetPointData().SetNormals(numpy_to_vtk(scene.normals, deep=True))
     mapper, actor = vtk.vtkPolyDataMapper(), vtk.vtkActor()
     mapper.SetInputData(mesh)
     actor.SetMapper(mapper)
+    actor.GetProperty().SetBackfaceCulling(scene.cull == "back")
+    return actor
+
+
+def draw_by_vtk(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+    """VTK: Gouraud or Phong as its mapper sees fit, a headlight, read back as RGB."""
+    import vtk
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    width, height = scene.size
+    actor = vtk_actor(scene)
     look = actor.GetProperty()
     look.SetInterpolationToPhong()
-    look.SetBackfaceCulling(True)
     look.SetAmbient(AMBIENT)
     look.SetDiffuse(1 - AMBIENT)
     renderer, window = vtk.vtkRenderer(), vtk.vtkRenderWindow()
@@ -213,20 +223,27 @@ def draw_by_riley(scene: Scene, threads: int) -> Drawing:
     return drawing(scene, draw_view, "grey", "")
 
 
+def deodr_scene(scene: Scene, triangles: np.ndarray, n_vertices: int, **arrays: np.ndarray) -> Any:
+    """Return triangles (T, 3) uint32 in pixels, untextured, of one channel: `ij`, `depths` and `colors` of vertices."""
+    from deodr import differentiable_renderer as renderer
+
+    width, height = scene.size
+    n = len(triangles)
+    return renderer.Scene2DBase(
+        faces=triangles, faces_uv=triangles, textured=np.zeros(n, bool), uv=np.zeros((n_vertices, 2)),
+        shade=np.zeros(n_vertices), shaded=np.zeros(n, bool), edgeflags=np.zeros((n, 3), bool), height=height,
+        width=width, nb_colors=1, texture=np.zeros((0, 0, 1)), background_color=np.zeros(1), clockwise=False,
+        backface_culling=scene.cull == "back", strict_edge=True, perspective_correct=False,
+        integer_pixel_centers=False, **arrays,
+    )  # fmt: skip
+
+
 def draw_by_deodr(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     """DEODR: light at the vertices, which are projected by NumPy for every view."""
     from deodr import differentiable_renderer as renderer
 
     width, height = scene.size
-    n_vertices, n_triangles = len(scene.vertices), len(scene.triangles)
     triangles = np.ascontiguousarray(scene.triangles, np.uint32)
-    constant = {
-        "faces": triangles, "faces_uv": triangles, "textured": np.zeros(n_triangles, bool), "nb_colors": 1,
-        "uv": np.zeros((n_vertices, 2)), "shade": np.zeros(n_vertices), "shaded": np.zeros(n_triangles, bool),
-        "edgeflags": np.zeros((n_triangles, 3), bool), "height": height, "width": width, "clockwise": False,
-        "texture": np.zeros((0, 0, 1)), "background_color": np.zeros(1), "backface_culling": True, "strict_edge": True,
-        "perspective_correct": False, "integer_pixel_centers": False,
-    }  # fmt: skip
     image, depth = np.zeros((height, width, 1)), np.zeros((height, width))
 
     def draw_view(i: int) -> np.ndarray:
@@ -235,7 +252,8 @@ def draw_by_deodr(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
         ndc = clip[:, :3] / clip[:, 3:]
         ij = np.ascontiguousarray((ndc[:, :2] * [1, -1] + 1) * [width / 2, height / 2])
         depths = np.ascontiguousarray((ndc[:, 2] + 1) / 2)  # it wants them positive
-        world = renderer.Scene2DBase(ij=ij, depths=depths, colors=np.ascontiguousarray(values[:, None]), **constant)
+        colors = np.ascontiguousarray(values[:, None])
+        world = deodr_scene(scene, triangles, len(colors), ij=ij, depths=depths, colors=colors)
         renderer.renderScene(world, 0, image, depth, False, None, None, False)
         return (255 * image[..., 0]).astype(np.uint8)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.peers import Drawing
 from benchmarks.peers.llvmpipe_peer import environment as mesa_environment
-from benchmarks.peers.views import draw_by_vtk, open_vtk_window
+from benchmarks.peers.views import draw_by_vtk, open_vtk_window, vtk_actor
 from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "vtk"
@@ -24,20 +24,11 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     if scene.views is not None:
         return draw_by_vtk(scene, threads)
     import vtk
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    from vtkmodules.util.numpy_support import vtk_to_numpy
 
     width, height = scene.size
-    points, cells, mesh = vtk.vtkPoints(), vtk.vtkCellArray(), vtk.vtkPolyData()
-    points.SetData(numpy_to_vtk(np.ascontiguousarray(scene.vertices, np.float32), deep=True))
-    rows = numpy_to_vtkIdTypeArray(np.ascontiguousarray(scene.triangles, np.int64).reshape(-1), deep=True)
-    cells.SetData(3, rows)
-    mesh.SetPoints(points)
-    mesh.SetPolys(cells)
-    mapper, actor = vtk.vtkPolyDataMapper(), vtk.vtkActor()
-    mapper.SetInputData(mesh)
-    actor.SetMapper(mapper)
+    actor = vtk_actor(scene)
     actor.GetProperty().SetLighting(False)
-    actor.GetProperty().SetBackfaceCulling(scene.cull == "back")
     renderer, window = vtk.vtkRenderer(), vtk.vtkRenderWindow()
     renderer.AddActor(actor)
     camera = open_vtk_window(scene, renderer, window)

@@ -5,9 +5,8 @@ In: the scenes of `scenes.py`. Out: a record of counts and grey levels, and shee
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import topleft as tl
-from benchmarks.harness.arguments import add_names, add_out, refuse_unknown
+from benchmarks.harness.arguments import Options, names, option, refuse_unknown
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, tell
 from benchmarks.pictures import tables
@@ -37,7 +36,7 @@ class Drawn(NamedTuple):
     triangle: np.ndarray
 
 
-def run_pictures(names: list[str], folder: Path | None = None) -> Record:
+def run_pictures(scenes: Sequence[str], folder: Path | None = None) -> Record:
     """Draw and compare scenes, all unless named, and write their sheets into the folder.
 
     Raises
@@ -49,11 +48,11 @@ def run_pictures(names: list[str], folder: Path | None = None) -> Record:
     """
     from benchmarks.pictures.opengl import ENVIRONMENT, OpenGL
 
-    refuse_unknown("--scene", names, SCENES)
+    refuse_unknown("--scene", scenes, SCENES)
     facts = describe("moderngl")
     peer = OpenGL()
     rows = []
-    for name in names or SCENES:
+    for name in scenes or SCENES:
         scene = SCENES[name]()
         ours, theirs = Drawn(*draw(scene)), Drawn(*peer.draw(scene))
         rows.append({"scene": name, "what": scene.what, "n_triangles": len(scene.mesh.triangles)})
@@ -198,20 +197,20 @@ def read_sheet(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return pixels[:, :width], pixels[:, width + GAP_PX : 2 * width + GAP_PX]
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(scenes=[])
-    add_names(parser, "--scene", "scenes", "scenes; all unless given")
-    parser.add_argument("--sheets", type=Path, metavar="FOLDER",
-                        help="write them side by side with their difference, PNG")  # fmt: skip
-    add_out(parser)
+@dataclass(frozen=True)
+class PictureOptions(Options):
+    scenes: Sequence[str] = names("--scene", "scenes; all unless given")
+    sheets: Path | None = option(
+        None, "--sheets", "write them side by side with their difference, PNG", type=Path, metavar="FOLDER"
+    )
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: PictureOptions, _: Save) -> Record:
     """Draw and compare."""
     try:
-        return run_pictures(arguments.scenes, arguments.sheets)
+        return run_pictures(options.scenes, options.sheets)
     except (ImportError, RuntimeError) as error:
         raise ValueError(str(error)) from error
 
 
-STUDY = Study("pictures", "compare pictures with OpenGL on llvmpipe", add_arguments, run, tables.lines, tables.PARTS)
+STUDY = Study("pictures", "compare pictures with OpenGL on llvmpipe", PictureOptions, run, tables.lines, tables.PARTS)

@@ -7,16 +7,15 @@ more than 1e-6.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from benchmarks.harness.arguments import add_names, add_number, add_out, options_of, refuse_unknown, set_options
+from benchmarks.harness.arguments import Options, count, fraction, names, option, refuse_unknown
 from benchmarks.harness.machine import describe, version_of
 from benchmarks.harness.records import Record, Save, tell
 from benchmarks.harness.turns import take_turns, turn_of
@@ -24,40 +23,22 @@ from benchmarks.polygons.cases import CASES, PolygonCase
 from benchmarks.polygons.painters import PAINTERS
 from benchmarks.report.study import Study
 
-
-@dataclass(frozen=True)
-class Options:
-    """The options of a run."""
-
-    cases: tuple[str, ...] = tuple(CASES)
-    painters: tuple[str, ...] = tuple(PAINTERS)
-    threads: int = 1
-    repeats: int = 7
-    seconds: float = 0.05
-    slow_s: float = 1.0
-    """A call that takes longer is timed once, and takes no turns."""
-    clock: str = "wall"
-    """Or "cpu", the time of the process: of one thread on a machine that others use, too."""
-
-
 CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options())
-    add_names(parser, "--case", "cases", f"of {', '.join(CASES)}")
-    add_names(parser, "--painter", "painters", f"of {', '.join(PAINTERS)}")
-    add_number(parser, "--threads", "threads", "of those that can use them")
-    add_number(parser, "--repeats", "repeats", "rounds")
-    parser.add_argument("--seconds", type=float, metavar="S", help="how long a turn is, at least a call")
-    parser.add_argument("--slow", dest="slow_s", type=float, metavar="S", help="calls that take longer are timed once")
-    parser.add_argument("--clock", choices=tuple(CLOCKS), help="the clock: cpu is the time of the process")
-    add_out(parser)
+@dataclass(frozen=True)
+class PolygonOptions(Options):
+    cases: Sequence[str] = names("--case", f"of {', '.join(CASES)}", tuple(CASES))
+    painters: Sequence[str] = names("--painter", f"of {', '.join(PAINTERS)}", tuple(PAINTERS))
+    threads: int = count(1, "--threads", "of those that can use them")
+    repeats: int = count(7, "--repeats", "rounds")
+    seconds: float = fraction(0.05, "--seconds", "how long a turn is, at least a call")
+    slow_s: float = fraction(1.0, "--slow", "calls that take longer are timed once, and take no turns")
+    clock: str = option("wall", "--clock", "cpu is the time of the process", choices=tuple(CLOCKS))
 
 
-def run(arguments: argparse.Namespace, save: Save) -> Record:
+def run(options: PolygonOptions, save: Save) -> Record:
     """Measure milliseconds of each call, in turns."""
-    options = options_of(Options, arguments)
     refuse_unknown("case", options.cases, CASES)
     refuse_unknown("painter", options.painters, PAINTERS)
     record: Record = {"kind": "polygons"} | describe() | {"threads": options.threads, "clock": options.clock}
@@ -68,7 +49,7 @@ def run(arguments: argparse.Namespace, save: Save) -> Record:
     return record
 
 
-def measure(case: PolygonCase, options: Options, record: Record) -> None:
+def measure(case: PolygonCase, options: PolygonOptions, record: Record) -> None:
     """Add the rows of one case."""
     polygons = case.make(case.size)
     right = right_picture(polygons, case)
@@ -197,7 +178,7 @@ def facts(record: Record) -> str:
 STUDY = Study(
     "polygons",
     "time masks, labels and areas of polygons beside other programs",
-    add_arguments,
+    PolygonOptions,
     run,
     lines,
     parts={"polygons": lambda record: "\n".join(table(record)), "polygons-facts": facts},

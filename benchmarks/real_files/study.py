@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.arguments import Options, count, option
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, tell, write_text
 from benchmarks.real_files import drawing, sheets, tables
@@ -144,26 +145,27 @@ def folder_of(text: str) -> tuple[str, Path]:
     return (label if mark else path.name, path)
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "folders", nargs="+", type=folder_of, metavar="[LABEL=]FOLDER", help="files, in folders within it too"
+@dataclass(frozen=True)
+class FileOptions(Options):
+    folders: Sequence[tuple[str, Path]] = option(
+        (), "", "files, in folders within it too", nargs="+", type=folder_of, metavar="[LABEL=]FOLDER"
     )
-    parser.add_argument("--page", type=Path, default=Path("real-files"), metavar="FOLDER",
-                        help="where index.md and the contact sheets go (%(default)s)")  # fmt: skip
-    parser.add_argument("--seconds", type=positive, default=60, metavar="S", help="a file may take (%(default)s)")
-    parser.add_argument("--suffix", nargs="+", default=SUFFIXES, metavar=".SUFFIX", help="files that are drawn")
-    parser.add_argument("--up", choices=["y", "z"], default="y", help="the axis that points up (%(default)s)")
-    add_out(parser)
+    page: Path = option(
+        Path("real-files"), "--page", "where index.md and the contact sheets go (%(default)s)", type=Path,
+        metavar="FOLDER",
+    )  # fmt: skip
+    seconds: int = count(60, "--seconds", "a file may take", "S")
+    suffix: Sequence[str] = option(SUFFIXES, "--suffix", "files that are drawn", nargs="+", metavar=".SUFFIX")
+    up: str = option("y", "--up", "the axis that points up (%(default)s)", choices=["y", "z"])
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: FileOptions, _: Save) -> Record:
     """Draw."""
-    suffixes = tuple(suffix.lower() for suffix in arguments.suffix)
-    return run_real_files(
-        dict(arguments.folders), arguments.page, seconds=arguments.seconds, suffixes=suffixes, up=arguments.up
-    )
+    suffixes = tuple(suffix.lower() for suffix in options.suffix)
+    folders, page = dict(options.folders), options.page
+    return run_real_files(folders, page, seconds=options.seconds, suffixes=suffixes, up=options.up)
 
 
 STUDY = Study(
-    "real-files", "draw all files of folders, with contact sheets", add_arguments, run, tables.lines, tables.PARTS
+    "real-files", "draw all files of folders, with contact sheets", FileOptions, run, tables.lines, tables.PARTS
 )

@@ -6,7 +6,6 @@ Design, 2008; both survive print and colour-blindness.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -51,21 +50,14 @@ LOOKS = {
 def write_chart(
     make: Callable[[], Figure], folder: Path, name: str, suffix: str = "svg", style: Style = STYLE, dpi: int = 100
 ) -> Path:
-    """Write a chart, return where it is."""
+    """Write a chart, return where it is; the same record gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.{suffix}"
-    path.write_bytes(figure_bytes(make, suffix, style, dpi))
-    return path
-
-
-def figure_bytes(make: Callable[[], Figure], suffix: str = "svg", style: Style = STYLE, dpi: int = 100) -> bytes:
-    """Return a chart as the bytes of a file; the same record gives the same bytes."""
     with plt.rc_context(dict(style)):
         figure = make()
-        target = io.BytesIO()
-        figure.savefig(target, format=suffix, dpi=dpi, metadata={"Date": None} if suffix == "svg" else {})
+        figure.savefig(path, format=suffix, dpi=dpi, metadata={"Date": None} if suffix == "svg" else {})
         plt.close(figure)
-    return target.getvalue()
+    return path
 
 
 def duration(ns: float) -> str:

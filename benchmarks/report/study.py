@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from benchmarks.harness.records import Record, Save
 
@@ -18,12 +18,12 @@ class Study:
     kind: str
     """Of its record; and the command."""
     help: str
-    add_arguments: Callable[[argparse.ArgumentParser], None]
-    """Declare the arguments; the one called `record` is the file that the record goes to."""
-    run: Callable[[argparse.Namespace, Save], Record]
-    """Measure and return the record; the function that it gets takes the record as far as it goes.
+    options: type
+    """A dataclass of `harness.arguments`; its field `record` is the file that the record goes to."""
+    run: Callable[[Any, Save], Record]
+    """Measure by options and return the record; the function that it gets takes the record as far as it goes.
 
-    Raises a ValueError for arguments that are refused.
+    Raises a ValueError for options that are refused.
     """
     lines: Callable[[Record], Iterable[str]]
     """The printed lines of a record."""

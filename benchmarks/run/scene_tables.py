@@ -46,22 +46,15 @@ def ratio_text(run: Run | None, other: Run | None) -> str:
     return f"{ratio(run, other):.2f}x" if run and other else "-"
 
 
-def yardstick_text(scene: Scene, run: Run | None) -> str:
-    """How many times as long as a program beside it a run takes, the shortest calls of both."""
-    ratios = [stick["ratios_of_minima"].get(run["name"]) for stick in scene["yardsticks"]] if run else []
-    return next((f"{value:.2f}x" for value in ratios if value is not None), "-")
-
-
 def own_cells(scene: Scene, isas: list[str]) -> list[str]:
-    """A time for each instruction set, the first one's gain by a second thread, and it over a program in C."""
+    """A time for each instruction set, and the first one's gain by a second thread."""
     alone = [own_run(scene, isa) for isa in isas]
-    gain = ratio_text(alone[0], own_run(scene, isas[0], 2))
-    return [*map(time_text, alone), gain, yardstick_text(scene, alone[0])]
+    return [*map(time_text, alone), ratio_text(alone[0], own_run(scene, isas[0], 2))]
 
 
 def own_head(isas: list[str]) -> list[str]:
     """The heads of these cells."""
-    return [*isas, f"two threads ({isas[0]})", "over the prototype"]
+    return [*isas, f"two threads ({isas[0]})"]
 
 
 def facts_text(record: Record) -> str | None:

@@ -1,64 +1,28 @@
-"""The study of the cases: its arguments, and who takes part."""
+"""The study of the cases: who takes part."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from benchmarks.harness.arguments import (
-    add_names,
-    add_number,
-    add_out,
-    add_pin,
-    options_of,
-    positive,
-    refuse_unknown,
-    set_options,
-)  # fmt: skip
+from benchmarks.harness.arguments import refuse_unknown
 from benchmarks.harness.contestants import known_peers
 from benchmarks.harness.records import Record, Save
-from benchmarks.harness.rounds import Options, run_cases
-from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick
-from benchmarks.peers import PEERS
+from benchmarks.harness.rounds import RunOptions, run_cases
 from benchmarks.report.study import Study
 from benchmarks.run import scene_tables, smooth_tables, tables
 from benchmarks.scenes.cases import CASES, TRIALS
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options((), list(PEERS), ()))
-    add_names(parser, "--scene", "scenes", "cases, or beginnings of their names")
-    add_names(parser, "--peer", "peers", "peers; all unless given, none: no names", "*")
-    add_names(parser, "--isa", "isas", "scalar, avx2, avx512; all unless given")
-    parser.add_argument("--threads", nargs="+", type=positive, metavar="N")
-    add_number(parser, "--repeats", "repeats", "rounds")
-    parser.add_argument("--seconds", type=float, metavar="S", help="length of a turn, at least a call (%(default)s)")
-    add_pin(parser)
-    parser.add_argument("--yardstick", action="append", default=[], metavar="[SCENE=]COMMAND")
-    parser.add_argument("--yardstick-pattern", action="append", default=[], metavar="REGEX",
-                        help="finds its figure; one for each yardstick, the last one for the rest")  # fmt: skip
-    parser.add_argument("--yardstick-folder", type=Path, metavar="FOLDER", help="where yardsticks run")
-    parser.add_argument("--no-check", dest="check", action="store_false", help="leave the pictures uncompared")
-    add_out(parser)
-
-
-def run(arguments: argparse.Namespace, save: Save) -> Record:
-    """Measure the cases of the arguments, checked."""
+def run(options: RunOptions, save: Save) -> Record:
+    """Measure the cases of the options, checked."""
     import topleft as tl
 
     available = tl.build_info()["isa_available"]
-    options = options_of(Options, arguments)
     refuse_unknown("--isa", options.isas, available)
     refuse_unknown("--peer", options.peers, known_peers())
-    patterns = arguments.yardstick_pattern or [DEFAULT_PATTERN]
-    patterns += [patterns[-1]] * (len(arguments.yardstick) - len(patterns))
-    yardsticks = list(zip(arguments.yardstick, patterns, strict=False))
-    for command, pattern in yardsticks:
-        Yardstick.parse(command, pattern, options.yardstick_folder, [])
     isas, scenes = options.isas or available[::-1], find_scenes(options.scenes)
-    return run_cases(replace(options, scenes=scenes, isas=isas, yardsticks=yardsticks), save)
+    return run_cases(replace(options, scenes=scenes, isas=isas), save)
 
 
 def find_scenes(names: Sequence[str]) -> list[str]:
@@ -74,4 +38,4 @@ def find_scenes(names: Sequence[str]) -> list[str]:
     return found
 
 
-STUDY = Study("run", "measure", add_arguments, run, tables.lines, {**scene_tables.PARTS, **smooth_tables.PARTS})
+STUDY = Study("run", "measure", RunOptions, run, tables.lines, {**scene_tables.PARTS, **smooth_tables.PARTS})

@@ -23,8 +23,6 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     for scene in record["scenes"]:
         yield ""
         yield from scene_lines(scene)
-    yield ""
-    yield from summary_lines(record["scenes"])
 
 
 def scene_lines(scene: dict[str, Any]) -> Iterator[str]:
@@ -39,17 +37,6 @@ def scene_lines(scene: dict[str, Any]) -> Iterator[str]:
     runs = scene["runs"]
     if runs:
         yield from table([*HEAD[:5], f"x {runs[0]['name']}", *HEAD[5:]], [run_cells(run) for run in runs])
-    for yardstick in scene["yardsticks"]:
-        yield ""
-        yield (
-            f"Yardstick `{yardstick['command']}`, which prints its shortest of many calls: "
-            f"{number(yardstick['median_ms'])} ms (quartiles {number(yardstick['q1_ms'])} to "
-            f"{number(yardstick['q3_ms'])}, min {number(yardstick['min_ms'])})."
-        )
-        calls = {run["name"]: run["calls"] / len(run["turn_minima_ms"]) for run in runs}
-        yield "Shortest call of a turn over that, median of the rounds (our calls a turn): " + ", ".join(
-            f"{name} {ratio:.2f} ({calls[name]:.0f})" for name, ratio in yardstick["ratios_of_minima"].items()
-        )
     crowded = [f"{run['name']} {run['cpu_share']:.0%}" for run in runs if is_crowded(run)]
     if crowded:
         yield ""
@@ -68,35 +55,6 @@ def is_crowded(run: dict[str, Any]) -> bool:
     """Whether the contestant had its CPUs for less than 90 % of the time; unknown in old records."""
     share = run.get("cpu_share")
     return share is not None and share < 0.9 * run["threads"]
-
-
-def summary_lines(scenes: list[dict[str, Any]]) -> Iterator[str]:
-    """A row for each scene and instruction set: more threads, the scene beside, yardsticks, the fastest peer."""
-    yield "## Summary"
-    yield "Medians, ms; ratios pair by pair. Yardsticks: our shortest call of a turn over what they print."
-    yield "!: the CPU was shared. That lengthens calls of several ms and spares short ones: do not trust the ratios."
-    yield ""
-    rows = []
-    for scene in scenes:
-        own = [run for run in scene["runs"] if run["peer"] == "topleft" and run["scene"] == scene["scene"]]
-        n_threads = min((run["threads"] for run in own), default=1)
-        peers = [run for run in scene["runs"] if run["peer"] != "topleft" and run["threads"] == n_threads]
-        for run in (run for run in own if run["threads"] == n_threads):
-            same = [other for other in scene["runs"] if other.get("isa") == run["isa"] and other is not run
-                    and other.get("way") == run.get("way")]  # fmt: skip
-            threads = [f"{ratio(run, other):.2f} ({other['threads']})" for other in same
-                       if other["scene"] == run["scene"]]  # fmt: skip
-            beside = [f"{ratio(run, other):.2f}" for other in same
-                      if other["scene"] != run["scene"] and other["threads"] == n_threads]  # fmt: skip
-            yardsticks = [f"{yardstick['ratios_of_minima'][run['name']]:.2f}" for yardstick in scene["yardsticks"]
-                          if run["name"] in yardstick["ratios_of_minima"]]  # fmt: skip
-            best = min(peers, key=lambda peer: peer["median_ms"], default=None)
-            peer = f"{best['name']} ({best['gives']}) {ratio(best, run):.1f}" if best else ""
-            median = number(run["median_ms"]) + "!" * is_crowded(run)
-            lists = [", ".join(ratios) for ratios in (threads, beside, yardsticks)]
-            rows.append([scene["scene"], run["name"].removeprefix("topleft "), median, *lists, peer])
-    head = ["scene", "isa", "ms", "faster with (n) threads", "x scene beside", "x yardsticks", "fastest peer, x ours"]
-    yield from table(head, rows)
 
 
 def ratio(run: dict[str, Any], other: dict[str, Any]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,28 @@ def map_arrays(n: int, size: tuple[int, int], *, is_whole: bool = False) -> Arra
     """Return a mesh that tiles the frame, its vertices whole pixels if wanted."""
     vertices, triangles = planar_mesh(n // 2, *size)
     return (np.rint(vertices) if is_whole else vertices), triangles
+
+
+def grid_triangles(n_rows: int, n_columns: int) -> NDArray[np.int32]:
+    """Return two triangles for each cell of a grid of vertices, row by row."""
+    corner = np.arange(n_rows * n_columns, dtype=np.int32).reshape(n_rows, n_columns)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+    return np.stack([a, c, b, b, c, d], axis=-1).reshape(-1, 3)
+
+
+def write_ply(path: Path, vertices: NDArray[Any], triangles: NDArray[Any], **attributes: NDArray[Any]) -> None:
+    """Write a binary PLY file of float32 vertices; attributes: columns of float32 or bytes by their names."""
+    columns = dict(zip("xyz", vertices.T.astype("<f4"), strict=True)) | attributes
+    points = np.zeros(len(vertices), [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        points[name] = column
+    faces = np.zeros(len(triangles), [("n", "u1"), ("corners", "<i4", 3)])
+    faces["n"], faces["corners"] = 3, triangles
+    kinds = {"u1": "uchar", "f4": "float"}
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    lines += [f"property {kinds[column.dtype.str[1:]]} {name}" for name, column in columns.items()]
+    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header\n"]
+    path.write_bytes("\n".join(lines).encode() + points.tobytes() + faces.tobytes())
 
 
 def rounded(arrays: Arrays) -> Arrays:

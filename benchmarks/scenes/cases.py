@@ -82,14 +82,12 @@ class Case:
     """A scene with a name.
 
     `beside` names a case whose scene topleft also draws here, in turn with this one, so that the two compare.
-    `aliases` are the names that external yardsticks may print for it.
     """
 
     name: str
     task: str
     make: Callable[[], Scene]
     beside: str | None = None
-    aliases: tuple[str, ...] = ()
 
 
 CASES: dict[str, Case] = {}
@@ -196,27 +194,26 @@ def empty_scene(size: tuple[int, int] = (64, 64)) -> Scene:
 
 
 def _register() -> None:
-    blobs = [("10k", 10_000, "10000"), ("100k", 100_000, "99856"), ("1m", 1_000_000, "1000000"),
-             ("10m", 10_000_000, "9998244")]  # fmt: skip
-    for label, n, printed in blobs:
-        add(Case(f"blob-{label}", "visibility", lambda n=n: blob_scene(n), aliases=(printed, f"blob{n}")))
-    for label, n, _ in blobs:
+    blobs = {"10k": 10_000, "100k": 100_000, "1m": 1_000_000, "10m": 10_000_000}
+    for label, n in blobs.items():
+        add(Case(f"blob-{label}", "visibility", lambda n=n: blob_scene(n)))
+    for label, n in blobs.items():
         name = f"blob-{label}"
         add(Case(f"{name}-f64", "visibility", lambda n=n: blob_scene(n, wide=True), beside=name))
-    for label, n, _ in blobs:
+    for label, n in blobs.items():
         add(Case(f"blob-{label}-nocull", "visibility", lambda n=n: blob_scene(n, cull="none")))
     for n, px in ((1000, 400), (10_000, 100), (100_000, 10), (1_000_000, 4)):
         make = lambda n=n, px=px: random_scene("depth-2d", n, px)  # noqa: E731
-        add(Case(f"random-{n}x{px}", "depth-2d", make, aliases=(f"rand{n}_{px}",)))
+        add(Case(f"random-{n}x{px}", "depth-2d", make))
     for name, is_near_first in (("near", True), ("far", False)):
         make = lambda near=is_near_first: frames_scene(40, is_near_first=near)  # noqa: E731
         add(Case(f"frames-{name}-first", "depth-2d", make))
-    add(Case("large-4k", "mask", large_scene, aliases=("large",)))
+    add(Case("large-4k", "mask", large_scene))
     for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
         make = lambda n=n, px=px: random_scene("fill", n, px)  # noqa: E731
-        add(Case(f"fill-{n}x{px}", "fill", make, aliases=(f"rand{n}_{px}",)))
-    add(Case("fill-4k", "fill", lambda: large_scene("fill"), aliases=("rgba-4k",)))
-    add(Case("labels-planar", "labels", planar_scene, aliases=("planar100000",)))
+        add(Case(f"fill-{n}x{px}", "fill", make))
+    add(Case("fill-4k", "fill", lambda: large_scene("fill")))
+    add(Case("labels-planar", "labels", planar_scene))
     for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
         add(Case(f"smooth-{n}x{px}", "smooth-fill", lambda n=n, px=px: random_scene("smooth-fill", n, px)))
     add(Case("smooth-planar", "smooth-fill", lambda: planar_scene("smooth-fill")))

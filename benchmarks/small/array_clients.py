@@ -5,7 +5,6 @@ Input: a checkout. Output: a row for each case: pixels that differ, how far valu
 
 from __future__ import annotations
 
-import argparse
 import os
 import statistics
 import sys
@@ -21,8 +20,9 @@ import numpy as np
 import topleft as tl
 from benchmarks.harness.records import Record
 from benchmarks.report.tables import table
+from benchmarks.scenes.arrays import write_ply
 
-Client = Callable[[Path, argparse.Namespace], list[Record]]
+Client = Callable[[Path, Any], list[Record]]
 Draws = tuple[Callable[[], Any], Callable[[], Any]]
 
 SIZES = (5_000, 20_000, 80_000)
@@ -49,7 +49,7 @@ def timed(theirs: Callable[[], Any], ours: Callable[[], Any], rounds: int) -> Re
     return {"ms": [1e3 * statistics.median(found) for found in times]}
 
 
-def run_bop(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_bop(folder: Path, options: Any) -> list[Record]:
     """Objects in many poses by bop_toolkit's vispy renderer and by topleft, and their errors VSD."""
     os.environ.setdefault("EGL_PLATFORM", "surfaceless")
     os.environ.setdefault("LP_NUM_THREADS", "1")
@@ -64,7 +64,7 @@ def run_bop(folder: Path, options: argparse.Namespace) -> list[Record]:
     with tempfile.TemporaryDirectory() as folder_of_models:
         paths = {n: Path(folder_of_models, f"{n}.ply") for n in SIZES}
         for n, path in paths.items():
-            write_ply(path, n)
+            write_bumpy(path, n)
         for mode in ("depth", "rgb+depth"):
             both = [own.create_renderer(640, 480, "vispy", mode=mode) for own in (renderer, bop)]
             for n, path in paths.items():
@@ -75,7 +75,7 @@ def run_bop(folder: Path, options: argparse.Namespace) -> list[Record]:
     return rows
 
 
-def compare_poses(pose_error: Any, both: list[Any], n: int, poses: list[Any], options: argparse.Namespace) -> Record:
+def compare_poses(pose_error: Any, both: list[Any], n: int, poses: list[Any], options: Any) -> Record:
     """Pixels of masks that differ, depth that is off, errors VSD that differ, and the median time of a call."""
     row: Record = {"pixels": 0, "differ": 0, "beyond edges": 0, "off": 0.0, "vsd": 0.0}
     found: list[Record] = []
@@ -118,24 +118,17 @@ def pose_of(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return R * np.linalg.det(R), rng.uniform([-60, -60, 400], [60, 60, 900])[:, None]
 
 
-def write_ply(path: Path, n: int) -> None:
+def write_bumpy(path: Path, n: int) -> None:
     """Write a bumpy object of about n triangles, 180 mm long, for the reader of bop_toolkit."""
     vertices, triangles = tl.scenes.blob(n)
     vertices = vertices * [60, 40, 90]
-    normals = tl.Mesh(vertices, triangles).vertex_normals()
-    colors = np.rint(127 + 127 * np.sin(vertices / 20)).astype(np.uint8)
-    points = np.zeros(len(vertices), [("place", "<f4", 3), ("normal", "<f4", 3), ("color", "u1", 3)])
-    points["place"], points["normal"], points["color"] = vertices, normals, colors
-    faces = np.zeros(len(triangles), [("n", "u1"), ("rows", "<i4", 3)])
-    faces["n"], faces["rows"] = 3, triangles
-    names = [("float", "x y z nx ny nz"), ("uchar", "red green blue")]
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
-    lines += [f"property {kind} {name}" for kind, own in names for name in own.split()]
-    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header\n"]
-    path.write_bytes("\n".join(lines).encode() + points.tobytes() + faces.tobytes())
+    normals = tl.Mesh(vertices, triangles).vertex_normals().T.astype("<f4")
+    colors = np.rint(127 + 127 * np.sin(vertices / 20)).astype(np.uint8).T
+    columns = zip(("nx", "ny", "nz", "red", "green", "blue"), (*normals, *colors), strict=True)
+    write_ply(path, vertices, triangles, **dict(columns))
 
 
-def run_pytorch3d(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_pytorch3d(folder: Path, options: Any) -> list[Record]:
     """Expected values of the tests of PyTorch3D without blur, and spheres by its kernel for the CPU and by topleft."""
     sys.path.insert(0, str(folder))
     import torch
@@ -168,7 +161,7 @@ def run_pytorch3d(folder: Path, options: argparse.Namespace) -> list[Record]:
     return rows
 
 
-def run_custom_rasterizer(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_custom_rasterizer(folder: Path, options: Any) -> list[Record]:
     """Faces and weights by the kernel of Hunyuan3D for the CPU; its compiled module lies in the folder."""
     sys.path.insert(0, str(folder))
     import torch
@@ -192,7 +185,7 @@ def run_custom_rasterizer(folder: Path, options: argparse.Namespace) -> list[Rec
     return rows
 
 
-def run_texture_baker(folder: Path, options: argparse.Namespace) -> list[Record]:
+def run_texture_baker(folder: Path, options: Any) -> list[Record]:
     """Faces and weights of atlases by the kernel of Stable Fast 3D for the CPU, and by topleft."""
     import torch
 

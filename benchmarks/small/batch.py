@@ -5,7 +5,6 @@ Contestants take turns in processes of their own, as in `harness/rounds.py`; a c
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,16 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.harness.arguments import (
-    add_names,
-    add_number,
-    add_out,
-    add_pin,
-    options_of,
-    positive,
-    refuse_unknown,
-    set_options,
-)  # fmt: skip
+from benchmarks.harness.arguments import Options, count, names, pinned, refuse_unknown
 from benchmarks.harness.contestants import Child, Contestant, SkippedError
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, tell
@@ -38,20 +28,19 @@ TASKS = ("views", "views-png")
 
 
 @dataclass(frozen=True)
-class Options:
-    """The options of a run."""
-
-    peers: Sequence[str] = PEERS
-    threads: Sequence[int] = (1, 2)
-    n_triangles: int = 70_000
-    n_views: int = 100
-    frame_px: int = 512
-    repeats: int = 5
-    pin: Sequence[int] = ()
+class BatchOptions(Options):
+    peers: Sequence[str] = names("--peer", ", ".join(PEERS), PEERS, "*")
+    threads: Sequence[int] = count((1, 2), "--threads", nargs="+")
+    n_triangles: int = count(70_000, "--triangles")
+    n_views: int = count(100, "--views", "a call")
+    frame_px: int = count(512, "--frame", "side", "PX")
+    repeats: int = count(5, "--repeats", "rounds")
+    pin: Sequence[int] = pinned()
 
 
-def run_batch(options: Options) -> dict[str, Any]:
+def run(options: BatchOptions, _: Save) -> Record:
     """Measure, return the record that `lines` reads."""
+    refuse_unknown("--peer", options.peers, PEERS)
     record: dict[str, Any] = {
         "schema": 1,
         "kind": "batch",
@@ -89,7 +78,7 @@ def run_batch(options: Options) -> dict[str, Any]:
     return record
 
 
-def _contestants(options: Options, skipped: list[dict[str, str]]) -> Iterator[Contestant]:
+def _contestants(options: BatchOptions, skipped: list[dict[str, str]]) -> Iterator[Contestant]:
     size = options.frame_px, options.frame_px
     for task in TASKS:
         case = Case(task, task, lambda task=task: views_scene(task, options.n_triangles, options.n_views, size))
@@ -162,24 +151,7 @@ def _name(contestant: Contestant) -> str:
     return f"{contestant.name} {contestant.case.name}"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options())
-    add_names(parser, "--peer", "peers", ", ".join(PEERS), "*")
-    parser.add_argument("--threads", nargs="+", type=positive, metavar="N")
-    add_number(parser, "--triangles", "n_triangles")
-    add_number(parser, "--views", "n_views", "a call")
-    add_number(parser, "--frame", "frame_px", "side", "PX")
-    add_number(parser, "--repeats", "repeats", "rounds")
-    add_pin(parser)
-    add_out(parser)
-
-
-def run(arguments: argparse.Namespace, _: Save) -> Record:
-    refuse_unknown("--peer", arguments.peers, PEERS)
-    return run_batch(options_of(Options, arguments))
-
-
 PARTS: dict[str, Callable[[Record], str | None]] = {"batch-facts": facts_text, "batch": views_text}
 """The parts of the page by their markers `<!-- table: NAME -->`."""
 
-STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", add_arguments, run, lines, PARTS)
+STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", BatchOptions, run, lines, PARTS)

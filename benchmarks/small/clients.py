@@ -9,7 +9,6 @@ outlines, and CPU time in turns.  Clients of arrays, bop=FOLDER say: array_clien
 
 from __future__ import annotations
 
-import argparse
 import io
 import os
 import re
@@ -17,14 +16,15 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
 
-from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.arguments import Options, count, option, switch
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
@@ -51,12 +51,12 @@ def run_tests(name: str, folder: Path, pattern: str) -> list[Record]:
     return rows
 
 
-def run_pyrender(folder: Path, _: argparse.Namespace) -> Record:
+def run_pyrender(folder: Path, _: Any) -> Record:
     """The tests of a checkout of pyrender."""
     return {"tests": run_tests("pyrender", folder, "tests/unit/test_*.py")}
 
 
-def run_trimesh(folder: Path, options: argparse.Namespace) -> Record:
+def run_trimesh(folder: Path, options: Any) -> Record:
     """The tests of a checkout of trimesh that make scenes and pictures, and its models beside its own window."""
     import trimesh
 
@@ -92,7 +92,7 @@ def run_trimesh(folder: Path, options: argparse.Namespace) -> Record:
     return {"tests": tests, "models": rows}
 
 
-def run_mujoco(folder: Path, options: argparse.Namespace) -> Record:
+def run_mujoco(folder: Path, options: Any) -> Record:
     """Each model of a folder that MuJoCo loads, by both renderers."""
     os.environ.setdefault("MUJOCO_GL", "egl")
     os.environ.setdefault("EGL_PLATFORM", "surfaceless")
@@ -108,7 +108,7 @@ def run_mujoco(folder: Path, options: argparse.Namespace) -> Record:
     return {"models": rows}
 
 
-def compare_model(mujoco: Any, model: Any, options: argparse.Namespace) -> Record:
+def compare_model(mujoco: Any, model: Any, options: Any) -> Record:
     """Pixels that differ, depth that is off, and milliseconds of a call."""
     from topleft.compat.mujoco import Renderer
 
@@ -159,7 +159,7 @@ def draw(mujoco: Any, renderer: Any, data: Any, mode: str, shadows: bool) -> np.
 CLIENTS = {"pyrender": run_pyrender, "trimesh": run_trimesh, "mujoco": run_mujoco, **ARRAY_CLIENTS}
 
 
-def run(options: argparse.Namespace, save: Save) -> Record:
+def run(options: Any, save: Save) -> Record:
     """The record of all clients."""
     record: Record = {"kind": "clients"} | describe() | {"shadows": options.shadows}
     for pair in options.clients:
@@ -199,14 +199,13 @@ def lines(record: Record) -> Iterator[str]:
             yield from lines_of(name, record[name])
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    command.add_argument("clients", nargs="+", metavar="NAME=FOLDER", help=f"of {', '.join(CLIENTS)}")
-    command.add_argument("--size", type=positive, default=224, help="of pictures of MuJoCo, pixels (224)")
-    command.add_argument("--rounds", type=positive, default=5, help="how often each is timed (5)")
-    command.add_argument("--models", type=positive, default=100, help="at most so many models (100)")
-    command.add_argument("--shadows", action="store_true", help="leave MuJoCo's shadows and reflections on")
-    add_out(command)
+@dataclass(frozen=True)
+class ClientOptions(Options):
+    clients: Sequence[str] = option((), "", f"of {', '.join(CLIENTS)}", nargs="+", metavar="NAME=FOLDER")
+    size: int = count(224, "--size", "of pictures of MuJoCo, pixels")
+    rounds: int = count(5, "--rounds", "how often each is timed")
+    models: int = count(100, "--models", "at most so many models")
+    shadows: bool = switch("--shadows", "leave MuJoCo's shadows and reflections on")
 
 
-STUDY = Study("clients", "run programs of other libraries on topleft", add_arguments, run, lines)
+STUDY = Study("clients", "run programs of other libraries on topleft", ClientOptions, run, lines)

@@ -8,19 +8,20 @@ share of the triangles are done sooner than workers that each look for the trian
 
 from __future__ import annotations
 
-import argparse
 import os
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.harness.arguments import Options, count, option, positive
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
@@ -121,16 +122,16 @@ def fastest(work: Any) -> float:
     return float(np.min(found))
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: ClusterOptions, _: Save) -> Record:
     """Measure."""
     rows: list[dict[str, float]] = []
     with client_of_processes() as client:
-        draw_jobs(client, 200, arguments.chunk)
-        for n in arguments.jobs:
-            rows += draw_jobs(client, n, arguments.chunk)
+        draw_jobs(client, 200, options.chunk)
+        for n in options.jobs:
+            rows += draw_jobs(client, n, options.chunk)
     pixel, triangle = triangle_ns()
     units = {"merge_ns": merge_ns(), "pixel_ns": pixel, "triangle_ns": triangle, "index_ns": index_ns()}
-    return {"kind": "cluster", "chunk": arguments.chunk, "rows": rows, "units": units, **describe("distributed")}
+    return {"kind": "cluster", "chunk": options.chunk, "rows": rows, "units": units, **describe("distributed")}
 
 
 def lines(record: Record) -> list[str]:
@@ -154,11 +155,10 @@ def lines(record: Record) -> list[str]:
     return made
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--jobs", type=int, nargs="+", default=[1000, 10_000], metavar="N", help="batches of so many (%(default)s)"
-    )
-    parser.add_argument("--chunk", type=int, metavar="N", help="jobs of a task (as the plan says)")
+@dataclass(frozen=True)
+class ClusterOptions(Options):
+    jobs: Sequence[int] = count((1000, 10_000), "--jobs", "batches of so many", nargs="+")
+    chunk: int | None = option(None, "--chunk", "jobs of a task (as the plan says)", type=positive, metavar="N")
 
 
-STUDY = Study("cluster", "costs of a Dask cluster: time of a job, memory of the client", add_arguments, run, lines)
+STUDY = Study("cluster", "costs of a Dask cluster: time of a job, memory of the client", ClusterOptions, run, lines)

@@ -7,7 +7,6 @@ are those of the machine as it is; CPU time of the two sides a frame says what t
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import shutil
@@ -16,18 +15,19 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-
-from benchmarks.harness.arguments import add_out, positive
+import topleft as tl
+from benchmarks.harness.arguments import Options, count, option
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, tell
 from benchmarks.report.study import Study
 from benchmarks.report.tables import table
+from benchmarks.scenes.arrays import write_ply
 
 SIZE = (1280, 720)
 N_TRIANGLES = (70_000, 1_000_000)
@@ -58,24 +58,6 @@ ASK = """async ([size, background]) => {
   const frame = await app.line.ask("mesh.draw", asked);
   return [performance.now() - start - frame.draw_ms - frame.encode_ms, frame.encode_ms, frame.arrays.pixels.length];
 }"""
-
-
-def write_blob(n_triangles: int, path: Path) -> int:
-    """Write the blob as a binary PLY file; return how many triangles it has."""
-    import topleft as tl
-
-    vertices, triangles = tl.scenes.blob(n_triangles)
-    faces = np.empty(len(triangles), [("n", "u1"), ("corners", "<i4", 3)])
-    faces["n"], faces["corners"] = 3, triangles
-    head = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty float x\nproperty float y\n"
-        f"property float z\nelement face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    with path.open("wb") as file:
-        file.write(head.encode())
-        file.write(vertices.astype("<f4").tobytes())
-        file.write(faces.tobytes())
-    return len(triangles)
 
 
 def cpu_ms(*roots: int) -> float:
@@ -150,8 +132,6 @@ def take_pictures(browser: Any, folder: Path) -> None:
 
     from PIL import Image
 
-    import topleft as tl
-
     with tl.explore("shared-edge", wait=False, browser=False) as explorer:
         for name, (scheme, (width, height), part, state) in PICTURES.items():
             viewport = {"width": width, "height": height}
@@ -164,14 +144,16 @@ def take_pictures(browser: Any, folder: Path) -> None:
             context.close()
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--triangles", type=positive, nargs="*", default=list(N_TRIANGLES), metavar="N")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write the pictures of the guide, too")
-    parser.add_argument("--seconds", type=positive, default=5, metavar="N", help="of turning (%(default)s)")
-    add_out(parser)
+@dataclass(frozen=True)
+class ExplorerOptions(Options):
+    triangles: Sequence[int] = count(N_TRIANGLES, "--triangles", nargs="*")
+    pictures: Path | None = option(
+        None, "--pictures", "write the pictures of the guide, too", type=Path, metavar="FOLDER"
+    )
+    seconds: int = count(5, "--seconds", "of turning")
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: ExplorerOptions, _: Save) -> Record:
     """Measure each mesh.
 
     Raises
@@ -189,14 +171,15 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
     rows = []
     with sync_playwright() as running, tempfile.TemporaryDirectory() as folder:
         browser = running.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        for n in arguments.triangles:
+        for n in options.triangles:
             path = Path(folder) / f"blob-{n}.ply"
-            n_triangles = write_blob(n, path)
-            rows.append({"triangles": n_triangles, **measure_mesh(browser, path, arguments.seconds)})
+            vertices, triangles = tl.scenes.blob(n)
+            write_ply(path, vertices, triangles)
+            rows.append({"triangles": len(triangles), **measure_mesh(browser, path, options.seconds)})
             tell(json.dumps(rows[-1]))
             path.unlink()
-        if arguments.pictures:
-            take_pictures(browser, arguments.pictures)
+        if options.pictures:
+            take_pictures(browser, options.pictures)
         version = browser.version
         browser.close()
     return {"kind": "explorer", "browser": version} | describe() | {"rows": rows}
@@ -222,4 +205,4 @@ def lines(record: Record) -> Iterator[str]:
     ])  # fmt: skip
 
 
-STUDY = Study("explorer", "frames a second of the explorer in a headless browser", add_arguments, run, lines)
+STUDY = Study("explorer", "frames a second of the explorer in a headless browser", ExplorerOptions, run, lines)

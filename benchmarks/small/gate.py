@@ -9,7 +9,6 @@ As a program by itself (`python -m benchmarks.small.gate`) this file draws: a sc
 
 from __future__ import annotations
 
-import argparse
 import os
 import re
 import shutil
@@ -18,12 +17,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.arguments import Options, count, names, option
 from benchmarks.harness.machine import ROOT, describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
@@ -198,26 +198,26 @@ def time_in_turns(folders: list[Path], names: list[str], n_rounds: int) -> dict[
     return found
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("base", metavar="BASE", help="the commit to compare with")
-    parser.add_argument("head", metavar="HEAD", nargs="?", default="HEAD", help="(%(default)s)")
-    parser.add_argument("--rounds", type=positive, default=N_ROUNDS, metavar="N", help="(%(default)s)")
-    parser.add_argument("--scene", nargs="+", metavar="NAME", help="beginnings of names (default: all)")
-    add_out(parser)
+@dataclass(frozen=True)
+class GateOptions(Options):
+    base: str = option("", "", "the commit to compare with", metavar="BASE")
+    head: str = option("HEAD", "", "(%(default)s)", metavar="HEAD", nargs="?")
+    rounds: int = count(N_ROUNDS, "--rounds")
+    scenes: Sequence[str] = names("--scene", "beginnings of names (default: all)")
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: GateOptions, _: Save) -> Record:
     """Build both commits, count and time."""
-    wanted = tuple(arguments.scene or [""])
-    names = [name for name in scenes() if name.startswith(wanted)]
-    if not names:
+    wanted = tuple(options.scenes or [""])
+    chosen = [name for name in scenes() if name.startswith(wanted)]
+    if not chosen:
         raise ValueError(f"no scene begins with {' or '.join(wanted)}: there are {', '.join(scenes())}")
     with tempfile.TemporaryDirectory() as room:
         folders = [Path(room, "base"), Path(room, "head")]
-        commits = [build(c, f) for c, f in zip((arguments.base, arguments.head), folders, strict=True)]
-        counts = [count_instructions(f, names) for f in folders] if shutil.which("valgrind") else []
-        times = time_in_turns(folders, names, arguments.rounds)
-    rows = [{"scene": name, "instructions": [count[name] for count in counts], "ms": times[name]} for name in names]
+        commits = [build(c, f) for c, f in zip((options.base, options.head), folders, strict=True)]
+        counts = [count_instructions(f, chosen) for f in folders] if shutil.which("valgrind") else []
+        times = time_in_turns(folders, chosen, options.rounds)
+    rows = [{"scene": name, "instructions": [count[name] for count in counts], "ms": times[name]} for name in chosen]
     return {"kind": "gate"} | describe() | {"commits": commits, "rows": rows}
 
 
@@ -250,7 +250,7 @@ def lines(record: Record) -> Iterator[str]:
     yield f"slower by more than {LIMIT - 1:.0%}: {', '.join(slower) or 'nothing'}"
 
 
-STUDY = Study("gate", "compare two commits: instructions, and time in turns", add_arguments, run, lines)
+STUDY = Study("gate", "compare two commits: instructions, and time in turns", GateOptions, run, lines)
 
 if __name__ == "__main__":
     serve()

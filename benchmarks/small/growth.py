@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import gc
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from resource import getpagesize
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
+from benchmarks.harness.arguments import Options, count
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
 
@@ -117,11 +118,11 @@ def rasterizer_bytes() -> tuple[int, int]:
     return with_it, resident_bytes() - before
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: GrowthOptions, _: Save) -> Record:
     """Measure each verb, and a Rasterizer that goes."""
-    grown = {name: [*growth(right, arguments.calls, fails=False), *growth(wrong, arguments.calls, fails=True)]
+    grown = {name: [*growth(right, options.calls, fails=False), *growth(wrong, options.calls, fails=True)]
              for name, (right, wrong) in calls().items()}  # fmt: skip
-    return {"kind": "growth", "calls": arguments.calls, "grown": grown, "rasterizer": list(rasterizer_bytes())}
+    return {"kind": "growth", "calls": options.calls, "grown": grown, "rasterizer": list(rasterizer_bytes())}
 
 
 def lines(record: Record) -> list[str]:
@@ -136,8 +137,9 @@ def lines(record: Record) -> list[str]:
     return made
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--calls", type=int, default=10_000, metavar="N", help="of each verb (%(default)s)")
+@dataclass(frozen=True)
+class GrowthOptions(Options):
+    calls: int = count(10_000, "--calls", "of each verb")
 
 
-STUDY = Study("growth", "memory after thousands of calls, and of calls that fail", add_arguments, run, lines)
+STUDY = Study("growth", "memory after thousands of calls, and of calls that fail", GrowthOptions, run, lines)

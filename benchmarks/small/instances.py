@@ -7,13 +7,13 @@ a temporary folder; its memory is that of the process without mapped files.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
-from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.arguments import Options, count, option
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
@@ -36,15 +36,15 @@ STREWN_TRIANGLES = 20_000
 MAPPED_AT_ONCE = 10_000_000
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--triangles", type=positive, default=1_000_000, metavar="N", help="of the blob (%(default)s)")
-    parser.add_argument("--counts", type=positive, nargs="+", default=[200, 3000], metavar="N", help="(%(default)s)")
-    parser.add_argument("--strewn", type=int, default=20_000, metavar="N", help="far away (%(default)s)")
-    parser.add_argument("--rounds", type=positive, default=11, metavar="N", help="(%(default)s)")
-    parser.add_argument(
-        "--mapped", type=int, default=0, metavar="N", help="times 10 million triangles from a memory map; 40 take 7 GB"
+@dataclass(frozen=True)
+class InstanceOptions(Options):
+    triangles: int = count(1_000_000, "--triangles", "of the blob")
+    counts: Sequence[int] = count((200, 3000), "--counts", nargs="+")
+    strewn: int = option(20_000, "--strewn", "far away (%(default)s)", type=int, metavar="N")
+    rounds: int = count(11, "--rounds")
+    mapped: int = option(
+        0, "--mapped", "times 10 million triangles from a memory map; 40 take 7 GB", type=int, metavar="N"
     )
-    add_out(parser)
 
 
 def in_rows(mesh: tl.Mesh, n: int) -> tl.Scene:
@@ -72,7 +72,7 @@ def seconds_of(call: Callable[[], object], rounds: int) -> list[float]:
     return found
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(asked: InstanceOptions, _: Save) -> Record:
     """Measure seconds, by the clock."""
     rows: list[dict[str, Any]] = []
 
@@ -80,18 +80,18 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
         for tolerance, threads in itertools.product(tolerances, (1, 2)):
             options = {"tolerance": tolerance, "threads": threads}
             call = partial(tl.rasterize_mesh, scene, camera, SIZE, **options)
-            frags, found = call(), seconds_of(call, arguments.rounds)
+            frags, found = call(), seconds_of(call, asked.rounds)
             rows.append({"scene": kind, "instances": len(scene), "triangles": scene.n_triangles, **options,
                          "shown": len(np.unique(frags.instance)) - 1, "seconds": found})  # fmt: skip
 
-    mesh, camera = blob(arguments.triangles), tl.Camera.look_at((0, 0.2, 7.0), fov_y_deg=60)
-    for n in arguments.counts:
+    mesh, camera = blob(asked.triangles), tl.Camera.look_at((0, 0.2, 7.0), fov_y_deg=60)
+    for n in asked.counts:
         measure("in rows", in_rows(mesh, n), camera, (0.0, 0.5))
-    if arguments.strewn:
+    if asked.strewn:
         far = tl.Camera.look_at((0, 0, 12_000), fov_y_deg=50, near=1, far=20_000)
-        measure("strewn, far", strewn(blob(STREWN_TRIANGLES), arguments.strewn), far, (0.0,))
-    if arguments.mapped:
-        rows.append(mapped(arguments.mapped))
+        measure("strewn, far", strewn(blob(STREWN_TRIANGLES), asked.strewn), far, (0.0,))
+    if asked.mapped:
+        rows.append(mapped(asked.mapped))
     return {"kind": "instances"} | describe() | {"rows": rows}
 
 
@@ -163,5 +163,5 @@ PARTS: dict[str, Callable[[Record], str | None]] = {
 """The parts of the page by their markers `<!-- table: NAME -->`."""
 
 STUDY = Study(
-    "instances", "time thousands of instances, and a mesh from a memory map", add_arguments, run, lines, PARTS
+    "instances", "time thousands of instances, and a mesh from a memory map", InstanceOptions, run, lines, PARTS
 )

@@ -13,10 +13,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.scenes.arrays import grid_triangles
+
 Calls = Mapping[str, Callable[[], object]]
 Scenes = Iterator[tuple[str, Calls]]
 
 HD = (1920, 1080)
+
+
+def installed(makers: Mapping[str, Callable[[], Callable[[], object]]]) -> dict[str, Callable[[], object]]:
+    """Return the calls that makers give, without those of programs that are not installed."""
+    calls = {}
+    for name, make in makers.items():
+        try:
+            calls[name] = make()
+        except (ImportError, OSError) as error:
+            print(f"{name}: {error}", file=sys.stderr)
+    return calls
 
 
 def field_beside_others() -> Scenes:
@@ -26,20 +39,13 @@ def field_beside_others() -> Scenes:
     points, triangles = tl.scenes.planar_mesh(100_100, *HD)
     values = np.sin(points[:, 0] / 100) * np.cos(points[:, 1] / 80)
     grid = tl.Grid(HD, (0, HD[0], 0, HD[1]), "down")
-    calls: dict[str, Callable[[], object]] = {
-        "topleft field": lambda: tl.field((points, triangles), values, grid, threads=1)
-    }
-    for name, prepare in OTHER_FIELDS.items():
-        try:
-            calls[name] = prepare(points, triangles, values)
-        except ImportError as error:
-            print(f"{name}: {error}", file=sys.stderr)
-    yield "200,000 triangles, 1920x1080", calls
+    others = installed({name: partial(make, points, triangles, values) for name, make in OTHER_FIELDS.items()})
+    own = {"topleft field": lambda: tl.field((points, triangles), values, grid, threads=1)}
+    yield "200,000 triangles, 1920x1080", own | others
     x, y = np.meshgrid(np.linspace(0, 200, 41), np.linspace(0, 200, 26))
     hills = np.column_stack([x.ravel(), y.ravel(), 5 * np.sin(x / 20).ravel() * np.cos(y / 25).ravel()])
-    corner = (np.arange(25)[:, None] * 41 + np.arange(40)).reshape(-1, 1)
-    faces = np.concatenate([corner + [0, 1, 41], corner + [1, 42, 41]]).astype(np.int32)
-    yield "2,000 faces, 400x400", {"topleft height_map": lambda: tl.height_map((hills, faces), 0.5, threads=1)}
+    mesh = hills, grid_triangles(26, 41)
+    yield "2,000 faces, 400x400", {"topleft height_map": lambda: tl.height_map(mesh, 0.5, threads=1)}
 
 
 def matplotlib_tripcolor(points: NDArray[Any], triangles: NDArray[Any], values: NDArray[Any]) -> Callable[[], object]:
@@ -170,13 +176,8 @@ def gradients_beside_deodr() -> Scenes:
     } | {"topleft.torch, a loss in one, area": step_of_loss, "DEODR": step_of_deodr}
     for n_triangles, size in ((10_000, (512, 512)), (70_000, (512, 512)), (100_000, HD)):
         clip, triangles = wavy_ball(n_triangles, *size)
-        steps = {}
-        for name, make in makers.items():
-            try:
-                steps[name] = make(clip, triangles, size)
-            except ImportError as error:
-                print(f"{name}: {error}", file=sys.stderr)
-        yield f"{n_triangles} triangles, {size[0]}x{size[1]}", steps
+        steps = {name: partial(make, clip, triangles, size) for name, make in makers.items()}
+        yield f"{n_triangles} triangles, {size[0]}x{size[1]}", installed(steps)
 
 
 OTHER_FIELDS = {
@@ -193,47 +194,41 @@ def grids_beside_others() -> Scenes:
     vertices, triangles = tl.scenes.blob(70_000)
     pitch = float(np.ptp(vertices, axis=0).max())
     for n in (128, 256):
-        calls: dict[str, Callable[[], object]] = {
-            "topleft voxelize": partial(tl.voxelize, (vertices, triangles), n, threads=1)
-        }
-        try:
-            import trimesh
-        except ImportError as error:
-            print(f"trimesh: {error}", file=sys.stderr)
-        else:
-            if n == 128:
-                mesh = trimesh.Trimesh(vertices, triangles, process=False)
-                calls["trimesh voxelized().fill()"] = lambda mesh=mesh: mesh.voxelized(pitch / 128).fill()
-        yield f"solid voxels, {n}^3 of 70,000 triangles", calls
+        own = {"topleft voxelize": partial(tl.voxelize, (vertices, triangles), n, threads=1)}
+        other = {"trimesh voxelized().fill()": partial(trimesh_voxels, vertices, triangles, pitch / n)}
+        yield f"solid voxels, {n}^3 of 70,000 triangles", own | (installed(other) if n == 128 else {})
     ball, uv = latitudes(316)
     atlas = tl.Mesh(*ball, uv=uv)
     bare = {"topleft bake, without a gutter": partial(tl.bake, atlas, "position", 1024, gutter=0, threads=1)}
     bare |= {f"gutter of {n}": partial(tl.bake, atlas, "position", 1024, gutter=n, threads=1) for n in (8, 32)}
-    try:
-        from scipy.ndimage import distance_transform_edt
-    except ImportError as error:
-        print(f"scipy: {error}", file=sys.stderr)
-    else:
-        mask = tl.bake(atlas, "triangle", 1024, gutter=0).mask
-        bare["scipy's nearest alone"] = lambda: distance_transform_edt(~mask, return_indices=True)
-    yield "atlas of 200,000 triangles, 1024x1024", bare
+    mask = tl.bake(atlas, "triangle", 1024, gutter=0).mask
+    other = installed({"scipy's nearest alone": partial(scipy_nearest, mask)})
+    yield "atlas of 200,000 triangles, 1024x1024", bare | other
     x, y = np.meshgrid(np.arange(1000), np.arange(1000))
     hills = 40 * np.sin(x / 97) * np.cos(y / 83) + 9 * np.sin(x / 23 + y / 31)
     views = {"topleft": partial(tl.viewshed, hills, (500.5, 400.5), eye_height=9.0, threads=1)}
     with TemporaryDirectory() as folder:
-        try:
-            views["gdal_viewshed"] = gdal_viewshed(hills, Path(folder))
-        except (ImportError, OSError) as error:
-            print(f"gdal_viewshed: {error}", file=sys.stderr)
-        yield "viewshed of 1000x1000", views
+        yield "viewshed of 1000x1000", views | installed({"gdal_viewshed": partial(gdal_viewshed, hills, Path(folder))})
     mesh = tl.Mesh(vertices, triangles)
     cameras = tl.viewpoints(mesh, 20)
     seen = {"topleft visible_faces": partial(tl.visible_faces, mesh, cameras, (512, 512))}
-    try:
-        seen["Open3D RaycastingScene"] = open3d_rays(vertices, triangles, cameras)
-    except ImportError as error:
-        print(f"open3d: {error}", file=sys.stderr)
-    yield "visible triangles of 70,000, 20 views of 512x512", seen
+    other = installed({"Open3D RaycastingScene": partial(open3d_rays, vertices, triangles, cameras)})
+    yield "visible triangles of 70,000, 20 views of 512x512", seen | other
+
+
+def trimesh_voxels(vertices: NDArray[Any], triangles: NDArray[Any], pitch: float) -> Callable[[], object]:
+    """Surface voxels, and those within."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, triangles, process=False)
+    return lambda: mesh.voxelized(pitch).fill()
+
+
+def scipy_nearest(mask: NDArray[Any]) -> Callable[[], object]:
+    """The nearest texel of each."""
+    from scipy.ndimage import distance_transform_edt
+
+    return lambda: distance_transform_edt(~mask, return_indices=True)
 
 
 def gdal_viewshed(heights: NDArray[Any], folder: Path) -> Callable[[], object]:
@@ -276,8 +271,7 @@ def latitudes(n: int) -> tuple[tuple[NDArray[Any], NDArray[Any]], NDArray[Any]]:
     """A ball of 2 n^2 triangles with a rectangle as its chart."""
     polar, azimuth = np.meshgrid(np.linspace(0, np.pi, n + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij")
     points = [np.sin(polar) * np.cos(azimuth), np.cos(polar), np.sin(polar) * np.sin(azimuth)]
-    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1, 1)
-    triangles = (corner + [0, 1, n + 2, n + 1])[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32)
+    triangles = np.ascontiguousarray(grid_triangles(n + 1, n + 1)[:, ::-1])
     uv = np.stack([azimuth / (2 * np.pi) * 0.93 + 0.03, polar / np.pi * 0.91 + 0.04], axis=-1)
     return (np.stack(points, axis=-1).reshape(-1, 3).astype(np.float32), triangles), uv.reshape(-1, 2)
 

@@ -6,10 +6,9 @@ times of the process, one thread unless a call says otherwise.
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.arguments import Options, option, positive
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.harness.turns import take_turns, turn_of
@@ -255,13 +254,12 @@ PAIRS = {
 }
 
 
-def add_arguments(pairs: Pairs, parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of a study."""
-    parser.add_argument("--rounds", type=positive, default=pairs.rounds, metavar="N", help="(%(default)s)")
-    parser.add_argument(
-        "--scene", nargs="+", default=[""], metavar="WORD", help="only scenes with one of these in the name"
+@dataclass(frozen=True)
+class PairOptions(Options):
+    rounds: int | None = option(None, "--rounds", "turns, unless as many as the study has", type=positive, metavar="N")
+    scenes: Sequence[str] = option(
+        ("",), "--scene", "only scenes with one of these in the name", nargs="+", metavar="WORD"
     )
-    add_out(parser)
 
 
 def cpu_seconds() -> float:
@@ -272,13 +270,13 @@ def cpu_seconds() -> float:
     return time.process_time() + children.ru_utime + children.ru_stime
 
 
-def run(kind: str, arguments: argparse.Namespace, _: Save) -> Record:
+def run(kind: str, options: PairOptions, _: Save) -> Record:
     """Measure milliseconds of each call, round by round."""
     rows = []
     for scene, calls in PAIRS[kind].scenes():
-        if any(word in scene for word in arguments.scene):
+        if any(word in scene for word in options.scenes):
             turns = [turn_of(call, cpu_seconds) for call in calls.values()]
-            times = take_turns(turns, arguments.rounds, PAIRS[kind].seconds)
+            times = take_turns(turns, options.rounds or PAIRS[kind].rounds, PAIRS[kind].seconds)
             rows += [{"scene": scene, "call": name, "ms": own.tolist()} for name, own in zip(calls, times, strict=True)]
     return {"kind": kind} | describe() | {"rows": rows}
 
@@ -297,7 +295,7 @@ def lines(record: Record) -> Iterator[str]:
 
 STUDIES = [
     Study(
-        kind, pairs.help, partial(add_arguments, pairs), partial(run, kind), lines,
+        kind, pairs.help, PairOptions, partial(run, kind), lines,
         {f"{kind}-facts": facts_text, kind: lambda record: "\n".join(lines(record))},
     )
     for kind, pairs in PAIRS.items()

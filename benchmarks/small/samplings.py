@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 import topleft as tl
+from benchmarks.harness.arguments import option
 from benchmarks.harness.machine import IMAGES
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
@@ -73,18 +74,21 @@ def number(value: float, sampling: str) -> str:
     return "<.001" if value < 0.001 else f".{int(1000 * value):03d}"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-o", "--out", type=Path, default=IMAGES, metavar="FOLDER")
+@dataclass(frozen=True)
+class SamplingOptions:
+    """Where the picture goes."""
+
+    out: Path = option(IMAGES, "-o --out", type=Path, metavar="FOLDER")
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: SamplingOptions, _: Save) -> Record:
     """Draw; the record is where the picture is."""
     from benchmarks.report.charts import write_chart
 
-    path = write_chart(chart_samplings, arguments.out, "samplings", "png", {"font.size": 8}, 130)
+    path = write_chart(chart_samplings, options.out, "samplings", "png", {"font.size": 8}, 130)
     return {"kind": "samplings", "path": str(path)}
 
 
 STUDY = Study(
-    "samplings", "draw one small scene in every sampling, PNG", add_arguments, run, lambda record: [record["path"]]
+    "samplings", "draw one small scene in every sampling, PNG", SamplingOptions, run, lambda record: [record["path"]]
 )

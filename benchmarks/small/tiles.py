@@ -8,7 +8,6 @@ own. Memory is the largest resident size of the process, mapped files included.
 
 from __future__ import annotations
 
-import argparse
 import json
 import resource
 import shutil
@@ -17,12 +16,14 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.harness.arguments import Options, count, option, switch
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
@@ -252,18 +253,18 @@ def predict(folder: Path, side: int, n_triangles: int) -> dict[str, dict[str, fl
     }
 
 
-def run(arguments: argparse.Namespace, _: Save) -> Record:
+def run(options: TileOptions, _: Save) -> Record:
     """Make the mesh and measure."""
     rows: dict[str, dict[str, float]] = {}
-    if arguments.predict:
-        with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
-            rows = predict(Path(name), arguments.side, arguments.triangles)
-        return {"kind": "tiles", "triangles": arguments.triangles, "side": arguments.side, "rows": rows, **describe()}
-    with tempfile.TemporaryDirectory(dir=arguments.folder) as name:
-        folder, side = Path(name), arguments.side
-        write_mesh(folder, arguments.triangles, side)
+    if options.predict:
+        with tempfile.TemporaryDirectory(dir=options.folder) as name:
+            rows = predict(Path(name), options.side, options.triangles)
+        return {"kind": "tiles", "triangles": options.triangles, "side": options.side, "rows": rows, **describe()}
+    with tempfile.TemporaryDirectory(dir=options.folder) as name:
+        folder, side = Path(name), options.side
+        write_mesh(folder, options.triangles, side)
         n_triangles = len(mesh_of(folder)[1])
-        for way in PEERS if arguments.peers else WAYS:
+        for way in PEERS if options.peers else WAYS:
             rows[way] = in_process(way, folder, side)
     about = describe("rasterio", "datashader")
     return {"kind": "tiles", "triangles": n_triangles, "side": side, "rows": rows, **about}
@@ -295,17 +296,16 @@ def lines(record: Record) -> list[str]:
     return made
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--triangles", type=int, default=20_000_000, metavar="N", help="about so many (%(default)s)")
-    parser.add_argument("--side", type=int, default=40_000, metavar="N", help="of the raster, pixels (%(default)s)")
-    parser.add_argument("--peers", action="store_true", help="beside other programs, the raster as a whole in memory")
-    parser.add_argument(
-        "--predict", action="store_true", help="measure an eighth of the work, and check the estimate of the whole"
-    )
-    parser.add_argument("--folder", metavar="DIR", help="where mesh and store go for the time (the system's)")
+@dataclass(frozen=True)
+class TileOptions(Options):
+    triangles: int = count(20_000_000, "--triangles", "about so many")
+    side: int = count(40_000, "--side", "of the raster, pixels")
+    peers: bool = switch("--peers", "beside other programs, the raster as a whole in memory")
+    predict: bool = switch("--predict", "measure an eighth of the work, and check the estimate of the whole")
+    folder: str | None = option(None, "--folder", "where mesh and store go for the time (the system's)", metavar="DIR")
 
 
-STUDY = Study("tiles", "huge rasters by windows: time and memory", add_arguments, run, lines)
+STUDY = Study("tiles", "huge rasters by windows: time and memory", TileOptions, run, lines)
 
 if __name__ == "__main__":  # one way, in a process of its own
     way, place, length = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import topleft as tl
-from benchmarks.scenes.arrays import Arrays, blob_arrays, shrunk
+from benchmarks.scenes.arrays import Arrays, blob_arrays, grid_triangles, shrunk
 from benchmarks.scenes.cases import HD
 
 Look = Callable[[Arrays, tuple[int, int]], tl.Camera]
@@ -122,10 +122,7 @@ def field_arrays(n: int) -> Arrays:
     side = max(2, round((n / 2) ** 0.5) + 1)
     x, z = np.meshgrid(*[np.linspace(-1, 1, side)] * 2)
     y = 0.1 * np.sin(9 * x) * np.cos(7 * z) + 0.02 * np.sin(40 * x + 31 * z)
-    corner = np.arange(side * side, dtype=np.int32).reshape(side, side)
-    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
-    triangles = np.stack([a, c, b, b, c, d], axis=-1).reshape(-1, 3)
-    return np.stack([x, y, z], axis=-1).reshape(-1, 3).astype(np.float32), triangles
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3).astype(np.float32), grid_triangles(side, side)
 
 
 def soup_arrays(n: int, reach: float) -> Arrays:

@@ -9,7 +9,6 @@ this pays. The other never is. A third one, where the first is in meshlets, neve
 
 from __future__ import annotations
 
-import argparse
 import copy
 import math
 import sys
@@ -24,9 +23,9 @@ from typing import Any
 from unittest.mock import patch
 
 import topleft as tl
-from benchmarks.harness.arguments import add_names, add_number, add_out, add_scale, options_of, set_options
+from benchmarks.harness.arguments import Options, count, fraction, names, option
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record, Save, forget, read_record, tell
+from benchmarks.harness.records import Record, Save, read_record, tell
 from benchmarks.harness.turns import digits, quartiles
 from benchmarks.harness.ways import Draw, Picture, Way, answers_of, check_same_bits, take_rounds
 from benchmarks.report.study import Study
@@ -50,19 +49,15 @@ LONGEST_BACKOFF = 9
 
 
 @dataclass(frozen=True)
-class Options:
-    """How much to do."""
-
-    scenes: Sequence[str] = ()
-    """Beginnings of labels; all for none."""
-    files: Sequence[Path] = ()
-    """Meshes to draw beside those that are made."""
-    rounds: int = 7
+class StaticOptions(Options):
+    scenes: Sequence[str] = names("--scene", "beginnings of names; all unless given")
+    files: Sequence[Path] = option((), "--mesh", "closed meshes to draw, too", nargs="+", type=Path, metavar="FILE")
+    rounds: int = count(7, "--repeats", "rounds")
     seconds: float = 0.02
     """Length of a turn, at least a call."""
     most_seconds: float = 6.0
     """Of all rounds of a scene, about; there are three at least."""
-    scale: float = 1.0
+    scale: float = fraction(1.0, "--scale", "of triangles and frames", "X")
 
 
 @dataclass
@@ -158,7 +153,7 @@ def cpu_ms(draw: Callable[[], Any]) -> float:
     return 1e3 * (time.thread_time() - start)
 
 
-def measure_scene(scene: StaticScene, options: Options) -> Row:
+def measure_scene(scene: StaticScene, options: StaticOptions) -> Row:
     """Return a row.
 
     Raises
@@ -243,8 +238,9 @@ def measure_model(scene: StaticScene) -> Row:
     }
 
 
-def run_static(options: Options, record: Record | None = None, save: Save = forget) -> Record:
+def run(options: StaticOptions, save: Save) -> Record:
     """Return a record, or the rows that were measured anew; `save` gets it after each scene."""
+    record = read_record(options.record)
     rows: list[Row] = []
     models: list[Row] = []
     for scene in chosen_scenes(options):
@@ -253,10 +249,12 @@ def run_static(options: Options, record: Record | None = None, save: Save = forg
         rows.append(measure_scene(scene, options))
         tell(row_text(rows[-1]))
         save(with_rows(record, rows, models))
+    if not rows:
+        raise ValueError(f"no scene begins with {' or '.join(options.scenes)}")
     return with_rows(record, rows, models)
 
 
-def chosen_scenes(options: Options) -> Iterator[StaticScene]:
+def chosen_scenes(options: StaticOptions) -> Iterator[StaticScene]:
     """Give the scenes with labels that begin so."""
     wanted = tuple(options.scenes)
     return (scene for scene in scenes(options.scale, options.files) if not wanted or scene.label.startswith(wanted))
@@ -285,20 +283,7 @@ def row_text(row: Row) -> str:
     return f"{what:72} {row['whole_ms'][1]:9.3f} -> {row['ms'][1]:9.3f} ms  x {row['faster'][1]:6.2f}  {how}"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    set_options(parser, Options())
-    add_names(parser, "--scene", "scenes", "beginnings of names; all unless given")
-    parser.add_argument("--mesh", dest="files", nargs="+", type=Path, metavar="FILE", help="closed meshes to draw, too")
-    add_number(parser, "--repeats", "rounds", "rounds")
-    add_scale(parser)
-    add_out(parser, "rows in it that are not measured stay")
-
-
-def run(arguments: argparse.Namespace, save: Save) -> Record:
-    return run_static(options_of(Options, arguments), read_record(arguments.record), save)
-
-
 STUDY = Study(
-    "static", "measure meshes that do not change, in clusters beside whole", add_arguments, run, tables.lines,
+    "static", "measure meshes that do not change, in clusters beside whole", StaticOptions, run, tables.lines,
     tables.PARTS, "benchmarks.static.charts",
 )  # fmt: skip

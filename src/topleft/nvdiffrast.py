@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     torch.nn.Module.cuda = lambda module, device=None: module  # noqa: ARG005
     sys.argv = given
     sys.path.insert(0, str(Path(given[0]).resolve().parent))
-    sys.stderr.write("topleft.nvdiffrast: what asks for 'cuda' runs on the CPU\n")
+    sys.stderr.write("topleft.nvdiffrast: calls for 'cuda' run on the CPU\n")
     with OnCpu():
         runpy.run_path(given[0], run_name="__main__")
     return 0

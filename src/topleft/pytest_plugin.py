@@ -62,7 +62,7 @@ class KeptPictures:
             assert_same_picture(got, _read(kept), tolerance=tolerance, path=off)
         except AssertionError as error:
             save_image(drawn, got)
-            told = f"{error}\n  what was drawn is {drawn}; if it is right: pytest --update-pictures"
+            told = f"{error}\n  the picture is {drawn}; if it is right: pytest --update-pictures"
             raise AssertionError(told) from None
 
 

@@ -105,5 +105,5 @@ def test_batch_results_carry_warnings_and_warn_once(lacking, executor):
 
 def test_explain_of_points_is_refused(run, folder):
     (folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\n")
-    assert run("explain", "a.obj") == (2, ["topleft: 'a.obj' holds points, of which there is no plan"])
+    assert run("explain", "a.obj") == (2, ["topleft: 'a.obj' holds points: plans are of triangles"])
     assert run("render", "a.obj", "-o", "a.png", *SMALL) == (0, [])

@@ -310,7 +310,7 @@ def test_segments_of_mujoco_are_numbers_in_three_bytes(hooked):
 def test_pixels_of_another_size_than_was_rendered_are_refused(hooked):
     mujoco, rectangle, own = hooked
     con = mujoco.MjrContext(own.model)
-    with pytest.raises(ValueError, match=r"viewport must have the size of what mjr_render drew last, got \(64, 48\)"):
+    with pytest.raises(ValueError, match=r"viewport must have the size of mjr_render's last picture, got \(64, 48\)"):
         mujoco.mjr_readPixels(np.zeros((48, 64, 3), np.uint8), None, rectangle, con)
 
 

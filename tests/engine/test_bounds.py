@@ -1,4 +1,4 @@
-"""Bounds of depth: large triangles leave out what lies behind, and no bit of a picture changes."""
+"""Bounds of depth: large triangles leave out hidden spans, and no bit of a picture changes."""
 
 import numpy as np
 import pytest
@@ -154,5 +154,5 @@ def test_bounds_are_kept_for_large_triangles(n, reach, width, pays):
 def test_plan_tells_of_bounds_and_counts_their_bytes():
     points, triangles, _ = tl.scenes.random_triangles(300, 400, 1280, 720)
     plan = tl.plan(points, triangles, (1280, 720))
-    assert "leave out what lies behind" in next(row.choice for row in plan.stages if row.name == "depth")
+    assert "leave out hidden spans" in next(row.choice for row in plan.stages if row.name == "depth")
     assert plan.scratch_bytes["bounds"] == 4 * 720 * 20

@@ -276,7 +276,7 @@ def test_as_mesh_of_trimesh_takes_no_highlights_that_nobody_gave():
     ("name", "content", "message"),
     [
         ("a.dxf", b"AutoCAD Binary DXF\r\n\x1a\0", "it is a binary DXF: save it as text"),
-        ("a.dxf", "0\nSECTION\n", "cannot draw .*a.dxf': it is a drawing, of which only curves could be read"),
+        ("a.dxf", "0\nSECTION\n", "cannot draw .*a.dxf': it is a drawing: only its curves could be read"),
         ("a.svg", "<svg/>", "cannot draw .*a.svg': it holds curves in a plane"),
         ("a.binvox", "#binvox 1", "it holds voxels: make a mesh of them"),
     ],

@@ -156,7 +156,7 @@ def test_choose_detail_is_the_mesh_itself_where_nothing_is_sure(camera, options,
 def test_choose_detail_through_a_lens_is_the_mesh_itself():
     lens = tl.Camera.from_intrinsics([[50, 0, 48], [0, 50, 32], [0, 0, 1]], np.diag([1, -1, -1, 1]), SIZE, near=1,
                                      far=99, distortion=[0.1, 0, 0, 0])  # fmt: skip
-    assert "a lens bends" in tl.choose_detail(BLOB, lens, SIZE, tolerance=1).why
+    assert "the bend of the lens" in tl.choose_detail(BLOB, lens, SIZE, tolerance=1).why
 
 
 def test_choose_detail_with_cut_outs_is_the_mesh_itself():

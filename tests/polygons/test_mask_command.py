@@ -259,7 +259,7 @@ def test_labels_that_are_no_whole_numbers_are_refused(files, run, value):
         (float("inf"), "feature 0 has a coordinate of inf"),
         (float("nan"), "feature 0 has a coordinate of nan"),
         (10**400, "something is missing or of a wrong kind"),
-        (5e-324, "reaches over 5e-324 x 5e-324: --extent must say what is shown"),
+        (5e-324, "reaches over 5e-324 x 5e-324: --extent must give the area"),
     ],
 )
 def test_planes_of_no_size_are_refused_in_one_line(files, run, far, said):

@@ -171,7 +171,7 @@ def test_composite_bad_values_are_refused(colors, options, message):
 
 def test_composite_bad_types_are_refused():
     layers = tl.peel([[0, 0], [2, 0], [0, 2]], [[0, 1, 2]], (1, 1))
-    with pytest.raises(TypeError, match="layers must be what peel returns, got ndarray"):
+    with pytest.raises(TypeError, match="layers must be the result of peel, got ndarray"):
         tl.composite(layers.triangle, np.zeros((1, 4)))
     with pytest.raises(TypeError, match="colors must be uint8 or float32, got dtype complex128"):
         tl.composite(layers, np.zeros((1, 4), complex))

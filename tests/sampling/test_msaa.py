@@ -317,7 +317,7 @@ def test_triangles_that_change_before_samples_are_asked_for_are_an_error():
     planes = tl.rasterize(corners, triangles, (8, 8), sampling="msaa4")
     triangles[0, 2] = 3
     assert (planes.samples_depth[0, 0] == 1).all()
-    with pytest.raises(IndexError, match="triangles must stay what they were drawn from until samples are asked for"):
+    with pytest.raises(IndexError, match="triangles must not change until samples are read"):
         frags.samples_depth  # noqa: B018
 
 

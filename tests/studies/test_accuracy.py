@@ -10,7 +10,7 @@ import pytest
 from benchmarks import cli
 from benchmarks.accuracy import study as accuracy
 from benchmarks.accuracy.filling import samplings
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 from benchmarks.accuracy.stability import CHANGES, count_flips, touch
 from benchmarks.accuracy.tables import with_no_snap
 from benchmarks.scenes.families import FAMILIES, NO_SNAP, Entry, entries, in_cells
@@ -66,7 +66,7 @@ def test_count_flips_shifted_picture_compares_what_both_show():
 @pytest.fixture(scope="module")
 def tiny():
     """A tiny run."""
-    options = Options(
+    options = AccuracyOptions(
         METHODS, ["pillow", "broken"], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001, max_threads=2
     )
     return accuracy.run_accuracy(options)

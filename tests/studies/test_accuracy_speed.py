@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -12,7 +13,7 @@ from benchmarks.accuracy import pure, speed_tables
 from benchmarks.accuracy import study as accuracy
 from benchmarks.accuracy.depth import BITS, FORMATS, RATIOS, clip_scene, covered, make_sheets
 from benchmarks.accuracy.filling import areas, measure_family
-from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.options import AccuracyOptions
 from benchmarks.accuracy.scaling import shortest_of, thread_counts
 from benchmarks.accuracy.sizes import equilateral
 from benchmarks.accuracy.tutorial import eleven_triangles, per_second
@@ -20,7 +21,7 @@ from benchmarks.harness.turns import SLOW_MS, SLOW_ROUNDS, take_turns
 from benchmarks.scenes.families import FAMILIES, in_cells
 
 FRAME_PX = 128
-LITTLE = Options(["auto", "point_in_triangle"], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001)
+LITTLE = AccuracyOptions(["auto", "point_in_triangle"], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001)
 
 
 def test_take_turns_slow_ones_take_fewer_rounds():
@@ -45,7 +46,7 @@ def family():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(load_peer("cairo"), "MODULE", "no_such_module")
-        options = Options(LITTLE.methods, ["pillow", "broken", "cairo"], 1, 0, 1, 320, 0.001)
+        options = AccuracyOptions(LITTLE.methods, ["pillow", "broken", "cairo"], 1, 0, 1, 320, 0.001)
         return measure_family(FAMILIES["slivers"], options)
 
 
@@ -153,19 +154,19 @@ def test_per_second_of_fills_that_noise_hides_is_what_the_clock_tells():
 
 
 def test_accuracy_part_replaces_its_rows_alone():
-    record = accuracy.run_accuracy(LITTLE, ["slivers", "sizes", "small"])
+    record = accuracy.run_accuracy(replace(LITTLE, parts=["slivers", "sizes", "small"]))
     assert [row["name"] for row in record["families"]] == ["small", "slivers"]
     before, sizes = json.loads(json.dumps(record)), record["sizes"]
-    again = accuracy.run_accuracy(LITTLE, ["slivers"], record)
+    again = accuracy.run_accuracy(replace(LITTLE, parts=["slivers"]), record)
     assert again["sizes"] is sizes
     assert [row["wrong_px"] for row in again["coverage"]] == [row["wrong_px"] for row in before["coverage"]]
     assert again["parts"].keys() == {"slivers", "sizes", "small"}
 
 
 def test_accuracy_part_of_another_machine_is_refused():
-    record = accuracy.run_accuracy(LITTLE, ["sizes"])
+    record = accuracy.run_accuracy(replace(LITTLE, parts=["sizes"]))
     with pytest.raises(ValueError, match=r"the record must be of the same isa to add to it, '.*', got 'mmx'"):
-        accuracy.run_accuracy(LITTLE, ["sizes"], record | {"isa": "mmx"})
+        accuracy.run_accuracy(replace(LITTLE, parts=["sizes"]), record | {"isa": "mmx"})
 
 
 def test_accuracy_unknown_part_is_refused(capsys):

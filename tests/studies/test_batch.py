@@ -4,12 +4,13 @@ import json
 
 import pytest
 from benchmarks import cli
+from benchmarks.harness.records import forget
 from benchmarks.small import batch
 
 
 @pytest.fixture(scope="module")
 def record():
-    return batch.run_batch(batch.Options(peers=(), n_triangles=500, n_views=3, frame_px=48, repeats=2))
+    return batch.run(batch.BatchOptions((), n_triangles=500, n_views=3, frame_px=48, repeats=2), forget)
 
 
 def test_batch_record_is_json_and_says_where_it_was_made(record):
@@ -37,7 +38,7 @@ def test_batch_table_has_a_row_for_each_run(record):
 def test_batch_peer_that_is_not_installed_is_named(monkeypatch):
     monkeypatch.setattr(batch, "why_not", lambda peer, task, threads: f"{peer.DISTRIBUTION} is not installed")
     skipped = []
-    assert list(batch._contestants(batch.Options(peers=("deodr",), threads=(1,)), skipped)) == []
+    assert list(batch._contestants(batch.BatchOptions(peers=("deodr",), threads=(1,)), skipped)) == []
     assert {"name": "deodr views", "reason": "deodr is not installed"} in skipped
 
 

@@ -20,7 +20,7 @@ from benchmarks.scenes.arrays import strewn_arrays
 
 from topleft._core.raster.costs import cost_table
 
-TINY = bench.Options(rounds=1, seconds=0.0, scale=0.02)
+TINY = bench.ChoiceOptions(rounds=1, seconds=0.0, scale=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def record():
     """Every choice and every scene, at a fiftieth of the size."""
     pytest.importorskip("scipy")
     found = bench.run_choices(TINY)
-    some = bench.Options(scenes=["mesh 1k,", "flat 20000"], rounds=1, seconds=0.0, scale=0.02)
+    some = bench.ChoiceOptions(scenes=["mesh 1k,", "flat 20000"], rounds=1, seconds=0.0, scale=0.02)
     return choices_plans.run_plans(some, found)
 
 

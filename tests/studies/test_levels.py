@@ -1,10 +1,8 @@
 """The benchmark of levels of detail: it runs, its page says what was measured. Nothing is timed."""
 
-import json
-
 import pytest
 from benchmarks import cli
-from benchmarks.levels import page as levels_page
+from benchmarks.harness.machine import PAGES
 from benchmarks.levels import study as levels
 
 import topleft as tl
@@ -25,21 +23,14 @@ def test_levels_measured_error_is_within_the_bound(mesh_record):
         assert view["levels"][view["level"]]["bound_px"] <= levels.TOLERANCE
 
 
-def test_levels_are_kept_from_run_to_run(tmp_path):
-    mesh = tl.Mesh(*tl.scenes.torus(segments=48, sections=24))
-    first, made_s = levels.find_levels("torus", mesh, tmp_path / "kept")
-    again, made_s_again = levels.find_levels("torus", mesh, tmp_path / "kept")
-    assert 0 < made_s == made_s_again
-    assert [one.bound for one in first] == [one.bound for one in again]
-
-
-def test_levels_command_writes_page_chart_and_record(tmp_path, monkeypatch, mesh_record, capsys):
+def test_levels_commands_write_record_page_and_chart(tmp_path, monkeypatch, mesh_record, capsys):
+    out, page = tmp_path / "levels.json", tmp_path / "page.md"
     monkeypatch.setattr(levels, "subjects", lambda _: [("torus", tl.Mesh(*tl.scenes.torus()))])
     monkeypatch.setattr(levels, "measure_mesh", lambda *_: mesh_record)
-    assert cli.main(["levels", "--json", str(tmp_path / "levels.json"), "-o", str(tmp_path)]) == 0
-    record = json.loads((tmp_path / "levels.json").read_text())
-    page = (tmp_path / "measured" / "levels.md").read_text()
-    assert page == levels_page.page(record)
-    assert "## torus, 2,304 triangles" in page
+    assert cli.main(["levels", "-o", str(out)]) == 0
     assert "1000 px high" in capsys.readouterr().out
-    assert (tmp_path / "images" / "levels.png").read_bytes().startswith(b"\x89PNG")
+    page.write_text((PAGES / "levels.md").read_text())
+    assert cli.main(["document", str(out), str(page)]) == 0
+    assert "\n\n## torus, 2,304 triangles\n" in page.read_text()
+    assert cli.main(["charts", str(out), "-o", str(tmp_path)]) == 0
+    assert (tmp_path / "levels.png").read_bytes().startswith(b"\x89PNG")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from benchmarks.harness.errors import area_error, draw_exact
-from benchmarks.harness.rounds import Options, run_cases
+from benchmarks.harness.rounds import RunOptions, run_cases
 from benchmarks.peers import load_peer
 from benchmarks.run import smooth_tables
 from benchmarks.scenes.cases import CASES
@@ -18,7 +18,7 @@ ISA = tl.build_info()["isa"]
 @pytest.fixture(scope="module")
 def record():
     """Our three ways to draw the smallest scene, and the scenes whose errors count."""
-    return run_cases(Options(["tiny-smooth", "smooth-singles", "smooth-seams"], [], [ISA], repeats=1, seconds=0))
+    return run_cases(RunOptions(["tiny-smooth", "smooth-singles", "smooth-seams"], [], [ISA], repeats=1, seconds=0))
 
 
 def test_area_error_by_hand():

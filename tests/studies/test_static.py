@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from benchmarks import cli
+from benchmarks.harness.records import forget
 from benchmarks.static import scenes as static_scenes
 from benchmarks.static import study as static
 from benchmarks.static import tables as static_tables
@@ -25,8 +26,8 @@ def record(tmp_path_factory):
     """Every scene and a cube, at a hundredth of the size."""
     path = tmp_path_factory.mktemp("static") / "cube.obj"
     path.write_text(CUBE)
-    options = static.Options(files=[path], rounds=1, seconds=0.0, most_seconds=0.0, scale=SCALE / 2)
-    return static.run_static(options)
+    options = static.StaticOptions(files=[path], rounds=1, seconds=0.0, most_seconds=0.0, scale=SCALE / 2)
+    return static.run(options, forget)
 
 
 def scene_named(label, scale=SCALE):
@@ -71,7 +72,7 @@ def test_other_bits_are_an_error(monkeypatch):
     drawing, others = static.drawing, iter((0, 1, 0))
     monkeypatch.setattr(static, "drawing", lambda scene: shifted(drawing(scene), next(others)))
     with pytest.raises(AssertionError, match="'whole' draws other bits than 'planner'"):
-        static.measure_scene(scene, static.Options(rounds=1, seconds=0.0))
+        static.measure_scene(scene, static.StaticOptions(rounds=1, seconds=0.0))
 
 
 def test_ways_draw_as_they_say(force):
@@ -79,7 +80,7 @@ def test_ways_draw_as_they_say(force):
     asked = []
     kept = choices.pays_to_draw_clusters
     force(pays_to_draw_clusters=lambda *a: asked.append(kept(*a)) or asked[-1])
-    row = static.measure_scene(scene, static.Options(rounds=1, seconds=0.0))
+    row = static.measure_scene(scene, static.StaticOptions(rounds=1, seconds=0.0))
     assert row["is_clustered"]
     assert row["shares"]["outside"] > 0.5
     assert asked
@@ -137,3 +138,8 @@ def test_command_measures_and_adds_to_its_file(tmp_path, capsys):
     assert {row["model"] for row in found["rows"]} == {"hills 1M", "soup, large, 30k"}
     assert {model["model"] for model in found["models"]} == {"hills 1M", "soup, large, 30k"}
     assert "| any scene" in capsys.readouterr().out
+
+
+def test_scene_that_does_not_exist_is_refused(capsys):
+    assert cli.main(["static", "--scene", "cube", "--scale", "0.02"]) == 2
+    assert "no scene begins with cube" in capsys.readouterr().err

@@ -36,7 +36,7 @@ def run(*arguments):
 def test_program_that_names_cuda_runs(tmp_path):
     tmp_path.joinpath("program.py").write_text(PROGRAM)
     done = run(str(tmp_path / "program.py"), "--steps", "3")
-    assert done.stderr == "topleft.nvdiffrast: what asks for 'cuda' runs on the CPU\n"
+    assert done.stderr == "topleft.nvdiffrast: calls for 'cuda' run on the CPU\n"
     assert done.stdout == "['--steps', '3'] 2 66 True cpu\n"
 
 

@@ -30,15 +30,7 @@ def is_client(executor: object) -> bool:
 
 
 def check_workers(client: Any) -> None:
-    """Look whether all workers have the package, of this version.
-
-    Raises
-    ------
-    MissingPackageError
-        If one has not.
-    TopleftError
-        If one has another version.
-    """
+    """Look whether all workers have the package, of this version."""
     from importlib.util import find_spec
 
     for worker, spec in client.run(find_spec, "topleft").items():
@@ -77,18 +69,13 @@ def result_of(task: Any) -> tuple[Any, BaseException | None]:
     return None, None
 
 
-def wait_for_scheduler(client: Any, is_over: Callable[[], bool]) -> None:
-    """Wait while a client has lost its scheduler, unless all is over: such a client forgets tasks that it is given."""
-    while client.status == "connecting" and not is_over():
-        time.sleep(WAIT_S)
-
-
 def send_again(client: Any, send: Callable[[], None], promise: Future[Any], is_over: Callable[[], bool]) -> None:
     """Send a lost task once more as soon as there is a scheduler, in a thread; cancel its promise if all is over."""
 
     def again() -> None:
         try:
-            wait_for_scheduler(client, is_over)
+            while client.status == "connecting" and not is_over():  # such a client forgets tasks that it is given
+                time.sleep(WAIT_S)
             if is_over() or promise.done():
                 promise.cancel()
             else:

@@ -240,13 +240,7 @@ class Renderer:
 
 
 class Model:
-    """An object, and what is interpolated of it.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    surf_color : (3,) of float, optional
-    """
+    """An object, and what is interpolated of it."""
 
     def __init__(self, mesh: tl.Mesh, surf_color: Any) -> None:
         self.mesh = mesh

@@ -225,7 +225,7 @@ def workers_on(executor: object, time_limit: float | None) -> Workers | None:
         if is_client(executor):
             return ClusterWorkers(executor, limit)
     if limit is not None:
-        raise ValueError("time_limit is for a dask.distributed.Client: other executors cannot end what hangs")
+        raise ValueError("time_limit is for a dask.distributed.Client: other executors cannot end jobs that hang")
     return workers_of(executor)
 
 

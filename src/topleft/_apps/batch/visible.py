@@ -129,7 +129,7 @@ def visible_faces(
         raise TypeError(f"cameras must be an iterable of Camera, got {shown(cameras)}")
     subject: Mesh | Scene = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     scene = subject if isinstance(subject, Scene) else Scene([subject])
-    scene.check_counted("a scene whose visible triangles are counted")
+    scene.check_counted("a scene with counts of visible triangles")
     n_faces = scene.n_triangles
     layers = ("triangle",) if len(scene) == 1 else ("triangle", "instance")
     jobs = (Job(subject, as_camera(one), size, {"cull": cull}, None, layers) for one in cameras)

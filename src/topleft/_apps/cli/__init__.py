@@ -94,7 +94,7 @@ def _parser() -> Parser:
     parser.add_argument("--version", action="version", version=f"topleft {build_info()['version']}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     parser.set_defaults(run=None)
-    info = commands.add_parser("info", help="print the version and what was built", description=run_info.__doc__)
+    info = commands.add_parser("info", help="print the version and the build", description=run_info.__doc__)
     info.set_defaults(run=run_info)
     render = commands.add_parser("render", help="render meshes to pictures", description="Render meshes to pictures.")
     add_render_arguments(render)

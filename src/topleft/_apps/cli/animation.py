@@ -32,15 +32,7 @@ PILLOW_OPTIONS: Mapping[str, Mapping[str, Any]] = {
 
 
 def check_animation(path: Path) -> None:
-    """Raise an error, before any work, for a file that could not be written.
-
-    Raises
-    ------
-    ImageError
-        If the format is none of `ANIMATION_SUFFIXES`.
-    MissingPackageError
-        If it is a video and there is no ffmpeg.
-    """
+    """Raise an error, before any work, for a file that could not be written."""
     suffix = path.suffix.lower()
     if suffix not in ANIMATION_SUFFIXES:
         known = " ".join(ANIMATION_SUFFIXES)

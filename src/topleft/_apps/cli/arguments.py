@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+import sys
+from collections.abc import Callable, Iterable
 from typing import Literal, NoReturn, get_args
 
 from topleft._apps.cli.animation import ANIMATION_SUFFIXES
@@ -107,6 +108,38 @@ def meant(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {found[0]}?" if found else ""
 
 
+def number(read: Callable[[float], float], wish: str) -> Callable[[str], float]:
+    """The type of an argument: a number that `read` checks with a ValueError."""
+
+    def checked(text: str) -> float:
+        try:
+            return read(float(text))
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"must be {wish}, got {text!r}") from None
+
+    return checked
+
+
+def within(low: float, high: float) -> Callable[[float], float]:
+    """A check that a number lies from one to another."""
+
+    def checked(value: float) -> float:
+        if not low <= value <= high:
+            raise ValueError
+        return value
+
+    return checked
+
+
+tolerance = number(within(0, sys.float_info.max), "a number of pixels, 0 or more")
+SECONDS = number(as_seconds, "a number of seconds, 0 or more")
+CREASE = number(as_crease, "an angle from 0 to 180 degrees")
+SHARE = number(within(0, 1), "a number from 0 to 1")
+POINT_SIZE = number(lambda size: float(as_point_size("--point-size", size, 1)), "a positive number of pixels")
+# a GIF counts hundredths of a second; slower than 10 s a frame is a mistake
+RATE = number(within(0.1, 100), "a number from 0.1 to 100")
+
+
 def add_render_arguments(parser: Parser) -> None:
     """Add all arguments of `topleft render`."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -133,7 +166,7 @@ def add_render_arguments(parser: Parser) -> None:
         metavar="FILE",
         help=f"the views of a mesh one after the other ({{name}} of the mesh): {' '.join(ANIMATION_SUFFIXES)}",
     )
-    add("--fps", type=_rate, default=20.0, metavar="N", help="views a second of an animation (default 20)")
+    add("--fps", type=RATE, default=20.0, metavar="N", help="views a second of an animation (default 20)")
 
 
 def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
@@ -145,25 +178,12 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
     add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="layers to write; see below (default color)")
-    add(
-        "--time",
-        type=_seconds,
-        default=None,
-        metavar="SECONDS",
-        help="of an animation of a glTF file (default: at rest)",
-    )
-    add(
-        "--clip",
-        type=_clip,
-        default=None,
-        metavar="N|NAME|all",
-        help="which animation --time is of, from 0 (default the first)",
-    )
+    add("--time", type=SECONDS, metavar="SECONDS", help="of an animation of a glTF file (default: at rest)")
+    add("--clip", type=_clip, metavar="N|NAME|all", help="which animation --time is of, from 0 (default the first)")
     add_scale(parser)
     add(
         "--threads",
         type=positive,
-        default=None,
         metavar="N",
         help="of a picture (default: as many as there are cores, 1 with --jobs)",
     )
@@ -172,7 +192,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
     add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
     add("--ortho", action="store_true", help="no perspective")
-    add("--camera", type=_index, default=None, metavar="N", help="the camera N of a glTF file, from 0")
+    add("--camera", type=_index, metavar="N", help="the camera N of a glTF file, from 0")
     add("--up", choices=["y", "z"], default="y", help=UP_HELP)
     add = parser.add_argument_group("look").add_argument
     add(
@@ -186,13 +206,12 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--background",
         type=_rgba,
-        default=None,
         metavar="COLOR",
         help="a name, #rrggbb[aa] or transparent (default white; behind white meshes a light blue-grey)",
     )
     add(
         "--crease",
-        type=_crease,
+        type=CREASE,
         default=DEFAULT_CREASE,
         metavar="DEG",
         help="edges that bend by more are sharp, of a mesh without normals; 0: all, 180: none (default %(default)g)",
@@ -204,26 +223,24 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SKY,GROUND",
         help="light from all around: a colour, one above and one below, or a picture of all directions",
     )
-    add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: like glass; each layer hides X")
+    add("--opacity", type=SHARE, metavar="X", help="0 to 1: like glass; each layer hides X")
     add(
         "--tolerance",
         type=tolerance,
         default=0.0,
         metavar="PX",
-        help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)",
+        help="draw a coarser level of the mesh, its outline off by at most PX pixels (default 0: the mesh)",
     )
     add("--wireframe", action="store_true", help="draw the edges over it")
     add(
         "--cull",
         choices=[str(side) for side in Cull],
-        default=None,
         help="the side to leave out, whatever materials say (default: backs of those that have one side)",
     )
     samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
     add(
         "--sampling",
         choices=samplings,
-        default=None,
         metavar="NAME",
         help=f"samples of a pixel: {', '.join(samplings)} (default msaa4; center with --layers, .npz, --opacity and "
         "--shading ids or depth)",
@@ -231,7 +248,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     add(
         "--point-size",
-        type=_point_size,
+        type=POINT_SIZE,
         default=DEFAULT_POINT_SIZE,
         metavar="PX",
         help="of clouds of points: the diameter of a point, pixels (default %(default)g)",
@@ -244,7 +261,7 @@ def add_scale(parser: argparse.ArgumentParser) -> None:
     """Add --scale."""
     parser.add_argument(
         "--scale",
-        type=_scale,
+        type=number(as_scale, "a positive number"),
         default=1.0,
         metavar="X",
         help="factor of the coordinates of a file: 0.001 makes metres of millimetres (default 1)",
@@ -289,67 +306,8 @@ def _index(text: str) -> int:
     return int(text)
 
 
-def _share(text: str) -> float:
-    try:
-        share = float(text)
-    except ValueError:
-        share = -1.0
-    if not 0 <= share <= 1:
-        raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
-    return share
-
-
-def _point_size(text: str) -> float:
-    try:
-        return float(as_point_size("--point-size", float(text), 1))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a positive number of pixels, got {text!r}") from None
-
-
-def _scale(text: str) -> float:
-    try:
-        return as_scale(float(text))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a positive number, got {text!r}") from None
-
-
-def _seconds(text: str) -> float:
-    try:
-        return as_seconds(float(text))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a number of seconds, 0 or more, got {text!r}") from None
-
-
 def _clip(text: str) -> int | str:
     return int(text) if text.isdecimal() else text
-
-
-def _crease(text: str) -> float:
-    try:
-        return as_crease(float(text))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be an angle from 0 to 180 degrees, got {text!r}") from None
-
-
-def tolerance(text: str) -> float:
-    """A number of pixels, 0 or more."""
-    try:
-        pixels = float(text)
-    except ValueError:
-        pixels = -1.0
-    if not 0 <= pixels < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a number of pixels, 0 or more, got {text!r}")
-    return pixels
-
-
-def _rate(text: str) -> float:
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
-    if not 0.1 <= rate <= 100:  # a GIF counts hundredths of a second; slower than 10 s a frame is a mistake
-        raise argparse.ArgumentTypeError(f"must be a number from 0.1 to 100, got {text!r}")
-    return rate
 
 
 def _layers(text: str) -> tuple[str, ...]:

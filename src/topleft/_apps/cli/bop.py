@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from topleft import Camera, Mesh, ObjectMasks, Scene, load, object_masks, save_image
-from topleft._apps.cli.arguments import UsageError, add_scale, positive, size
+from topleft._apps.cli.arguments import UsageError, add_scale, number, positive, size, within
 from topleft._core.base.array_types import Array
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.model.pose import as_pose
@@ -28,6 +28,7 @@ examples:
   topleft bop lmo/test/000002 --models lmo/models -o info.json --coco coco.json --masks masks
 """
 
+PICTURES = number(within(0, 1000), "a number from 0 to 1000")
 FOLDERS = ("rgb", "gray", "depth")
 SUFFIXES = (".png", ".jpg", ".tif")
 
@@ -146,16 +147,6 @@ def write_json(path: Path, content: Any) -> None:
     write_whole(path, lambda file: file.write(json.dumps(content).encode()))
 
 
-def _beyond(text: str) -> float:
-    try:
-        beyond = float(text)
-    except ValueError:
-        beyond = -1.0
-    if not 0 <= beyond < 1000:
-        raise argparse.ArgumentTypeError(f"must be a number from 0 to 1000, got {text!r}")
-    return beyond
-
-
 def add_bop_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
     bop = commands.add_parser(
@@ -173,7 +164,7 @@ def add_bop_command(commands: Any) -> None:
     bop.add_argument("--masks", metavar="DIR", help="a folder for mask/ and mask_visib/, besides")
     bop.add_argument("--size", type=size, metavar="WxH", help="of the images (that of their pictures)")
     bop.add_argument(
-        "--beyond", type=_beyond, default=1.0, metavar="N", help="how many pictures beyond the frame count (1)"
+        "--beyond", type=PICTURES, default=1.0, metavar="N", help="how many pictures beyond the frame count (1)"
     )
     add_scale(bop)
     bop.add_argument("--threads", type=positive, metavar="N", help="how many at most")

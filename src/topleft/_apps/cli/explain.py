@@ -25,7 +25,7 @@ def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: the choice of each stage, its reason and its time."""
     mesh = MeshSource(options.mesh)()
     if isinstance(mesh, Points):
-        raise UsageError(f"{options.mesh!r} holds points, of which there is no plan")
+        raise UsageError(f"{options.mesh!r} holds points: plans are of triangles")
     orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
     camera = orbit(mesh, options.size)
     outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))
@@ -58,7 +58,7 @@ def run_calibrate(_: argparse.Namespace) -> int:
     costs = calibrate()
     before, after, n = costs.tuned
     print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual[1]:.1f}")
-    print(f"of {n} scenes not fitted, what is chosen takes {before:.3f} -> {after:.3f} times as long as the best")
+    print(f"of {n} scenes not fitted, choices take {before:.3f} -> {after:.3f} times as long as the best")
     return 0
 
 
@@ -82,7 +82,7 @@ def add_plan_commands(commands: Any) -> None:
     add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
-    add("--threads", type=positive, default=None, metavar="N", help="(default: as many as pay)")
+    add("--threads", type=positive, metavar="N", help="(default: as many as pay)")
     add("--measure", action="store_true", help="draw it, and show the times of the stages")
     add("--json", action="store_true", help="numbers and sentences as JSON")
     calibrate = commands.add_parser("calibrate", help="measure this machine", description=run_calibrate.__doc__)

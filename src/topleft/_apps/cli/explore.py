@@ -55,7 +55,7 @@ def add_explore_command(commands: argparse._SubParsersAction[Parser]) -> None:
         description=EXPLORE_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    command.add_argument("what", nargs="?", metavar="WHAT", help="what is shown")
+    command.add_argument("what", nargs="?", metavar="WHAT", help="a file, the name of a scene, or a link")
     command.add_argument("--size", type=size, metavar="WxH", help="of the magnified picture, for an .npz file")
     command.add_argument("--no-browser", action="store_true", help="print the address alone")
     command.add_argument("--export", metavar="DIR", help="write the page there, as files that need no Python")

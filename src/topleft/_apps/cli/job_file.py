@@ -26,15 +26,7 @@ class JobParser(argparse.ArgumentParser):
 
 
 def read_jobs(path: Path, options: argparse.Namespace) -> list[argparse.Namespace]:
-    """Return the arguments of each job.
-
-    Raises
-    ------
-    UsageError
-        If the file is broken, or a job has wrong arguments.
-    OSError
-        If the file cannot be read.
-    """
+    """Return the arguments of each job."""
     document = _parsed(path)
     jobs = document.pop("job", None)
     if not isinstance(jobs, list) or not jobs or not all(isinstance(job, dict) for job in jobs):

@@ -203,7 +203,7 @@ def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[Any,
 def grid_over(points: npt.NDArray[np.float64], options: argparse.Namespace) -> Grid:
     """Return the grid of the options over points, or over --extent."""
     if options.extent is None and not len(points):
-        raise UsageError(f"{options.file} has no polygons: --extent must say what is shown")
+        raise UsageError(f"{options.file} has no polygons: --extent must give the area")
     if options.extent is None:
         (x_min, y_min), (x_max, y_max) = points.min(axis=0), points.max(axis=0)
         extent = float(x_min), float(x_max), float(y_min), float(y_max)
@@ -215,7 +215,7 @@ def grid_over(points: npt.NDArray[np.float64], options: argparse.Namespace) -> G
     with np.errstate(all="ignore"):
         scale = float(np.float64(DEFAULT_SIDE) / max(wide, tall))
     if not 0 < scale < math.inf:
-        raise UsageError(f"{options.file} reaches over {wide} x {tall}: --extent must say what is shown")
+        raise UsageError(f"{options.file} reaches over {wide} x {tall}: --extent must give the area")
     return Grid((max(1, round(wide * scale)), max(1, round(tall * scale))), extent)
 
 

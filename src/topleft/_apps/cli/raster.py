@@ -159,7 +159,7 @@ def raster_of(options: argparse.Namespace) -> Tiles:
     if options.values is not None:
         kind, values = "field", options.values
     if sum((options.labels, options.values is not None, options.kind is not None)) > 1:
-        raise UsageError("--labels, --values and --kind each say what is drawn: give one of them")
+        raise UsageError("--labels, --values and --kind exclude each other: give one of them")
     if kind == "height_map":
         more["surface"] = options.surface or "upper"
     elif options.surface is not None:

@@ -67,7 +67,9 @@ def run_render(options: argparse.Namespace) -> int:
         if failed and len(groups) > 1:
             complain(f"{len(failed)} of {len(groups)} meshes failed: {' '.join(dict.fromkeys(failed))}")
         if not drawn:
-            _raise_unknown(results)
+            for error in (result.error for result in results):
+                if error is not None and not isinstance(error, TOLD):  # a bug: its trace belongs in the report
+                    raise error
             return REFUSED
         for path, group in animations:
             if all(file.is_file() for file in _color_files(group)):
@@ -91,13 +93,6 @@ def _reasons(groups: Sequence[MeshJobs], results: Sequence[Result]) -> list[str]
         is_named = not reason or len(groups) == 1 or group.source in reason
         reasons.append(reason if is_named else f"{group.source}: {reason}")
     return reasons
-
-
-def _raise_unknown(results: Sequence[Result]) -> None:
-    """Raise an error that is a bug of the library: its trace belongs in the report."""
-    for result in results:
-        if result.error is not None and not isinstance(result.error, TOLD):
-            raise result.error
 
 
 def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:

@@ -78,15 +78,7 @@ def read_texture(path: str) -> Texture:
 
 
 def read_environment(text: str, up: str) -> Environment:
-    """The light from all around of a colour, two colours, or the picture of a file.
-
-    Raises
-    ------
-    UsageError
-        If it is neither.
-    ImageError, OSError
-        As of `read_picture`.
-    """
+    """The light from all around of a colour, two colours, or the picture of a file."""
     from PIL import ImageColor
 
     top = (0.0, 0.0, 1.0) if up == "z" else (0.0, 1.0, 0.0)
@@ -192,13 +184,7 @@ class MeshJobs:
 
 
 def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
-    """Return the jobs of each mesh of the arguments; `start` is the index of the first mesh.
-
-    Raises
-    ------
-    UsageError
-        If OUT cannot hold the pictures.
-    """
+    """Return the jobs of each mesh of the arguments; `start` is the index of the first mesh."""
     if options.camera is not None and options.views > 1:
         raise UsageError("--camera does not go with --views: a camera of a file stands still")
     if options.clip is not None and options.time is None:
@@ -342,11 +328,6 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
     """Raise an error before any work if a file cannot be written, as far as that shows beforehand.
 
     `others` are further files: sheets and animations.
-
-    Raises
-    ------
-    UsageError
-        If two pictures would have the same name, or a picture that of a mesh, or a folder cannot be written to.
     """
     owner_of: dict[str, str] = {}
     targets: list[tuple[Location, str]] = [

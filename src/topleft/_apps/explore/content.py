@@ -83,13 +83,7 @@ def content_of(vertices: Any, triangles: ArrayLike | None, size: Any) -> Content
 
 
 def content_of_name(name: str, size: Any = None) -> Content:
-    """Return what stands behind a word of the command line.
-
-    Raises
-    ------
-    MeshError
-        If it is neither a scene nor a file that can be read.
-    """
+    """Return what stands behind a word of the command line."""
     if "#" in name and (name.startswith(("#", "http://127.0.0.1:", "http://localhost:", "http://[::1]:"))):
         return Content(fragment=name.partition("#")[2])
     if name in SCENES:
@@ -125,13 +119,7 @@ def content_of_arrays(path: Path, size: Any) -> Content:
 
 
 def magnified(vertices: ArrayLike, triangles: ArrayLike, size: Any) -> dict[str, Any]:
-    """Return arrays as the page holds them, after every check.
-
-    Raises
-    ------
-    ValueError
-        If they are not in pixels, or more than can be shown.
-    """
+    """Return arrays as the page holds them, after every check."""
     points = as_vertices(vertices, has_transform=False).astype(np.float64)
     if points.shape[1] > 3:
         raise ValueError(f"vertices must be in pixels, (V, 2) or (V, 3), got shape {points.shape}")
@@ -169,11 +157,6 @@ def scene(name: str) -> dict[str, Any]:
 
     A single triangle of the tutorials is shown at a tenth of its size; along an axis on which it is thin it keeps what
     it measures.
-
-    Raises
-    ------
-    ValueError
-        If there is none of that name.
     """
     if name == SCENES[0]:
         return dict(SHARED_EDGE)

@@ -105,13 +105,7 @@ def call(state: PixelState) -> list[str]:
 
 
 def test_case(state: PixelState) -> str:
-    """Return a test that holds a method to the exact picture, which stands in it.
-
-    Raises
-    ------
-    ValueError
-        If there is no exact picture of owners.
-    """
+    """Return a test that holds a method to the exact picture, which stands in it."""
     if state.sampling != "center":
         raise ValueError("a test case is of pixel centres: choose the sampling 'center'")
     exact = draw(state, EXACT).owners[..., 0]

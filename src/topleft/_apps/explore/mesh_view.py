@@ -107,37 +107,17 @@ WORDS = {
 
 @dataclass(frozen=True)
 class MeshView:
-    """What a page asks to see.
+    """What a page asks to see; lights, edges, sampling, tolerance and cull are those of `render`."""
 
-    Attributes
-    ----------
-    size : (int, int)
-        Pixels.
-    azimuth, elevation : float
-        Degrees, as for `Camera.framing`.
-    zoom : float
-        1: the sphere round the mesh just fits.
-    pan : (float, float)
-        Where the middle of the mesh lies, in half heights of the frame from its middle; right and up.
-    fov : float
-        Degrees from bottom to top; 0 is without perspective.
-    up : str
-        "y" or "z".
-    layer : str
-        One of `LAYERS`.
-    lights, edges, sampling, tolerance, cull
-        As for `render`; `lights` is a key of `LIGHTS`.
-    """
-
-    size: tuple[int, int]
-    azimuth: float = 35.0
+    size: tuple[int, int]  # pixels
+    azimuth: float = 35.0  # degrees, as for `Camera.framing`
     elevation: float = 20.0
-    zoom: float = 1.0
-    pan: tuple[float, float] = (0.0, 0.0)
-    fov: float = 40.0
+    zoom: float = 1.0  # 1: the sphere round the mesh just fits
+    pan: tuple[float, float] = (0.0, 0.0)  # of the middle of the mesh, in half heights of the frame; right and up
+    fov: float = 40.0  # degrees from bottom to top; 0 is without perspective
     up: str = "y"
-    layer: str = "smooth"
-    lights: str = "headlight"
+    layer: str = "smooth"  # one of `LAYERS`
+    lights: str = "headlight"  # one of `LIGHTS`
     edges: bool = False
     sampling: str = "center"
     tolerance: float = 0.0
@@ -145,13 +125,7 @@ class MeshView:
 
     @classmethod
     def parse(cls, request: Request) -> MeshView:
-        """Return the view of a request, checked.
-
-        Raises
-        ------
-        ValueError, TypeError
-            If it makes no sense.
-        """
+        """Return the view of a request, checked."""
         given = {name: request[name] for name in cls.__dataclass_fields__ if name in request}
         if given.get("sampling") == AT_REST:
             given["sampling"] = "center" if "background" in request else "msaa4"
@@ -237,13 +211,7 @@ def shown_in(session: Session) -> Shown:
 
 
 def load_bytes(data: bytes | memoryview, name: str) -> tuple[Mesh, list[str]]:
-    """Return the mesh in the bytes of a file, and what it lacks; the end of the name tells the format.
-
-    Raises
-    ------
-    MeshError
-        As `topleft.load`, and for points.
-    """
+    """Return the mesh in the bytes of a file, and what it lacks; the end of the name tells the format."""
     suffix = Path(name).suffix.lower()
     if not suffix[1:].isalnum() or len(suffix) > 12:
         raise MeshError(f"the end of the name must tell the format, as in bunny.ply, got {name[-40:]!r}")
@@ -416,19 +384,14 @@ def answer_pick(session: Session, request: Request) -> Reply:
     if level.uv is not None:
         rows.append(("uv", numbers(frags.interpolate(level.uv)[0, 0])))
     if level.materials:
-        of_triangle = level.material_of_triangle
-        rows.append(("material", material_text(level, 0 if of_triangle is None else int(of_triangle[i]))))
+        k = 0 if level.material_of_triangle is None else int(level.material_of_triangle[i])
+        rows.append(("material", f"{k}: {level.materials[k]!r}"[:300]))
     return Reply({**found, "rows": rows})
 
 
 def numbers(values: Iterable[float]) -> str:
     """Return numbers to five digits."""
     return ", ".join(f"{float(value):.5g}" for value in values)
-
-
-def material_text(mesh: Mesh, i: int) -> str:
-    """Return a material in one line."""
-    return f"{i}: {mesh.materials[i]!r}"[:300]
 
 
 def answer_plan(session: Session, request: Request) -> Reply:

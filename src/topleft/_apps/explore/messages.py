@@ -14,7 +14,6 @@ import struct
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from topleft._apps.explore.session import Reply, Request
 
@@ -35,13 +34,8 @@ def split(reply: Reply) -> tuple[dict[str, Any], list[memoryview]]:
         if array.dtype == np.bool_:
             array = array.view(np.uint8)
         arrays[name] = {"dtype": array.dtype.name, "shape": array.shape, "part": len(parts)}
-        parts.append(as_memory(array))
+        parts.append(array.reshape(-1).view(np.uint8).data)
     return {**reply.header, "arrays": arrays}, parts
-
-
-def as_memory(array: NDArray[Any]) -> memoryview:
-    """The bytes of an array, not copied."""
-    return array.reshape(-1).view(np.uint8).data
 
 
 def pack(header: dict[str, Any], parts: list[memoryview]) -> bytes:
@@ -55,13 +49,7 @@ def pack(header: dict[str, Any], parts: list[memoryview]) -> bytes:
 
 
 def unpack(frame: bytes) -> Request:
-    """Return the question in a frame.
-
-    Raises
-    ------
-    ValueError
-        If it is not one.
-    """
+    """Return the question in a frame."""
     if len(frame) < 4:
         raise ValueError(f"a message must begin with the length of its header, got {len(frame)} bytes")
     (length,) = struct.unpack_from("<I", frame)
@@ -81,13 +69,7 @@ def unpack(frame: bytes) -> Request:
 
 
 def read_header(text: bytes | str) -> dict[str, Any]:
-    """Return the JSON object of a header.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or holds a number that JSON does not have.
-    """
+    """Return the JSON object of a header."""
 
     def refuse(constant: str) -> NoReturn:
         raise ValueError(f"numbers must be finite, got {constant}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 from typing import Any
 
@@ -10,18 +11,12 @@ from numpy.typing import NDArray
 
 from topleft._apps.explore.handlers import answer
 from topleft._apps.explore.messages import split
-from topleft._apps.explore.session import Content, Session
+from topleft._apps.explore.session import SCRIPTS, Content, Session
 from topleft.errors import MissingPackageError
 
 
 def widget_of(content: Content) -> Any:
-    """Return the widget that shows a content.
-
-    Raises
-    ------
-    MissingPackageError
-        If anywidget is not installed.
-    """
+    """Return the widget that shows a content."""
     try:
         import anywidget
         import traitlets
@@ -33,7 +28,7 @@ def widget_of(content: Content) -> Any:
     class ExplorerWidget(anywidget.AnyWidget):  # type: ignore[misc, unused-ignore]
         """The page in a cell; `vertices` are those that were moved."""
 
-        _esm = page.joinpath("explore.js").read_text(encoding="utf-8")
+        _esm = one_module()
         _css = page.joinpath("explore.css").read_text(encoding="utf-8")
         markup = traitlets.Unicode(markup()).tag(sync=True)
 
@@ -52,6 +47,13 @@ def widget_of(content: Content) -> Any:
             self.send(header, arrays)
 
     return ExplorerWidget()
+
+
+def one_module() -> str:
+    """The modules of the page as one, which a notebook takes."""
+    page = files("topleft._apps.explore").joinpath("page")
+    text = "\n".join(page.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
+    return re.sub(r"^import .*;\n|^export (?!default)", "", text, flags=re.MULTILINE)
 
 
 def markup() -> str:

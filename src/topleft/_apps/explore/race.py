@@ -165,13 +165,7 @@ def is_continuous(axis: Axis) -> bool:
 
 @lru_cache(maxsize=64)
 def scene_at(family: str, positions: tuple[float, ...], seed: int) -> tuple[Exact, tuple[str, ...]]:
-    """Return the scene of a family where its sliders stand, and how their values are written.
-
-    Raises
-    ------
-    ValueError
-        If there is no such family, or it has other sliders.
-    """
+    """Return the scene of a family where its sliders stand, and how their values are written."""
     if family not in FAMILIES:
         raise ValueError(f"family must be one of {', '.join(map(repr, FAMILIES))}, got {family!r}")
     found = FAMILIES[family]
@@ -230,13 +224,7 @@ def cell_of(faults: FaultyPixels | str, n_edge_px: int) -> dict[str, str]:
 
 
 def as_request(request: Request) -> tuple[str, tuple[float, ...], int]:
-    """Return family, positions and seed.
-
-    Raises
-    ------
-    ValueError
-        If a position or the seed is no number of its kind.
-    """
+    """Return family, positions and seed."""
     positions = tuple(float(position) for position in request["positions"])
     seed = int(request.get("seed", 0))
     if not all(map(math.isfinite, positions)) or not 0 <= seed < 2**32:

@@ -22,7 +22,7 @@ from typing import Any
 
 from topleft._apps.explore.handlers import answer
 from topleft._apps.explore.messages import pack, read_header, split, unpack
-from topleft._apps.explore.session import Content, Reply, Session
+from topleft._apps.explore.session import SCRIPTS, Content, Reply, Session
 from topleft.errors import MissingPackageError
 
 try:
@@ -53,7 +53,7 @@ POSTING_SECONDS = 90.0
 FILES: Mapping[str, str] = {
     "": "text/html; charset=utf-8",
     "explore.css": "text/css; charset=utf-8",
-    "explore.js": "text/javascript; charset=utf-8",
+    **dict.fromkeys(SCRIPTS, "text/javascript; charset=utf-8"),
 }
 """All that is served, with its type; the first is the page itself."""
 

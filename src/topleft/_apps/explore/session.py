@@ -15,6 +15,12 @@ from numpy.typing import NDArray
 
 from topleft import Mesh
 
+SCRIPTS = (
+    "line.js", "elements.js", "edits.js", "mesh_part.js", "pixels_part.js", "race_part.js", "steps_part.js",
+    "explore.js",
+)  # fmt: skip
+"""The modules of the page, each behind those that it imports."""
+
 Request = dict[str, Any]
 """What a page asks: "do" names it; "parts" are the arrays that came along, as bytes."""
 
@@ -28,30 +34,14 @@ class Reply(NamedTuple):
 
 @dataclass
 class Content:
-    """What an explorer was opened with.
+    """What an explorer was opened with."""
 
-    Attributes
-    ----------
-    tab : str
-        Which part of the page is shown first: "pixels", "steps", "mesh" or "race".
-    pixels : dict
-        Of the part Pixels: the state that a link restores, without defaults.
-    mesh : Mesh or None
-        Of the part Mesh.
-    name : str
-        Of the mesh or the scene, for the reader.
-    fragment : str
-        What stands after the # of the address.
-    moved : ndarray or None
-        Vertices (V, 2) or (V, 3) of the part Pixels as a page has moved them last.
-    """
-
-    tab: str = "pixels"
-    pixels: dict[str, Any] = field(default_factory=dict)
+    tab: str = "pixels"  # shown first: "pixels", "steps", "mesh" or "race"
+    pixels: dict[str, Any] = field(default_factory=dict)  # the state that a link restores, without defaults
     mesh: Mesh | None = None
-    name: str = ""
-    fragment: str = ""
-    moved: NDArray[np.float64] | None = None
+    name: str = ""  # of the mesh or the scene, for the reader
+    fragment: str = ""  # of the address, behind the #
+    moved: NDArray[np.float64] | None = None  # (V, 2) or (V, 3): vertices as a page has moved them last
 
     def __post_init__(self) -> None:
         if "vertices" in self.pixels:

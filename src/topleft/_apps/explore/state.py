@@ -24,42 +24,20 @@ MAX_COORDINATE = 2.0**52
 
 @dataclass(frozen=True)
 class PixelState:
-    """What is drawn magnified, and how.
+    """What is drawn magnified, and how; sampling, cull and depth_test are those of `rasterize`."""
 
-    Attributes
-    ----------
-    vertices : ndarray, shape (V, 2) or (V, 3)
-        Pixels of the whole picture.
-    triangles : ndarray of int32, shape (T, 3)
-        As they are turned by `winding`.
-    size, origin : (int, int)
-        The window.
-    method, other : str
-        What draws the first picture, and the second; "" for no second one.
-    exact : bool
-        Whether the exact picture is drawn, too.
-    subpixel_bits : int or "exact"
-        Of both methods, where they have any.
-    sampling, cull, depth_test : str
-        As in `topleft.rasterize`; of methods that have them.
-    winding : str
-        How triangles turn on the screen before they are drawn.
-    look : str
-        "owners", "overdraw" or "wireframe".
-    """
-
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int32]
-    size: tuple[int, int]
+    vertices: NDArray[np.float64]  # (V, 2) or (V, 3), pixels of the whole picture
+    triangles: NDArray[np.int32]  # (T, 3), as they are turned by `winding`
+    size: tuple[int, int]  # of the window
     origin: tuple[int, int] = (0, 0)
     method: str = "auto"
-    other: str = ""
-    exact: bool = False
+    other: str = ""  # draws the second picture; "" for no second one
+    exact: bool = False  # whether the exact picture is drawn, too
     subpixel_bits: int | Literal["exact"] = 8
     sampling: SamplingOption = "center"
     cull: CullOption = "none"
     depth_test: DepthTestOption = "less"
-    winding: Turn = "as given"
+    winding: Turn = "as given"  # how triangles turn on the screen before they are drawn
     look: Look = "owners"
 
     @property
@@ -99,13 +77,7 @@ class PixelState:
 
 
 def parse_state(given: object) -> PixelState:
-    """Return a state from the JSON object that a page or a link holds.
-
-    Raises
-    ------
-    ValueError, TypeError, IndexError
-        If a value is missing, unknown or out of range.
-    """
+    """Return a state from the JSON object that a page or a link holds."""
     if not isinstance(given, Mapping):
         raise TypeError(f"a state must be an object, got {type(given).__name__}")
     names = {one.name for one in fields(PixelState)}

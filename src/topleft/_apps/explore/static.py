@@ -20,7 +20,7 @@ from topleft import Mesh
 from topleft._apps.explore import mesh_view, pixels, race, trace
 from topleft._apps.explore.content import MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES, SCENES, scene
 from topleft._apps.explore.handlers import hello
-from topleft._apps.explore.session import Content, Request, Session
+from topleft._apps.explore.session import SCRIPTS, Content, Request, Session
 from topleft._apps.explore.state import Look, PixelState, Turn
 from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.whole_file import write_whole
@@ -36,10 +36,11 @@ from topleft.typing import CullOption, DepthTestOption, SamplingOption
 SETS = ("simd128", "scalar")
 """The instruction sets of the kernels; a page fetches one."""
 
-SCRIPTS = (
-    "explore.js", "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js",
-    "race.js", "mesh.js", "camera.js", "files.js",
+IN_PLACE_OF_PYTHON = (
+    "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js", "race.js", "mesh.js",
+    "camera.js", "files.js",
 )  # fmt: skip
+"""The modules that answer the page."""
 
 LIT = ("smooth", "flat", "unlit", "normals")
 LAYERS = (*LIT, "triangle", "overdraw")
@@ -53,15 +54,7 @@ CHOICES = ("layer", "sampling", "cull", "fov", "up", "spin")
 
 
 def write_static(folder: Path, content: Content) -> list[Path]:
-    """Write the page into a folder, which is made, and return what was written.
-
-    Raises
-    ------
-    MissingPackageError
-        If this installation has no kernels for WebAssembly.
-    OSError
-        If the folder cannot be written.
-    """
+    """Write the page into a folder, which is made, and return what was written."""
     page = files("topleft._apps.explore").joinpath("page")
     modules = {name: page.joinpath(name) for name in (f"topleft-{one}.wasm" for one in SETS)}
     if missing := [name for name, module in modules.items() if not module.is_file()]:
@@ -69,7 +62,7 @@ def write_static(folder: Path, content: Content) -> list[Path]:
             f"this installation has no {' and no '.join(missing)}: wheels of a release have them, and in a clone "
             "python packaging/wasm.py makes them (apt-get install clang lld wasi-libc libclang-rt-dev-wasm32)"
         )
-    made = {name: page.joinpath(name).read_bytes() for name in ("explore.css", *SCRIPTS)}
+    made = {name: page.joinpath(name).read_bytes() for name in ("explore.css", *SCRIPTS, *IN_PLACE_OF_PYTHON)}
     made |= {name: module.read_bytes() for name, module in modules.items()}
     made["index.html"] = static_html(page).encode()
     made["data.json"] = json.dumps(data_of(content), allow_nan=False, separators=(",", ":")).encode()

@@ -34,48 +34,25 @@ HEAD_WORDS, MOST_WORDS = 6, 24
 
 
 class TraceStep(NamedTuple):
-    """One thing that a method did.
+    """One thing that a method did."""
 
-    Attributes
-    ----------
-    kind : str
-        "triangle": it was set up. "row": a row begins. "line": a line passes a pixel. "test": a pixel was asked.
-        "span": the pixels x to `last` were drawn.
-    triangle : int
-    x, y, last : int
-        Pixels; `last` is x where it is one.
-    is_drawn : bool
-        Whether these pixels were drawn by this step.
-    values : mapping of str to numbers
-        What decided it.
-    """
-
-    kind: str
+    kind: str  # a triangle set up, a row begun, a line that passes a pixel, a test of one, a span from x to last
     triangle: int
     x: int
     y: int
-    last: int
-    is_drawn: bool
-    values: Mapping[str, Any]
+    last: int  # x where it is one pixel
+    is_drawn: bool  # whether these pixels were drawn by this step
+    values: Mapping[str, Any]  # what decided it
 
 
 @dataclass(frozen=True)
 class Trace:
-    """How a method draws triangles. Made by `trace`.
-
-    Attributes
-    ----------
-    method : str
-    size : (int, int)
-    steps : tuple of TraceStep
-    counts : ndarray of int32, shape (H, W)
-        How often each pixel is drawn.
-    """
+    """How a method draws triangles. Made by `trace`."""
 
     method: str
     size: tuple[int, int]
     steps: tuple[TraceStep, ...]
-    counts: NDArray[np.int32]
+    counts: NDArray[np.int32]  # (H, W): how often each pixel is drawn
 
     def picture(self, n_steps: int | None = None) -> NDArray[np.int32]:
         """Return how often each pixel has been drawn after so many steps, all of them unless given."""
@@ -95,27 +72,7 @@ def trace(
     subpixel_bits: int = 8,
     origin: tuple[int, int] = (0, 0),
 ) -> Trace:
-    """Return how a method draws triangles, step by step.
-
-    Parameters
-    ----------
-    vertices : array_like, shape (V, 2)
-        Pixels.
-    triangles : array_like of int, shape (T, 3)
-    size : (width, height), pixels
-    method : str
-        One of `TRACED`.
-    subpixel_bits : int
-        Of a method that has any.
-    origin : (x, y), pixels
-        Where the window lies in the picture; the steps are those of the window.
-
-    Raises
-    ------
-    ValueError
-        As `topleft.overdraw`; for "auto", which draws many pixels at a time; and where there would be more than 40,000
-        steps.
-    """
+    """Return how a method of `TRACED` draws triangles, step by step; arguments as of `topleft.overdraw`."""
     size, found = as_size(size), find_method(method)
     if method not in TRACED:
         raise ValueError(f"method must be one of {', '.join(map(repr, TRACED))} to be traced, got {method!r}")

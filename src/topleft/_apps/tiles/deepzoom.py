@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from topleft._apps.tiles.folders import MANIFEST, DiskFolder, fingerprints_at, only_writer, write_own
+from topleft._apps.tiles.folders import MANIFEST, Folder, fingerprints_at, only_writer, write_own
 from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, halved, write_levels
 from topleft._apps.tiles.store import TileStore, begin, n_levels_to
 from topleft._core.base.array_types import U8, Array
@@ -81,7 +81,7 @@ def write_deepzoom(
     paint = painting(raster) if colors is None else colors
     ground = checked(paint(raster.painter.blank((1, 1))), (1, 1))
     n_levels = n_levels_to(raster.size, 1)
-    folder = DiskFolder(file.with_name(f"{file.stem}_files"))
+    folder = Folder(file.with_name(f"{file.stem}_files"))
     store = DeepZoomStore(
         folder, raster.size, window, (side, side), ground.shape[2:], np.dtype(np.uint8), ground[0, 0], n_levels
     )
@@ -126,13 +126,7 @@ def fill_blanks(raster: Tiles, store: DeepZoomStore, ground: U8) -> None:
 
 
 def painting(raster: Tiles) -> Callable[[Array], U8]:
-    """Return the function that makes colours of the pixels of a kind.
-
-    Raises
-    ------
-    ValueError
-        If the kind has no default colours.
-    """
+    """Return the function that makes colours of the pixels of a kind."""
     if raster.kind == "labels":
         return label_colors
     if raster.dtype == bool:

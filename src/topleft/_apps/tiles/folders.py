@@ -11,12 +11,11 @@ import os
 import re
 import shutil
 import sys
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, Any
 
 from topleft._core.base.arrays import shown
 from topleft._core.base.remote import Location, RemotePath, as_location
@@ -41,119 +40,75 @@ NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP}
 """Errors of file systems without locks."""
 
 
-class Folder(ABC):
-    """Where chunks are kept."""
+@dataclass(frozen=True)
+class Folder:
+    """Chunks in a folder on a disk, or behind a URL that fsspec reaches."""
 
-    @abstractmethod
-    def put(self, name: str, content: bytes) -> None:
-        """Write a chunk."""
+    location: Location
 
-    @abstractmethod
-    def get(self, name: str) -> bytes | None:
-        """Read a chunk; None where there is none."""
-
-    @abstractmethod
-    def has(self, name: str) -> bool:
-        """Whether a chunk is there."""
-
-    @abstractmethod
-    def place(self, name: str) -> str:
-        """Where a chunk is, for messages."""
-
-    @abstractmethod
-    def exists(self) -> bool:
-        """Whether anything is there."""
-
-    @abstractmethod
-    def absolute(self) -> Self:
-        """The same folder for processes that run in other ones."""
-
-    @abstractmethod
-    def names(self) -> list[str]:
-        """The names of all files."""
-
-    @abstractmethod
-    def delete(self, name: str) -> None:
-        """Remove a file, if it is there."""
-
-    def check_own(self) -> None:
-        """Raise an error for a file that is no chunk of a raster.
-
-        Raises
-        ------
-        FileExistsError
-            If there is one.
-        """
-        for name in self.names():
-            if not is_own(name):
-                raise FileExistsError(f"{self.place(name)} was not written by topleft: move it, or write elsewhere")
-
-    def remove(self) -> None:
-        """Remove the chunks, the manifest last."""
-        for name in sorted(filter(is_own, self.names()), key=lambda name: "/" not in name):
-            self.delete(name)
-
-
-def is_own(name: str) -> bool:
-    """Whether a file has the name of a chunk, or of one that is being written."""
-    folder, slash, last = name.rpartition("/")
-    return OWN_NAME.fullmatch(folder + slash + PART.sub(r"\1", last)) is not None
-
-
-class DiskFolder(Folder):
-    """A folder on a disk."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    @property
+    def is_on_disk(self) -> bool:
+        """Whether other programs may damage chunks, and a killed process leaves parts of them."""
+        return isinstance(self.location, Path)
 
     def put(self, name: str, content: bytes) -> None:
         """Write a chunk."""
-        path = self.path / name
-        if not path.parent.is_dir():
-            path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda file: file.write(content))
+        file = self.location / name
+        if isinstance(file, Path) and not file.parent.is_dir():
+            file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, lambda out: out.write(content))
 
     def get(self, name: str) -> bytes | None:
         """Read a chunk; None where there is none."""
         try:
-            return (self.path / name).read_bytes()
+            return (self.location / name).read_bytes()
         except (FileNotFoundError, NotADirectoryError):
             return None
 
     def has(self, name: str) -> bool:
         """Whether a chunk is there."""
-        return (self.path / name).is_file()
+        return (self.location / name).is_file()
 
     def place(self, name: str) -> str:
         """Where a chunk is, for messages."""
-        return str(self.path / name)
+        return str(self.location / name)
 
     def exists(self) -> bool:
         """Whether anything is there except files that a killed process had not renamed yet."""
-        if not self.path.is_dir():
-            return self.path.exists()
-        return any(not name.startswith(".") for name in os.listdir(self.path))
+        if not (isinstance(self.location, Path) and self.location.is_dir()):
+            return self.location.exists()
+        return any(not name.startswith(".") for name in os.listdir(self.location))
 
-    def absolute(self) -> DiskFolder:
+    def absolute(self) -> Folder:
         """The same folder for processes that run in other ones."""
-        return DiskFolder(self.path.absolute())
+        return Folder(self.location.absolute()) if isinstance(self.location, Path) else self
 
     def names(self) -> list[str]:
         """The names of all files, and of links to folders."""
+        if not isinstance(self.location, Path):
+            return self.location.names_below()
         found = []
-        for folder, folders, files in os.walk(self.path):
+        for folder, folders, files in os.walk(self.location):
             links = [name for name in folders if os.path.islink(os.path.join(folder, name))]
-            found += [Path(folder, name).relative_to(self.path).as_posix() for name in [*files, *links]]
+            found += [Path(folder, name).relative_to(self.location).as_posix() for name in [*files, *links]]
         return found
 
     def delete(self, name: str) -> None:
         """Remove a file, if it is there."""
-        (self.path / name).unlink(missing_ok=True)
+        with suppress(FileNotFoundError):
+            (self.location / name).unlink()
+
+    def check_own(self) -> None:
+        """Raise an error for a file that is no chunk of a raster."""
+        for name in self.names():
+            if not is_own(name):
+                raise FileExistsError(f"{self.place(name)} was not written by topleft: move it, or write elsewhere")
 
     def remove(self) -> None:
-        """Remove the chunks, and the folders that are empty then."""
-        super().remove()
-        for folder, _, _ in os.walk(self.path, topdown=False):
+        """Remove the chunks, the manifest last, and on a disk the folders that are empty then."""
+        for name in sorted(filter(is_own, self.names()), key=lambda name: "/" not in name):
+            self.delete(name)
+        for folder, _, _ in os.walk(self.location, topdown=False) if self.is_on_disk else ():
             with suppress(OSError):  # something is in it
                 os.rmdir(folder)
 
@@ -164,57 +119,21 @@ class DiskFolder(Folder):
                 self.delete(name)
 
 
-class RemoteFolder(Folder):
-    """A folder behind a URL, reached by fsspec."""
-
-    def __init__(self, path: RemotePath) -> None:
-        self._path = path
-        path.exists()  # raises for a wrong URL before anything is drawn
-
-    def put(self, name: str, content: bytes) -> None:
-        """Write a chunk."""
-        (self._path / name).write_bytes(content)
-
-    def get(self, name: str) -> bytes | None:
-        """Read a chunk; None where there is none."""
-        try:
-            return (self._path / name).read_bytes()
-        except FileNotFoundError:
-            return None
-
-    def has(self, name: str) -> bool:
-        """Whether a chunk is there."""
-        return (self._path / name).exists()
-
-    def place(self, name: str) -> str:
-        """Where a chunk is, for messages."""
-        return str(self._path / name)
-
-    def exists(self) -> bool:
-        """Whether anything is there."""
-        return self._path.exists()
-
-    def absolute(self) -> RemoteFolder:
-        """The same folder for processes that run in other ones."""
-        return self
-
-    def names(self) -> list[str]:
-        """The names of all files."""
-        return self._path.names_below()
-
-    def delete(self, name: str) -> None:
-        """Remove a file, if it is there."""
-        (self._path / name).unlink()
+def is_own(name: str) -> bool:
+    """Whether a file has the name of a chunk, or of one that is being written."""
+    folder, slash, last = name.rpartition("/")
+    return OWN_NAME.fullmatch(folder + slash + PART.sub(r"\1", last)) is not None
 
 
-def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> DiskFolder | RemoteFolder:
+def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> Folder:
     """Return the folder of chunks at a path or URL."""
     if not (storage is None or isinstance(storage, dict)):
         raise TypeError(f"storage must be a dict or None, got {shown(storage)}")
     place = as_location("path", path)
     if isinstance(place, RemotePath):
-        return RemoteFolder(replace(place, storage=tuple((storage or {}).items())))
-    return DiskFolder(place)
+        place = replace(place, storage=tuple((storage or {}).items()))
+        place.exists()  # raises for a wrong URL before anything is drawn
+    return Folder(place)
 
 
 @contextmanager
@@ -280,25 +199,19 @@ def _take(file: int) -> bool:
     return True
 
 
-def fingerprints_at(folder: DiskFolder, file: Path) -> list[tuple[object, str | None]]:
+def fingerprints_at(folder: Folder, file: Path) -> list[tuple[object, str | None]]:
     """The folder and the file where they exist, with the fingerprint of the raster; None if they are not topleft's."""
     found: list[tuple[object, str | None]] = []
     if folder.exists():
         manifest = folder.get(MANIFEST)
-        found.append((folder.path, None if manifest is None else manifest.decode(errors="replace")))
+        found.append((folder.location, None if manifest is None else manifest.decode(errors="replace")))
     if file.is_dir() or is_whole(file):
         found.append((file, _mark_of(file)))
     return found
 
 
 def write_own(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file.
-
-    Raises
-    ------
-    FileExistsError
-        If another program has written a file there meanwhile.
-    """
+    """Write a file, unless another program has written one there meanwhile."""
     if is_whole(path) and _mark_of(path) is None:
         raise FileExistsError(f"{path} was not written by topleft: move it, or write elsewhere")
     write_whole(path, write)
@@ -313,13 +226,7 @@ def _mark_of(path: Path) -> str | None:
 
 
 def check_space(folder: Path, n_bytes: int, what: str) -> None:
-    """Raise an error unless so many bytes are free where a folder is, or is to be.
-
-    Raises
-    ------
-    OSError
-        If they are not.
-    """
+    """Raise an error unless so many bytes are free where a folder is, or will be."""
     place = folder.absolute()
     while not place.exists():
         place = place.parent

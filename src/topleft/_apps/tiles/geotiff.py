@@ -23,8 +23,8 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._apps.tiles.folders import MANIFEST, DiskFolder, fingerprints_at, only_writer, write_own
-from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, halved, write_levels
+from topleft._apps.tiles.folders import MANIFEST, Folder, fingerprints_at, only_writer, write_own
+from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, write_levels
 from topleft._apps.tiles.store import TileStore, begin, level_size, n_levels_to
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_number, check_progress
@@ -138,7 +138,7 @@ def write_geotiff(
     n_levels = n_levels_to(raster.size, side) if overviews else 1
     if n_levels > 1 and any(w % (2 * side) and w < n for w, n in zip(window, raster.size, strict=True)):
         raise ValueError(f"window must have sides of whole pairs of tiles, of {2 * side} pixels, got {window}")
-    folder = DiskFolder(file.with_name(file.name + ".parts"))
+    folder = Folder(file.with_name(file.name + ".parts"))
     store = TiffStore(
         folder, raster.size, window, (side, side), raster.painter.channels, dtype, raster.painter.empty, n_levels,
         compression,
@@ -152,13 +152,7 @@ def write_geotiff(
             n_windows = int((raster.index.counts > 0).sum())
             return Written(0, n_windows, raster.n_windows - n_windows)
         folder.put(MANIFEST, fingerprint.encode())
-        written = write_levels(
-            raster,
-            store,
-            halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
-            progress=progress,
-            executor=executor,
-        )
+        written = write_levels(raster, store, progress=progress, executor=executor)
         tags = {**geo, 305: ("s", f"topleft: {fingerprint};".encode() + b"\0")}
         write_own(file, lambda out: assemble(raster, store, out, told, tags))
         folder.remove()

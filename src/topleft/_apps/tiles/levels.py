@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._apps.cluster import is_client
-from topleft._apps.tiles.folders import DiskFolder
 from topleft._apps.tiles.store import TileStore
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import check_progress, shown
@@ -112,7 +111,7 @@ def write_levels(
     raster: Tiles,
     store: TileStore,
     *,
-    halve: Callable[[Array], Array],
+    halve: Callable[[Array], Array] | None = None,
     prepare: Callable[[Array], Array] | None = None,
     progress: Progress | bool | None = None,
     executor: Any = None,
@@ -121,8 +120,8 @@ def write_levels(
 
     Parameters
     ----------
-    halve : function of an array
-        Makes the level above.
+    halve : function of an array, optional
+        Makes the level above, instead of `halved`.
     prepare : function of an array, optional
         Converts the pixels of a window to those of the file.
     executor : dask.distributed.Client, optional
@@ -132,7 +131,6 @@ def write_levels(
     n_blocks = int(sum(level.sum() for level in there))
     check_progress(progress)
     bar = _bar(n_blocks) if progress is True else None
-    tell = bar.tell if bar is not None else progress if callable(progress) else None
     n_done = n_drawn = n_kept = 0
 
     def make(level: int, row: int, column: int) -> None:
@@ -140,7 +138,9 @@ def write_levels(
             pixels = raster.draw_window(row, column, threads=1 if n_threads > 1 else None)
             store.write(0, row, column, pixels if prepare is None else prepare(pixels))
             return
-        store.write(level, row, column, halve(together(level - 1, row, column)))
+        below = together(level - 1, row, column)
+        small = halved(below, raster.painter.nodata, is_mean=raster.has_means) if halve is None else halve(below)
+        store.write(level, row, column, small)
 
     def together(level: int, row: int, column: int) -> Array:
         """The four blocks of a level that lie below one of the next."""
@@ -162,22 +162,26 @@ def write_levels(
     n_threads = raster.n_threads
     try:
         with ThreadPoolExecutor(n_threads, thread_name_prefix="topleft-tiles") as pool:
+            begin: Callable[..., Future[None]] = pool.submit
             for level, blocks in enumerate(there):
                 listed = [(level, row, column) for row, column in np.argwhere(blocks).tolist()]
                 kept: set[tuple[int, int, int]] = set()
-                for _ in _in_turn(_on_threads(pool, partial(note_whole, store, kept)), iter(listed), n_threads):
+                for _ in _in_turn(partial(begin, note_whole, store, kept), iter(listed), n_threads):
                     pass
                 waiting = [block for block in listed if block not in kept]
                 n_kept, n_done = n_kept + len(kept) * (level == 0), n_done + len(kept)
                 if bar is not None:
-                    bar.begin(n_done)
-                submit, n_most = _on_threads(pool, make), n_threads
+                    bar.update(n_done - bar.n)
+                submit: Submit
+                submit, n_most = partial(begin, make), n_threads
                 if executor is not None and level == 0:
                     submit, n_most = _submitter(executor, raster, store, prepare)
                 for done in _in_turn(submit, iter(waiting), n_most):
                     n_drawn, n_done = n_drawn + (level == 0), n_done + 1
-                    if tell is not None:
-                        tell(Step(*done, n_done, n_blocks))
+                    if bar is not None:
+                        bar.update()
+                    elif callable(progress):
+                        progress(Step(*done, n_done, n_blocks))
         check_whole(store, there)
     finally:
         if bar is not None:
@@ -192,14 +196,8 @@ def note_whole(store: TileStore, kept: set[tuple[int, int, int]], level: int, ro
 
 
 def check_whole(store: TileStore, there: list[npt.NDArray[np.bool_]]) -> None:
-    """Raise an error if a tile that was written to a disk is not there any more.
-
-    Raises
-    ------
-    FileNotFoundError
-        If so.
-    """
-    if not isinstance(store.folder, DiskFolder):
+    """Raise an error if a tile that was written to a disk is not there any more."""
+    if not store.folder.is_on_disk:
         return
     for level, blocks in enumerate(there):
         for row, column in np.argwhere(blocks).tolist():
@@ -214,15 +212,6 @@ def check_executor(executor: Any) -> None:
         raise TypeError(f"executor must be a dask.distributed.Client or None, got {shown(executor)}")
 
 
-def _on_threads(pool: ThreadPoolExecutor, make: Callable[[int, int, int], None]) -> Submit:
-    """A function that submits a block to threads."""
-
-    def submit(level: int, row: int, column: int) -> Future[None]:
-        return pool.submit(make, level, row, column)
-
-    return submit
-
-
 def _submitter(
     client: Any, raster: Tiles, store: TileStore, prepare: Callable[[Array], Array] | None
 ) -> tuple[Submit, int]:
@@ -230,7 +219,7 @@ def _submitter(
     from topleft._apps.tiles.cluster import ClusterWriters, WriteJob
     from topleft._apps.tiles.dask_array import WindowJob
 
-    seen, writers = store.seen_from_elsewhere(), ClusterWriters(client)
+    seen, writers = replace(store, folder=store.folder.absolute()), ClusterWriters(client)
 
     def submit(_: int, row: int, column: int) -> Future[None]:
         return writers.submit(WriteJob(seen, WindowJob(raster, row, column), row, column, prepare))
@@ -257,28 +246,10 @@ def _in_turn(submit: Submit, blocks: Iterator[tuple[int, int, int]], n_most: int
         wait(running)
 
 
-class _LevelBar:
+def _bar(n_blocks: int) -> Any:
     """A bar with rate and remaining time."""
-
-    def __init__(self, bar: Any) -> None:
-        self._bar = bar
-
-    def begin(self, n_done: int) -> None:
-        """Count the blocks of an earlier run."""
-        self._bar.update(n_done - self._bar.n)
-
-    def tell(self, step: Step) -> None:
-        """Advance by one."""
-        self._bar.update(step.n_done - self._bar.n)
-
-    def close(self) -> None:
-        """Leave it on the screen as it is."""
-        self._bar.close()
-
-
-def _bar(n_blocks: int) -> _LevelBar:
     try:
         from tqdm import tqdm
     except ImportError:
         raise MissingPackageError("progress=True needs the package tqdm: pip install tqdm") from None
-    return _LevelBar(tqdm(total=n_blocks, unit=" windows"))
+    return tqdm(total=n_blocks, unit=" windows")

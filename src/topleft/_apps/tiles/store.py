@@ -10,12 +10,13 @@ import struct
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from topleft._apps.tiles.folders import DiskFolder, Folder, check_space
+from topleft._apps.tiles.folders import Folder, check_space
 from topleft._core.base.array_types import Array
 
 if TYPE_CHECKING:
@@ -47,28 +48,15 @@ def level_size(size: tuple[int, int], level: int) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class TileStore(ABC):
-    """Where the tiles of a raster go, and how a format encodes them.
-
-    Attributes
-    ----------
-    folder : Folder
-    size, window, tile : (width, height), pixels
-        Of the raster at level 0, of a block, of a tile.
-    channels : tuple of int
-    dtype : dtype
-        As stored.
-    empty : number or ndarray
-        The value of pixels without a triangle.
-    n_levels : int
-    """
+    """Where the tiles of a raster go, and how a format encodes them."""
 
     folder: Folder
-    size: tuple[int, int]
-    window: tuple[int, int]
-    tile: tuple[int, int]
+    size: tuple[int, int]  # (width, height) of level 0, pixels
+    window: tuple[int, int]  # of a block
+    tile: tuple[int, int]  # of a tile
     channels: tuple[int, ...]
-    dtype: np.dtype[Any]
-    empty: Any
+    dtype: np.dtype[Any]  # as stored
+    empty: Any  # the value of pixels without a triangle
     n_levels: int
 
     #: Whether tiles of the border are filled up to the size of others.
@@ -85,10 +73,6 @@ class TileStore(ABC):
     @abstractmethod
     def decoded(self, content: bytes) -> Array:
         """Return the pixels of a tile."""
-
-    def seen_from_elsewhere(self) -> Self:
-        """The same for processes that run in other folders."""
-        return replace(self, folder=self.folder.absolute())
 
     def n_tiles(self, level: int) -> tuple[int, int]:
         """Columns and rows of tiles of a level."""
@@ -120,7 +104,7 @@ class TileStore(ABC):
         if self.missing(level, row, column) is not None:
             return False
         try:
-            if isinstance(self.folder, DiskFolder):
+            if self.folder.is_on_disk:
                 self.read(level, row, column)
         except OSError:
             return False
@@ -143,13 +127,7 @@ class TileStore(ABC):
         return whole
 
     def read(self, level: int, row: int, column: int) -> Array:
-        """Return the pixels of a block that was written.
-
-        Raises
-        ------
-        OSError
-            If a tile has been removed since, or is damaged.
-        """
+        """Return the pixels of a block that was written."""
         pixels = np.empty(self.shape_of(level, row, column), self.dtype)
         for r, c in self.tiles_of(level, row, column):
             own = pixels[self.location_of(r, c, row, column)]
@@ -166,13 +144,7 @@ class TileStore(ABC):
         return pixels
 
     def content(self, name: str) -> bytes:
-        """Return a tile as it is stored.
-
-        Raises
-        ------
-        FileNotFoundError
-            If it has been removed.
-        """
+        """Return a tile as it is stored."""
         found = self.folder.get(name)
         if found is None:
             raise self.gone(name)
@@ -211,18 +183,9 @@ def begin(
         The number of copies of all tiles on the disk at a time.
     prepare : function of an array
         Converts the pixels of a window to those of the file.
-
-    Raises
-    ------
-    ValueError
-        If `resume` finds another raster, or both options are set.
-    FileExistsError
-        If something is there and neither option is set, or topleft did not write it.
-    OSError
-        If the disk has no room.
     """
     if resume and overwrite:
-        raise ValueError("resume=True goes on with what is there, overwrite=True replaces it: give one of them")
+        raise ValueError("resume=True continues the store, overwrite=True replaces it: give one of them")
     for place, kept in there:
         if kept is None:
             raise FileExistsError(f"{place} was not written by topleft: move it, or write elsewhere")
@@ -238,11 +201,11 @@ def begin(
         )
     folder = store.folder
     if resume and there:
-        if isinstance(folder, DiskFolder):
+        if folder.is_on_disk:
             folder.sweep()
         return True
-    if isinstance(folder, DiskFolder):
-        check_space(folder.path, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
+    if isinstance(folder.location, Path):
+        check_space(folder.location, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
     if there:
         folder.check_own()
         folder.remove()

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from topleft._apps.tiles.folders import Folder, folder_of, only_writer
-from topleft._apps.tiles.levels import Progress, Written, check_executor, halved, write_levels
+from topleft._apps.tiles.levels import Progress, Written, check_executor, write_levels
 from topleft._apps.tiles.store import TileStore, begin, level_size
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_size, check_progress
@@ -75,7 +75,8 @@ def write_zarr(
     size = window if chunk is None else as_size(chunk, "chunk", smallest=1)
     if window[0] % size[0] or window[1] % size[1]:
         raise ValueError(f"chunk must divide the windows of {window[0]} x {window[1]} pixels, got {size}")
-    check_halves(window, n_levels, raster.size)
+    if n_levels > 1 and any(w % 2 and w < length for w, length in zip(window, raster.size, strict=True)):
+        raise ValueError(f"window must have even sides for several levels, got {window[0]} x {window[1]}")
     encode, decode, codec = codec_of(compression)
     folder = folder_of(path, storage)
     store = ZarrStore(
@@ -87,13 +88,7 @@ def write_zarr(
         there: list[tuple[object, str | None]] = [(path, fingerprint_in(folder))] if folder.exists() else []
         begin(raster, store, there, fingerprint, resume=resume, overwrite=overwrite)
         write_metadata(raster, store, codec, fingerprint)
-        return write_levels(
-            raster,
-            store,
-            halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
-            progress=progress,
-            executor=executor,
-        )
+        return write_levels(raster, store, progress=progress, executor=executor)
 
 
 def codec_of(compression: str) -> tuple[Callable[[bytes], bytes], Callable[[bytes], bytes], list[dict[str, Any]]]:
@@ -117,18 +112,6 @@ def gzipped(content: bytes) -> bytes:
     """Return a gzip member without a time: the same bytes at any time."""
     deflate = zlib.compressobj(1, zlib.DEFLATED, 31)
     return deflate.compress(content) + deflate.flush()
-
-
-def check_halves(window: tuple[int, int], n_levels: int, size: tuple[int, int]) -> None:
-    """Raise an error unless windows of a raster of several have halves.
-
-    Raises
-    ------
-    ValueError
-        If not.
-    """
-    if n_levels > 1 and any(w % 2 and w < length for w, length in zip(window, size, strict=True)):
-        raise ValueError(f"window must have even sides for several levels, got {window[0]} x {window[1]}")
 
 
 def fingerprint_in(folder: Folder) -> str | None:

@@ -50,7 +50,7 @@ cdef class SnappedMesh:
         self.test = <tl_test>test
 
     def __reduce__(self):
-        raise TypeError("what has been drawn refers to memory of this process and is not pickled or copied deeply: take "
+        raise TypeError("a drawn mesh refers to memory of this process and is not pickled or copied deeply: take "
                         "its arrays, such as .triangle and .depth")
 
     @property

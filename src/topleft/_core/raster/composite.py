@@ -88,7 +88,7 @@ def composite(
     [[75, 255], [150, 255], [150, 255]]
     """
     if not isinstance(layers, DepthLayers):
-        raise TypeError(f"layers must be what peel returns, got {type(layers).__name__}")
+        raise TypeError(f"layers must be the result of peel, got {type(layers).__name__}")
     n_layers, height, width = layers.planes[0].shape
     palette = as_palette(apart_from(out, "colors", colors), opacity)
     wish = find_owner(palette, per, layers)

@@ -65,7 +65,7 @@ class Costs:
     affine: Numbers = row((1.289, 1.635), "ns", "a vertex, with a matrix and no divide")
     transform: Numbers = row((1.797, 2.444), "ns", "a vertex, with a matrix and a divide")
     project: Numbers = row((1.553, 1.634), "ns", "a vertex in clip space")
-    index: float = row(0.4286, "ns", "a triangle whose indices are made int32")
+    index: float = row(0.4286, "ns", "a triangle, its indices made int32")
     clip: float = row(66.41, "ns", "a triangle that a plane cuts or leaves out, before the draw")
     beyond: float = row(19.49, "ns", "the same in the draw")
     touch: float = row(0.07796, "ns", "a byte of fresh memory")

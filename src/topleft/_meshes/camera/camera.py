@@ -108,7 +108,7 @@ class Camera:
             raise TypeError(f"lens must be an OpenCVLens, a FisheyeLens or None, got {shown(self.lens)}")
         if self.lens is not None and not np.array_equal(self.projection[3], [0, 0, -1, 0]):
             raise ValueError(
-                f"a lens needs a projection whose last row is [0, 0, -1, 0], got {self.projection[3].tolist()}"
+                f"a lens needs a projection with the last row [0, 0, -1, 0], got {self.projection[3].tolist()}"
             )
 
     def __repr__(self) -> str:
@@ -457,9 +457,7 @@ class Camera:
         pose = of_opengl(c2w)
         if intrinsics is None:
             if not (size is None and distortion is None and fisheye is None):
-                raise ValueError(
-                    "size, distortion and fisheye need intrinsics; without them fov_y_deg says what is seen"
-                )
+                raise ValueError("size, distortion and fisheye need intrinsics; without them fov_y_deg sets the view")
             near, far = planes_for(engine.length(pose[:3, 3]), near, far)
             fov_y_deg = DEFAULT_FOV_Y_DEG if fov_y_deg is None else fov_y_deg
             return cls.perspective(np.append(FLIP, 1)[:, None] * pose, near=near, far=far, fov_y_deg=fov_y_deg)
@@ -710,15 +708,7 @@ def as_camera(camera: object, name: str = "camera") -> Camera:
 
 
 def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: tuple[int, int]) -> Camera:
-    """The camera, or the three-quarter view of the subject in a picture of this size.
-
-    Raises
-    ------
-    TypeError
-        If the camera is none.
-    ValueError
-        If there is none, and nothing to frame.
-    """
+    """The camera, or the three-quarter view of the subject in a picture of this size."""
     if camera is not None:
         return as_camera(camera)
     if isinstance(subject, Mesh) and not len(subject.triangles):

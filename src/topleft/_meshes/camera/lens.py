@@ -246,13 +246,7 @@ def _as_points(points: npt.ArrayLike) -> F64:
 
 
 def lens_of_opencv(distortion: npt.ArrayLike | None, fisheye: npt.ArrayLike | None) -> Lens | None:
-    """The lens of the coefficients that OpenCV returns, in its order; `None` without any.
-
-    Raises
-    ------
-    ValueError
-        If both are given, or their number is none that OpenCV knows or this library draws.
-    """
+    """The lens of the coefficients that OpenCV returns, in its order; `None` without any."""
     if distortion is not None and fisheye is not None:
         raise ValueError("distortion and fisheye are two models of a lens: give one of them")
     if distortion is not None:

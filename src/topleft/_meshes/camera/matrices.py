@@ -41,13 +41,7 @@ def as_framed(subject: MeshLike | Scene | npt.ArrayLike) -> Framed:
 
 
 def points_to_frame(subject: Framed) -> F64:
-    """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points.
-
-    Raises
-    ------
-    ValueError
-        If there is no point, or one is not finite.
-    """
+    """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points."""
     if isinstance(subject, Points):
         points = np.asarray(subject.positions, np.float64)
     elif isinstance(subject, Scene):
@@ -87,15 +81,7 @@ def box_corners(ends: F64) -> F64:
 
 
 def distance_to_fit(points: F64, tan_x: float, tan_y: float) -> float:
-    """The distance in front of the origin at which a camera has all points just inside its frame.
-
-    Parameters
-    ----------
-    points : (N, 3) float64
-        In eye axes, relative to the point that the camera looks at.
-    tan_x, tan_y : float
-        Tangents of half the fields of view.
-    """
+    """The distance at which a camera has all points (N, 3), in its axes, just inside a frame of two half tangents."""
     x, y, z = points.T
     needed = z + FRAMING_MARGIN * np.maximum(np.abs(x) / tan_x, np.abs(y) / tan_y)
     farthest = np.sqrt((points**2).sum(axis=1).max())
@@ -106,11 +92,6 @@ def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
     """View and projection (4, 4) float64 of their product, up to its scale; the view turns and moves, nothing else.
 
     Without perspective the eye is put into the near plane, in the middle of the picture: no matrix tells where it is.
-
-    Raises
-    ------
-    ValueError
-        If the matrix is singular, is a pose, or its depth is not that of planes across the view.
     """
     name = "clip_from_world"
     check_regular(name, clip_from_world)
@@ -193,13 +174,7 @@ def _middle(axis: F64, z: F64, tan: float, distance: float) -> float:
 
 
 def view_matrix(eye: F64, target: F64, up: F64) -> F64:
-    """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`.
-
-    Raises
-    ------
-    ValueError
-        If eye and target coincide, or if `up` is zero or parallel to the view.
-    """
+    """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`."""
     forward = target - eye
     distance = engine.length(forward)
     if distance == 0:
@@ -224,13 +199,7 @@ def orbit_view(
     *,
     up: UpOption = "y",
 ) -> F64:
-    """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`.
-
-    Raises
-    ------
-    ValueError
-        If the elevation is outside -90 to 90 degrees or `up` is neither "y" nor "z".
-    """
+    """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`."""
     check_choice("up", up, get_args(UpOption))
     if not math.isfinite(as_number("azimuth_deg", azimuth_deg)):
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")

@@ -27,6 +27,7 @@ from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.verbs import overdraw, rasterize
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.lod.distance import TriangleTree
+from topleft._meshes.lod.simplify import weights_of
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import face_normals, unit_or_zero
 from topleft._meshes.picture.render import rasterize_mesh
@@ -217,7 +218,7 @@ def chart_of(mesh: Mesh, size: tuple[int, int], rule: str, n_threads: int) -> Ch
         if not np.isfinite(uv[mesh.triangles]).all():
             raise ValueError("uv must be finite where triangles use them, got NaN or infinite ones")
         n_outside = np.count_nonzero(~is_inside[mesh.triangles].all(axis=1))
-        line = f"{n_outside} triangles leave the square of uv from 0 to 1: what lies outside is not baked"
+        line = f"{n_outside} triangles leave the square of uv from 0 to 1: their parts outside are not baked"
         warnings.warn(line, MeshWarning, stacklevel=3)
     points = np.ascontiguousarray(np.stack([uv[:, 0] * size[0], (1 - uv[:, 1]) * size[1]], axis=1))
     n_shared = int(
@@ -284,7 +285,7 @@ def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | 
     if values is None:
         return Baked(triangle.copy(), triangle, triangle >= 0)
     corners = source.triangles[own]
-    weights = weights_at(tree.points[corners], feet[is_near]).astype(np.float32)
+    weights = weights_of(tree.points[corners], feet[is_near]).astype(np.float32)
     each = values[own] if values.ndim == 3 else values[corners]
     taken = np.einsum("nk,nkc->nc", weights, each)
     if word.endswith("normal"):
@@ -294,17 +295,6 @@ def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | 
     out = np.zeros((ids.size, taken.shape[1]), np.float32)
     out[at] = taken
     return Baked(out.reshape(*ids.shape, -1), triangle, triangle >= 0)
-
-
-def weights_at(corners: F64, points: F64) -> F64:
-    """Barycentric weights (N, 3) of points on triangles (N, 3, 3); those of the first corner where there is no area."""
-    u, v, p = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
-    uu, uv, vv = (np.einsum("ij,ij->i", a, b) for a, b in ((u, u), (u, v), (v, v)))
-    pu, pv = np.einsum("ij,ij->i", p, u), np.einsum("ij,ij->i", p, v)
-    d = uu * vv - uv * uv
-    safe = np.where(d > 0, d, 1)
-    second, third = (np.where(d > 0, x / safe, 0).clip(0, 1) for x in (vv * pu - uv * pv, uu * pv - uv * pu))
-    return np.stack([1 - second - third, second, third], axis=1)
 
 
 def in_tangent_frame(chart: Chart, own: I32, at: npt.NDArray[np.intp], normals: F32) -> F32:

@@ -41,7 +41,7 @@ from topleft.errors import MeshError, MissingPackageError
 
 NO_TRIANGLES = {
     ".svg": "it holds curves in a plane",
-    ".dxf": "it is a drawing, of which only curves could be read",
+    ".dxf": "it is a drawing: only its curves could be read",
     ".binvox": "it holds voxels: make a mesh of them, by trimesh's VoxelGrid.marching_cubes say",
 }
 """Objects of trimesh that are no mesh."""
@@ -86,15 +86,7 @@ OF_NUMBERS = frozenset({"float_array", "float", "color", "matrix", "translate", 
 
 
 def read_by_trimesh(source: InputFile) -> list[Mesh]:
-    """The meshes of a file, in its order.
-
-    Raises
-    ------
-    MeshError
-        If it is of an unsupported format, holds no mesh, or is an archive of too much.
-    MissingPackageError
-        If trimesh, or a package that it needs for this format, is not installed.
-    """
+    """The meshes of a file, in its order."""
     suffix = source.path.suffix.lower()
     try:
         import trimesh
@@ -202,13 +194,7 @@ def _check_models(archive: zipfile.ZipFile, source: InputFile) -> None:
 
 
 class Model3MF:
-    """Counts the elements of a model of a 3MF file, and keeps none.
-
-    Raises
-    ------
-    MeshError
-        If it is no XML, or has more elements than its budget.
-    """
+    """Counts the elements of a model of a 3MF file, and keeps none."""
 
     def __init__(self, content: bytes, budget: Budget) -> None:
         from xml.parsers import expat
@@ -364,13 +350,7 @@ def quiet() -> Iterator[None]:
 
 
 def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, bool]:
-    """The file with triangles alone, and whether its materials have two sides: unless all say that they have one.
-
-    Raises
-    ------
-    MeshError
-        If it is no XML, its polygons name missing data, or it has more than its budget.
-    """
+    """The file with triangles alone, and whether its materials have two sides: unless all say that they have one."""
     budget.spend("max_lines", content.count(b"<") - content.count(b"</"))
     try:
         root = ElementTree.fromstring(content)

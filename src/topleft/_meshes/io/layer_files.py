@@ -34,13 +34,7 @@ LARGEST = 65535
 
 
 def layer_paths(destination: Location, names: Sequence[str]) -> dict[str, Location]:
-    """Return the file of each layer: `{layer}` in the name stands for the layer; .npz holds all of them.
-
-    Raises
-    ------
-    ImageError
-        If the format is unknown, or several layers would have one file that can hold one.
-    """
+    """Return the file of each layer: `{layer}` in the name stands for the layer; .npz holds all of them."""
     text = str(destination)
     if destination.suffix.lower() not in SUFFIXES:
         known = " ".join(SUFFIXES)
@@ -79,13 +73,6 @@ def save_layers(
         Clip space from the world; goes into .npz with the layers, as `clip_from_world`.
     background : (3,) of 0 to 255
         The colour behind in JPEG.
-
-    Raises
-    ------
-    ImageError
-        If the format is unknown, cannot hold a layer, or several layers would have one file that can hold one.
-    OSError
-        If a file cannot be written.
     """
     place = as_location("path", destination)
     if scale is not None:

@@ -241,17 +241,7 @@ def _points(source: InputFile) -> Points:
 
 
 def reading(source: InputFile, read: Callable[[], Made]) -> Made:
-    """The result of a reader; its errors become one line.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    MeshError
-        If the reader fails.
-    MissingPackageError
-        If it needs a package that is not installed.
-    """
+    """The result of a reader; its errors become one line."""
     path = source.path
     if not path.exists():
         raise FileNotFoundError(f"there is no file {str(path)!r}")

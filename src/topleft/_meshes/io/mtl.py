@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -65,17 +66,7 @@ class _Entry:
 
 
 def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[], Material]]:
-    """The materials of a library: functions, so that pictures of unused ones are not read.
-
-    Parameters
-    ----------
-    text : str
-        The library.
-    folder : Path
-        Where its pictures are.
-    source : InputFile
-        The mesh file, which gets the notes.
-    """
+    """The materials of a library: functions, so that pictures of unused ones are not read; `source` gets the notes."""
     entries: dict[str, _Entry] = {}
     own = _Entry()
     lines = text.replace("\\\n", " ").splitlines()
@@ -89,8 +80,8 @@ def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[
             own = entries[rest] = _Entry()
         elif key == "map_Ka":
             own.has_ambient_map = True
-        elif _lower(key) in MAPS:
-            own.maps[MAPS[_lower(key)]] = _map_of(rest)
+        elif key.lower() in MAPS:
+            own.maps[MAPS[key.lower()]] = _map_of(rest)
         elif key in UNREAD_MAPS:
             source.notes.add(f"{key} of its materials not read")
         elif key in ("Kd", "Ks", "Ke", "Ns", "d", "Tr", "illum", "Pr", "Pm"):
@@ -98,7 +89,7 @@ def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[
     if any(entry.has_ambient_map and "color" not in entry.maps for entry in entries.values()):
         source.notes.add("map_Ka of its materials not read")  # beside map_Kd exporters repeat its picture
     makers = _Makers(folder, source)
-    return {name: _maker(makers, entry) for name, entry in entries.items()}
+    return {name: partial(makers.material, entry) for name, entry in entries.items()}
 
 
 MAPS = {
@@ -106,10 +97,6 @@ MAPS = {
     "bump": "bump", "norm": "normal", "map_norm": "normal", "map_kn": "normal", "map_pr": "roughness",
     "map_pm": "metallic",
 }  # fmt: skip
-
-
-def _lower(key: str) -> str:
-    return key.lower()
 
 
 def _numbers(rest: str, key: str) -> list[float]:
@@ -172,10 +159,6 @@ def _set_option(own: _Map, option: str, values: list[str]) -> None:
             own.bump = numbers[0]
         case "-imfchan" if values:
             own.channel = values[0]
-
-
-def _maker(makers: _Makers, entry: _Entry) -> Callable[[], Material]:
-    return lambda: makers.material(entry)
 
 
 class _Makers:

@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import I64, Array
+from topleft._meshes.io.faces import mesh_of_faces
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text, whole_numbers
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.model.polygons import triangulate
 from topleft._meshes.model.texture import Texture
 from topleft.errors import MeshError
 
@@ -66,13 +66,7 @@ Rows = dict[str, Any]
 
 
 def read_ply(source: InputFile) -> list[Mesh]:
-    """The faces of a PLY file, in one mesh; none, and a cloud of its points, if it has none.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The faces of a PLY file, in one mesh; none, and a cloud of its points, if it has none."""
     content = source.content()
     order, elements, textures, start = _header(content)
     for element in elements:
@@ -139,11 +133,6 @@ def mapped_elements(path: Path) -> tuple[dict[str, Array], Array, dict[str, Arra
     """Numbers of the vertices by name (V,), the triangles (T, 3) and numbers of these (T,) of a binary file, mapped.
 
     None where faces are no triangles, or something else stands before them.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
     """
     with open(path, "rb") as file:
         order, elements, _, at = _header(file.read(MAX_HEADER_BYTES))
@@ -436,33 +425,13 @@ def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, source: InputF
     positions = _together(vertex, (("x", "y", "z"),))
     if positions is None:
         raise MeshError("its vertices have no x, y and z")
-    if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < len(positions):
-        bad = int(corners.min()) if int(corners.min()) < 0 else int(corners.max())
-        raise MeshError(f"a face names vertex {bad} of {len(positions)}")
-    triangles, faces = triangulate(positions, corners, n_corners)
-    if not len(triangles):
-        return None
-    normals = _together(vertex, (("nx", "ny", "nz"),))
-    colors = _colors(vertex)
-    uv = _together(vertex, UV_NAMES)
-    names = corners[triangles].astype(np.int32)
-    on_corners = face.get("texcoord")
-    color_of_face = _colors(face)
+    on_corners, uv_of_corners = face.get("texcoord"), None
     if isinstance(on_corners, _List) and (on_corners.lengths == 2 * n_corners).all():
-        uv = on_corners.values.reshape(-1, 2)[triangles.ravel()]
-    elif color_of_face is None or colors is not None:
-        return Mesh(positions, names, normals, colors, uv)
-    else:
-        uv = None if uv is None else uv[names.ravel()]
-    # vertices of their own for each triangle: the values of a face end at its edges
-    source.budget.spend("max_vertices", 3 * len(triangles))
-    if color_of_face is not None and colors is None:
-        colors = np.repeat(color_of_face[faces], 3, axis=0)
-    elif colors is not None:
-        colors = colors[names.ravel()]
-    own_normals = None if normals is None else normals[names.ravel()]
-    rows = np.arange(names.size, dtype=np.int32).reshape(-1, 3)
-    return Mesh(positions[names.ravel()], rows, own_normals, colors, uv)
+        uv_of_corners = on_corners.values.reshape(-1, 2)
+    return mesh_of_faces(
+        source, positions, corners, n_corners, normals=_together(vertex, (("nx", "ny", "nz"),)), colors=_colors(vertex),
+        uv=_together(vertex, UV_NAMES), uv_of_corners=uv_of_corners, colors_of_faces=_colors(face),
+    )  # fmt: skip
 
 
 def _textured(mesh: Mesh, textures: list[str], source: InputFile) -> Mesh:

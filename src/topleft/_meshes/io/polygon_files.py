@@ -71,15 +71,6 @@ def load_polygons(
 
     Without `has_crowds` annotations of COCO that are crowds are left out. `layer` is that of a vector file, its first
     one unless given.
-
-    Raises
-    ------
-    MeshError
-        If the file is none of these, or broken.
-    MissingPackageError
-        If it is a vector file, and neither pyogrio nor fiona is installed.
-    OSError
-        If it cannot be read.
     """
     path = Path(path)
     if path.exists() and not path.is_file():

@@ -219,13 +219,7 @@ class InputFile:
 
 
 def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]:
-    """The numbers of a text that holds nothing else.
-
-    Raises
-    ------
-    MeshError
-        If something else is in it.
-    """
+    """The numbers of a text that holds nothing else."""
     if not content.strip():
         return np.zeros(0, dtype)
     try:
@@ -244,15 +238,7 @@ def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
 
 @contextmanager
 def opened(content: bytes) -> Iterator[Image.Image]:
-    """A picture before its pixels are decoded.
-
-    Raises
-    ------
-    MeshError
-        If a side of it is too long.
-    OSError, ValueError, SyntaxError
-        If it is broken.
-    """
+    """A picture before its pixels are decoded."""
     from PIL import Image
 
     with warnings.catch_warnings():
@@ -288,15 +274,7 @@ def _known() -> set[str]:
 
 
 def read_picture(path: str) -> U8:
-    """The picture (H, W, 4) of a file that a caller names.
-
-    Raises
-    ------
-    ImageError
-        If it is none that Pillow reads.
-    OSError
-        If it cannot be read.
-    """
+    """The picture (H, W, 4) of a file that a caller names."""
     if not Path(path).is_file() and Path(path).exists():
         raise ImageError(f"cannot read {path!r}: it is no file")
     try:

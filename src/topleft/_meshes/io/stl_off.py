@@ -18,61 +18,47 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import I64, Array
+from topleft._meshes.io.faces import mesh_of_faces
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text, whole_numbers
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.model.polygons import triangulate
 from topleft.errors import MeshError
 
 N_HEADER_BYTES, N_TRIANGLE_BYTES = 84, 50
+ROWS = np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")])
 HEAD = re.compile(rb"\s*((?:ST)?C?N?(4?)(n?)OFF)?(?=[\s\d]|$)", re.IGNORECASE)
 
 
 def read_stl(source: InputFile) -> list[Mesh]:
-    """The triangles of an STL file, in one mesh; none if it has none.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The triangles of an STL file, in one mesh; none if it has none."""
     content = source.content()
-    n = int.from_bytes(content[80:84], "little") if len(content) >= N_HEADER_BYTES else 0
-    n_bytes = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
-    # Binary files may begin with "solid", too.
-    if content.lstrip()[:5].lower() == b"solid" and len(content) != n_bytes:
+    n = _n_triangles(content[:N_HEADER_BYTES], len(content))
+    if n is None:
         corners = _corners_of_text(content)
-    elif len(content) < N_HEADER_BYTES or n_bytes > len(content):
-        n_there = max(0, len(content) - N_HEADER_BYTES) // N_TRIANGLE_BYTES
-        raise MeshError(f"it has {n_there} of {n} triangles")
     else:
-        rows = np.frombuffer(content, np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")]), n, N_HEADER_BYTES)
-        corners = rows["corners"].reshape(-1, 3)
+        corners = np.frombuffer(content, ROWS, n, N_HEADER_BYTES)["corners"].reshape(-1, 3)
     source.budget.spend("max_vertices", len(corners))
     source.budget.spend("max_triangles", len(corners) // 3)
     return [Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))] if len(corners) else []
 
 
 def mapped_corners(path: Path) -> np.ndarray[tuple[int, int], np.dtype[np.float32]] | None:
-    """The nine numbers of each triangle (T, 9) of a binary file, mapped; None of a text.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
-    n_file = path.stat().st_size
+    """The nine numbers of each triangle (T, 9) of a binary file, mapped; None of a text."""
     with open(path, "rb") as file:
-        header = file.read(N_HEADER_BYTES)
-    n = int.from_bytes(header[80:84], "little") if len(header) == N_HEADER_BYTES else 0
-    n_bytes = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
-    if header.lstrip()[:5].lower() == b"solid" and n_file != n_bytes:
-        return None
-    if len(header) < N_HEADER_BYTES or n_bytes > n_file:
-        raise MeshError(f"it has {max(0, n_file - N_HEADER_BYTES) // N_TRIANGLE_BYTES} of {n} triangles")
-    if not n:
+        n = _n_triangles(file.read(N_HEADER_BYTES), path.stat().st_size)
+    if n == 0:
         raise MeshError("it has no triangles")
-    rows = np.memmap(path, np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")]), "r", N_HEADER_BYTES, (n,))
-    return rows["corners"]
+    return None if n is None else np.memmap(path, ROWS, "r", N_HEADER_BYTES, (n,))["corners"]
+
+
+def _n_triangles(header: bytes, n_bytes: int) -> int | None:
+    """How many triangles a binary file of so many bytes has; None of a text."""
+    n = int.from_bytes(header[80:84], "little") if len(header) == N_HEADER_BYTES else 0
+    n_wanted = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
+    if header.lstrip()[:5].lower() == b"solid" and n_bytes != n_wanted:  # binary files may begin so, too
+        return None
+    if n_wanted > n_bytes:
+        raise MeshError(f"it has {max(0, n_bytes - N_HEADER_BYTES) // N_TRIANGLE_BYTES} of {n} triangles")
+    return n
 
 
 def _corners_of_text(content: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
@@ -86,13 +72,7 @@ def _corners_of_text(content: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.
 
 
 def read_off(source: InputFile) -> list[Mesh]:
-    """The faces of an OFF file, in one mesh; none, and a cloud of its points, if it has none.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The faces of an OFF file, in one mesh; none, and a cloud of its points, if it has none."""
     content = re.sub(rb"#[^\r\n]*", b"", source.content()).replace(b"\r", b"\n")
     head = HEAD.match(content)
     if head is None:
@@ -198,24 +178,14 @@ def _meshes(
         colors = _bytes(rows[:, at : at + n_colors])
     if n_uv:
         uv = rows[:, -2:]
-    if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < len(positions):
-        bad = int(corners.min()) if int(corners.min()) < 0 else int(corners.max())
-        raise MeshError(f"a face names vertex {bad} of {len(positions)}")
     source.budget.spend("max_triangles", int(np.maximum(n_corners - 2, 0).sum()))
-    triangles, faces = triangulate(positions, corners, n_corners)
-    if not len(triangles):
-        if not len(corners) and len(positions):
-            source.clouds.append(Cloud(positions, _opaque(colors), normals))
-        return []
-    names = corners[triangles].astype(np.int32)
-    if of_faces is None or colors is not None:
-        return [Mesh(positions, names, normals, colors, uv)]
-    source.budget.spend("max_vertices", names.size)
-    at_corner = names.ravel()
-    own = (None if each is None else each[at_corner] for each in (normals, uv))
-    own_normals, own_uv = own
-    rows_of = np.arange(len(at_corner), dtype=np.int32).reshape(-1, 3)
-    return [Mesh(positions[at_corner], rows_of, own_normals, np.repeat(_bytes(of_faces)[faces], 3, axis=0), own_uv)]
+    table = None if of_faces is None else _bytes(of_faces)
+    mesh = mesh_of_faces(
+        source, positions, corners, n_corners, normals=normals, colors=colors, uv=uv, colors_of_faces=table
+    )
+    if mesh is None and not len(corners) and len(positions):
+        source.clouds.append(Cloud(positions, _opaque(colors), normals))
+    return [] if mesh is None else [mesh]
 
 
 def _opaque(colors: Array | None) -> Array | None:

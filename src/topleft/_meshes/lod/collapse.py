@@ -60,13 +60,7 @@ class Collapsed(NamedTuple):
 
 
 def collapser() -> Any:
-    """The package that collapses edges.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
+    """The package that collapses edges."""
     try:
         import fast_simplification  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError:
@@ -165,13 +159,19 @@ def gather(points: F64, triangles: I32, n_wanted: int, *, least_flat: float = 0.
     if least_flat > 0:
         is_bent = flatness(points, triangles, group, len(first))[group] < least_flat
         into[is_bent] = np.flatnonzero(is_bent)
+    corners, row = left_of(triangles, into)
+    return Collapsed(points[row >= 0], corners, row[into])
+
+
+def left_of(triangles: I32, into: I32) -> tuple[I32, I32]:
+    """The triangles with three corners where points go into others, and the row of each point in use; else -1."""
     corners = into[triangles]
     a, b, c = corners.T
     corners = corners[(a != b) & (b != c) & (c != a)]
-    is_left = np.zeros(len(points), np.bool_)
-    is_left[corners.ravel()] = True
-    row: I32 = np.where(is_left, np.cumsum(is_left) - 1, -1).astype(np.int32)
-    return Collapsed(points[is_left], row[corners], row[into])
+    is_used = np.zeros(len(into), np.bool_)
+    is_used[corners.ravel()] = True
+    row: I32 = np.where(is_used, np.cumsum(is_used) - 1, -1).astype(np.int32)
+    return row[corners], row
 
 
 def flatness(points: F64, triangles: I32, group: npt.NDArray[np.int64], n_groups: int) -> F64:
@@ -235,12 +235,5 @@ def rows_of_pairs(pairs: Any, triangles: I32, n_points: int, left: I32) -> I32 |
         if np.array_equal(further, into):
             break
         into = further
-    corners = into[triangles]
-    a, b, c = corners.T
-    corners = corners[(a != b) & (b != c) & (c != a)]
-    is_left = np.zeros(n_points, np.bool_)
-    is_left[corners.ravel()] = True
-    row: I32 = np.where(is_left, np.cumsum(is_left) - 1, -1).astype(np.int32)
-    if not np.array_equal(row[corners], left):
-        return None
-    return row[into]
+    corners, row = left_of(triangles, into)
+    return row[into] if np.array_equal(corners, left) else None

@@ -205,7 +205,7 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, ma
     if not len(mesh.triangles):
         return "it has no triangles"
     if camera.lens is not None:
-        return "a lens bends the picture by what no bound is known of"
+        return "no bound is known for the bend of the lens"
     if cull is not None and str(cull) != "none":
         return f"cull={str(cull)!r}: which way a triangle is turned has no bound"
     if any(has_holes(one, mesh) for one in (mesh.materials if material is None else (material,))):
@@ -223,22 +223,6 @@ def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: t
         low, high = min(0, first), max(whole, first + n)
         ends.append((2 * (low - 1) / max(whole, 1) - 1, 2 * (high + 1) / max(whole, 1) - 1))
     return np.array([*ends[0], -ends[1][1], -ends[1][0]])
-
-
-def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level) -> float | None:
-    """The largest error of a visible point, pixels; None where that is unknown.
-
-    Parameters
-    ----------
-    matrix : (4, 4) float64
-        Clip from object.
-    viewport : (width, height), pixels
-    window : (4,) float64
-        The result of `window_of`.
-    original, level : Level
-    """
-    scale = engine.pixels_per_unit(matrix, viewport, window, np.stack([original.extent, level.extent]))
-    return None if scale is None else level.bound * scale
 
 
 def detailed(scene: Scene, camera: Camera, size: tuple[int, int], tolerance: float, **options: Any) -> Scene:

@@ -41,24 +41,13 @@ _lock = threading.RLock()
 
 
 class Corners(NamedTuple):
-    """Points that are one only where all their attributes are equal.
+    """Points that are one only where all their attributes are equal."""
 
-    Attributes
-    ----------
-    points : (N, 3) float64
-    triangles : (T, 3) int32
-    attributes : dict of str to (N, K) array
-    material : (N,) int32 or None
-        Row of the materials; triangles of two materials have no point in common.
-    mixes_light : bool
-        Whether colours between vertices are mixed as light.
-    """
-
-    points: F64
-    triangles: I32
-    attributes: dict[str, npt.NDArray[Any]]
-    material: I32 | None
-    mixes_light: bool = False
+    points: F64  # (N, 3)
+    triangles: I32  # (T, 3)
+    attributes: dict[str, npt.NDArray[Any]]  # (N, K) each
+    material: I32 | None  # (N,) rows; triangles of two materials have no point in common
+    mixes_light: bool = False  # whether colours between vertices are mixed as light
 
 
 def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:

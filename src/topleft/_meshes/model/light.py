@@ -179,13 +179,7 @@ class Fog:
 
 
 def as_not_negative(name: str, value: float) -> float:
-    """The number as a float.
-
-    Raises
-    ------
-    ValueError
-        If it is negative or not finite.
-    """
+    """The number as a float."""
     if not 0 <= as_number(name, value) < math.inf:
         raise ValueError(f"{name} must be finite and not negative, got {value!r}")
     return float(value)

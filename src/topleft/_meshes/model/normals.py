@@ -73,13 +73,6 @@ def creased_normals(
     of_corners : CornerNormals or None
         None where no vertex has corners with different normals.
 
-    Raises
-    ------
-    IndexError
-        If a triangle names a vertex that does not exist.
-    ValueError
-        If there are 2**28 triangles or more.
-
     Notes
     -----
     Two corners of a vertex belong together when their triangles share a side at that vertex and the angle between their

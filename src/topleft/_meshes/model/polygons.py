@@ -34,13 +34,6 @@ def triangulate(points: Array, corners: Array, n_corners: Array) -> tuple[I64, I
         Rows of `corners`, in the order of the polygons and with their winding.
     faces : (T,) int64
         The polygon of each triangle.
-
-    Raises
-    ------
-    IndexError
-        If a corner is no point.
-    ValueError
-        If the polygons have more corners than there are, or take too many steps.
     """
     n_corners = n_corners.astype(np.int64)
     if (n_corners == 3).all():

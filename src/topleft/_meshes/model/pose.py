@@ -26,13 +26,6 @@ def as_pose(name: str, pose: Any) -> F64:
 
     A matrix (4, 4) or (3, 4); a pair of a rotation (3, 3), or the vector (3,) that OpenCV has for it, and a translation
     (3,); or a mapping with `cam_R_m2c` and `cam_t_m2c`, or `cam_R_w2c` and `cam_t_w2c`, as BOP writes them.
-
-    Raises
-    ------
-    ValueError
-        If it has another shape, another last row than [0, 0, 0, 1], a number that is not finite, or is singular.
-    TypeError
-        If it is no array.
     """
     is_matrix = type(pose) is np.ndarray and pose.shape == (4, 4) and pose.dtype == np.float64 and pose.flags.aligned
     if is_matrix and engine.is_pose(pose):

@@ -208,15 +208,7 @@ class Texture:
 
 
 def as_image(name: str, pixels: npt.ArrayLike) -> U8:
-    """The picture as its own read-only (H, W, 4) uint8.
-
-    Raises
-    ------
-    TypeError
-        If the pixels are no uint8.
-    ValueError
-        If it has another shape, no pixels, or a side of more than 32768.
-    """
+    """The picture as its own read-only (H, W, 4) uint8."""
     array = as_array(name, pixels)
     if array.dtype != np.uint8:
         if array.dtype.kind not in "iu" or (array.size and not (0 <= array.min() and array.max() <= 255)):

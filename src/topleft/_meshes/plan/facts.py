@@ -40,27 +40,15 @@ TRIANGLE_BYTES_OF_MESHLETS = 19.2
 
 @dataclass(frozen=True, slots=True)
 class ClusterFacts:
-    """How the clusters of a mesh fare in a view.
+    """How the clusters of a mesh fare in a view."""
 
-    Attributes
-    ----------
-    clusters : Clusters or None
-        The clusters that are drawn; None when the mesh is drawn whole.
-    why_not : str
-        Why it is drawn whole.
-    n_outside, n_turned, n_hidden, n_drawn : int
-        Clusters outside of the picture, turned away, hidden, and drawn.
-    meshlet_bytes : int
-        About the memory of meshlets, where later pictures are drawn from them; else 0.
-    """
-
-    clusters: Clusters | None
-    why_not: str = ""
+    clusters: Clusters | None  # that are drawn; None when the mesh is drawn whole
+    why_not: str = ""  # why it is drawn whole
     n_outside: int = 0
-    n_turned: int = 0
+    n_turned: int = 0  # away from the eye
     n_hidden: int = 0
     n_drawn: int = 0
-    meshlet_bytes: int = 0
+    meshlet_bytes: int = 0  # about, where later pictures are drawn from meshlets
 
 
 class Decided(NamedTuple):

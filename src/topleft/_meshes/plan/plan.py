@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Unpack
 
@@ -151,15 +151,7 @@ class Plan:
         """Return all of it as numbers, strings, lists and dicts: for JSON."""
         measured = self.measured_ms
         stages = [
-            {
-                "name": stage.name,
-                "choice": stage.choice,
-                "why": stage.why,
-                "rejected": list(stage.rejected),
-                "estimated_ms": stage.estimated_ms,
-                "measured_ms": measured.get(stage.timed_in),
-                "timed_in": stage.timed_in,
-            }
+            asdict(stage) | {"rejected": list(stage.rejected), "measured_ms": measured.get(stage.timed_in)}
             for stage in self.stages
         ]
         return {

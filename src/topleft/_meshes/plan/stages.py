@@ -102,7 +102,7 @@ def plan_meshlets(found: ClusterFacts, costs: Costs) -> list[Stage]:
     if not found.meshlet_bytes:
         return []
     choice = f"from picture {costs.grown_pictures:g} on, at most {engine.MESHLET_TRIANGLES} triangles each"
-    why = "what is drawn so often is worth growing, once; estimates are of the pictures before"
+    why = "a mesh that is drawn so often is worth growing, once; estimates are of the pictures before"
     rejected = ("from the first picture on: growing takes as long as a hundred of them save",)
     return [Stage("meshlets", choice, why, rejected, timed_in="method")]
 
@@ -235,7 +235,7 @@ def plan_decisions(found: Decided) -> Stage:
     if found.n_turns:
         parts.append(f"the turn of {plural(found.n_turns, 'triangle')}")
     why = (
-        f"float32 and float64 lanes decide what lies beyond their error; of the rest {found.n_expansions:,} signs took "
+        f"float32 and float64 lanes decide samples beyond their error; of the rest {found.n_expansions:,} signs took "
         f"sums of several float64, {found.n_integers:,} integers of 2,176 bits"
     )
     rejected = ("the exact sign for every sample: 10 to 1,000 times as long for the same picture",)
@@ -294,7 +294,7 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
         rejected = ("method='auto': another one was asked for; the picture is the same",)
     if facts.is_large_shapes and facts.n_drawn:
         parts = [f"{plural(facts.n_drawn, 'triangle')} at once, row by row: every pixel is written once"]
-        rejected = ("one after the other: what they cover would be cleared first, and written again",)
+        rejected = ("one after the other: covered pixels would be cleared first, and written again",)
     elif facts.is_direct and facts.n_drawn:
         parts = [f"{plural(facts.n_drawn, 'triangle')} one after the other, in painter's order"]
         rejected = ("vectors and queues of triangles: they change the order, and colours have no ids to tell it",)
@@ -350,12 +350,12 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
         ms = costs.flat_pixel * n_pixels / facts.drawing.n_threads / 1e6
         return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
-    why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
+    why = "depths differ" if facts.test else "no test is set, but the depth of visible triangles is returned"
     if facts.common_depth is not None:
         why = f"every vertex lies at depth {facts.common_depth:g}, but little of the picture is covered"
         rejected = ("ids alone, and a pass over all pixels for depth: longer than the comparisons",)
     if facts.drawing.is_bounded:
-        what += "; large triangles leave out what lies behind"
+        what += "; large triangles leave out hidden spans"
         why += "; rows of triangles are long, so a bound of depth is kept for each 64 columns of a row"
     return Stage("depth", what, why, rejected, timed_in="method")
 
@@ -373,7 +373,7 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
         why = f"about {facts.work_ms:.2g} ms of work are {is_enough} {each}; {wake}"
     if facts.in_bands:
         sorted_ = f"the {n:,} triangles are sorted into bands of rows, which are cleared and drawn in the cache"
-        rejected = ("triangles as they come: what that saves is less than what pixels outside of the cache cost",)
+        rejected = ("triangles as they come: sorting them costs less than pixels outside of the cache",)
         who = "1, the caller's own" if n_threads == 1 else f"{n_threads}, each its bands of rows"
         return Stage("threads", f"{who}; one band after the other", f"{why}; {sorted_}", rejected)
     if n_threads == 1:

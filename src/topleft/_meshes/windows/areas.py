@@ -157,13 +157,7 @@ class AreaPainter(Painter):
 
     @classmethod
     def of_kind(cls, kind: str, grid: Grid | None, areas: Areas, values: Any, options: dict[str, Any]) -> AreaPainter:
-        """Return the painter of windows of polygons.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If there is no such option, or an option or the values do not fit the kind.
-        """
+        """Return the painter of windows of polygons."""
         known = (*cls.own, "subpixel_bits")
         unknown = sorted(options.keys() - set(known))
         if unknown:

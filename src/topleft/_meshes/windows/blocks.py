@@ -82,13 +82,7 @@ class IndexedTriangles:
         return np.asarray(self.triangles[which])
 
     def corners(self, which: slice | I32, memory: Memory = FRESH) -> Array:
-        """The corners (N, 3, C) of triangles, in memory that is given or in a fresh array.
-
-        Raises
-        ------
-        IndexError
-            If a triangle names a vertex that does not exist.
-        """
+        """The corners (N, 3, C) of triangles, in memory that is given or in a fresh array."""
         points, triangles = self.columns[0], self.triangles
         if len(self.columns) == 1 and is_copied(points) and is_copied(triangles) and triangles.dtype in INDICES:
             first, end, _ = which.indices(self.n) if isinstance(which, slice) else (0, len(which), 1)

@@ -11,7 +11,7 @@ from topleft._core.base.array_types import I32, Array
 from topleft._core.base.arrays import as_aligned
 from topleft._meshes.windows.ahead import kept_memory
 from topleft._meshes.windows.blocks import Triangles
-from topleft._meshes.windows.drawing import Painter, Payload, without_values
+from topleft._meshes.windows.drawing import Painter, Payload
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,6 @@ class SentJob:
     payload: Payload
     origin: tuple[int, int]
     size: tuple[int, int]
-
-    @classmethod
-    def of(cls, painter: Painter, payload: Payload, origin: tuple[int, int], size: tuple[int, int]) -> SentJob:
-        """Return it, with a painter that carries no values beside those of the window."""
-        return cls(without_values(painter), payload, origin, size)
 
     def __call__(self) -> Array:
         """Draw it."""

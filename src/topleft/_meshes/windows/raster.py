@@ -19,13 +19,14 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_pair, as_path, as_size
-from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
+from topleft._core.base.grid import Extent, ExtentLike, Grid
 from topleft._core.base.options import check_choice
 from topleft._core.base.threads import available_threads, parse_threads
+from topleft._meshes.field.field import grid_of
 from topleft._meshes.windows.ahead import in_order, kept_memory
 from topleft._meshes.windows.areas import AreaIndex, AreaPainter, Areas, are_polygons, areas_of, extent_of_polygons
 from topleft._meshes.windows.blocks import BLOCK, Triangles, fingerprint_of, mapped_npy, triangles_of
-from topleft._meshes.windows.drawing import KINDS, ON_GRIDS, Painter, painter_of
+from topleft._meshes.windows.drawing import KINDS, ON_GRIDS, Painter, painter_of, without_values
 from topleft._meshes.windows.jobs import MappedJob, SentJob
 from topleft._meshes.windows.spans import SPAN_BYTES, Tiling, WindowIndex
 from topleft.typing import RasterKindOption, YOption
@@ -105,14 +106,8 @@ class WindowedRaster:
         is_of_areas = are_polygons(mesh)
         self.triangles: Any = mesh if is_of_areas else triangles_of(mesh, self._folder)
         grid: Grid | None = None
-        if isinstance(size, Grid):
-            if extent is not None or pixel_size is not None or y != "up":
-                raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")
-            grid = size
-        elif kind in ON_GRIDS or extent is not None or pixel_size is not None:
-            if extent is None:
-                extent = extent_of(self.triangles)
-            grid = grid_around(extent, None if size is None else as_size(size), pixel_size, y)
+        if isinstance(size, Grid) or kind in ON_GRIDS or extent is not None or pixel_size is not None:
+            grid = grid_of(size, pixel_size, extent, y, lambda: extent_of(self.triangles))
         elif size is None:
             raise TypeError("size must be (width, height) or a Grid, or extent or pixel_size be given")
         self.kind: str = kind
@@ -246,20 +241,14 @@ class WindowedRaster:
         which = self.index.of_window(row, column)
         if self.is_mapped:
             return MappedJob(self.triangles, self.painter, which, origin, size)
-        return SentJob.of(self.painter, self.painter.gather(self.triangles, which), origin, size)
+        return SentJob(without_values(self.painter), self.painter.gather(self.triangles, which), origin, size)
 
     def __iter__(self) -> Iterator[Window]:
         """Give all windows, row by row, each with an array of its own."""
         return self.windows()
 
     def windows(self, *, reuse: bool = False) -> Iterator[Window]:
-        """Yield all windows, row by row; each thread draws one, a few ahead of the caller.
-
-        Parameters
-        ----------
-        reuse : bool
-            Whether the next window may overwrite the pixels of this one: a fresh array costs its first touch.
-        """
+        """Yield all windows, row by row; with `reuse` the next one may overwrite pixels: fresh ones cost a touch."""
         n_threads = max(1, min(self.n_threads, self.n_windows))
         n_ahead = 2 * n_threads if n_threads > 1 else 1
         own_threads = 1 if n_threads > 1 else None
@@ -364,13 +353,7 @@ def extent_of(subject: Any) -> Extent:
 
 
 def values_of(name: str | os.PathLike[str], triangles: Any) -> Any:
-    """The values of a .npy file, or those that a mapped PLY file has of its vertices or faces by this name.
-
-    Raises
-    ------
-    ValueError
-        If there are none of this name.
-    """
+    """The values of a .npy file, or those that a mapped PLY file has of its vertices or faces by this name."""
     text = os.fspath(name)
     if text.endswith(".npy"):
         return mapped_npy(pathlib.Path(text))

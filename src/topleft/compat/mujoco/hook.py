@@ -72,16 +72,10 @@ def mjr_render(viewport: Any, scn: Any, con: MjrContext) -> None:
 
 
 def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None:
-    """Draw the scene that was rendered last into arrays, of whatever shape, whose first row is the lowest.
-
-    Raises
-    ------
-    ValueError
-        If nothing has been rendered, or in another size.
-    """
+    """Draw the scene that was rendered last into arrays, of whatever shape, whose first row is the lowest."""
     size = int(viewport.width), int(viewport.height)
     if con.rendered is None or con.painter is None or con.rendered[1] != size:
-        raise ValueError(f"viewport must have the size of what mjr_render drew last, got {size}")
+        raise ValueError(f"viewport must have the size of mjr_render's last picture, got {size}")
     scene, _, is_segmented = con.rendered
     if rgb is not None and not is_segmented:
         rgb.reshape(*size[::-1], 3)[:] = con.painter.colors(scene, size)[::-1]
@@ -130,9 +124,7 @@ def install() -> None:
         sys.modules[name] = module = ModuleType(name)
         module.__getattr__ = partial(context_of_dm_control, word)  # type: ignore[method-assign]
     mujoco = import_module("mujoco")
-    calls: dict[str, Any] = {
-        own.__name__: own for own in (mjr_render, mjr_readPixels, mjr_resizeOffscreen, mjr_maxViewport)
-    }
+    calls: dict[str, Any] = {own.__name__: own for own in CALLS}
     calls |= dict.fromkeys(IGNORED, nothing) | dict.fromkeys(RENEWED, renew)
     calls |= {"MjrContext": MjrContext, "GLContext": GLContext, "Renderer": Renderer}
     for name, own in calls.items():

@@ -43,12 +43,7 @@ class Subject(NamedTuple):
 
 
 class Painter:
-    """Draws scenes of one model; meshes, materials and scenes are kept from picture to picture.
-
-    Parameters
-    ----------
-    model : mujoco.MjModel
-    """
+    """Draws scenes of one model; meshes, materials and scenes are kept from picture to picture."""
 
     def __init__(self, model: Any) -> None:
         import mujoco

@@ -75,13 +75,7 @@ class Parts:
 
 
 def primitive(kind: int, size: tuple[float, float, float], quality: tuple[int, int]) -> tl.Mesh:
-    """The mesh of a primitive of half sizes, in slices and stacks as MuJoCo has them.
-
-    Raises
-    ------
-    ValueError
-        If MuJoCo has no such primitive of triangles.
-    """
+    """The mesh of a primitive of half sizes, in slices and stacks as MuJoCo has them."""
     n_slices, n_stacks = quality
     x, y, z = size
     parts = Parts()

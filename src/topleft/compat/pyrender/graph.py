@@ -13,7 +13,22 @@ import numpy as np
 
 from topleft.compat._arrays import F64, moved, product
 from topleft.compat.pyrender.meshes import Box, Mesh, Primitive, box_of
-from topleft.compat.pyrender.values import Camera, DirectionalLight, Light, PointLight, SpotLight, as_rgb
+from topleft.compat.pyrender.values import Camera, Checked, Color, DirectionalLight, Light, PointLight, SpotLight
+
+
+class Part(Checked):
+    """The rotation, the scale or the translation of a node, n numbers."""
+
+    def __init__(self, n: int) -> None:
+        self.n = n
+
+    def __set__(self, instance: Node, value: Any) -> None:
+        array = np.array(value, np.float64)
+        if array.shape != (self.n,):
+            raise ValueError(f"{self.name} must have shape ({self.n},), got {array.shape}")
+        if self.n == 4 and abs((array**2).sum() - 1) > 2e-3:
+            raise ValueError(f"rotation must be a quaternion of length 1, got {value!r}")
+        vars(instance).update({self.name: array, "_matrix": None})
 
 
 class Node:
@@ -31,6 +46,8 @@ class Node:
         (3,) and `translation` (3,).
     """
 
+    rotation, scale, translation = Part(4), Part(3), Part(3)
+
     def __init__(
         self, name: Any = None, camera: Any = None, children: Any = None, skin: Any = None, matrix: Any = None,
         mesh: Any = None, rotation: Any = None, scale: Any = None, translation: Any = None, weights: Any = None,
@@ -40,13 +57,12 @@ class Node:
         self.children: list[Node] = [] if children is None else children
         self.camera, self.mesh, self.light = camera, mesh, light
         self._matrix: F64 | None = None
-        self._rotation, self._scale, self._translation = np.array([0.0, 0, 0, 1]), np.ones(3), np.zeros(3)
         if matrix is not None:
             self.matrix = matrix
             return
-        for part, value in (("rotation", rotation), ("scale", scale), ("translation", translation)):
-            if value is not None:
-                setattr(self, part, value)
+        self.rotation = (0, 0, 0, 1) if rotation is None else rotation
+        self.scale = (1, 1, 1) if scale is None else scale
+        self.translation = (0, 0, 0) if translation is None else translation
 
     def __setattr__(self, name: str, value: Any) -> None:
         kinds: dict[str, type] = {"camera": Camera, "mesh": Mesh, "light": Light}
@@ -59,8 +75,8 @@ class Node:
         """Parent from node, (4, 4): a copy."""
         if self._matrix is None:
             self._matrix = np.eye(4)
-            self._matrix[:3, :3] = rotation_of(self._rotation) * self._scale
-            self._matrix[:3, 3] = self._translation
+            self._matrix[:3, :3] = rotation_of(self.rotation) * self.scale
+            self._matrix[:3, 3] = self.translation
         return self._matrix.copy()
 
     @matrix.setter
@@ -68,46 +84,9 @@ class Node:
         matrix = np.asarray(value, np.float64)
         if matrix.shape != (4, 4) or not np.allclose(matrix[3], [0, 0, 0, 1]):
             raise ValueError(f"matrix must have shape (4, 4) and the last row [0, 0, 0, 1], got {value!r}")
-        self._matrix = matrix.copy()
-        self._scale = np.sqrt((matrix[:3, :3] ** 2).sum(axis=0))
-        self._rotation = quaternion_of(matrix[:3, :3] / np.where(self._scale > 0, self._scale, 1))
-        self._translation = matrix[:3, 3].copy()
-
-    def _set(self, name: str, value: Any, n: int) -> None:
-        array = np.array(value, np.float64)
-        if array.shape != (n,):
-            raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
-        if n == 4 and abs((array**2).sum() - 1) > 2e-3:
-            raise ValueError(f"rotation must be a quaternion of length 1, got {value!r}")
-        super().__setattr__(f"_{name}", array)
-        self._matrix = None
-
-    @property
-    def rotation(self) -> F64:
-        """A quaternion (x, y, z, w)."""
-        return self._rotation
-
-    @rotation.setter
-    def rotation(self, value: Any) -> None:
-        self._set("rotation", value, 4)
-
-    @property
-    def scale(self) -> F64:
-        """(3,): along each axis."""
-        return self._scale
-
-    @scale.setter
-    def scale(self, value: Any) -> None:
-        self._set("scale", value, 3)
-
-    @property
-    def translation(self) -> F64:
-        """(3,): where it stands in its parent."""
-        return self._translation
-
-    @translation.setter
-    def translation(self, value: Any) -> None:
-        self._set("translation", value, 3)
+        scale = np.sqrt((matrix[:3, :3] ** 2).sum(axis=0))
+        rotation = quaternion_of(matrix[:3, :3] / np.where(scale > 0, scale, 1))
+        vars(self).update(_matrix=matrix.copy(), scale=scale, rotation=rotation, translation=matrix[:3, 3].copy())
 
 
 def rotation_of(quaternion: F64) -> F64:
@@ -143,6 +122,8 @@ class Scene(Box):
     name : str, optional
     """
 
+    bg_color, ambient_light = Color(4, 1), Color(3, 0)
+
     def __init__(self, nodes: Any = None, bg_color: Any = None, ambient_light: Any = None, name: Any = None) -> None:
         self.bg_color, self.ambient_light, self.name = bg_color, ambient_light, name
         self._parents: dict[Node, Node | None] = {}
@@ -154,24 +135,6 @@ class Scene(Box):
                 raise ValueError("nodes must form trees: a node may have one parent, and none is its own")
             for node in roots:
                 self.add_node(node)
-
-    @property
-    def bg_color(self) -> F64:
-        """(4,) float64."""
-        return self._bg_color
-
-    @bg_color.setter
-    def bg_color(self, value: Any) -> None:
-        self._bg_color = np.ones(4) if value is None else as_rgb("bg_color", value, 4)
-
-    @property
-    def ambient_light(self) -> F64:
-        """(3,) float64."""
-        return self._ambient_light
-
-    @ambient_light.setter
-    def ambient_light(self, value: Any) -> None:
-        self._ambient_light = np.zeros(3) if value is None else as_rgb("ambient_light", value, 3)
 
     @property
     def nodes(self) -> set[Node]:

@@ -105,15 +105,7 @@ class OffscreenRenderer:
 
 
 class Shot:
-    """What one call draws.
-
-    Parameters
-    ----------
-    scene : Scene
-    size : (width, height)
-    point_size : float
-    flags : int
-    """
+    """What one call draws."""
 
     def __init__(self, scene: Scene, size: tuple[int, int], point_size: float, flags: int) -> None:
         node = scene.main_camera_node

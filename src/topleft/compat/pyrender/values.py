@@ -59,19 +59,23 @@ class GLTF:
     TRIANGLE_FAN = 6
 
 
-class Number:
-    """A number of an object that is checked when it is set: ``name = Number(above=0)``."""
-
-    def __init__(
-        self, *, above: float = -math.inf, least: float = -math.inf, below: float = math.inf, optional: bool = False
-    ) -> None:
-        self.above, self.least, self.below, self.optional = above, least, below, optional
+class Checked:
+    """A value of an object that a subclass checks when it is set."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
     def __get__(self, instance: Any, owner: type | None = None) -> Any:
         return self if instance is None else vars(instance)[self.name]
+
+
+class Number(Checked):
+    """A number of an object: ``name = Number(above=0)``."""
+
+    def __init__(
+        self, *, above: float = -math.inf, least: float = -math.inf, below: float = math.inf, optional: bool = False
+    ) -> None:
+        self.above, self.least, self.below, self.optional = above, least, below, optional
 
     def __set__(self, instance: Any, value: Any) -> None:
         if value is None and self.optional:
@@ -85,13 +89,7 @@ class Number:
 
 
 def as_vector(name: str, value: Any, n: int) -> F64:
-    """The numbers (n,) as float64.
-
-    Raises
-    ------
-    ValueError
-        If there are others.
-    """
+    """The numbers (n,) as float64."""
     array = np.asarray(value, np.float64) if value is not None else np.empty(0)
     if array.shape != (n,):
         raise ValueError(f"{name} must have shape ({n},), got {array.shape}")
@@ -108,6 +106,17 @@ def as_rgb(name: str, value: Any, n: int) -> F64:
     if array.ndim == 1 and n == 3 and len(array) == 4:
         array = array[:3]
     return as_vector(name, array, n)
+
+
+class Color(Checked):
+    """A colour of n floats of an object, (n,) float64; `default` in place of None."""
+
+    def __init__(self, n: int, default: float | None = None) -> None:
+        self.n, self.default = n, default
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        given = np.full(self.n, self.default) if value is None and self.default is not None else value
+        vars(instance)[self.name] = as_rgb(self.name, given, self.n)
 
 
 class Camera:
@@ -278,21 +287,12 @@ class Light:
     name : str, optional
     """
 
-    intensity = Number()
+    color, intensity = Color(3), Number()
 
     def __init__(self, color: Any = None, intensity: float | None = 1.0, name: Any = None) -> None:
         self.name = name
         self.color = np.ones(3) if color is None else color
         self.intensity = 1.0 if intensity is None else intensity
-
-    @property
-    def color(self) -> F64:
-        """(3,) float64, linear."""
-        return self._color
-
-    @color.setter
-    def color(self, value: Any) -> None:
-        self._color = as_rgb("color", value, 3)
 
 
 class DirectionalLight(Light):
@@ -447,7 +447,7 @@ class MetallicRoughnessMaterial(Material):
     metallicFactor, roughnessFactor : float
     """
 
-    metallicFactor, roughnessFactor = Number(least=0), Number(least=0)
+    baseColorFactor, metallicFactor, roughnessFactor = Color(4), Number(least=0), Number(least=0)
 
     def __init__(
         self, name: Any = None, normalTexture: Any = None, occlusionTexture: Any = None, emissiveTexture: Any = None,
@@ -464,15 +464,6 @@ class MetallicRoughnessMaterial(Material):
         self.metallicRoughnessTexture = as_texture(metallicRoughnessTexture)
         self.metallicFactor = 1.0 if metallicFactor is None else metallicFactor
         self.roughnessFactor = 1.0 if roughnessFactor is None else roughnessFactor
-
-    @property
-    def baseColorFactor(self) -> F64:
-        """(4,) float64: linear red, green and blue, and opacity."""
-        return self._base
-
-    @baseColorFactor.setter
-    def baseColorFactor(self, value: Any) -> None:
-        self._base = as_rgb("baseColorFactor", value, 4)
 
     @property
     def is_transparent(self) -> bool:

@@ -27,13 +27,7 @@ N_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 def entry(tree: Tree, kind: str, index: Any) -> Tree:
-    """A row of one of the lists of the file.
-
-    Raises
-    ------
-    MeshError
-        If there is no such row, or it is no object.
-    """
+    """A row of one of the lists of the file."""
     rows = tree.get(kind, [])
     if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
         raise MeshError(f"{kind}[{index!r}] is no entry of a list")
@@ -45,13 +39,7 @@ def entry(tree: Tree, kind: str, index: Any) -> Tree:
 
 
 def whole(row: Tree, name: str, default: int | None = None) -> int:
-    """A whole number, not negative, of an object.
-
-    Raises
-    ------
-    MeshError
-        If it is none, or is not there and has no default.
-    """
+    """A whole number, not negative, of an object."""
     value = row.get(name, default)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
@@ -61,17 +49,7 @@ def whole(row: Tree, name: str, default: int | None = None) -> int:
 
 
 class Accessors:
-    """The arrays of a file by their index, each decoded once.
-
-    Parameters
-    ----------
-    tree : dict
-        The JSON.
-    blob : bytes, optional
-        The binary chunk of a GLB file.
-    source : InputFile
-        Where the buffers are.
-    """
+    """The arrays of a file by their index, each decoded once; `blob` is the binary chunk of a GLB."""
 
     def __init__(self, tree: Tree, blob: bytes | None, source: InputFile) -> None:
         self._tree = tree
@@ -94,13 +72,7 @@ class Accessors:
         return self._arrays[index]
 
     def view(self, index: Any) -> npt.NDArray[np.uint8]:
-        """The bytes of a view of a buffer.
-
-        Raises
-        ------
-        MeshError
-            If it lies beyond its buffer.
-        """
+        """The bytes of a view of a buffer."""
         row = entry(self._tree, "bufferViews", index)
         buffer = self._buffer(row.get("buffer"))
         start, size = whole(row, "byteOffset", 0), whole(row, "byteLength")
@@ -176,13 +148,7 @@ def normalized(values: Array) -> Array:
 
 
 def uri_content(uri: Any, source: InputFile, what: str) -> bytes | None:
-    """The bytes of a URI: of a file beside the mesh, or its own.
-
-    Raises
-    ------
-    MeshError
-        If it is no text, or its own bytes are broken.
-    """
+    """The bytes of a URI: of a file beside the mesh, or its own."""
     if not isinstance(uri, str):
         raise MeshError(f"a uri of {what} must be text, got {uri!r}"[:120])
     if not uri.startswith("data:"):

@@ -28,13 +28,7 @@ NEARLY_ONE = 0.9995
 
 
 def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -> Tree:
-    """The file at a moment: a property has the value of its first key before it, that of its last key after it.
-
-    Raises
-    ------
-    MeshError
-        If it has no animations or not that clip, or a sampler is broken.
-    """
+    """The file at a moment: a property has the value of its first key before it, that of its last key after it."""
     rows = tree.get("animations")
     if not rows:
         raise MeshError(f"{str(source.path)!r} has no animations, so it has no time={moment.time:g}")
@@ -61,13 +55,7 @@ def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -
 
 
 def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFile) -> list[Tree]:
-    """The animations that play: that of an index or a name, all of them, or the first, with a note of the others.
-
-    Raises
-    ------
-    MeshError
-        If there is no such one.
-    """
+    """The animations that play: that of an index or a name, all of them, or the first, with a note of the others."""
     animations = [entry(tree, "animations", i) for i in range(len(rows))]
     names = [str(row.get("name", i)) for i, row in enumerate(animations)]
     if clip is None:
@@ -87,13 +75,7 @@ def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFil
 
 
 def value_at(sampler: Tree, accessors: Accessors, time: float, path: str) -> F64:
-    """The value (C,) of a sampler at a time.
-
-    Raises
-    ------
-    MeshError
-        If its keys do not go up, or its numbers are not those of as many keys.
-    """
+    """The value (C,) of a sampler at a time."""
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in N_PARTS:
         raise MeshError(f"an animation has the interpolation {kind!r}"[:120])

@@ -59,7 +59,7 @@ class DracoBytes:
             value |= (byte & 0x7F) << shift
             shift += 7
             if shift > 63:
-                raise MeshError("a number of what Draco has compressed has no end")
+                raise MeshError("a number in Draco's data has no end")
         return value | byte << shift
 
     def skip_metadata(self, deep: int = 0) -> None:
@@ -91,7 +91,7 @@ class DracoBytes:
             return
         is_tagged = self.byte() == TAGGED
         if is_tagged and n > MOST_TAGS:
-            raise MeshError(f"what Draco has compressed has {n} symbols with tags, more than {MOST_TAGS}")
+            raise MeshError(f"Draco's data has {n} symbols with tags, more than {MOST_TAGS}")
         if not is_tagged:
             self.byte()  # the bits of the largest
         chances = self._chances()
@@ -116,7 +116,7 @@ class DracoBytes:
 def _tags(packed: bytes, chances: list[int], n: int) -> list[int]:
     """Unpack n tags, from the end of their bytes on."""
     if sum(chances) != 1 << TAG_BITS:
-        raise MeshError("tags of what Draco has compressed have no chances")
+        raise MeshError("tags in Draco's data have no probabilities")
     before = [0, *accumulate(chances)]
     tag_of = [tag for tag, chance in enumerate(chances) for _ in range(chance)]
     at = len(packed) - 1 - (packed[-1] >> 6)
@@ -146,7 +146,7 @@ def _skip_indices(rest: DracoBytes, n_triangles: int, n_vertices: int) -> None:
 def _skip_walk(rest: DracoBytes, traversal: int) -> bool:
     """Skip the walk from triangle to triangle (Edgebreaker); returns whether there may be seams."""
     if traversal not in (STANDARD, VALENCE):
-        raise MeshError(f"what is compressed is no mesh of Draco 2.2 (traversal {traversal})")
+        raise MeshError(f"the data is no mesh of Draco 2.2 (traversal {traversal})")
     n_with_seams = rest.byte()
     for _ in range(2):  # symbols, and those where the walk splits
         rest.number()
@@ -179,16 +179,10 @@ def _row_bytes(rest: DracoBytes, bytes_of_decoder: int) -> int:
 
 
 def declared_by_draco(content: bytes) -> DracoSize:
-    """The sizes that a mesh declares, which it need not hold.
-
-    Raises
-    ------
-    MeshError
-        If it is no mesh of the version that glTF takes, or is cut off before its attributes.
-    """
+    """The sizes that a mesh declares, which it need not hold."""
     head = content[:11]
     if head[:5] != b"DRACO" or head[5:7] != b"\2\2" or len(head) < 11 or head[7] != 1:
-        raise MeshError("what is compressed is no mesh of Draco 2.2")
+        raise MeshError("the data is no mesh of Draco 2.2")
     rest = DracoBytes(content, 11)
     try:
         if int.from_bytes(head[9:11], "little") & HAS_METADATA:
@@ -206,4 +200,4 @@ def declared_by_draco(content: bytes) -> DracoSize:
         n_rows = max(n_vertices, 3 * n_triangles) if has_seams else n_vertices
         return DracoSize(n_triangles, n_vertices, n_rows, _row_bytes(rest, bytes_of_decoder=3))
     except IndexError:
-        raise MeshError("what Draco has compressed is cut off") from None
+        raise MeshError("Draco's data is cut off") from None

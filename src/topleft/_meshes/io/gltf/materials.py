@@ -39,17 +39,7 @@ UP = np.array([[1.0, 0, 0], [0, -1, 1]])
 
 
 class Materials:
-    """The materials of a file by their index.
-
-    Parameters
-    ----------
-    tree : dict
-        The JSON.
-    accessors : Accessors
-        Where pictures inside the file are.
-    source : InputFile
-        Where those beside it are.
-    """
+    """The materials of a file by their index; pictures lie inside the file or beside it."""
 
     def __init__(self, tree: Tree, accessors: Accessors, source: InputFile) -> None:
         self._tree = tree

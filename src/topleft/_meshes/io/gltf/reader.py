@@ -99,13 +99,7 @@ def read_gltf(source: InputFile) -> list[Mesh]:
 
 
 def read_cameras(source: InputFile) -> list[CameraOfFile]:
-    """The cameras of a glTF or GLB file, in the order of the nodes that hold them.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The cameras of a glTF or GLB file, in the order of the nodes that hold them."""
     tree, blob = _tree_and_blob(source)
     if source.moment is not None:
         tree = posed(tree, Accessors(tree, blob, source), source.moment, source)
@@ -209,13 +203,7 @@ class _Nodes:
         self._matrices: dict[int, F64] = {}
 
     def shown(self) -> Iterator[int]:
-        """Nodes of the scene that the file shows, parents first, in its order.
-
-        Raises
-        ------
-        MeshError
-            If a node is below itself.
-        """
+        """Nodes of the scene that the file shows, parents first, in its order."""
         if self._tree.get("scenes"):
             roots = entry(self._tree, "scenes", self._tree.get("scene", 0)).get("nodes", [])
         else:
@@ -232,13 +220,7 @@ class _Nodes:
             stack.extend(reversed(self._children[index]))
 
     def matrix(self, index: int) -> F64:
-        """World from the space of a node, (4, 4).
-
-        Raises
-        ------
-        MeshError
-            If the node is below itself.
-        """
+        """World from the space of a node, (4, 4)."""
         chain = []
         at: int | None = index
         while at is not None and at not in self._matrices:

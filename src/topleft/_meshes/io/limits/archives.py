@@ -44,13 +44,7 @@ class SupportsRead(Protocol):
 
 @contextmanager
 def unpacked(archive: Path, budget: Budget) -> Iterator[tuple[Path, list[Path]]]:
-    """A folder that goes when the block ends, and the mesh files of an archive in it, in their order.
-
-    Raises
-    ------
-    MeshError
-        If the archive is broken, unpacks to more than its budget, or holds no mesh.
-    """
+    """A folder that goes when the block ends, and the mesh files of an archive in it, in their order."""
     with tempfile.TemporaryDirectory(prefix="topleft-") as name:
         folder = Path(name).resolve()
         try:
@@ -152,13 +146,7 @@ def _write(content: SupportsRead, path: Path) -> None:
 
 
 def check_zip(path: Path, budget: Budget) -> zipfile.ZipFile | None:
-    """The archive that a file of any suffix is, counted as if all of it were unpacked; None if it is none.
-
-    Raises
-    ------
-    MeshError
-        If it is broken, or unpacks to more than its budget.
-    """
+    """The archive that a file of any suffix is, counted as if all of it were unpacked; None if it is none."""
     if not zipfile.is_zipfile(path):
         return None
     try:

@@ -44,13 +44,6 @@ class Budget:
         Of the file, for errors.
     **limits : int or None
         Options of `LIMITS`; those that are not given, or None, follow the bytes of the file.
-
-    Raises
-    ------
-    TypeError
-        If a limit is no whole number.
-    ValueError
-        If it is negative.
     """
 
     def __init__(self, name: str, **limits: int | None) -> None:
@@ -74,13 +67,7 @@ class Budget:
         return self._spent[option] + n <= self.limit(option)
 
     def check(self, option: str, n: int) -> None:
-        """Raise an error unless so many more are allowed; they are not counted yet.
-
-        Raises
-        ------
-        MeshError
-            If they are not.
-        """
+        """Raise an error unless so many more are allowed; they are not counted yet."""
         if not self.has(option, n):
             raise MeshError(
                 f"{self._name!r} has {self._spent[option] + n} {LIMITS[option].what}, more than the "

@@ -19,13 +19,7 @@ from topleft.errors import MeshError
 
 
 def check_header(file: IO[bytes], n_bytes: int) -> None:
-    """Raise an error unless an array of a file of so many bytes may be read.
-
-    Raises
-    ------
-    MeshError
-        If it is none, holds objects, or says that it has more bytes than there are.
-    """
+    """Raise an error unless an array of a file of so many bytes may be read."""
     try:
         version = np.lib.format.read_magic(file)
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0

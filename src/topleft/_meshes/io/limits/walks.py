@@ -19,13 +19,7 @@ MANY = 1 << 62
 
 
 def walks(below: Mapping[Node, Iterable[Node]], roots: Iterable[Node]) -> dict[Node, tuple[int, int]]:
-    """The number of ways to each node that is reached, and the number of all their steps.
-
-    Raises
-    ------
-    MeshError
-        If a node is below itself.
-    """
+    """The number of ways to each node that is reached, and the number of all their steps."""
     starts = list(roots)
     n_above: dict[Node, int] = dict.fromkeys(starts, 0)
     stack = list(n_above)
