@@ -92,19 +92,24 @@ typedef struct {
     void *g_color;
 } tl_grad_edges;
 
-/* A picture of attributes with smooth silhouettes beside another one. */
-enum { TL_LOSS_ROWS = 8, TL_LOSS_WINDOW = TL_LOSS_ROWS + 4 };
+/* A picture of attributes of float32 with smooth silhouettes beside another one; its band has two rows more on either
+ * side, of n_px pixels.  Scratch has no bounds of its own. */
+enum { TL_LOSS_WINDOW = 12, TL_PAIR_BYTES = 152, TL_SUMS_OF_FACE = 24 };
 typedef struct {
-    const int32_t *ids; /* as grad_points takes them */
-    int64_t step, first_id;
-    const void *attr; /* (n_attr, n_columns) */
+    const int32_t *ids; /* of row 0; -1: none */
+    int64_t step;       /* from row to row */
+    const float *attr;  /* (n_attr, n_columns) */
     int64_t n_attr, n_columns;
     tl_grad_edges edges; /* but for its pictures */
-    const void *target;  /* (height, width, n_columns) */
+    const float *target; /* (height, width, n_columns) */
     double scale;        /* gradients are those of the sum of squares times half of it */
-    void *scratch;       /* TL_LOSS_WINDOW rows of pixels of 8 + 4 n_columns numbers */
-    tl_grad_sums *faces; /* by triangle, as those of tl_grad_colors: scratch */
-    tl_grad_sums *of_points, *of_edges, *of_attr;
+    int64_t *rows;       /* scratch: 2 (rows + 1) of them; then int32, 2 (n_px + TL_IDS_ROOM), and five times
+                          * min(n_px, n_triangles) + TL_IDS_ROOM */
+    void *pairs;         /* scratch: 2 n_px of TL_PAIR_BYTES */
+    float *window;       /* scratch: 3 TL_LOSS_WINDOW rows of n_columns numbers a pixel */
+    float *rast;         /* scratch: a row of four numbers a pixel */
+    tl_grad_sums *faces; /* by triangle, 12 columns and TL_SUMS_OF_FACE for each three attributes: scratch */
+    tl_grad_sums *of_points, *of_attr;
 } tl_grad_loss;
 
 /* Areas of triangles in pixels, each times the values of the triangle, NULL for 1. */

@@ -76,24 +76,32 @@ TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_
     return vq4_load(some, 4, 4);
 }
 
+/* Sums up the gradients of n attributes at TL_SUMMED of the n_pixels that are left of a run, none of which is clamped:
+ * as they are, and times the number of the pixel; `from` the beginning of the plane on. */
+TL_INLINE void sum_up_pixels(const run_plane *plane, int from, const float *g_out, int n_pixels, int n,
+                             int64_t n_columns, vq4 sums[2])
+{
+    const vq4 zero = vq4_all(vq_set1(0.0f));
+    sums[0] = sums[1] = zero;
+    for (int i = 0; i < TL_SUMMED && i < n_pixels; i += 4) {
+        const vq4 at = plane_at_pixels(plane, from + i), inverse = vq4_inverse_of_last(at);
+        const vq4 g = vq4_mul(load_gradients(g_out + n_columns * i, n_pixels - i, n, n_columns), inverse);
+        const vq4 of_total = vq4_sub(zero, vq4_sum(vq4_mul(g, vq4_mul(at, inverse))));
+        const vq4 h = vq4_first(TL_VQ4_BLEND(g, of_total, 8), n_pixels - i);
+        sums[0] = vq4_add(sums[0], h), sums[1] = vq4_add(sums[1], vq4_mul(h, columns_from(i)));
+    }
+}
+
 /* Adds the gradients of n attributes at the pixels of a run, none of which is clamped. */
 TL_INLINE void pull_three(const tl_grad_view *view, const grad_span *s, int r, const float *g_out, int n,
                           int64_t n_columns, const double *begins, double *moments)
 {
     const run_plane plane = plane_of_run(s, r);
-    const vq4 zero = vq4_all(vq_set1(0.0f));
     const int n_pixels = s->begins[r + 1] - s->begins[r];
     for (int first = 0; first < n_pixels; first += TL_SUMMED) {
-        vq4 sum = zero, sum_x = zero;
-        for (int i = 0; i < TL_SUMMED && first + i < n_pixels; i += 4) {
-            const int n_left = n_pixels - first - i;
-            const vq4 at = plane_at_pixels(&plane, first + i), inverse = vq4_inverse_of_last(at);
-            const vq4 g = vq4_mul(load_gradients(g_out + n_columns * (first + i), n_left, n, n_columns), inverse);
-            const vq4 of_total = vq4_sub(zero, vq4_sum(vq4_mul(g, vq4_mul(at, inverse))));
-            const vq4 h = vq4_first(TL_VQ4_BLEND(g, of_total, 8), n_left);
-            sum = vq4_add(sum, h), sum_x = vq4_add(sum_x, vq4_mul(h, columns_from(i)));
-        }
-        add_moments(view, s, r, first, s->inverses[r], begins, moments, sum, sum_x);
+        vq4 sums[2];
+        sum_up_pixels(&plane, first, g_out + n_columns * first, n_pixels - first, n, n_columns, sums);
+        add_moments(view, s, r, first, s->inverses[r], begins, moments, sums[0], sums[1]);
     }
 }
 
@@ -166,42 +174,121 @@ static int64_t pull_colors(const tl_grad_view *view, const tl_grad_colors *p)
     }
 }
 
-/* Gradients of the corners of a triangle and of their attributes from its sums. */
-static void close_color_triangle(const tl_grad_view *view, const tl_grad_colors *p, int32_t id, const double *sums)
+/* TL_LANES triangles to close, of which n have sums: the rows of their corners and attributes, where they begin. */
+typedef struct {
+    const double
+        *sums; /* of the first one: x and y, and from `moments` on, `stride` further for each three attributes */
+    int64_t n_columns, moments, stride;
+    int n, is_in_pixels; /* in pixels, and units of the total where they begin */
+    int32_t corners[3][TL_MAX_LANES], rows[3][TL_MAX_LANES];
+    vd q[3][3], units[3];
+} closing_lanes;
+
+TL_INLINE void load_closing(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, closing_lanes *l,
+                            vd *x0, vd *y0, vd *w)
 {
-    const tl_grad_values *v = &p->values;
-    const double none[3] = {0};
-    double by_q[3][3] = {{0}}, *to[3];
-    int64_t rows[3];
-    grad_triangle t;
-    load_seen_triangle(view, id, sums[0], sums[1], &t, 0);
-    for (int k = 0; k < 3; k++) {
-        rows[k] = v->n_columns * p->corners[3 * (int64_t)id + k];
-        to[k] = sums_of(p->attr, p->corners[3 * (int64_t)id + k]);
+    const int32_t *const corners[3] = {l->corners[0], l->corners[1], l->corners[2]};
+    double about[2][TL_MAX_LANES];
+    vd z[3];
+    for (int i = 0; i < TL_LANES; i++) {
+        const int from = i < l->n ? i : 0;
+        for (int k = 0; k < 3; k++) {
+            l->corners[k][i] = view->tri[3 * (int64_t)ids[from] + k];
+            l->rows[k][i] = p->corners[3 * (int64_t)ids[from] + k];
+        }
+        about[0][i] = l->sums[from * l->n_columns], about[1][i] = l->sums[from * l->n_columns + 1];
     }
-    for (int64_t c = 0; c < v->n_columns; c++) {
-        const double *m = sums + sums_of_three(c) + c % 3;
-        double step[2];
-        attr_steps(v, rows, c, step, 0);
-        for (int k = 0; k < 3; k++)
-            to[k][c] += t.q[k][0] * m[0] + t.q[k][1] * m[4] + t.q[k][2] * m[8];
-        for (int j = 0; j < 3; j++)
-            by_q[0][j] += step[0] * m[4 * j], by_q[1][j] += step[1] * m[4 * j];
-    }
-    for (int64_t c = 0; c < v->n_columns; c += 3)
-        for (int j = 0; j < 3; j++)
+    *x0 = vd_load(about[0]), *y0 = vd_load(about[1]);
+    load_triangles(view, corners, *x0, *y0, l->q, z, w);
+    const vd total = sum_of_three(l->q[0][2], l->q[1][2], l->q[2][2]), one = vd_set1(1.0);
+    const vd unit = l->is_in_pixels ? vd_div(one, one_for_zero(total)) : one;
+    for (int c = 0; c < 3; c++)
+        l->units[c] = l->is_in_pixels && c < 2 ? vd_mul(vd_set1(2.0 * view->scale[c]), unit) : unit;
+}
+
+/* Adds the gradients of the attributes of corners; returns those of q_k, added. */
+TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l, vd by_q[3][3])
+{
+    const int64_t n = p->values.n_columns;
+    for (int64_t c = 0; c < n; c++) {
+        double some[6][TL_MAX_LANES], found[3][TL_MAX_LANES];
+        vd m[6], at[3];
+        for (int j = 0; j < 6; j++) {
+            for (int i = 0; i < TL_LANES; i++)
+                some[j][i] = i < l->n ? l->sums[i * l->n_columns + l->moments + c / 3 * l->stride +
+                                                (j < 3 ? 4 * j + c % 3 : 4 * (j - 3) + 3)]
+                                      : 0.0;
+            m[j] = vd_mul(vd_load(some[j]), l->units[j % 3]);
+        }
+        for (int k = 0; k < 3; k++) {
+            const vi row = vi_mul(vi_load(l->rows[k]), vi_set1((int32_t)n));
+            at[k] = vd_from_vf(vf_of_bits(vi_gather(vm_first(l->n), (const int32_t *)p->values.attr + c, row)));
+            vd_store(found[k],
+                     sum_of_three(vd_mul(l->q[k][0], m[0]), vd_mul(l->q[k][1], m[1]), vd_mul(l->q[k][2], m[2])));
+        }
+        for (int j = 0; j < 3; j++) {
+            by_q[0][j] = vd_add(by_q[0][j], vd_mul(vd_sub(at[0], at[2]), m[j]));
+            by_q[1][j] = vd_add(by_q[1][j], vd_mul(vd_sub(at[1], at[2]), m[j]));
+            for (int k = 0; k < 3 && c % 3 == 0; k++)
+                by_q[k][j] = vd_add(by_q[k][j], m[3 + j]);
+        }
+        for (int i = 0; i < l->n; i++)
             for (int k = 0; k < 3; k++)
-                by_q[k][j] += sums[sums_of_three(c) + 4 * j + 3];
-    corner_sums(view, p->vertices, id, to);
-    pull_corners(&t, by_q, sums[0], sums[1], none, none, to);
+                sums_of(p->attr, l->rows[k][i])[c] += found[k][i];
+    }
+}
+
+/* Gradients of the corners of triangles and of their attributes from their sums, as pull_corners gives them. */
+static void close_triangles(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, closing_lanes *l)
+{
+    vd x0, y0, w[3], by_q[3][3], g[3][3];
+    double found[3][4][TL_MAX_LANES];
+    load_closing(view, p, ids, l, &x0, &y0, w);
+    for (int k = 0; k < 9; k++)
+        by_q[k / 3][k % 3] = g[k / 3][k % 3] = vd_set1(0.0);
+    close_attributes(p, l, by_q);
+    vd v[3][3];
+    for (int k = 0; k < 3; k++) {
+        vi bits[4];
+        vi_load_records(view->pos, 16, l->corners[k], bits);
+        v[k][0] = vd_sub(vd_from_vf(vf_of_bits(bits[0])), vd_mul(x0, w[k]));
+        v[k][1] = vd_sub(vd_from_vf(vf_of_bits(bits[1])), vd_mul(y0, w[k]));
+        v[k][2] = w[k];
+    }
+    for (int k = 0; k < 3; k++) { /* q_k = v_i x v_j */
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        for (int a = 0; a < 3; a++) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            g[i][a] = vd_add(g[i][a], vd_sub(vd_mul(v[j][b], by_q[k][c]), vd_mul(v[j][c], by_q[k][b])));
+            g[j][a] = vd_add(g[j][a], vd_sub(vd_mul(v[i][c], by_q[k][b]), vd_mul(v[i][b], by_q[k][c])));
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        vd_store(found[k][0], g[k][0]), vd_store(found[k][1], g[k][1]);
+        vd_store(found[k][3], vd_sub(g[k][2], vd_add(vd_mul(x0, g[k][0]), vd_mul(y0, g[k][1]))));
+    }
+    for (int i = 0; i < l->n; i++)
+        for (int k = 0; k < 3; k++) {
+            double *to = sums_of(p->vertices, l->corners[k][i]);
+            to[0] += found[k][0][i], to[1] += found[k][1][i], to[3] += found[k][3][i];
+        }
 }
 
 /* Ends a band: from sums of triangles to those of their corners. */
-static void close_colors(const tl_grad_view *view, const tl_grad_colors *p)
+TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, int64_t moments, int64_t stride,
+                            int is_in_pixels)
 {
-    for (int64_t i = 0; i < p->faces->n; i++)
-        close_color_triangle(view, p, p->faces->rows[i], p->faces->sums + p->faces->n_columns * i);
-    leave_band(p->faces);
+    const tl_grad_sums *faces = p->faces;
+    for (int64_t i = 0; i < faces->n; i += TL_LANES) {
+        closing_lanes l = {.sums = faces->sums + i * faces->n_columns,
+                           .n_columns = faces->n_columns,
+                           .moments = moments,
+                           .stride = stride,
+                           .n = (int)(faces->n - i < TL_LANES ? faces->n - i : TL_LANES),
+                           .is_in_pixels = is_in_pixels};
+        close_triangles(view, p, faces->rows + i, &l);
+    }
+    forget_band(p->faces);
     leave_band(p->vertices);
     leave_band(p->attr);
 }
@@ -210,7 +297,7 @@ static void close_colors(const tl_grad_view *view, const tl_grad_colors *p)
 static int64_t grad_colors_vjp(const tl_grad_view *view, const tl_grad_colors *p)
 {
     const int64_t bad_id = pull_colors(view, p);
-    close_colors(view, p);
+    close_colors(view, p, FACE_X, TL_SUMS_OF_THREE, 0);
     return bad_id;
 }
 

@@ -176,38 +176,49 @@ typedef struct {
     const int32_t *ids, *others;
 } meeting;
 
-/* What the pixels of a column do. */
-TL_INLINE void meet(const meeting *m, int64_t x, int is_f64)
-{
-    const tl_grad_view *view = m->view;
-    const tl_grad_edges *e = m->edges;
-    const int64_t first = m->row * view->width + x, second = first + (m->axis ? view->width : 1);
-    const int32_t id = m->ids[x], other = m->others[x];
-    const int is_flipped =
-        id < 0 || (other >= 0 && get_real(e->rast, 4 * second + 2, is_f64) < get_real(e->rast, 4 * first + 2, is_f64));
-    tl_pair pair = {is_flipped ? second : first,
-                    is_flipped ? first : second,
-                    is_flipped ? other : id,
-                    is_flipped ? id : other,
-                    m->axis,
-                    is_flipped ? -1.0 : 1.0,
-                    {(double)x + 0.5, (double)m->row + 0.5}};
-    pair.middle[m->axis] += is_flipped;
+/* A pair and its edge. */
+typedef struct {
+    tl_pair pair;
     tl_pair_edge edge;
+} tl_met_pair;
+
+/* Finds what meets in a column, the second pixel being the nearer one if it is flipped; 0 if nothing comes of it. */
+TL_INLINE int meet_pair(const meeting *m, int64_t x, int is_flipped, tl_met_pair *p)
+{
+    const tl_grad_edges *e = m->edges;
+    const int64_t first = m->row * m->view->width + x, second = first + (m->axis ? m->view->width : 1);
+    const int32_t id = m->ids[x], other = m->others[x];
+    p->pair = (tl_pair){is_flipped ? second : first,
+                        is_flipped ? first : second,
+                        is_flipped ? other : id,
+                        is_flipped ? id : other,
+                        m->axis,
+                        is_flipped ? -1.0 : 1.0,
+                        {(double)x + 0.5, (double)m->row + 0.5}};
+    p->pair.middle[m->axis] += is_flipped;
+    return e->rule == TL_PAIR_STRAIGHT ? 1
+           : e->rule == TL_PAIR_AREA   ? find_area_edge(m->view, e, &p->pair, &p->edge)
+                                       : find_silhouette(m->view, e, &p->pair, &p->edge);
+}
+
+/* Blends the pixels of a pair in the band; backward adds the gradients of their colours and of its edge. */
+TL_INLINE void blend_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_met_pair *p, tl_grad_sums *sums,
+                          int is_f64)
+{
+    const tl_pair *pair = &p->pair;
     if (e->rule == TL_PAIR_STRAIGHT) {
-        pull_straight(view, e, &pair, m->sums);
+        if (e->g_out)
+            pull_straight(view, e, pair, sums);
         return;
     }
-    if (e->rule == TL_PAIR_AREA ? !find_area_edge(view, e, &pair, &edge) : !find_silhouette(view, e, &pair, &edge))
-        return;
     if (e->g_out) {
-        pull_pair(view, e, &pair, &edge, m->sums, is_f64);
+        pull_pair(view, e, pair, &p->edge, sums, is_f64);
         return;
     }
-    if (in_band(view, pair.near) && edge.near != 0.0)
-        take_color(e, pair.near, pair.far, edge.near, is_f64);
-    if (in_band(view, pair.far) && edge.far != 0.0)
-        take_color(e, pair.far, pair.near, edge.far, is_f64);
+    if (in_band(view, pair->near) && p->edge.near != 0.0)
+        take_color(e, pair->near, pair->far, p->edge.near, is_f64);
+    if (in_band(view, pair->far) && p->edge.far != 0.0)
+        take_color(e, pair->far, pair->near, p->edge.far, is_f64);
 }
 
 /* The pairs of n columns. */
@@ -215,8 +226,15 @@ TL_INLINE void meet_row(const meeting *m, int64_t n, int is_f64)
 {
     int32_t *columns = m->edges->ids + 2 * (m->view->width + TL_IDS_ROOM);
     const int64_t n_pairs = list_pairs(m->edges, m->ids, m->others, n, columns);
-    for (int64_t i = 0; i < n_pairs; i++)
-        meet(m, columns[i], is_f64);
+    for (int64_t i = 0; i < n_pairs; i++) {
+        const int64_t first = m->row * m->view->width + columns[i], second = first + (m->axis ? m->view->width : 1);
+        const int is_flipped = m->ids[columns[i]] < 0 ||
+                               (m->others[columns[i]] >= 0 && get_real(m->edges->rast, 4 * second + 2, is_f64) <
+                                                                  get_real(m->edges->rast, 4 * first + 2, is_f64));
+        tl_met_pair pair;
+        if (meet_pair(m, columns[i], is_flipped, &pair))
+            blend_pair(m->view, m->edges, &pair, m->sums, is_f64);
+    }
 }
 
 TL_INLINE void edges_of_band(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums, int is_f64)

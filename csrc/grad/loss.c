@@ -1,10 +1,11 @@
-/* The mean squared difference of a picture from another one, and its gradients: points, attributes, edges and all of
- * them backwards, a few rows at a time, which stay in the cache.
+/* The mean squared difference of a picture from another one, and its gradients: attributes of float32, smooth edges,
+ * and both backwards, in one pass over the rows of a band while they are in the cache.
  * In: ids of a picture, a mesh with attributes, the other picture.  Out: a sum of squares; sums by vertex, attribute.
  *
- * Rows go through the kernels of this room, so sums have the bits that these give one after the other.  What backward
- * takes of a row depends on the one above it, that on the colours of the next: rows are drawn two ahead, compared one
- * ahead. */
+ * A triangle that is seen is a face: planes in float64, about the first pixel that shows it and in units of its total
+ * there, whose quotients are the attributes at its pixels; and the sums of colors.c.  A run of pixels begins in float64
+ * and goes on in float32; one with a weight that is clamped goes by itself, as in points.c.  Pairs of pixels are found
+ * once, for both ways.  A row is drawn, compared when the next one is drawn, led back when that one is compared. */
 #ifndef TL_GRAD_LOSS_C
 #define TL_GRAD_LOSS_C
 
@@ -17,161 +18,452 @@
 #include "grad/pixels.h"
 #include "grad/points.c"
 #include "grad/values.c"
+#include "lanes/lanes.h"
+#include "lanes/quads.h"
 
-enum {
-    WINDOW_RAST,
-    WINDOW_COLOR,
-    WINDOW_G_OUT,
-    N_KEPT_WINDOWS,
-    WINDOW_OUT = N_KEPT_WINDOWS,
-    WINDOW_G_COLOR,
-    WINDOW_G_RAST,
-    N_WINDOWS
-};
+/* Planes of a face: by column, by row, and at its first pixel; four numbers each. */
+enum { FACE_U, FACE_V, FACE_ZW, FACE_TOTAL, FACE_PLANE = 12 };
 
-/* Rows of pictures, from `base` on. */
+/* A band, with two rows on either side of it, [lowest, end): runs of pixels of equal id, faces, pairs. */
 typedef struct {
-    char *rows[N_WINDOWS];
-    int64_t n_bytes[N_WINDOWS]; /* of a row */
+    const tl_grad_view *view;
+    const tl_grad_loss *l;
+    tl_grad_view all;        /* of those rows */
+    int64_t *row_runs;       /* the first run of each row */
+    int64_t *row_pairs;      /* the first pair of a row with the one below or within the row */
+    int32_t *begins, *faces; /* of runs: the column; twice the face, 1 more where clamped, less than 0 for none */
+    int32_t *corners[3], *column, *row; /* of faces */
+    tl_met_pair *pairs;
+    float *colors, *g_out, *g_color; /* TL_LOSS_WINDOW rows from `base` on */
     int64_t base;
-} loss_windows;
+} loss_pass;
 
-static loss_windows open_windows(const tl_grad_view *view, const tl_grad_loss *l, int64_t base)
+_Static_assert(sizeof(tl_met_pair) == TL_PAIR_BYTES, "callers make room for pairs");
+
+static loss_pass open_loss(const tl_grad_view *view, const tl_grad_loss *l)
 {
-    loss_windows w = {.base = base};
-    char *next = l->scratch;
-    for (int k = 0; k < N_WINDOWS; k++) {
-        const int64_t n = k == WINDOW_RAST || k == WINDOW_G_RAST ? 4 : l->n_columns;
-        w.n_bytes[k] = (view->is_f64 ? 8 : 4) * n * view->width;
-        w.rows[k] = next;
-        next += TL_LOSS_WINDOW * w.n_bytes[k];
+    loss_pass p = {.view = view, .l = l, .all = *view};
+    p.all.first_row = view->first_row > 2 ? view->first_row - 2 : 0;
+    p.all.end_row = view->end_row + 2 < view->height ? view->end_row + 2 : view->height;
+    const int64_t n_rows = p.all.end_row - p.all.first_row, n_px = n_rows * view->width;
+    const int64_t n_faces = (view->n_triangles < n_px ? view->n_triangles : n_px) + TL_IDS_ROOM;
+    int32_t *next = (int32_t *)(l->rows + 2 * (n_rows + 1));
+    p.row_runs = l->rows, p.row_pairs = l->rows + n_rows + 1;
+    p.begins = next, p.faces = next + n_px + TL_IDS_ROOM;
+    next += 2 * (n_px + TL_IDS_ROOM);
+    for (int k = 0; k < 3; k++, next += n_faces)
+        p.corners[k] = next;
+    p.column = next, p.row = next + n_faces;
+    p.pairs = l->pairs;
+    p.colors = l->window, p.g_out = p.colors + TL_LOSS_WINDOW * view->width * l->n_columns;
+    p.g_color = p.g_out + TL_LOSS_WINDOW * view->width * l->n_columns;
+    p.base = p.all.first_row;
+    return p;
+}
+
+/* The ids of a row with room beyond: -1 for none, less for what is no triangle. */
+TL_INLINE void copy_ids(const loss_pass *p, int64_t row, int32_t *ids)
+{
+    const int32_t *from = p->l->ids + p->l->step * row;
+    const vi end = vi_set1(clamped_to_int(p->view->n_triangles)), none = vi_set1(-1);
+    for (int64_t x = 0; x < p->view->width; x += TL_LANES) {
+        vi id = vi_load_masked(vm_first(p->view->width - x), from + x);
+        id = vi_select(vi_gt(id, none), id, none);
+        vi_store(ids + x, vi_select(vi_gt(end, id), id, vi_set1(TL_NO_ID)));
     }
-    return w;
 }
 
-/* Where row 0 of a picture would be. */
-TL_INLINE void *window_of(const loss_windows *w, int k)
+/* The face of a triangle that a pixel shows; -1 if its corners do not exist. */
+TL_INLINE int32_t find_face(loss_pass *p, int32_t id, int32_t column, int64_t row)
 {
-    return (void *)((uintptr_t)w->rows[k] - (uintptr_t)(w->base * w->n_bytes[k]));
+    const tl_grad_view *view = p->view;
+    const int64_t n_rows = p->l->n_attr < view->n_vertices ? p->l->n_attr : view->n_vertices;
+    int32_t face = id < 0 ? -1 : p->l->faces->slot_of[id];
+    if (face >= 0 || id < 0 || !has_corners(view, n_rows, id))
+        return face;
+    face = (int32_t)p->l->faces->n;
+    sums_of(p->l->faces, id);
+    for (int k = 0; k < 3; k++)
+        p->corners[k][face] = view->tri[3 * (int64_t)id + k];
+    p->column[face] = column, p->row[face] = (int32_t)row;
+    return face;
 }
 
-/* Forgets what lies below a row. */
-static void slide_windows(loss_windows *w, int64_t base, int64_t end)
+/* Lists runs, row by row, and faces in the order of their first pixels. */
+static void list_faces(loss_pass *p)
 {
-    for (int k = 0; k < N_KEPT_WINDOWS; k++)
-        memmove(w->rows[k], w->rows[k] + (base - w->base) * w->n_bytes[k], (size_t)((end - base) * w->n_bytes[k]));
-    w->base = base;
-}
-
-TL_INLINE tl_grad_view rows_of(const tl_grad_view *view, int64_t first, int64_t end)
-{
-    tl_grad_view rows = *view;
-    rows.first_row = first, rows.end_row = end;
-    return rows;
-}
-
-static void show_rows(const tl_grad_view *view, const tl_grad_loss *l, const loss_windows *w)
-{
-    const tl_grad_values values = {.attr = l->attr,
-                                   .n_attr = l->n_attr,
-                                   .n_columns = l->n_columns,
-                                   .rast = window_of(w, WINDOW_RAST),
-                                   .out = window_of(w, WINDOW_COLOR)};
-    grad_points(view, l->ids, l->step, l->first_id, window_of(w, WINDOW_RAST), 0);
-    grad_values(view, &values);
-}
-
-TL_INLINE double compare_row(const void *out, const void *target, void *g_out, int64_t n, double scale, int is_f64)
-{
-    double sum = 0.0;
-    for (int64_t i = 0; i < n; i++) {
-        const double step = is_f64 ? ((const double *)out)[i] - ((const double *)target)[i]
-                                   : (double)(((const float *)out)[i] - ((const float *)target)[i]);
-        sum += step * step;
-        put_real(g_out, i, is_f64 ? step * scale : (double)((float)step * (float)scale), is_f64);
+    int32_t *ids = p->l->edges.ids;
+    int64_t n_runs = 0;
+    for (int64_t row = p->all.first_row; row < p->all.end_row; row++) {
+        const int64_t first = n_runs;
+        vi before = vi_set1(INT32_MIN);
+        p->row_runs[row - p->all.first_row] = n_runs;
+        copy_ids(p, row, ids);
+        for (int64_t x = 0; x < p->view->width; x += TL_LANES) {
+            const vi id = vi_load(ids + x);
+            const vm starts = vm_and_not(vm_first(p->view->width - x), vi_eq(id, vi_shift_in(id, before)));
+            vi_compress(p->begins + n_runs, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
+            n_runs += __builtin_popcount(vm_bits(starts));
+            before = id;
+        }
+        for (int64_t r = first; r < n_runs; r++)
+            p->faces[r] = 2 * find_face(p, ids[p->begins[r]], p->begins[r], row);
     }
+    p->row_runs[p->all.end_row - p->all.first_row] = n_runs;
+    for (int k = 0; k < TL_IDS_ROOM; k++) {
+        const int64_t at = p->l->faces->n + k;
+        p->corners[0][at] = p->corners[1][at] = p->corners[2][at] = p->column[at] = p->row[at] = 0;
+    }
+}
+
+/* Planes of TL_LANES faces: of the weights, of z/w and of the total. */
+TL_INLINE void set_face_planes(const loss_pass *p, int64_t first, vd planes[FACE_PLANE])
+{
+    const tl_grad_view *view = p->view;
+    const int32_t *const corners[3] = {p->corners[0] + first, p->corners[1] + first, p->corners[2] + first};
+    const vd steps[3] = {vd_set1(2.0 * view->scale[0]), vd_set1(2.0 * view->scale[1]), vd_set1(1.0)};
+    vd q[3][3], z[3], w[3];
+    load_triangles(view, corners, middles_at(view, 0, vi_load(p->column + first)),
+                   middles_at(view, 1, vi_load(p->row + first)), q, z, w);
+    const vd inverse = vd_div(vd_set1(1.0), one_for_zero(sum_of_three(q[0][2], q[1][2], q[2][2])));
+    const vd under = one_for_zero(sum_of_three(vd_mul(w[0], q[0][2]), vd_mul(w[1], q[1][2]), vd_mul(w[2], q[2][2])));
+    for (int c = 0; c < 3; c++) {
+        const vd unit = vd_mul(inverse, steps[c]);
+        const vd over = sum_of_three(vd_mul(z[0], q[0][c]), vd_mul(z[1], q[1][c]), vd_mul(z[2], q[2][c]));
+        planes[4 * c + FACE_U] = vd_mul(q[0][c], unit), planes[4 * c + FACE_V] = vd_mul(q[1][c], unit);
+        planes[4 * c + FACE_ZW] = vd_mul(vd_div(over, under), steps[c]);
+        planes[4 * c + FACE_TOTAL] = vd_mul(sum_of_three(q[0][c], q[1][c], q[2][c]), unit);
+    }
+}
+
+/* Stores planes of lanes. */
+TL_INLINE void store_planes(const loss_pass *p, int64_t first, int64_t at, const vd planes[FACE_PLANE])
+{
+    const tl_grad_sums *faces = p->l->faces;
+    double some[FACE_PLANE][TL_MAX_LANES];
+    for (int k = 0; k < FACE_PLANE; k++)
+        vd_store(some[k], planes[k]);
+    for (int64_t i = 0; i < TL_LANES && first + i < faces->n; i++)
+        for (int k = 0; k < FACE_PLANE; k++)
+            faces->sums[(first + i) * faces->n_columns + at + k] = some[k][i];
+}
+
+/* Planes of each three attributes are those less that of the last corner. */
+TL_INLINE void set_attr_planes(const loss_pass *p, int64_t first, int64_t column, vd planes[FACE_PLANE])
+{
+    const int64_t n_columns = p->l->n_columns;
+    const vm m = vm_first(p->l->faces->n - first);
+    vd attr[3][FACE_PLANE];
+    for (int c = 0; c < 3; c++) {
+        vd at[3];
+        for (int k = 0; k < 3; k++) {
+            const vi row = vi_mul(vi_load(p->corners[k] + first), vi_set1((int32_t)n_columns));
+            at[k] = vd_from_vf(vf_of_bits(
+                vi_gather(column + c < n_columns ? m : vm_first(0), (const int32_t *)p->l->attr + column + c, row)));
+        }
+        const vd by_u = vd_sub(at[0], at[2]), by_v = vd_sub(at[1], at[2]);
+        for (int j = 0; j < 3; j++)
+            attr[c][j] = vd_add(vd_mul(by_u, planes[4 * j + FACE_U]), vd_mul(by_v, planes[4 * j + FACE_V]));
+    }
+    for (int c = 0; c < 3; c++)
+        for (int j = 0; j < 3; j++)
+            planes[4 * j + c] = attr[c][j];
+}
+
+static void set_up_faces(const loss_pass *p)
+{
+    for (int64_t first = 0; first < p->l->faces->n; first += TL_LANES) {
+        vd of_points[FACE_PLANE], planes[FACE_PLANE];
+        set_face_planes(p, first, of_points);
+        store_planes(p, first, 0, of_points);
+        for (int64_t c = 0; c < p->l->n_columns; c += 3) {
+            memcpy(planes, of_points, sizeof planes);
+            set_attr_planes(p, first, c, planes);
+            store_planes(p, first, FACE_PLANE + 8 * c, planes);
+        }
+    }
+}
+
+/* The planes and sums of a face: of points, then of each three attributes those and sums of as many. */
+TL_INLINE double *face_at(const loss_pass *p, int64_t face)
+{
+    return p->l->faces->sums + face * p->l->faces->n_columns;
+}
+TL_INLINE double zw_at(const loss_pass *p, int32_t id, int64_t column, int64_t row)
+{
+    const int32_t face = p->l->faces->slot_of[id];
+    const double *plane = face_at(p, face) + FACE_ZW;
+    return plane[8] + plane[0] * (double)(column - p->column[face]) + plane[4] * (double)(row - p->row[face]);
+}
+
+/* Finds the pairs of a row of ids with others; returns how many there are then. */
+static int64_t meet_pairs(const loss_pass *p, const meeting *m, int64_t n, int64_t n_pairs)
+{
+    int32_t *columns = p->l->edges.ids + 2 * (p->view->width + TL_IDS_ROOM);
+    const int64_t n_listed = list_pairs(m->edges, m->ids, m->others, n, columns);
+    for (int64_t i = 0; i < n_listed; i++) {
+        const int64_t x = columns[i];
+        const int32_t id = m->ids[x], other = m->others[x];
+        const int is_flipped = id < 0 || (other >= 0 && (float)zw_at(p, other, x + !m->axis, m->row + m->axis) <
+                                                            (float)zw_at(p, id, x, m->row));
+        n_pairs += meet_pair(m, x, is_flipped, p->pairs + n_pairs);
+    }
+    return n_pairs;
+}
+
+static void list_met_pairs(const loss_pass *p)
+{
+    const int64_t width = p->view->width, lowest = p->all.first_row;
+    int64_t n = 0;
+    for (int64_t row = lowest; row < p->all.end_row; row++) {
+        int32_t *ids = p->l->edges.ids + row % 2 * (width + TL_IDS_ROOM);
+        const int32_t *below = p->l->edges.ids + (row + 1) % 2 * (width + TL_IDS_ROOM);
+        copy_ids(p, row, ids);
+        p->row_pairs[row - lowest] = n;
+        if (row > lowest)
+            n = meet_pairs(p, &(meeting){&p->all, &p->l->edges, 0, row - 1, 1, below, ids}, width, n);
+        n = meet_pairs(p, &(meeting){&p->all, &p->l->edges, 0, row, 0, ids, ids + 1}, width - 1, n);
+    }
+    p->row_pairs[p->all.end_row - lowest] = n;
+}
+
+/* Blends the pairs of a row, or leads them back. */
+static void blend_row(const loss_pass *p, const tl_grad_view *view, int64_t row, int is_back)
+{
+    const int64_t before = p->base * p->view->width * p->l->n_columns;
+    tl_grad_edges e = p->l->edges;
+    e.color = (const void *)((uintptr_t)p->colors - 4 * (uintptr_t)before);
+    e.out = (void *)((uintptr_t)p->g_out - 4 * (uintptr_t)before);
+    e.g_out = is_back ? e.out : 0;
+    e.g_color = (void *)((uintptr_t)p->g_color - 4 * (uintptr_t)before);
+    row -= p->all.first_row;
+    for (int64_t i = p->row_pairs[row]; i < p->row_pairs[row + 1]; i++)
+        blend_pair(view, &e, p->pairs + i, p->l->of_points, 0);
+}
+
+/* A plane of a face from a pixel on, x and y off its first one. */
+TL_INLINE run_plane plane_of_face(const double *plane, int64_t x, int64_t y)
+{
+    const four by_x = TL_FOUR(plane), begin = TL_FOUR(plane + 8) + by_x * (double)x + TL_FOUR(plane + 4) * (double)y;
+    return (run_plane){vq4_all(__builtin_convertvector(begin, vq)), vq4_all(__builtin_convertvector(by_x, vq))};
+}
+
+/* Whether a pixel lies well within its triangle. */
+TL_INLINE int is_within(const double *face, int64_t x, int64_t y)
+{
+    const four at = TL_FOUR(face + 8) + TL_FOUR(face) * (double)x + TL_FOUR(face + 4) * (double)y;
+    return at[FACE_U] > 0.0 && at[FACE_V] > 0.0 && at[FACE_U] + at[FACE_V] < TL_ALMOST_ONE * at[FACE_TOTAL];
+}
+
+/* `rast` of a run that is clamped somewhere, of which row 0 of the picture would stand there. */
+static const float *points_of_clamped(const loss_pass *p, const pixel_run *run)
+{
+    void *const out[2] = {(void *)((uintptr_t)p->l->rast - 16 * (uintptr_t)(run->row * p->view->width)), 0};
+    grad_triangle t;
+    load_seen_triangle(p->view, run->id, middle_at(p->view, 0, run->column), middle_at(p->view, 1, run->row), &t, 0);
+    for (int64_t i = 0; i < run->n; i++)
+        store_point(p->view, &t, run, i, 2.0 * p->view->scale[0] * (double)i, out, 0);
+    return out[0];
+}
+
+/* Run r of a row, the face's. */
+TL_INLINE pixel_run run_of_face(const loss_pass *p, int64_t r, int64_t end, int64_t row)
+{
+    const int32_t face = p->faces[r] >> 1;
+    const int64_t column = p->begins[r];
+    return (pixel_run){.id = face < 0 ? -1 : p->l->faces->rows[face],
+                       .row = row,
+                       .column = column,
+                       .at = row * p->view->width + column,
+                       .n = (r + 1 < end ? p->begins[r + 1] : p->view->width) - column};
+}
+
+static void draw_clamped(const loss_pass *p, const pixel_run *run, float *colors)
+{
+    const int64_t n = p->l->n_columns;
+    int64_t rows[3];
+    const tl_grad_values v = {.attr = p->l->attr,
+                              .rast = points_of_clamped(p, run),
+                              .out = (void *)((uintptr_t)colors - 4 * (uintptr_t)(n * run->row * p->view->width))};
+    attr_rows(p->view, run->id, n, rows);
+    for (int64_t c = 0; c < n; c += TL_FEW_COLUMNS)
+        values_of_run(&v, run, rows, c, n - c < TL_FEW_COLUMNS ? (int)(n - c) : TL_FEW_COLUMNS, n, 0);
+}
+
+/* n of n_columns attributes from `first` on at the pixels of a run; x and y off the first pixel of the face. */
+TL_INLINE void draw_three(const loss_pass *p, int32_t face, int64_t first, int n, int64_t n_columns, int64_t x,
+                          int64_t y, int64_t n_pixels, float *colors)
+{
+    const float *attr = (const float *)p->l->attr + n_columns * p->corners[2][face] + first;
+    const double *planes = face_at(p, face) + FACE_PLANE + 8 * first;
+    const vq4 last = vq4_all(vq_load_some(attr, n));
+    for (int64_t begin = 0; begin < n_pixels; begin += TL_SUMMED) {
+        const run_plane plane = plane_of_face(planes, x + begin, y);
+        for (int i = 0; i < TL_SUMMED && begin + i < n_pixels; i += 4) {
+            const vq4 at = plane_at_pixels(&plane, i);
+            const vq4 color = vq4_add(vq4_mul(at, vq4_inverse_of_last(at)), last);
+            const int64_t n_left = n_pixels - begin - i;
+            float some[16], *to = colors + n_columns * (begin + i) + first;
+            vq4_store(n == n_columns ? to : some, color, n_left, n);
+            for (int64_t k = 0; n < n_columns && k < 4 && k < n_left; k++)
+                memcpy(to + n_columns * k, some + n * k, (size_t)n * sizeof *some);
+        }
+    }
+}
+
+TL_INLINE void draw_row(const loss_pass *p, int64_t row, int64_t n_columns)
+{
+    const int64_t end = p->row_runs[row + 1 - p->all.first_row], n = p->view->width * n_columns;
+    float *colors = p->colors + (row - p->base) * n;
+    for (int64_t r = p->row_runs[row - p->all.first_row]; r < end; r++) {
+        const pixel_run run = run_of_face(p, r, end, row);
+        float *to = colors + n_columns * run.column;
+        const int32_t face = p->faces[r] >> 1;
+        if (run.id < 0) {
+            memset(to, 0, (size_t)(n_columns * run.n) * sizeof *to);
+            continue;
+        }
+        const int64_t x = run.column - p->column[face], y = row - p->row[face];
+        if (!is_within(face_at(p, face), x, y) || !is_within(face_at(p, face), x + run.n - 1, y)) {
+            p->faces[r] |= 1;
+            draw_clamped(p, &run, colors);
+            continue;
+        }
+        for (int64_t c = 0; c < n_columns; c += 3)
+            draw_three(p, face, c, n_columns - c < 3 ? (int)(n_columns - c) : 3, n_columns, x, y, run.n, to);
+    }
+    memcpy(p->g_out + (row - p->base) * n, colors, (size_t)n * sizeof *colors);
+}
+
+/* Writes the gradient of a row over the row, and again; returns the sum of squares, in sixteen parts. */
+static double compare_row(const loss_pass *p, int64_t row)
+{
+    const int64_t n = p->view->width * p->l->n_columns;
+    float *restrict out = p->g_out + (row - p->base) * n, *restrict again = p->g_color + (row - p->base) * n;
+    const float *restrict target = p->l->target + row * n;
+    const float scale = (float)p->l->scale;
+    double sums[16] = {0}, sum = 0.0;
+    int64_t i = 0;
+    for (; i + 16 <= n; i += 16)
+        for (int k = 0; k < 16; k++) {
+            const float step = out[i + k] - target[i + k];
+            sums[k] += (double)step * (double)step;
+            out[i + k] = again[i + k] = step * scale;
+        }
+    for (; i < n; i++) {
+        const float step = out[i] - target[i];
+        sums[i % 16] += (double)step * (double)step;
+        out[i] = again[i] = step * scale;
+    }
+    for (int k = 0; k < 16; k++)
+        sum += sums[k];
     return sum;
 }
 
-/* Smooths rows and compares them; returns the sum of squares of those of the band. */
-static double compare_rows(const tl_grad_view *view, const tl_grad_loss *l, const loss_windows *w,
-                           const tl_grad_view *band)
+static tl_grad_colors colors_of(const loss_pass *p)
 {
-    tl_grad_edges e = l->edges;
-    double sum = 0.0;
-    e.rast = window_of(w, WINDOW_RAST), e.color = window_of(w, WINDOW_COLOR), e.out = window_of(w, WINDOW_OUT);
-    smooth_rows(view, &e, 0);
-    for (int64_t row = view->first_row; row < view->end_row; row++) {
-        const int64_t at = (row - w->base) * w->n_bytes[WINDOW_OUT], n = l->n_columns * view->width;
-        const char *target = (const char *)l->target + row * w->n_bytes[WINDOW_OUT];
-        const char *out = w->rows[WINDOW_OUT] + at;
-        const double found = view->is_f64 ? compare_row(out, target, w->rows[WINDOW_G_OUT] + at, n, l->scale, 1)
-                                          : compare_row(out, target, w->rows[WINDOW_G_OUT] + at, n, l->scale, 0);
-        sum += row >= band->first_row && row < band->end_row ? found : 0.0;
-    }
-    return sum;
-}
-
-/* The gradient of a picture of attributes; of float32 at once to the vertices. */
-static tl_grad_colors colors_of(const tl_grad_view *view, const tl_grad_loss *l, const loss_windows *w)
-{
+    const tl_grad_loss *l = p->l;
+    const int64_t before = p->base * p->view->width * l->n_columns;
     return (tl_grad_colors){.values = {.attr = l->attr,
                                        .n_attr = l->n_attr,
                                        .n_columns = l->n_columns,
-                                       .rast = window_of(w, WINDOW_RAST),
-                                       .out = window_of(w, WINDOW_G_COLOR),
-                                       .g_rast = window_of(w, WINDOW_G_RAST)},
-                            .corners = view->tri,
+                                       .out = (void *)((uintptr_t)p->g_color - 4 * (uintptr_t)before)},
+                            .corners = p->view->tri,
                             .faces = l->faces,
                             .vertices = l->of_points,
                             .attr = l->of_attr};
 }
 
-static void pull_rows(const tl_grad_view *view, const tl_grad_loss *l, const loss_windows *w)
+/* Adds the gradients of a row to the sums of its faces. */
+TL_INLINE void pull_row(const loss_pass *p, int64_t row, int64_t n_columns)
 {
-    tl_grad_edges e = l->edges;
-    const tl_grad_colors colors = colors_of(view, l, w);
-    const tl_grad_values *values = &colors.values;
-    e.rast = values->rast, e.color = window_of(w, WINDOW_COLOR);
-    e.g_out = window_of(w, WINDOW_G_OUT), e.g_color = values->out;
-    smooth_rows(view, &e, l->of_edges);
-    if (!view->is_f64) {
-        pull_colors(view, &colors);
-        return;
+    const int64_t end = p->row_runs[row + 1 - p->all.first_row];
+    const float *g_color = p->g_color + (row - p->base) * p->view->width * n_columns;
+    for (int64_t r = p->row_runs[row - p->all.first_row]; r < end; r++) {
+        const pixel_run run = run_of_face(p, r, end, row);
+        const int32_t face = p->faces[r] >> 1;
+        if (run.id < 0)
+            continue;
+        if (p->faces[r] & 1) {
+            tl_grad_colors colors = colors_of(p);
+            colors.values.rast = points_of_clamped(p, &run);
+            pull_clamped(p->view, &colors, &run);
+            continue;
+        }
+        const int64_t x = run.column - p->column[face], y = row - p->row[face];
+        for (int64_t c = 0; c < n_columns; c += 3) {
+            double *planes = face_at(p, face) + FACE_PLANE + 8 * c, *moments = planes + FACE_PLANE;
+            for (int64_t first = 0; first < run.n; first += TL_SUMMED) {
+                const run_plane plane = plane_of_face(planes, x + first, y);
+                const float *g = g_color + n_columns * (run.column + first) + c;
+                vq4 sums[2];
+                sum_up_pixels(&plane, 0, g, (int)(run.n - first), n_columns - c < 3 ? (int)(n_columns - c) : 3,
+                              n_columns, sums);
+                const four whole = __builtin_convertvector(vq4_fold(sums[0]), four);
+                TL_FOUR(moments) += __builtin_convertvector(vq4_fold(sums[1]), four) + whole * (double)(x + first);
+                TL_FOUR(moments + 4) += whole * (double)y;
+                TL_FOUR(moments + 8) += whole;
+            }
+        }
     }
-    pull_value_rows(view, values, l->of_attr);
-    pull_point_rows(view, &(tl_grad_points){.rast = values->rast, .g_rast = values->g_rast, .faces = l->faces});
+}
+
+/* Ends a band: from sums of faces to those of corners. */
+static void close_faces(const loss_pass *p)
+{
+    const tl_grad_colors colors = colors_of(p);
+    for (int64_t i = 0; i < p->l->faces->n; i++) {
+        face_at(p, i)[0] = middle_at(p->view, 0, p->column[i]);
+        face_at(p, i)[1] = middle_at(p->view, 1, p->row[i]);
+    }
+    close_colors(p->view, &colors, 2 * FACE_PLANE, 2 * FACE_PLANE, 1);
+}
+
+/* Rows drawn, compared and led back, one after the other. */
+TL_INLINE double pass_rows(loss_pass *p, int64_t n_columns)
+{
+    const tl_grad_view *view = p->view;
+    const int64_t n = view->width * n_columns;
+    const int64_t compared = view->first_row > 0 ? view->first_row - 1 : 0;
+    const int64_t compared_end = view->end_row < view->height ? view->end_row + 1 : view->height;
+    double sum = 0.0;
+    for (int64_t row = p->all.first_row; row < view->end_row + 2; row++) {
+        if (row - p->base == TL_LOSS_WINDOW) { /* two rows stay */
+            float *const windows[3] = {p->colors, p->g_out, p->g_color};
+            for (int k = 0; k < 3; k++)
+                memcpy(windows[k], windows[k] + (TL_LOSS_WINDOW - 2) * n, (size_t)(2 * n) * sizeof(float));
+            p->base = row - 2;
+        }
+        if (row < p->all.end_row) {
+            draw_row(p, row, n_columns);
+            blend_row(p, &p->all, row, 0);
+        }
+        if (row > compared && row <= compared_end) {
+            const double found = compare_row(p, row - 1);
+            sum += row > view->first_row && row <= view->end_row ? found : 0.0;
+            if (row > view->first_row)
+                blend_row(p, view, row - 1, 1);
+        }
+        if (row - 2 >= view->first_row)
+            pull_row(p, row - 2, n_columns);
+    }
+    return sum;
 }
 
 /* See kernels.h. */
 static double grad_loss(const tl_grad_view *view, const tl_grad_loss *l)
 {
-    const int64_t lowest = view->first_row > 2 ? view->first_row - 2 : 0;
-    int64_t n_drawn = lowest, n_compared = view->first_row > 1 ? view->first_row - 1 : 0;
-    loss_windows w = open_windows(view, l, lowest);
-    double sum = 0.0;
-    for (int64_t row = view->first_row; row < view->end_row; row += TL_LOSS_ROWS) {
-        const int64_t end = row + TL_LOSS_ROWS < view->end_row ? row + TL_LOSS_ROWS : view->end_row;
-        const int64_t to_draw = end + 2 < view->height ? end + 2 : view->height;
-        const int64_t to_compare = end + 1 < view->height ? end + 1 : view->height;
-        tl_grad_view rows = rows_of(view, n_drawn, to_draw);
-        show_rows(&rows, l, &w);
-        rows = rows_of(view, n_compared, to_compare);
-        sum += compare_rows(&rows, l, &w, view);
-        rows = rows_of(view, row, end);
-        pull_rows(&rows, l, &w);
-        n_drawn = to_draw, n_compared = to_compare;
-        slide_windows(&w, end - 1, n_drawn);
+    loss_pass p = open_loss(view, l);
+    double sum;
+    list_faces(&p);
+    set_up_faces(&p);
+    list_met_pairs(&p);
+    switch (l->n_columns) {
+    case 1: sum = pass_rows(&p, 1); break;
+    case 3: sum = pass_rows(&p, 3); break;
+    default: sum = pass_rows(&p, l->n_columns);
     }
-    if (view->is_f64) {
-        close_points(view, &(tl_grad_points){.faces = l->faces, .vertices = l->of_points});
-        leave_band(l->faces);
-        leave_band(l->of_attr);
-    } else {
-        const tl_grad_colors colors = colors_of(view, l, &w);
-        close_colors(view, &colors);
-    }
-    leave_band(l->of_edges);
+    close_faces(&p);
     return sum;
 }
 

@@ -150,6 +150,13 @@ TL_INLINE void leave_band(tl_grad_sums *sums)
         sums->slot_of[sums->rows[i]] = -1;
 }
 
+/* Ends a band whose sums are not needed any longer. */
+TL_INLINE void forget_band(tl_grad_sums *sums)
+{
+    leave_band(sums);
+    sums->n = 0;
+}
+
 TL_INLINE int32_t clamped_to_int(int64_t a) { return a < INT32_MAX ? (int32_t)a : INT32_MAX; }
 
 TL_INLINE double clamped(double a, double low, double high) { return a < low ? low : a > high ? high : a; }

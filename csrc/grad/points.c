@@ -122,17 +122,21 @@ enum {
     POINT_ZW_X
 };
 
-/* q_k of the triangles of TL_LANES runs about their first pixels, as load_seen_triangle has them; z and w. */
-TL_INLINE void load_run_triangles(const tl_grad_view *view, const grad_span *s, int r, vd q[3][3], vd *z, vd *w)
+/* The middles of some columns or rows. */
+TL_INLINE vd middles_at(const tl_grad_view *view, int axis, vi i)
 {
-    const vd columns = vd_from_vi(vi_add(vi_load(s->begins + r), vi_set1((int32_t)s->first)));
-    const vd middle = vd_add(vd_mul(vd_set1(2.0), columns), vd_set1(1.0));
-    const vd x0 = vd_add(vd_mul(middle, vd_set1(view->scale[0])), vd_set1(view->shift[0]));
-    const vd y0 = vd_set1(middle_at(view, 1, s->row));
+    const vd middle = vd_add(vd_mul(vd_set1(2.0), vd_from_vi(i)), vd_set1(1.0));
+    return vd_add(vd_mul(middle, vd_set1(view->scale[axis])), vd_set1(view->shift[axis]));
+}
+
+/* q_k of TL_LANES triangles about x0, y0, as load_seen_triangle has them; z and w. */
+TL_INLINE void load_triangles(const tl_grad_view *view, const int32_t *const corners[3], vd x0, vd y0, vd q[3][3],
+                              vd *z, vd *w)
+{
     vd x[3], y[3];
     for (int k = 0; k < 3; k++) {
         vi bits[4];
-        vi_load_records(view->pos, 16, s->corners[k] + r, bits);
+        vi_load_records(view->pos, 16, corners[k], bits);
         z[k] = vd_from_vf(vf_of_bits(bits[2])), w[k] = vd_from_vf(vf_of_bits(bits[3]));
         x[k] = vd_sub(vd_from_vf(vf_of_bits(bits[0])), vd_mul(x0, w[k]));
         y[k] = vd_sub(vd_from_vf(vf_of_bits(bits[1])), vd_mul(y0, w[k]));
@@ -170,7 +174,9 @@ TL_INLINE void set_point_numbers(const tl_grad_view *view, grad_span *s, double 
                 vf_store(s->numbers[k] + r, vf_set1(0.0f));
             continue;
         }
-        load_run_triangles(view, s, r, q, z, w);
+        const int32_t *const corners[3] = {s->corners[0] + r, s->corners[1] + r, s->corners[2] + r};
+        const vd x0 = middles_at(view, 0, vi_add(vi_load(s->begins + r), vi_set1((int32_t)s->first)));
+        load_triangles(view, corners, x0, vd_set1(middle_at(view, 1, s->row)), q, z, w);
         for (int c = 0; c < 3; c++)
             sum[c] = sum_of_three(q[0][c], q[1][c], q[2][c]);
         const vd inverse = vd_div(vd_set1(1.0), one_for_zero(sum[2]));
@@ -532,7 +538,7 @@ static int64_t grad_points_vjp(const tl_grad_view *view, const tl_grad_points *p
 {
     const int64_t bad_id = pull_point_rows(view, p);
     close_points(view, p);
-    leave_band(p->faces);
+    forget_band(p->faces);
     return bad_id;
 }
 

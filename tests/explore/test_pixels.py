@@ -200,37 +200,6 @@ def test_probe_tells_of_gaps():
     )
 
 
-# Edits
-
-
-def edited(what, triangle=0, **more):
-    return ask("pixels.edit", state=SQUARE | more, what=what, triangle=triangle).header
-
-
-def test_edits_make_states_that_can_be_drawn():
-    n = [len(edited(what)["state"]["triangles"]) for what in ("add", "split", "flip", "remove")]
-    assert n == [3, 4, 2, 1]
-    assert edited("flip", 1)["state"]["triangles"] == [[0, 1, 2], [1, 2, 3]]
-    assert edited("remove", 1) | {"id": 0} == {
-        "state": {"vertices": SQUARE["vertices"][:3], "triangles": [[0, 1, 2]]}, "triangle": 0, "id": 0,
-    }  # fmt: skip
-    for what in ("add", "split", "flip", "remove"):
-        draw(SQUARE | edited(what)["state"])
-    assert edited("add", None, vertices=[], triangles=[])["triangle"] == 0
-
-
-def test_split_triangle_covers_the_same_pixels():
-    before, after = draw(SQUARE).arrays["a_counts"], draw(SQUARE | edited("split")["state"]).arrays["a_counts"]
-    assert (before == after).all()
-
-
-@pytest.mark.parametrize(
-    ("what", "triangle"), [("flip", 2), ("split", -1), ("remove", None), ("remove", True), ("x", 0)]
-)
-def test_edit_that_is_none_is_refused(what, triangle):
-    assert "must be" in edited(what, triangle)["error"]
-
-
 # Files
 
 

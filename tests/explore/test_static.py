@@ -210,13 +210,6 @@ def test_window_far_away_is_that_of_python(ask):
     check(ask, [{"do": "pixels.draw", "state": state | more} for more in ({"exact": True}, {"subpixel_bits": "exact"})])
 
 
-def test_edits_are_those_of_python(ask):
-    words = [("add", 0), ("split", 0), ("flip", 1), ("remove", 0), ("remove", 1), ("split", 7), ("flip", None)]
-    check(
-        ask, [{"do": "pixels.edit", "state": one, "what": w, "triangle": i} for w, i in words for one in (SQUARE, DEEP)]
-    )
-
-
 BAD_STATES = [
     {"size": [300, 2]}, {"size": [1.5, 2]}, {"size": 3}, {"origin": [2**60, 0]},
     {"vertices": [[1, 2], [3, 4, 5], [0, 0]]},

@@ -347,9 +347,8 @@ def squares(
     """Return the mean squared difference from pictures, and the gradients of `pos` and `attr`."""
     n_rows = min(pos.shape[1], attr.shape[1])
     grid = replace(grid_of(tri, ids, n_rows), threads=threads_of(threads, ids.numel()))
-    edges, pictures = tensors.Outline(*map(numpy_of, outline)), [(one, 0) for one in numpy_of(ids)]
-    arrays = numpy_of(attr), numpy_of(target)
-    loss, *gradients = tensors.squares(grid, EdgeRule(rule), edges, numpy_of(pos), pictures, *arrays, is_flipped=True)
+    edges = tensors.Outline(*map(numpy_of, outline))
+    loss, *gradients = tensors.squares(grid, EdgeRule(rule), edges, *map(numpy_of, (pos, ids, attr, target)))
     g_pos, g_attr = map(torch.from_numpy, gradients)
     return torch.tensor(loss, dtype=pos.dtype), g_pos, g_attr
 

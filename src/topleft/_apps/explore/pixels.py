@@ -317,45 +317,4 @@ def methods() -> list[dict[str, Any]]:
     ]
 
 
-def edit(_: Session, request: Request) -> Reply:
-    """Return a state with a triangle added, split, flipped or removed, and the triangle that is edited next."""
-    given = request["state"]
-    parse_state(given)
-    vertices, triangles = list(given["vertices"]), list(given["triangles"])
-    what, chosen = request.get("what"), request.get("triangle")
-    if what == "add":
-        chosen = len(triangles)
-        triangles.append(list(range(len(vertices), len(vertices) + 3)))
-        vertices += new_triangle(given)
-    elif type(chosen) is not int or not 0 <= chosen < len(triangles):
-        raise ValueError(f"triangle must be from 0 to {len(triangles) - 1}, got {str(chosen)[:20]}")
-    elif what == "split":
-        a, b, c = triangles[chosen]
-        n = len(vertices)
-        triangles[chosen : chosen + 1] = [[a, b, n], [b, c, n], [c, a, n]]
-        vertices.append(
-            [round(sum(values) / 3 * 256) / 256 for values in zip(*(vertices[i] for i in (a, b, c)), strict=True)]
-        )
-    elif what == "flip":
-        a, b, c = triangles[chosen]
-        triangles[chosen] = [a, c, b]
-    elif what == "remove":
-        del triangles[chosen]
-        used = sorted({i for row in triangles for i in row})
-        triangles = [[used.index(i) for i in row] for row in triangles]
-        vertices = [vertices[i] for i in used]
-    else:
-        raise ValueError(f"what must be one of 'add', 'split', 'flip', 'remove', got {str(what)[:20]!r}")
-    chosen = max(0, min(chosen, len(triangles) - 1))
-    return Reply({"state": {"vertices": vertices, "triangles": triangles}, "triangle": chosen})
-
-
-def new_triangle(given: dict[str, Any]) -> list[list[float]]:
-    """Three vertices in the middle of the window, at the depth of the first one."""
-    x, y = (first + n // 2 for first, n in zip(given.get("origin", (0, 0)), given["size"], strict=True))
-    r = max(2, min(given["size"]) // 4)
-    depth = given["vertices"][0][2:] if given["vertices"] else []
-    return [[x - r, y + r, *depth], [x, y - r, *depth], [x + r, y + r, *depth]]
-
-
-HANDLERS = {"pixels.edit": edit, "pixels.draw": draw_all, "pixels.plan": explain, "pixels.scene": take_scene}
+HANDLERS = {"pixels.draw": draw_all, "pixels.plan": explain, "pixels.scene": take_scene}

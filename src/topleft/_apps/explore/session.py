@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 
 from topleft import Mesh
 
-SCRIPTS = ("line.js", "elements.js", "mesh_part.js", "pixels_part.js", "race_part.js", "steps_part.js", "explore.js")
+SCRIPTS = (
+    "line.js", "elements.js", "edits.js", "mesh_part.js", "pixels_part.js", "race_part.js", "steps_part.js",
+    "explore.js",
+)  # fmt: skip
 """The modules of the page, each behind those that it imports."""
 
 Request = dict[str, Any]

@@ -260,15 +260,7 @@ def as_seconds(time: float) -> float:
 
 
 def as_crease(value: float) -> float:
-    """Return a crease angle, degrees.
-
-    Raises
-    ------
-    TypeError
-        If it is no number.
-    ValueError
-        If it is outside of 0 to 180.
-    """
+    """Return a crease angle, degrees."""
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(f"crease must be an angle in degrees, got {value!r}")
     if not 0 <= value <= 180:
@@ -477,15 +469,7 @@ def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDA
 
 
 def as_point_size(name: str, value: ArrayLike, n_points: int) -> float | NDArray[np.float64]:
-    """Return a positive size, or one of each point, (N,) float64.
-
-    Raises
-    ------
-    ValueError
-        If there is another number of them, or one is not positive.
-    TypeError
-        If they are no real numbers.
-    """
+    """Return a positive size, or one of each point, (N,) float64."""
     array = as_array(name, value)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name} must hold real numbers, got {array.dtype}")

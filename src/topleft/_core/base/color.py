@@ -111,13 +111,7 @@ def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
 
 
 def color_of_name(name: str, text: str) -> tuple[int, int, int, int]:
-    """Red, green, blue and alpha of 0 to 255 of a colour by its name.
-
-    Raises
-    ------
-    ValueError
-        If no colour is called so.
-    """
+    """Red, green, blue and alpha of 0 to 255 of a colour by its name."""
     from PIL import ImageColor  # which colours as numbers do without
 
     try:

@@ -32,13 +32,7 @@ DIMENSIONS = ({"x", "lon", "longitude", "easting", "projection_x_coordinate"},
 
 
 def crs_text(crs: Any) -> str | None:
-    """A CRS as text: that of rasterio, pyproj, geopandas, an EPSG code, a name or WKT.
-
-    Raises
-    ------
-    TypeError
-        If it is none of these.
-    """
+    """A CRS as text: that of rasterio, pyproj, geopandas, an EPSG code, a name or WKT."""
     if crs is None or isinstance(crs, str):
         return f"EPSG:{crs}" if crs and crs.isdecimal() else crs or None
     if isinstance(crs, int) and not isinstance(crs, bool):
@@ -59,15 +53,7 @@ def is_same_crs(one: str, other: str) -> bool:
 
 
 def transformed(points: Array, own: str, crs: str) -> F64:
-    """Points (N, 2), x before y, of one CRS in another one.
-
-    Raises
-    ------
-    ValueError
-        If a point lies where the other CRS has none.
-    MissingPackageError
-        If pyproj is not installed.
-    """
+    """Points (N, 2), x before y, of one CRS in another one."""
     pyproj = _pyproj("another CRS")
     change = pyproj.Transformer.from_crs(_known(pyproj, own), _known(pyproj, crs), always_xy=True)
     there = np.column_stack(change.transform(points[:, 0], points[:, 1]))
@@ -106,13 +92,7 @@ def epsg_of(crs: str | int) -> tuple[int, bool]:
 
 
 def geo_tags(crs: str | int | None, transform: Six) -> Tags:
-    """The tags that say where a raster lies: size of pixels, corner, kind and EPSG code of the CRS.
-
-    Raises
-    ------
-    ValueError
-        If the CRS is unknown.
-    """
+    """The tags that say where a raster lies: size of pixels, corner, kind and EPSG code of the CRS."""
     keys = [(1025, 1)]  # a pixel is an area
     if crs is not None:
         code, is_geographic = epsg_of(crs)
@@ -204,13 +184,7 @@ def numbers_without_data(raster: Any) -> list[float]:
 
 
 def data_array(array: Any, name: str | None, x: F64, y: F64, transform: Six, crs: str | None, nodata: Any) -> Any:
-    """An `xarray.DataArray` on the centres of pixels; rioxarray reads its CRS, transform and no data.
-
-    Raises
-    ------
-    MissingPackageError
-        If xarray is not installed.
-    """
+    """An `xarray.DataArray` on the centres of pixels; rioxarray reads its CRS, transform and no data."""
     xr = xarray_module()
     a, b, c, d, e, f = transform
     attributes = {"GeoTransform": " ".join(map(repr, (c, a, b, f, d, e)))}
@@ -224,13 +198,7 @@ def data_array(array: Any, name: str | None, x: F64, y: F64, transform: Six, crs
 
 
 def xarray_module() -> Any:
-    """Import xarray.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
+    """Import xarray."""
     try:
         import xarray
     except ImportError:

@@ -113,13 +113,7 @@ def members(kind: type[Option]) -> dict[str, Option]:
 
 
 def parse(kind: type[Option], name: str, value: object) -> Option:
-    """Return the member of an enum that an option names.
-
-    Raises
-    ------
-    ValueError
-        If `value` is none of the choices.
-    """
+    """Return the member of an enum that an option names."""
     member = members(kind).get(value) if isinstance(value, str) else None
     if member is None:
         choices = ", ".join(repr(str(member)) for member in kind)
@@ -139,13 +133,7 @@ LAYER_NAMES: tuple[str, ...] = get_args(LayerOption)
 
 
 def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names of layers, each once.
-
-    Raises
-    ------
-    ValueError
-        If there is no such layer.
-    """
+    """Return names of layers, each once."""
     checked = tuple(dict.fromkeys(as_names("layers", names)))
     for name in checked:
         if name not in LAYER_NAMES:

@@ -4,7 +4,9 @@ MOST_LEVELS = TL_MOST_LEVELS
 SUMS_OF_POINTS = TL_SUMS_OF_POINTS
 SUMS_OF_THREE = TL_SUMS_OF_THREE
 IDS_ROOM = TL_IDS_ROOM
+SUMS_OF_FACE = TL_SUMS_OF_FACE
 LOSS_WINDOW = TL_LOSS_WINDOW
+PAIR_BYTES = TL_PAIR_BYTES
 
 
 cdef const void *first_of(array: object):
@@ -171,36 +173,31 @@ cdef class GradientView:
         with nogil:
             K.grad_edges(&view, &e, &sums.sums)
 
-
-    def loss(self, ids: tuple[Array, bool, int], attr: Array, mesh: tuple[Array, Array, Array], codes: tuple[int, float],
-             target: Array, scratch: tuple[Array, Array], sums: tuple[GradientSums, ...], int64_t first,
-             int64_t end) -> float:
+    def loss(self, const int32_t[:, ::1] ids, const float[:, ::1] attr, mesh: tuple[Array, Array, Array],
+             codes: tuple[int, float], const float[:, :, ::1] target, scratch: tuple[Array, ...],
+             sums: tuple[GradientSums, GradientSums, GradientSums], int64_t first, int64_t end) -> float:
         """Return the sum of squared differences of rows of a picture of `attr` (V, K) from `target`; adds gradients to sums.
 
-        `ids`: those of the picture, whether row 0 is on top, the number added to them. `mesh` and `scratch[0]` are those
-        of `edges`, `codes` the rule and the weight of squares; `scratch[1]` holds LOSS_WINDOW rows of 8 + 4 K numbers a
-        pixel. `sums`: by triangle, columns as `points_vjp` and `values` take them; by vertex, of points and of edges; by
-        row of `attr`.
+        `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, `codes` the rule and the weight of squares;
+        the rest of `scratch` is that of ``tl_grad_loss``. `sums`: by triangle, 12 columns and SUMS_OF_FACE for each three
+        attributes; by vertex; by row of `attr`.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_loss l
-        cdef const int32_t[:, ::1] rows = ids[0]
-        cdef int32_t[:, ::1] of_edges = scratch[0]
-        cdef GradientSums faces = sums[0], points = sums[1], edges = sums[2], values = sums[3]
+        cdef GradientSums faces = sums[0], points = sums[1], values = sums[2]
         cdef double found
         memset(&l, 0, sizeof(l))
-        if first >= end or view.width == 0:
+        if first >= end or view.width == 0 or attr.shape[0] == 0 or attr.shape[1] == 0:
             return 0.0
-        l.step, l.first_id = view.width, ids[2]
-        l.ids = &rows[0, 0]
-        if ids[1]:
-            l.ids, l.step = &rows[rows.shape[0] - 1, 0], -l.step
-        l.attr, l.n_attr, l.n_columns = first_of(attr), attr.shape[0], attr.shape[1]
+        l.ids, l.step = &ids[ids.shape[0] - 1, 0], -view.width
+        l.attr, l.n_attr, l.n_columns = &attr[0, 0], attr.shape[0], attr.shape[1]
         l.edges.across, l.edges.places = <const int32_t *>first_of(mesh[0]), <const double *>first_of(mesh[1])
         l.edges.outline, l.edges.rule = <const int32_t *>first_of(mesh[2]), <tl_pair_rule><int>codes[0]
-        l.edges.ids, l.edges.n_channels = &of_edges[0, 0], l.n_columns
-        l.target, l.scale, l.scratch = first_of(target), codes[1], <void *>first_of(scratch[1])
-        l.faces, l.of_points, l.of_edges, l.of_attr = &faces.sums, &points.sums, &edges.sums, &values.sums
+        l.edges.ids, l.edges.n_channels = <int32_t *>first_of(scratch[0]), l.n_columns
+        l.target, l.scale = &target[0, 0, 0], codes[1]
+        l.rows, l.pairs = <int64_t *>first_of(scratch[1]), <void *>first_of(scratch[2])
+        l.window, l.rast = <float *>first_of(scratch[3]), <float *>first_of(scratch[4])
+        l.faces, l.of_points, l.of_attr = &faces.sums, &points.sums, &values.sums
         with nogil:
             found = K.grad_loss(&view, &l)
         return found
@@ -221,7 +218,7 @@ cdef class GradientSums:
         self.sums.n, self.sums.n_columns = 0, sums.shape[1]
 
     def add_to(self, out: Array):
-        """Add the sums to the rows (N, K) that they belong to."""
+        """Add the sums to the rows (N, K) that they belong to, and forget them."""
         cdef int64_t i, c, n_columns = self.sums.n_columns
         cdef void *rows = <void *>first_of(out)
         cdef bint is_f64 = out.dtype == np.float64
@@ -234,6 +231,7 @@ cdef class GradientSums:
                         (<double *>rows)[at + c] += self.sums.sums[i * n_columns + c]
                     else:
                         (<float *>rows)[at + c] = <float>((<float *>rows)[at + c] + self.sums.sums[i * n_columns + c])
+        self.sums.n = 0
 
 
 def area_vjp(const double[:, ::1] points_px, const int32_t[:, ::1] triangles, const double[:, ::1] values or None,

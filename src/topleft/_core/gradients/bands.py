@@ -27,7 +27,7 @@ WAITING_BANDS = 4
 
 Array = NDArray[Any]
 Found = TypeVar("Found")
-Done = TypeVar("Done")
+Made = TypeVar("Made", bound=Sequence[Any])
 
 
 class Band(NamedTuple):
@@ -63,37 +63,49 @@ class Bands:
 
         rows_per_px: the most rows that a pixel has a share in.
         """
-
-        def with_sums(band: Band) -> tuple[list[engine.GradientSums], int | None]:
-            sums = sums_of(out.shape[1], out.shape[2], band, rows_per_px * self.width)
-            found = work(band, sums)
-            return [sums], found
-
-        return max((bad for bad in self.add_up_all(with_sums, [out]) if bad is not None), default=-1)
+        found = self.add_up_all(
+            lambda room: [room.sums("rows", out.shape[1], out.shape[2], rows_per_px)],
+            lambda band, sums: work(band, *sums),
+            [out],
+        )
+        return max((bad for bad in found if bad is not None), default=-1)
 
     def add_up_all(
-        self, work: Callable[[Band], tuple[Sequence[engine.GradientSums], Found]], outs: Sequence[Array]
+        self, make: Callable[[Room], Made], work: Callable[[Band, Made], Found], outs: Sequence[Array]
     ) -> list[Found]:
-        """Add the sums that `work` returns for each band to `outs`; returns its other results."""
+        """Add sums of each band to `outs`; returns what `work` does.
+
+        `make` returns what `work` takes beside a band, which some bands use one after the other: as many sums as there
+        are `outs`, then others.
+        """
         results: list[Found] = []
-        at_a_time = self.threads * WAITING_BANDS if self.threads > 1 else 1
-        for start in range(0, len(self.all), at_a_time):
-            some = self.all[start : start + at_a_time]
+        at_a_time = min(len(self.all), self.threads * WAITING_BANDS if self.threads > 1 else 1)
+        made = [make(Room(i, (self.all[0].end - self.all[0].first) * self.width)) for i in range(at_a_time)]
+        for start in range(0, len(self.all), max(1, at_a_time)):
+            some = list(zip(self.all[start : start + at_a_time], made, strict=False))
             parts = run_parts(partial(work_on, work, some), len(some), self.threads)
-            for band, (sums, found) in zip(some, chain.from_iterable(parts), strict=True):
-                for own, out in zip(sums, outs, strict=True):
-                    own.add_to(out[band.picture if len(out) > 1 else 0])
-                results.append(found)
+            results.extend(chain.from_iterable(parts))
+            for band, own in some:
+                for sums, out in zip(own, outs, strict=False):
+                    sums.add_to(out[band.picture if len(out) > 1 else 0])
         return results
 
 
-def work_on(work: Callable[[Band], Done], bands: Sequence[Band], first: int, end: int) -> list[Done]:
-    """Return the results of `work` for bands [first, end)."""
-    return [work(band) for band in bands[first:end]]
+class Room(NamedTuple):
+    """Memory of the bands that are worked on one after the other, of which none has more pixels."""
+
+    number: int
+    n_px: int
+
+    def sums(self, name: str, n_rows: int, n_columns: int, rows_per_px: int) -> engine.GradientSums:
+        """Return sums of `n_rows` rows, of which a pixel touches so many at most."""
+        slots = SCRATCH.constant(f"gradient {name} {self.number}", n_rows, -1)
+        room = min(n_rows, self.n_px * rows_per_px)
+        return engine.GradientSums(slots, empty((room,), np.int32), empty((room, n_columns), np.float64))
 
 
-def sums_of(n_rows: int, n_columns: int, band: Band, width: int, name: str = "rows") -> engine.GradientSums:
-    """Return room for the sums of a band that touches at most `width` of `n_rows` rows in each row of pixels."""
-    slots = SCRATCH.constant(f"gradient {name}", n_rows, -1)[:n_rows]
-    room = min(n_rows, (band.end - band.first) * width)
-    return engine.GradientSums(slots, empty((room,), np.int32), empty((room, n_columns), np.float64))
+def work_on(
+    work: Callable[[Band, Made], Found], some: Sequence[tuple[Band, Made]], first: int, end: int
+) -> list[Found]:
+    """Return the results of `work` for some bands, of which [first, end)."""
+    return [work(band, made) for band, made in some[first:end]]

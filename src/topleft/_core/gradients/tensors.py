@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts
-from topleft._core.gradients.bands import Array, Band, Bands, sums_of
+from topleft._core.gradients.bands import Array, Band, Bands, Room
 
 
 class TexelFilter(IntEnum):
@@ -117,23 +118,19 @@ def points(
     return rast, rast_db
 
 
-def faces_of(grid: PixelGrid, band: Band, n_values: int = 0) -> engine.GradientSums:
-    """Return room for sums by triangle: of points, or of points and so many values at once."""
-    n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, n_values - 1) // 3)
-    return sums_of(len(grid.tri), n_columns, band, grid.width, "faces")
-
-
 def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
     """Return the gradient of `pos`."""
     out = np.zeros(pos.shape, pos.dtype)
 
-    def work(band: Band, sums: engine.GradientSums) -> int:
+    def make(room: Room) -> list[engine.GradientSums]:
+        return [room.sums("rows", pos.shape[1], 4, 3), room.sums("faces", len(grid.tri), engine.SUMS_OF_POINTS, 1)]
+
+    def work(band: Band, sums: list[engine.GradientSums]) -> int:
         i = band.picture
         slopes = None if g_db is None else g_db[i]
-        faces = faces_of(grid, band)
-        return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, faces, sums, band.first, band.end)
+        return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, sums[1], sums[0], band.first, band.end)
 
-    grid.refuse(grid.bands.add_up(work, out, 3))
+    grid.refuse(max(grid.bands.add_up_all(make, work, [out]), default=-1))
     return out
 
 
@@ -191,18 +188,20 @@ def colors_vjp(
     check_counted("attr", attr.shape[1:])
     g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
 
-    def work(band: Band) -> tuple[list[engine.GradientSums], int]:
-        i = band.picture
-        faces, *sums = [
-            faces_of(grid, band, attr.shape[2]),
-            sums_of(pos.shape[1], 4, band, 3 * grid.width, "points"),
-            sums_of(attr.shape[1], attr.shape[2], band, 3 * grid.width),
+    def make(room: Room) -> list[engine.GradientSums]:
+        n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, attr.shape[2] - 1) // 3)
+        return [
+            room.sums("points", pos.shape[1], 4, 3),
+            room.sums("rows", attr.shape[1], attr.shape[2], 3),
+            room.sums("faces", len(grid.tri), n_columns, 1),
         ]
-        all_of_them = faces, sums[0], sums[1]
-        view = grid.view(of(pos, i))
-        return sums, view.colors_vjp(of(attr, i), corners, rast[i], g_out[i], all_of_them, band.first, band.end)
 
-    grid.refuse(max(grid.bands.add_up_all(work, [g_pos, g_attr]), default=-1))
+    def work(band: Band, sums: list[engine.GradientSums]) -> int:
+        i, (points, rows, faces) = band.picture, sums
+        view = grid.view(of(pos, i))
+        return view.colors_vjp(of(attr, i), corners, rast[i], g_out[i], (faces, points, rows), band.first, band.end)
+
+    grid.refuse(max(grid.bands.add_up_all(make, work, [g_pos, g_attr]), default=-1))
     return g_pos, g_attr
 
 
@@ -322,44 +321,57 @@ def smooth_vjp(
 
 
 def squares(
-    grid: PixelGrid,
-    rule: EdgeRule,
-    outline: Outline,
-    pos: Array,
-    ids: Sequence[tuple[NDArray[np.int32], int]],
-    attr: Array,
-    target: Array,
-    *,
-    is_flipped: bool,
+    grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, ids: NDArray[np.int32], attr: Array, target: Array
 ) -> tuple[float, Array, Array]:
     """Return the mean squared difference of pictures of attributes from others, and the gradients of `pos` and `attr`.
 
-    Equal to `points`, `values`, `smooth` and their products, a few rows at a time: no picture is made.
+    `ids` (B, H, W): row 0 is on top. float32 takes a few rows at a time, and makes no picture.
     """
-    of_points, of_edges, g_attr = (np.zeros(one.shape, one.dtype) for one in (pos, pos, attr))
-    n_vertices, n_rows, n = pos.shape[1], attr.shape[1], attr.shape[2]
+    if pos.dtype == np.float64:
+        return squares_of_pictures(grid, rule, outline, pos, ids, attr, target)
+    g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
+    n, width, scale = attr.shape[2], grid.width, 2 / max(1, target.size)
 
-    def work(band: Band) -> tuple[list[engine.GradientSums], float]:
-        i, width = band.picture, grid.width
-        faces = faces_of(grid, band, n)
-        sums = [
-            sums_of(n_vertices, 4, band, 3 * width, "points"),
-            sums_of(n_vertices, 4, band, 6 * width, "edges"),
-            sums_of(n_rows, n, band, 3 * width),
-        ]
-        scratch = (
+    def make(room: Room) -> list[Any]:
+        beyond = room.n_px + 4 * width
+        n_faces, n_rows = min(len(grid.tri), beyond) + engine.IDS_ROOM, beyond // max(1, width)
+        around = Room(room.number, beyond)
+        return [
+            around.sums("points", pos.shape[1], 4, 9),
+            around.sums("rows", attr.shape[1], n, 3),
+            around.sums("faces", len(grid.tri), 12 + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
             empty((3, width + engine.IDS_ROOM), np.int32),
-            empty((engine.LOSS_WINDOW * width * (8 + 4 * n),), pos.dtype),
-        )
-        own, first = ids[i]
-        found = grid.view(of(pos, i)).loss(
-            (own, is_flipped, first), of(attr, i), outline.of_picture(i), (int(rule), 2 / target.size), target[i],
-            scratch, (faces, *sums), band.first, band.end,
-        )  # fmt: skip
-        return sums, found
+            empty((2 * (n_rows + 1) + beyond + engine.IDS_ROOM + (5 * n_faces + 1) // 2,), np.int64),
+            empty((2 * beyond * engine.PAIR_BYTES,), np.uint8),
+            empty((3 * engine.LOSS_WINDOW * width * n,), np.float32),
+            empty((4 * width,), np.float32),
+        ]
 
-    found = sum(grid.bands.add_up_all(work, [of_points, of_edges, g_attr])) if target.size else 0.0
-    return found / max(1, target.size), of_points + of_edges, g_attr
+    def work(band: Band, made: list[Any]) -> float:
+        i, (points, rows, faces, *scratch) = band.picture, made
+        return grid.view(of(pos, i)).loss(
+            ids[i], of(attr, i), outline.of_picture(i), (int(rule), scale), target[i], tuple(scratch),
+            (faces, points, rows), band.first, band.end,
+        )  # fmt: skip
+
+    found = sum(grid.bands.add_up_all(make, work, [g_pos, g_attr]))
+    return found / max(1, target.size), g_pos, g_attr
+
+
+def squares_of_pictures(
+    grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, ids: NDArray[np.int32], attr: Array, target: Array
+) -> tuple[float, Array, Array]:
+    """Return what `squares` does, of float64 picture by picture."""
+    rast, _ = points(grid, pos, [(one, 0) for one in ids], is_flipped=True, with_db=False)
+    color, _ = values(grid, attr, rast)
+    step = smooth(grid, rule, outline, pos, rast, color) - target
+    g_color, of_edges = smooth_vjp(grid, rule, outline, pos, rast, color, step * (2 / max(1, target.size)))
+    g_attr, g_rast, _ = values_vjp(grid, attr, rast, g_color)
+    return (
+        float(np.square(step).mean()) if step.size else 0.0,
+        points_vjp(grid, pos, rast, g_rast, None) + of_edges,
+        g_attr,
+    )
 
 
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:

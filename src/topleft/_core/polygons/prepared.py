@@ -90,13 +90,7 @@ def threads_for(frame: Frame, n_points: int) -> int:
 
 
 def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -> Prepared:
-    """Snap the points of polygons and find their boxes.
-
-    Raises
-    ------
-    ValueError
-        If a point is not finite, or lies beyond 2**60 sub-pixels.
-    """
+    """Snap the points of polygons and find their boxes."""
     points, n = rings.points, len(rings.points)
     source = engine.Source(points)
     columns: npt.NDArray[np.int32] = memory.empty("polygon points", (2, n + engine.POLYGON_PAD), np.int32)

@@ -49,15 +49,7 @@ class RingSet:
 
 
 def as_rings(values: Any) -> RingSet:
-    """Return polygons as points and offsets.
-
-    Raises
-    ------
-    ValueError
-        For shapes that are none of these, offsets that do not fit, and rings of fewer than three points.
-    TypeError
-        If an item is no polygon, or coordinates are no real numbers.
-    """
+    """Return polygons as points and offsets."""
     if isinstance(values, RingSet):
         return values
     values = _without_tensors(values)

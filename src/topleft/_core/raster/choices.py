@@ -77,11 +77,6 @@ def forced(**values: Any) -> Iterator[None]:
     **values
         By the name of a function of this module: its answer, or a function that gives it. By the name of a row of
         `Costs`: its value.
-
-    Raises
-    ------
-    ValueError
-        If a name is neither.
     """
     names, table, rows = globals(), cost_table(), Costs.__dataclass_fields__.keys()
     costs = {name: value for name, value in values.items() if name in rows}

@@ -76,15 +76,7 @@ def draw_classic(
     sink: Sink,
     out: object = None,
 ) -> NDArray[Any]:
-    """Return the mask, the counts or the labels (-1: none) that a classic draws.
-
-    Raises
-    ------
-    ValueError
-        If an option or a vertex is not for this method.
-    IndexError
-        If a triangle names a vertex that does not exist.
-    """
+    """Return the mask, the counts or the labels (-1: none) that a classic draws."""
     check_options(method, view)
     vertices, triangles = apart_from(out, "vertices", vertices), apart_from(out, "triangles", triangles)
     points, corners = as_scene(method, vertices, triangles, view)
@@ -111,13 +103,7 @@ def fill_classic(
     background: ArrayLike | None,
     out: object,
 ) -> NDArray[Any]:
-    """Return the picture of triangles in one colour each, the later over the earlier.
-
-    Raises
-    ------
-    ValueError
-        As `draw_classic`, and if the colours are not one a triangle.
-    """
+    """Return the picture of triangles in one colour each, the later over the earlier."""
     n_triangles = len(as_triangles(triangles))
     if parse(Per, "per", per) is Per.VERTEX or len(colors) != n_triangles:
         raise ValueError(

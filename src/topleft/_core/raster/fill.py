@@ -52,13 +52,7 @@ class Blending:
 
     @classmethod
     def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending:
-        """Check the options of a call.
-
-        Raises
-        ------
-        ValueError
-            If an option is unknown, "over" lacks alpha, or a classic is to blend.
-        """
+        """Check the options of a call."""
         n_channels = 1 if colors.ndim == 1 else colors.shape[1]
         modes = parse(Blend, "blend", mode), parse(Alpha, "alpha", alpha)
         chosen = cls(*modes, by_area=view.sampling is Sampling.AREA, has_alpha=n_channels in (2, 4))
@@ -334,13 +328,7 @@ def blend_picture(
 
 
 def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> engine.Transfer | None:
-    """Return how samples are averaged; None for the mean of values.
-
-    Raises
-    ------
-    ValueError
-        If the option is unknown, or it is light and the colours are no uint8.
-    """
+    """Return how samples are averaged; None for the mean of values."""
     is_linear = parse(Resolve, "resolve", resolve) is Resolve.LINEAR
     if is_linear and colors.dtype != np.uint8:
         raise ValueError(

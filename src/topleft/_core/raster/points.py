@@ -245,13 +245,7 @@ def rows_of(
 
 
 def snap_points(memory: Memory, array: NDArray[Any], view: View) -> NDArray[np.uint8]:
-    """The records of all points; those that cannot be drawn are marked.
-
-    Raises
-    ------
-    ValueError
-        If a position is not finite.
-    """
+    """The records of all points; those that cannot be drawn are marked."""
     source, n = source_of(array, view), len(array)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
     records, _, n_bad, _ = snap(

@@ -207,13 +207,7 @@ def draw_batch(
     background_depth: float | None,
     out: object,
 ) -> FragmentsBatch:
-    """`rasterize` of n poses: each is drawn by one thread, so many side by side as there are.
-
-    Raises
-    ------
-    ValueError, TypeError, IndexError
-        As `rasterize`.
-    """
+    """`rasterize` of n poses: each is drawn by one thread, so many side by side as there are."""
     view = View.parse(size, options, has_poses=True)
     refuse_many(view, "rasterize")
     fragment_options = FragmentOptions.parse(depth_test, background_depth, out)

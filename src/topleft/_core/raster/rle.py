@@ -93,15 +93,7 @@ def encode_masks(masks: NDArray[Any], *, compressed: bool) -> list[dict[str, Any
 
 
 def encode_ids(ids: NDArray[Any], labels: ArrayLike, *, compressed: bool) -> list[dict[str, Any]]:
-    """Return the run lengths of the pixels of each label in ids (H, W).
-
-    Raises
-    ------
-    TypeError
-        If labels or ids are no integers.
-    ValueError
-        If ids are no picture or lie beyond int32, or labels are no list or not different.
-    """
+    """Return the run lengths of the pixels of each label in ids (H, W)."""
     wanted = as_array("labels", labels)
     if wanted.dtype.kind not in "iu" and wanted.size:
         raise TypeError(f"labels must be integers, got dtype {wanted.dtype}")
@@ -132,13 +124,7 @@ def encode_ids(ids: NDArray[Any], labels: ArrayLike, *, compressed: bool) -> lis
 
 
 def annotation_of(rle: dict[str, Any], own: int, image: int, category: int) -> dict[str, Any]:
-    """Return the annotation of COCO of an object with run lengths: area and box, left, top, width and height, of these.
-
-    Raises
-    ------
-    ValueError
-        If the text is none.
-    """
+    """Return the annotation of COCO of an object with run lengths, its area and box (left, top, width, height)."""
     height = rle["size"][0]
     ends = np.cumsum(
         read_counts(rle["counts"]) if isinstance(rle["counts"], str) else np.array(rle["counts"], np.int64)

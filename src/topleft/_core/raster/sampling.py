@@ -117,13 +117,7 @@ class SplitSamples:
         return ids
 
     def planes(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Return the ids and depths of all samples, (S, H, W): a depth is that of the triangle at the sample.
-
-        Raises
-        ------
-        IndexError
-            If the triangles have been changed since they were drawn.
-        """
+        """Return the ids and depths of all samples, (S, H, W): a depth is that of the triangle at the sample."""
         shape = len(self.drawn.positions), *self.ids.shape
         check_fits(shape, np.int32, np.float32)
         ids, depth = empty(shape, np.int32), empty(shape, np.float32)

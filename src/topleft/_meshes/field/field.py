@@ -130,15 +130,9 @@ def field(
     nodata = grid.nodata if nodata is None else nodata
     dtype = dtype_of_field(array.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
     empty = nodata_of(nodata, dtype)
+    own = array if not is_of_faces or polygons.faces is None else array[polygons.faces]
     with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
-        ids = visible(points_px, triangles, view, Sink.LABEL)
-        if is_of_faces:
-            own = array if polygons.faces is None else array[polygons.faces]
-            np.take(np.append(own.astype(dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
-        else:
-            fill_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), view, canvas)
-            if nodata is not None:
-                canvas[ids < 0] = empty
+        draw_field(canvas, points_px, triangles, own, view, empty, is_of_faces=is_of_faces)
     return result
 
 
@@ -207,13 +201,8 @@ def height_map(
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     points_px, heights = grid.to_pixels(points), points[:, 2].astype(np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
-    sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
     with canvas_of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
-        depth = depth_of(heights, *range_of(heights, triangles))
-        ids = visible(np.column_stack([points_px, depth]), triangles, view, sink)
-        fill_planes(ids, points_px, triangles, heights, view, canvas)
-        if grid.nodata is not None:
-            canvas[ids < 0] = grid.nodata
+        draw_heights(canvas, points_px, triangles, heights, view, range_of(heights, triangles), surface, grid.nodata)
     return result
 
 
@@ -307,6 +296,32 @@ def depth_of(heights: F64, low: float, high: float) -> F64:
         middle, half = low / 2 + high / 2, high / 2 - low / 2
         depth: F64 = np.divide(np.subtract(heights, middle), half or 1.0)
     return depth
+
+
+def draw_field(
+    canvas: npt.NDArray[Any], points_px: F64, triangles: I32, values: npt.NDArray[Any], view: View,
+    empty: npt.NDArray[Any], *, is_of_faces: bool,
+) -> None:  # fmt: skip
+    """Draw values of triangles, or of vertices, and `empty` where nothing is."""
+    ids = visible(points_px, triangles, view, Sink.LABEL)
+    if is_of_faces:
+        np.take(np.append(values.astype(canvas.dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
+        return
+    fill_planes(ids, points_px, triangles, values.astype(np.float64, copy=False), view, canvas)
+    if not np.isnan(empty):  # which planes leave
+        canvas[ids < 0] = empty
+
+
+def draw_heights(
+    canvas: F64, points_px: F64, triangles: I32, heights: F64, view: View, ends: tuple[float, float],
+    surface: SurfaceOption, nodata: float | None,
+) -> None:  # fmt: skip
+    """Draw the upper or lower surface, heights between two ends."""
+    sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
+    ids = visible(np.column_stack([points_px, depth_of(heights, *ends)]), triangles, view, sink)
+    fill_planes(ids, points_px, triangles, heights, view, canvas)
+    if nodata is not None:
+        canvas[ids < 0] = nodata
 
 
 def visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:

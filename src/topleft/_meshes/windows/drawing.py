@@ -21,11 +21,11 @@ from topleft._core.base.array_types import F64, I32, Array
 from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
-from topleft._core.base.options import Per, Sampling, Sink, check_choice, parse
-from topleft._core.raster.rasterize import FragmentOptions, draw_fragments
+from topleft._core.base.options import Per, Sampling, check_choice, parse
+from topleft._core.raster.rasterize import FragmentOptions, canvas_of, draw_fragments
 from topleft._core.raster.verbs import coverage, fill, overdraw
 from topleft._core.raster.view import View
-from topleft._meshes.field.field import depth_of, dtype_of_field, fill_planes, is_per_face, nodata_of, visible
+from topleft._meshes.field.field import draw_field, draw_heights, dtype_of_field, is_per_face, nodata_of
 from topleft._meshes.windows.ahead import kept_memory
 from topleft._meshes.windows.blocks import Triangles
 
@@ -221,11 +221,9 @@ class LabelsPainter(FragmentsPainter):
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
-        ids = out if out is not None and out.flags.carray else np.empty(size[::-1], np.int32)
-        self.draw_into(payload, origin, size, threads, (ids, None))
-        if out is not None and ids is not out:
-            out[...] = ids
-        return ids if out is None else out
+        with canvas_of(FRESH, "labels", out, size[::-1], np.int32) as (result, ids):
+            self.draw_into(payload, origin, size, threads, (ids, None))
+        return result
 
 
 class DepthPainter(FragmentsPainter):
@@ -309,7 +307,7 @@ class FieldPainter(Painter):
         nodata = self.grid.nodata if nodata is None and self.grid is not None else nodata
         self.dtype = np.dtype(dtype_of_field(array.dtype, is_of_faces=self.is_of_faces, has_nodata=nodata is not None))
         self.empty = nodata_of(nodata, self.dtype.type)[0]
-        self.has_nodata, self.nodata = nodata is not None, float(self.empty)
+        self.nodata = float(self.empty)
         self.values = array
 
     def find_range(self) -> None:
@@ -334,17 +332,10 @@ class FieldPainter(Painter):
         assert payload.values is not None
         points = self.grid.to_pixels(payload.corners.reshape(-1, self.n_components))
         view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
-        canvas = out if out is not None and out.flags.carray else np.empty(size[::-1], self.dtype)
-        ids = visible(points, rows(len(payload.triangles)), view, Sink.LABEL)
-        if self.is_of_faces:
-            np.take(np.append(payload.values.astype(self.dtype), self.empty), ids, out=canvas, mode="wrap")
-        else:
-            fill_planes(ids, points, rows(len(payload.triangles)), payload.values, view, canvas)
-            if self.has_nodata:
-                canvas[ids < 0] = self.empty
-        if out is not None and canvas is not out:
-            out[...] = canvas
-        return canvas if out is None else out
+        own, values = rows(len(payload.triangles)), payload.values
+        with canvas_of(FRESH, "field", out, size[::-1], self.dtype) as (result, canvas):
+            draw_field(canvas, points, own, values, view, self.empty, is_of_faces=self.is_of_faces)
+        return result
 
 
 class HeightPainter(Painter):
@@ -380,16 +371,10 @@ class HeightPainter(Painter):
         flat = payload.corners.reshape(-1, 3)
         points, heights = self.grid.to_pixels(flat), np.ascontiguousarray(flat[:, 2], np.float64)
         view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
-        sink = Sink.FARTHEST if self.surface == "upper" else Sink.NEAREST
-        canvas = out if out is not None and out.flags.carray else np.empty(size[::-1], np.float64)
-        own = rows(len(payload.triangles))
-        ids = visible(np.column_stack([points, depth_of(heights, self.low, self.high)]), own, view, sink)
-        fill_planes(ids, points, own, heights, view, canvas)
-        if self.grid.nodata is not None:
-            canvas[ids < 0] = self.empty
-        if out is not None and canvas is not out:
-            out[...] = canvas
-        return canvas if out is None else out
+        own, ends, nodata = rows(len(payload.triangles)), (self.low, self.high), self.grid.nodata
+        with canvas_of(FRESH, "field", out, size[::-1], np.float64) as (result, canvas):
+            draw_heights(canvas, points, own, heights, view, ends, self.surface, nodata)
+        return result
 
 
 KINDS: dict[str, type[Painter]] = {

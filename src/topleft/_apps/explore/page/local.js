@@ -2,7 +2,7 @@
 // In: a question {do, id, ...} and its parts. Out: a promise of [header, parts], as messages.py splits an answer.
 
 import * as mesh from "./mesh.js";
-import {drawAll, edit} from "./pixels.js";
+import {drawAll} from "./pixels.js";
 import {probe} from "./probe.js";
 import * as race from "./race.js";
 import {trace} from "./steps.js";
@@ -12,7 +12,6 @@ const NAMES = new Map([[Uint8ClampedArray, "uint8"], [Uint8Array, "uint8"], [Int
 const HANDLERS = {
   hello: (kernels, data) => ({header: data.hello}),
   "pixels.draw": drawAll,
-  "pixels.edit": edit,
   "pixels.probe": probe,
   "pixels.scene": (kernels, data, {name}) => {
     if (!(name in data.states)) throw new Error(`scene must be one of ${data.hello.scenes.join(", ")}, got '${name}'`);

@@ -327,32 +327,3 @@ export function drawAll(kernels, data, {state: given}) {
   const samples = isCoverage(state) ? [] : data.samples[state.n_samples].map((at) => at.map((x) => 0.5 + x / 16));
   return {header: {panels: Object.values(panels), samples}, arrays};
 }
-
-// ---- edits -----------------------------------------------------------------------------------------------------
-
-export function edit(kernels, data, {state: given, what, triangle}) {
-  parseState(given, data);
-  let vertices = [...given.vertices], triangles = [...given.triangles], at = triangle;
-  if (what === "add") {
-    const [x, y] = given.size.map((n, k) => (given.origin?.[k] ?? 0) + (n >> 1)), r = Math.max(2, Math.min(...given.size) >> 2);
-    const depth = vertices[0]?.slice(2) ?? [], n = vertices.length;
-    at = triangles.length;
-    triangles.push([n, n + 1, n + 2]);
-    vertices.push([x - r, y + r, ...depth], [x, y - r, ...depth], [x + r, y + r, ...depth]);
-  } else if (!Number.isInteger(at) || !(0 <= at && at < triangles.length)) {
-    refuse(`triangle must be from 0 to ${triangles.length - 1}, got ${shown(at)}`);
-  } else if (what === "remove") {
-    triangles.splice(at, 1);
-    const used = [...new Set(triangles.flat())].sort((a, b) => a - b);
-    triangles = triangles.map((row) => row.map((i) => used.indexOf(i)));
-    vertices = used.map((i) => vertices[i]);
-  } else {
-    const [a, b, c] = triangles[at], n = vertices.length;
-    if (what === "flip") triangles[at] = [a, c, b];
-    else {
-      triangles.splice(at, 1, [a, b, n], [b, c, n], [c, a, n]);
-      vertices.push(vertices[a].map((value, k) => rint((value + vertices[b][k] + vertices[c][k]) / 3 * 256) / 256));
-    }
-  }
-  return {header: {state: {vertices, triangles}, triangle: Math.max(0, Math.min(at, triangles.length - 1))}};
-}

@@ -1,5 +1,6 @@
 // The part Pixels: triangles are moved, and their pixels watched.
 
+import {edited} from "./edits.js";
 import {make, svg, sceneOptions, download, paint} from "./elements.js";
 import {newest} from "./line.js";
 
@@ -104,9 +105,9 @@ export function pixelsPart(app, panel) {
     } else if (what === "next" || what === "previous") await nextScene(what === "next" ? 1 : -1);
     else if (what === "forward" || what === "back") chosen = (chosen + (what === "forward" ? 1 : n - 1)) % Math.max(1, n);
     else {
-      const made = await app.line.ask("pixels.edit", {state, triangle: chosen, what});
-      [corner, chosen] = [null, made.triangle];
-      change(made.state);
+      const {triangle, ...made} = edited(state, what, chosen);
+      [corner, chosen] = [null, triangle];
+      change(made);
     }
     overlay(), controls();
   }
