@@ -204,9 +204,9 @@ typedef struct tl_kernels {
      * is NORMALS. */
     void (*shade_normals)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, float *out);
 
-    /* Per pixel of `ids` (rows of window->width): the value of its point, float32 or float64. */
-    void (*fill_points)(const tl_snapped *snapped, const tl_window *window, const tl_points *points, const int32_t *ids,
-                        void *out);
+    /* Per pixel of `ids` (rows of window->width): the value of its point, float32 or float64.  No shading is read. */
+    void (*fill_points)(const tl_shaded_scene *scene, const tl_window *window, const tl_points *points,
+                        const int32_t *ids, void *out);
 
     /* Draws n alpha-tested triangles over a target, NEAREST or PEEL, of all others; the window
      * as for a share of a part, and fewer than 2^31 pixels. */

@@ -476,9 +476,13 @@ typedef enum {
 typedef struct {
     const void *positions; /* (n_vertices, 3) float32 or float64 */
     int is_f64;
+    double rows[TL_POINT_ROWS][4]; /* a number is row . (x, y, z, 1) */
+} tl_point_mesh;
+
+typedef struct {
+    const tl_point_mesh *meshes; /* of each instance of the picture */
     tl_point_kind kind;
     int n_rows;
-    double rows[TL_POINT_ROWS][4];        /* a number is row . (x, y, z, 1) */
     double half_width_px, half_height_px; /* FLOW: half of the whole picture */
     double background;
     int is_f64_out;

@@ -1,6 +1,6 @@
 /* Points: where in space the pixels of a visibility buffer lie, their distances, and their ways in the
  * picture.
- * In: ids, the mesh they were drawn from, positions of its vertices.  Out: float32, or float64, of each pixel.
+ * In: ids, the meshes they were drawn from, positions of their vertices.  Out: float32, or float64, of each pixel.
  *
  * A point has the weights of its pixel in its triangle, relative to the first corner: it lies on the triangle.  A
  * number that depends linearly on the point is computed at the corners, and interpolated.  All is float64, rounded once
@@ -12,9 +12,11 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
+#include "pixels/instances.c"
 #include "pixels/runs.c"
 #include "pixels/weights.c"
 
@@ -22,21 +24,22 @@ typedef struct {
     weighed_span weighed;
     /* of each row at the first corner, and along the edges to the others */
     _Alignas(64) double value[3 * TL_POINT_ROWS][TL_SPAN_ROOM];
+    double numbers[3][TL_SPAN_ROOM]; /* of the pixels of the span */
 } point_span;
 
 /* The rows at the corners of runs. */
-TL_INLINE void set_values(point_span *r, const tl_points *points)
+TL_INLINE void set_values(point_span *r, const tl_points *points, const tl_point_mesh *mesh)
 {
     const int end = TL_LANES + r->weighed.runs.n_runs;
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
         vd p[9];
         for (int k = 0; k < 3; k++)
-            load_positions(points->positions, points->is_f64, r->weighed.corners[k] + slot, p + 3 * k);
+            load_positions(mesh->positions, mesh->is_f64, r->weighed.corners[k] + slot, p + 3 * k);
         for (int k = 3; k < 9; k++)
             p[k] = vd_sub(p[k], p[k % 3]);
         for (int i = 0; i < points->n_rows; i++)
             for (int k = 0; k < 3; k++) {
-                const double *row = points->rows[i];
+                const double *row = mesh->rows[i];
                 vd sum = vd_add(vd_mul(vd_set1(row[0]), p[3 * k]), vd_mul(vd_set1(row[1]), p[3 * k + 1]));
                 sum = vd_add(sum, vd_mul(vd_set1(row[2]), p[3 * k + 2]));
                 vd_store(r->value[3 * i + k] + slot, k ? sum : vd_add(sum, vd_set1(row[3])));
@@ -86,61 +89,84 @@ TL_INLINE int make_numbers(const point_span *r, const tl_points *points, int i, 
     return points->n_rows;
 }
 
-/* Writes n pixels of float64. */
-static void store_numbers(double *restrict out, int n, const vd *numbers, int n_numbers)
+/* The numbers of n pixels of a span from `first` on that show one mesh, after its runs. */
+TL_INLINE void set_numbers(point_span *r, const tl_points *points, int n_numbers, int first, int n)
 {
-    double lanes[TL_MAX_LANES];
-    for (int c = 0; c < n_numbers; c++) {
-        vd_store(lanes, numbers[c]);
-        for (int lane = 0; lane < n; lane++)
-            out[lane * n_numbers + c] = lanes[lane];
-    }
-}
-
-/* A span of n pixels, after its runs. */
-TL_INLINE void write_points(point_span *r, const tl_points *points, int n_numbers, int64_t at, int n, void *out)
-{
-    const vd background = vd_set1(points->background);
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         const vm visible = vm_from_bits(r->weighed.runs.visible[i]);
-        const int n_lanes = (int)min64(n - x, TL_LANES);
-        vd numbers[TL_POINT_ROWS];
-        vf rounded[3];
-        if (vm_any(visible))
-            make_numbers(r, points, i, numbers);
+        vd numbers[3] = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)}; /* for compilers, which do not know the kind */
+        if (!vm_any(visible))
+            continue;
+        make_numbers(r, points, i, numbers);
         for (int c = 0; c < n_numbers; c++) {
-            numbers[c] = vm_any(visible) ? vd_select(visible, numbers[c], background) : background;
-            rounded[c] = vf_from_vd(numbers[c]);
+            double *own = r->numbers[c] + first + x;
+            vd_store(own, vd_select(visible, numbers[c], vd_load(own)));
         }
-        if (points->is_f64_out)
-            store_numbers((double *)out + n_numbers * (at + x), n_lanes, numbers, n_numbers);
-        else
-            store_channels((float *)out + n_numbers * (at + x), n_numbers, n_lanes, rounded, n_numbers);
     }
 }
 
-static void fill_points(const tl_snapped *snapped, const tl_window *window, const tl_points *points, const int32_t *ids,
-                        void *out)
+/* The instances of a span of n pixels, one after the other; the background elsewhere. */
+TL_INLINE void fill_span(point_span *r, span_list *list, const tl_points *points, int n_numbers, const int32_t *ids,
+                         int64_t row, int64_t column, int n)
 {
+    for (int c = 0; c < n_numbers; c++)
+        for (int x = 0; x < n; x += TL_LANES)
+            vd_store(r->numbers[c] + x, vd_set1(points->background));
+    list_instances(list, ids, n);
+    for (int k = 0; k < list->n; k++) {
+        const int first = list->parts[k].first, n_own = list->parts[k].end - first;
+        const tl_shaded *own = list->parts[k].instance;
+        if (own != list->set) {
+            list->set = own;
+            weigh_mesh(&r->weighed, own->snapped, own->first_id);
+        }
+        weigh_span(&r->weighed, ids + first, n_own, row, column + first);
+        set_values(r, points, points->meshes + (own - list->scene->instances));
+        set_numbers(r, points, n_numbers, first, n_own);
+    }
+}
+
+/* Writes n pixels. */
+TL_INLINE void store_numbers(const point_span *r, int is_f64, int n_numbers, int n, void *out)
+{
+    for (int x = 0; is_f64 && x < n; x++)
+        for (int c = 0; c < n_numbers; c++)
+            ((double *)out)[n_numbers * x + c] = r->numbers[c][x];
+    for (int x = 0; !is_f64 && x < n; x += TL_LANES) {
+        vf rounded[3];
+        for (int c = 0; c < n_numbers; c++)
+            rounded[c] = vf_from_vd(vd_load(r->numbers[c] + x));
+        store_channels((float *)out + n_numbers * x, n_numbers, (int)min64(n - x, TL_LANES), rounded, n_numbers);
+    }
+}
+
+TL_INLINE void fill_rows(const tl_shaded_scene *scene, const tl_window *window, const tl_points *points, int n_numbers,
+                         const int32_t *ids, char *out)
+{
+    const int64_t pixel_bytes = n_numbers * (points->is_f64_out ? (int64_t)sizeof(double) : (int64_t)sizeof(float));
     point_span r;
-    start_weights(&r.weighed, snapped, window);
+    span_list list;
+    start_weights(&r.weighed, window);
+    start_list(&list, scene);
     memset(r.value, 0, sizeof r.value);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = (int)min64(TL_SPAN, window->width - column);
-            weigh_span(&r.weighed, ids + at, n, row, column);
-            set_values(&r, points);
-            switch (points->kind) { /* so that each has a loop of its own */
-            case TL_POINT_LENGTH: write_points(&r, points, 1, at, n, out); break;
-            case TL_POINT_FLOW: write_points(&r, points, 2, at, n, out); break;
-            default:
-                if (points->n_rows == 1)
-                    write_points(&r, points, 1, at, n, out);
-                else
-                    write_points(&r, points, 3, at, n, out);
-            }
+            fill_span(&r, &list, points, n_numbers, ids + at, row, column, n);
+            store_numbers(&r, points->is_f64_out, n_numbers, n, out + pixel_bytes * at);
         }
+}
+
+static void fill_points(const tl_shaded_scene *scene, const tl_window *window, const tl_points *points,
+                        const int32_t *ids, void *out)
+{
+    const int n_numbers = points->kind == TL_POINT_LENGTH ? 1 : points->kind == TL_POINT_FLOW ? 2 : points->n_rows;
+    switch (n_numbers) { /* so that each has a loop of its own */
+    case 1: fill_rows(scene, window, points, 1, ids, out); break;
+    case 2: fill_rows(scene, window, points, 2, ids, out); break;
+    default: fill_rows(scene, window, points, 3, ids, out);
+    }
 }
 
 #endif

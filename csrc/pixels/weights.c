@@ -35,14 +35,20 @@ typedef struct {
     _Alignas(64) double w[3][TL_SPAN + TL_MAX_LANES]; /* the weights of the pixels of the span */
 } weighed_span;
 
-static void start_weights(weighed_span *r, const tl_snapped *snapped, const tl_window *window)
+/* Weights of nothing yet. */
+static void start_weights(weighed_span *r, const tl_window *window)
 {
-    const tl_source *source = snapped->mesh.source;
-    shade_runs *s = &r->runs;
-    s->snapped = snapped, s->window = window, s->shading = NULL, s->first_id = 0;
-    memset(s->ints, 0, sizeof s->ints);
+    r->runs.window = window, r->runs.shading = NULL;
+    memset(r->runs.ints, 0, sizeof r->runs.ints);
     memset(r->q, 0, sizeof r->q);
     memset(r->corners, 0, sizeof r->corners);
+}
+
+/* Weights in triangles of a mesh from now on, the first of which is called first_id. */
+static void weigh_mesh(weighed_span *r, const tl_snapped *snapped, int32_t first_id)
+{
+    const tl_source *source = snapped->mesh.source;
+    r->runs.snapped = snapped, r->runs.first_id = first_id;
     r->alone.id = -1;
     r->has_w = snapped->mesh.inv_w || (source && !(source->matrix && source->is_affine));
 }
@@ -261,7 +267,8 @@ static void barycentric(const tl_snapped *snapped, const tl_window *window, cons
 {
     weighed_span r;
     const vf zero = vf_set1(0.0f);
-    start_weights(&r, snapped, window);
+    start_weights(&r, window);
+    weigh_mesh(&r, snapped, 0);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
@@ -345,7 +352,8 @@ static void interpolate(const tl_snapped *snapped, const tl_window *window, cons
 {
     const vertex_values read = {values, n_values, per_corner, background};
     weighed_span r;
-    start_weights(&r, snapped, window);
+    start_weights(&r, window);
+    weigh_mesh(&r, snapped, 0);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;

@@ -7,6 +7,7 @@ import struct
 import subprocess
 from importlib.resources import files
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from topleft._apps.explore.static import LAYERS, N_SEEDS, SETS, write_static
 from topleft._apps.explore.trace import TRACED
 from topleft.methods import CLASSICS
 from topleft.scene_families import FAMILIES
+from topleft.typing import SamplingOption
 
 NODE = shutil.which("node")
 PAGE = files("topleft._apps.explore").joinpath("page")
@@ -39,7 +41,7 @@ DEEP = SQUARE | {
     "triangles": [[0, 3, 2], [1, 3, 4]],
 }
 FAR = SQUARE | {"vertices": [[-3e9, 2.0], [7.1, 1e10], [11.9, -5.5], [9.5, 9.5]]}
-SAMPLINGS = ("center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner")
+SAMPLINGS = get_args(SamplingOption)
 
 
 @pytest.fixture(scope="module")

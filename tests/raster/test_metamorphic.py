@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from comparing import assert_same, assert_same_buffers, buffers
-from engine_cases import sharing
+from engine_cases import ON_EACH_ISA, sharing
 from hypothesis import given
 from strategies import (
     CLIP_SCENES,
@@ -175,10 +175,8 @@ def hash_of_buffers(n=4):
     return digest.hexdigest()
 
 
-@pytest.mark.parametrize("isa", ["scalar", "avx2", "avx512"])
+@ON_EACH_ISA
 def test_instruction_sets_give_every_buffer_alike(isa):
-    if isa not in tl.build_info()["isa_available"]:
-        pytest.skip(f"{isa} does not run here")
     code = "import topleft, test_metamorphic as t; print(topleft.build_info()['isa'], t.hash_of_buffers())"
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     environment = os.environ | {"TOPLEFT_ISA": isa, "PYTHONPATH": path}

@@ -161,6 +161,28 @@ def test_flow_of_a_mesh_under_two_cameras_and_behind_one():
     assert np.isnan(look(Camera.look_at((0, 0, 5)), "flow", subject=CUBE, transforms_to=away)["flow"]).all()
 
 
+@pytest.mark.parametrize("layer", ["distance", "ray_distance", "world_position", "flow"])
+def test_points_of_instances_that_alternate_along_a_row_are_those_of_each_by_itself(layer):
+    """Ten meshes of two dtypes in each span of a row; each alone, where the scene shows it, gives the same bits."""
+    rng, camera, size = np.random.default_rng(3), CAMERAS["perspective"], (90, 40)
+    instances = []
+    for k in range(10):
+        vertices, triangles = tl.scenes.icosphere(k % 3)
+        place = np.eye(4)
+        place[:3, 3] = rng.uniform(-0.6, 0.6, 3)
+        mesh = tl.Mesh((0.3 * vertices).astype(np.float32 if k % 2 else np.float64), triangles)
+        instances.append(tl.Instance(mesh, place))
+    options = {"layers": (layer, "instance"), "camera_to": CAMERAS["off-centre"]}
+    found = render_layers(tl.Scene(instances), camera, size, **options, threads=1)
+    assert len(np.unique(found["instance"])) > 8
+    for k, one in enumerate(instances):
+        is_own = found["instance"] == k
+        alone = render_layers(tl.Scene([one]), camera, size, **options)
+        assert_same(found[layer][is_own], alone[layer][is_own])
+    shared = render_layers(tl.Scene(instances), camera, size, **options, threads=3)
+    assert_same(np.nan_to_num(shared[layer]), np.nan_to_num(found[layer]))
+
+
 def test_ids_depth_and_masks_are_those_of_the_visibility_buffer():
     camera = CAMERAS["perspective"]
     found = look(camera, "triangle", "instance", "barycentric", "depth", "silhouette", "alpha")

@@ -8,15 +8,17 @@ import hashlib
 import json
 import pathlib
 from collections.abc import Iterator
+from typing import get_args
 
 import numpy as np
 
 import topleft as tl
 from topleft._meshes.picture.layers import LAYERS
 from topleft.testing import HARD_SCENES, SIZE, hard_scenes, words_of
+from topleft.typing import SamplesOption
 
 FILE = pathlib.Path(__file__).with_name("golden.json")
-SAMPLINGS = ("center", "msaa2", "msaa4", "msaa8", "msaa16")
+SAMPLINGS = get_args(SamplesOption)
 
 VIEW = np.array([[1.0, 0, 0, 0], [0, 0.75, 0.5, 0], [0, -0.5, 0.75, -3], [0, 0, 0, 1]])
 PROJECTION = np.array([[1.5, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, -1.5, -1.0], [0, 0, -1, 0]])

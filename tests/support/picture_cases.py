@@ -1,11 +1,14 @@
 """Random pictures for tests: meshes with materials of every kind, cameras with and without lens, options of a view."""
 
+from typing import get_args
+
 import numpy as np
 
 import topleft as tl
+from topleft.typing import SamplesOption
 
 SIZE = (61, 47)
-SAMPLINGS = ("center", "msaa2", "msaa4", "msaa8", "msaa16")
+SAMPLINGS = get_args(SamplesOption)
 SHAPES = ("torus-knot", "cube", "sphere", "torus")
 SHADINGS = ("smooth", "smooth", "smooth", "flat", "unlit", "matcap", "normals", "ids", "depth")
 MODES = ("opaque", "opaque", "mask", "blend")

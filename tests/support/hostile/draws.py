@@ -9,11 +9,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, get_args
 
 import numpy as np
 
 import topleft as tl
+from topleft.typing import SamplesOption
 
 REFUSALS = (ValueError, TypeError, IndexError, MemoryError, tl.TopleftError)
 TINY = [0.0, -0.0, 5e-324, 1e-310, 1e-45, 0.5, -0.5, 1 / 512, 2.0**22, -(2.0**24)]
@@ -25,7 +26,7 @@ SIZES = [(0, 0), (0, 5), (5, 0), (2**31 - 1, 0), (0, 2**31 - 1), (2**31 - 1, 2**
 DTYPES = ["f8", "f4", "f2", ">f4", ">f8", "i4", "i8", "i2", "u1", "u8", ">i4", "g"]
 ODD_DTYPES = ["?", "c8", "O", "U3", "M8[s]"]
 INDEX_DTYPES = ["i4", "i8", "u4", "u8", "i2", "u1", ">i4", ">u8"]
-SAMPLINGS = ["center", "msaa2", "msaa4", "msaa8", "msaa16"]
+SAMPLINGS = [*get_args(SamplesOption)]
 GUARD = 64
 LARGEST = 5000  # the longest side of a picture that is drawn; what is larger is to be refused
 FAR = [2.0**20, -(2.0**22), 2.0**23, -(2.0**27), 2.0**31]

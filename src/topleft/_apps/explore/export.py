@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,11 @@ from topleft._apps.explore.pixels import EXACT, draw, picture
 from topleft._apps.explore.session import Reply, Request, Session
 from topleft._apps.explore.state import PixelState, parse_state
 from topleft.methods import CLASSICS
+from topleft.typing import SamplesOption
 
 MAX_FILE_SIDE_PX = 2048
 MAX_CELL_PX = 32
 SIGNS = ".0123456789abcdefghijklmnopqrstuvwxyz"
-SAMPLED = ("center", "msaa2", "msaa4", "msaa8", "msaa16")
 
 
 def export(_: Session, request: Request) -> Reply:
@@ -46,7 +46,7 @@ def grid(state: PixelState, path: str) -> None:
     """Write the first picture, magnified, with the edges over it."""
     shown = picture(state, draw(state, state.method))
     points = state.vertices[:, :2] - state.origin
-    sampling: Any = state.sampling if state.sampling in SAMPLED else None
+    sampling: Any = state.sampling if state.sampling in get_args(SamplesOption) else None
     cell = max(1, min(MAX_CELL_PX, MAX_FILE_SIDE_PX // max(state.size)))
     dots = sampling if cell >= 8 else None
     pixel_grid(shown, points, state.triangles, sampling=dots, cell=cell, edge_color="#1d2733", path=path)

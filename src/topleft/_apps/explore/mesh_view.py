@@ -71,7 +71,7 @@ CONTROLS: dict[str, list[tuple[str, str, list[tuple[Any, str]] | None]]] = {
         ("layer", "layer", []),
         ("light", "lights", [(name, name) for name in LIGHTS]),
         ("sampling", "sampling", [(AT_REST, "msaa4 at rest")]
-         + [(name, name) for name in ("center", "msaa2", "msaa4", "msaa8", "msaa16")]),
+         + [(name, name) for name in get_args(SamplesOption)]),
         ("tolerance", "tolerance", [(0, "none: the mesh itself")]
          + [(px, f"{px:g} px: a coarser level") for px in (0.25, 0.5, 1, 2, 4)]),
         ("cull", "cull", [("none", "as materials say"), ("back", "back"), ("front", "front")]),

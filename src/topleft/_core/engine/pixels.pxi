@@ -186,33 +186,47 @@ def halve_rows(const float[:, ::1] level, int64_t width, int64_t height, int64_t
 
 
 cdef class PixelPoints:
-    """`tl_points`: positions of vertices, and the kind of value that is found at a point."""
+    """`tl_points` of the instances of a picture: positions of vertices, and the kind of value that is found at a point."""
 
     cdef tl_points points
-    cdef object array
+    cdef tl_shaded_scene scene
+    cdef SnappedMesh mesh  # the first: all have its window
+    cdef uint8_t[::1] instances
+    cdef uint8_t[::1] meshes
+    cdef object arrays
 
-    def __init__(self, positions: Array, int kind, const double[:, ::1] rows, half_size: tuple[float, float],
-                 double background, bint is_f64_out):
-        """`positions`: (V, 3) float32 or float64; `rows`: (N, 4); `half_size`: half of width and height of the whole picture."""
-        cdef const uint8_t[::1] raw = as_bytes(positions)
-        cdef int i, k
-        self.array = raw
-        self.points.positions, self.points.is_f64 = data(raw), positions.dtype == np.float64
-        self.points.kind, self.points.n_rows, self.points.background = <tl_point_kind>kind, rows.shape[0], background
+    def __init__(self, snapped: Sequence[SnappedMesh], positions: Sequence[Array], first_ids: Sequence[int], int kind,
+                 const double[:, :, ::1] rows, half_size: tuple[float, float], double background, bint is_f64_out):
+        """Take at least one mesh, its vertices (V, 3) float32 or float64, and the id of triangle 0, of each instance.
+
+        `rows`: (N, R, 4); `half_size`: half of width and height of the whole picture.
+        """
+        cdef int64_t i, n = len(snapped)
+        cdef const uint8_t[::1] raw
+        cdef SnappedMesh mesh
+        cdef tl_shaded *instances
+        cdef tl_point_mesh *meshes
+        self.arrays, self.mesh = (snapped, positions), snapped[0]
+        self.instances, self.meshes = np.zeros(n * sizeof(tl_shaded), np.uint8), np.zeros(n * sizeof(tl_point_mesh), np.uint8)
+        instances, meshes = <tl_shaded *>&self.instances[0], <tl_point_mesh *>&self.meshes[0]
+        for i in range(n):
+            mesh, raw = snapped[i], as_bytes(positions[i])
+            instances[i].snapped, instances[i].first_id = &mesh.snapped, first_ids[i]
+            meshes[i].positions, meshes[i].is_f64 = data(raw), positions[i].dtype == np.float64
+            memcpy(&meshes[i].rows[0][0], &rows[i, 0, 0], rows.shape[1] * 4 * sizeof(double))
+        self.scene.instances, self.scene.n, self.scene.view = instances, n, self.mesh.clip_view()
+        self.points.meshes, self.points.is_f64_out = meshes, is_f64_out
+        self.points.kind, self.points.n_rows, self.points.background = <tl_point_kind>kind, rows.shape[1], background
         self.points.half_width_px, self.points.half_height_px = half_size
-        self.points.is_f64_out = is_f64_out
-        for i in range(rows.shape[0]):
-            for k in range(4):
-                self.points.rows[i][k] = rows[i, k]
 
-    def fill(self, SnappedMesh mesh, const int32_t[:, ::1] ids, out: Array, int64_t first_row, int64_t n_rows):
+    def fill(self, const int32_t[:, ::1] ids, out: Array, int64_t first_row, int64_t n_rows):
         """Write rows of the value of each pixel's point, a `tl_point_kind`, (H, W) or (H, W, C)."""
-        cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
+        cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
         cdef uint8_t[::1] flat
         if n_rows and ids.shape[1]:
             flat = as_bytes(out[first_row:first_row + n_rows])
             with nogil:
-                K.fill_points(&mesh.snapped, &window, &self.points, &ids[first_row, 0], &flat[0])
+                K.fill_points(&self.scene, &window, &self.points, &ids[first_row, 0], &flat[0])
 
 
 PLANE_DOUBLES = TL_PLANE_DOUBLES

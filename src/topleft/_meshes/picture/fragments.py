@@ -68,7 +68,7 @@ class VisiblePart:
         """The mesh as it was drawn, for kernels."""
         ((_, snapped, first),) = self.frags._drawn()
         mesh = self.mesh if self.bent is None else self.bent.mesh_of(self.mesh)
-        return ShownInstance(snapped, mesh, self.place, first)
+        return ShownInstance(snapped, mesh, self.place, first, i=self.i)
 
     def interpolate(self, values: Any, background: float, *, derivatives: bool = False) -> NDArray[np.float32]:
         """Return an attribute of the mesh in the rectangle, or its derivatives."""
@@ -96,8 +96,11 @@ def parts_of(frags: Fragments, scene: Scene) -> Sequence[VisiblePart]:
 
 def shown_of(frags: Fragments, scene: Scene) -> Sequence[ShownInstance]:
     """The instances that some sample sees, as they are shaded, of the scene that was drawn."""
-    drawn = [(scene[i], frags._parts_of(i, scene[i].mesh), snapped, first) for i, snapped, first in frags._drawn()]
-    return [ShownInstance(snapped, mesh, one.transform, first, one.material) for one, mesh, snapped, first in drawn]
+    found = []
+    for i, snapped, first in frags._drawn():
+        one = scene[i]
+        found.append(ShownInstance(snapped, frags._parts_of(i, one.mesh), one.transform, first, one.material, i))
+    return found
 
 
 def join(

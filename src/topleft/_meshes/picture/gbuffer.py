@@ -23,8 +23,9 @@ from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.cloud import draw_cloud
-from topleft._meshes.picture.fragments import VisiblePart, join, parts_of
+from topleft._meshes.picture.fragments import VisiblePart, join, parts_of, shown_of
 from topleft._meshes.picture.holes import cuts_of, draw_visible
+from topleft._meshes.picture.shade import ShownInstance
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene
 
@@ -41,7 +42,8 @@ N_NUMBERS = {PointKind.LENGTH: 1, PointKind.FLOW: 2}
 
 
 def evaluate(
-    part: VisiblePart,
+    shown: Sequence[ShownInstance],
+    ids: npt.NDArray[np.int32],
     what: PointKind,
     rows: F64,
     background: float,
@@ -50,29 +52,28 @@ def evaluate(
     threads: int | None = None,
     dtype: type[np.floating[Any]] = np.float32,
 ) -> npt.NDArray[Any]:
-    """The values of pixels' points by pixels/points.c, from numbers that are rows (N, 4) times (x, y, z, 1).
+    """The values of pixels' points by pixels/points.c, from numbers that are rows (N, R, 4) times (x, y, z, 1).
 
-    Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the snap,
-    relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.
+    `shown`: at least the N instances that show. Points are in the space of each mesh. A point has the float64 weights
+    of its pixel in its triangle, before the snap, relative to a corner; all is float64 and rounded once. `size` is that
+    of the whole picture, for the flow.
     """
-    ids = part.frags._seen().ids[0]
-    shown = part.shown
-    mesh = shown.mesh
-    n = N_NUMBERS.get(what, len(rows))
+    n = N_NUMBERS.get(what, rows.shape[1])
     out: npt.NDArray[Any] = empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
-    half_size = size[0] / 2, size[1] / 2
     points = engine.PixelPoints(
-        mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64
-    )
-    scene = shown.snapped.with_inverse_w(ids.size, empty)
-    n_threads = threads_for(threads, len(mesh.triangles))
-    run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
+        [one.snapped.with_inverse_w(ids.size // len(shown), empty) for one in shown],
+        [one.mesh.vertices for one in shown], [one.first_id for one in shown], what, np.ascontiguousarray(rows),
+        (size[0] / 2, size[1] / 2), background, dtype is np.float64,
+    )  # fmt: skip
+    n_threads = threads_for(threads, sum(len(one.mesh.triangles) for one in shown))
+    run_parts(lambda first, end: points.fill(ids, out, first, end - first), len(ids), n_threads)
     return out
 
 
 def points_of(part: VisiblePart) -> F64:
     """Where the pixels that are seen lie on the mesh, in its own space: (P, 3) float64."""
-    points: F64 = evaluate(part, PointKind.ROWS, np.eye(4)[:3], np.nan, dtype=np.float64)[part.seen]
+    ids, rows = part.frags._seen().ids[0], np.eye(4)[None, :3]
+    points: F64 = evaluate([part.shown], ids, PointKind.ROWS, rows, np.nan, dtype=np.float64)[part.seen]
     return points
 
 
@@ -149,15 +150,29 @@ class GBuffer:
         """Return a picture (H, W, *channels), made by `make` for the rectangle of each part."""
         return join(self.parts, (*self.frags.depth.shape, *channels), background, make)
 
+    def evaluate(
+        self, kind: PointKind, rows_of: Callable[[ShownInstance], F64], channels: tuple[int, ...], background: float
+    ) -> npt.NDArray[np.float32]:
+        """The values of visible points of meshes by rows (R, 4), in the space of each."""
+        ids, threads = self.frags._seen().ids[0], self.options.get("threads")
+
+        def make(shown: Sequence[ShownInstance], ids: npt.NDArray[np.int32]) -> npt.NDArray[np.float32]:
+            if not shown:
+                return np.full((*ids.shape, *channels), background, np.float32)
+            rows = np.array([rows_of(one) for one in shown])
+            return evaluate(shown, ids, kind, rows, background, size=self.size, threads=threads)
+
+        if ids.dtype == np.int32:
+            return make(shown_of(self.frags, self.scene), ids)
+        return self.join(channels, background, lambda part: make([part.shown], part.frags._seen().ids[0]))
+
     def tell(
         self, kind: PointKind, rows_of: Callable[[F64], F64], channels: tuple[int, ...], background: float
     ) -> npt.NDArray[np.float32]:
-        """The values of visible points by matrices: rows (N, 4) for world from object; of a cloud at the centres."""
-        threads, cloud = self.options.get("threads"), self.shot.cloud
+        """The values of visible points by matrices: rows (R, 4) from world from object; of a cloud at the centres."""
+        cloud = self.shot.cloud
         if cloud is None:
-            return self.join(
-                channels, background, lambda one: evaluate(one, kind, rows_of(one.place), background, threads=threads)
-            )
+            return self.evaluate(kind, lambda one: rows_of(one.place), channels, background)
         rows = rows_of(np.eye(4))
         values = moved(cloud.positions, np.resize(rows, (3, 4)))[:, : len(rows)]
         if kind is PointKind.LENGTH:

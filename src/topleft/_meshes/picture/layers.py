@@ -18,10 +18,10 @@ from topleft._meshes.picture.blended import blended_masks
 from topleft._meshes.picture.cloud import normals_at
 from topleft._meshes.picture.edges import draw_all_edges
 from topleft._meshes.picture.fragments import VisiblePart, shown_of
-from topleft._meshes.picture.gbuffer import GBuffer, PointKind, evaluate, points_of, project
+from topleft._meshes.picture.gbuffer import GBuffer, PointKind, points_of, project
 from topleft._meshes.picture.render import render
 from topleft._meshes.picture.scene_shade import shade_by
-from topleft._meshes.picture.shade import ShadingOptions, shade_normals
+from topleft._meshes.picture.shade import ShadingOptions, ShownInstance, shade_normals
 from topleft._meshes.picture.silhouette import silhouette as draw_silhouette
 from topleft._meshes.picture.transparent import render_transparent
 
@@ -144,19 +144,22 @@ def flow(gbuffer: GBuffer) -> Array:
         moves = project(centres, end, there, size) - project(centres, begin, here, size)
         return gbuffer.frags.interpolate(moves, background=np.nan)
 
+    def end_of(one: VisiblePart | ShownInstance) -> F64:
+        return one.place if gbuffer.transforms_to is None else gbuffer.transforms_to[one.i]
+
+    def rows_of(one: ShownInstance) -> F64:
+        ways = ((begin, one.place), (end, end_of(one)))
+        both = [engine.product(camera.clip_from_world(size), place) for camera, place in ways]
+        return np.concatenate([way[[0, 1, 3]] for way in both])
+
     def make(part: VisiblePart) -> Array:
-        here = part.place
-        there = here if gbuffer.transforms_to is None else gbuffer.transforms_to[part.i]
-        if begin.lens is None and end.lens is None:
-            ways = [engine.product(camera.clip_from_world(size), at) for camera, at in ((begin, here), (end, there))]
-            rows = np.concatenate([way[[0, 1, 3]] for way in ways])
-            threads = gbuffer.options.get("threads")
-            return evaluate(part, PointKind.FLOW, rows, np.nan, size=size, threads=threads)
         picture = np.full((*part.seen.shape, 2), np.nan, np.float32)
         points = points_of(part)
-        picture[part.seen] = project(points, end, there, size) - project(points, begin, here, size)
+        picture[part.seen] = project(points, end, end_of(part), size) - project(points, begin, part.place, size)
         return picture
 
+    if begin.lens is None and end.lens is None:
+        return gbuffer.evaluate(PointKind.FLOW, rows_of, (2,), np.nan)
     return gbuffer.join((2,), np.nan, make)
 
 

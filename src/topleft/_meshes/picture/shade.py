@@ -163,6 +163,8 @@ class ShownInstance(NamedTuple):
     """The id of its triangle 0."""
     material: Material | None = None
     """Goes before the materials of the mesh."""
+    i: int = 0
+    """Its number in the scene."""
 
 
 def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
