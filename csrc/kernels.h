@@ -410,7 +410,7 @@ typedef struct tl_kernels {
     /* A texture at the pixels of a band. */
     void (*grad_texels)(const tl_grad_view *view, const tl_grad_texture *texture);
 
-    /* Its gradients: sums by texel, and those of where it is looked at. */
+    /* Its gradients: sums by texel, a multiple of four columns, unless NULL; and those of where it is looked at. */
     void (*grad_texels_vjp)(const tl_grad_view *view, const tl_grad_texture *texture, tl_grad_sums *sums);
 
     /* Of a mesh in a view, whatever the band: where its vertices are, (n_vertices, 2) pixels; and of each triangle the

@@ -1,95 +1,126 @@
-/* Directions to points of the faces of a cube map, and backwards.
+/* Directions to points of the faces of a cube map, in lanes; and backwards.
  *
  * The faces are those of the OpenGL 4.6 specification, table 8.19: +x, -x, +y, -y, +z, -z.  Beyond an edge of a face,
  * where its plane runs on as seen from the middle, lies the next one. */
 #ifndef TL_GRAD_CUBE_C
 #define TL_GRAD_CUBE_C
 
-#include <math.h>
+#include <float.h>
 #include <stdint.h>
 
-#include "lanes/inline.h"
+#include "lanes/lanes.h"
 
-/* The axes of each face: of u (its columns), of v (its rows), and from the middle to the face. */
-static const int8_t cube_frames[6][3][3] = {
-    {{0, 0, -1}, {0, -1, 0}, {1, 0, 0}}, {{0, 0, 1}, {0, -1, 0}, {-1, 0, 0}}, {{1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
-    {{1, 0, 0}, {0, 0, -1}, {0, -1, 0}}, {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}},  {{-1, 0, 0}, {0, -1, 0}, {0, 0, -1}},
-};
-
-/* Where a direction meets the cube. */
+/* Faces, and where directions meet them. */
 typedef struct {
-    int face; /* -1: nowhere */
-    double along[3], uv[2], slopes[4], by[3][2];
+    vi face;
+    vm is_x, is_y; /* whether the face lies along that axis; neither: along z */
+    vd sign;       /* 1 or -1: on which side */
+    vm is_there;
+    vd along[3], slopes[3][2]; /* of the direction along u, v, and towards the face; what they change by */
+    vd uv[2];
 } cube_point;
 
-/* `by`: what the direction changes by along x and along y, (3, 2), or NULL. */
-TL_INLINE cube_point meet_cube(const double *direction, const double *by)
+TL_INLINE vd vd_negative(vd a) { return vd_sub(vd_set1(0.0), a); }
+
+/* Of a direction its part along u (columns), along v (rows) and towards the face. */
+TL_INLINE void onto_face(const cube_point *p, const vd *direction, vd *along)
 {
-    cube_point p = {.face = -1};
-    const double x = fabs(direction[0]), y = fabs(direction[1]), z = fabs(direction[2]);
-    const int axis = z > (x > y ? x : y) ? 2 : y > x ? 1 : 0;
-    const int face = 2 * axis + (direction[axis] < 0.0);
-    if (!(isfinite(x) && isfinite(y) && isfinite(z)) || direction[axis] == 0.0)
-        return p;
-    p.face = face;
-    for (int j = 0; j < 3; j++)
-        for (int k = 0; k < 3; k++) {
-            p.along[j] += cube_frames[face][j][k] * direction[k];
-            for (int c = 0; by && c < 2; c++)
-                p.by[j][c] += cube_frames[face][j][k] * by[2 * k + c];
-        }
+    const vd x = direction[0], y = direction[1], z = direction[2];
+    along[0] = vd_select(p->is_x, vd_negative(vd_mul(p->sign, z)), vd_select(p->is_y, x, vd_mul(p->sign, x)));
+    along[1] = vd_select(p->is_y, vd_mul(p->sign, z), vd_negative(y));
+    along[2] = vd_mul(p->sign, vd_select(p->is_x, x, vd_select(p->is_y, y, z)));
+}
+
+/* Back. */
+TL_INLINE void off_face(const cube_point *p, const vd *along, vd *direction)
+{
+    const vd u = along[0], v = along[1], w = vd_mul(p->sign, along[2]);
+    direction[0] = vd_select(p->is_x, w, vd_select(p->is_y, u, vd_mul(p->sign, u)));
+    direction[1] = vd_select(p->is_y, w, vd_negative(v));
+    direction[2] = vd_select(p->is_x, vd_negative(vd_mul(p->sign, u)), vd_select(p->is_y, vd_mul(p->sign, v), w));
+}
+
+/* Where directions meet the cube. */
+TL_INLINE cube_point meet_cube(const vd *direction)
+{
+    cube_point p;
+    const vd x = vd_abs(direction[0]), y = vd_abs(direction[1]), z = vd_abs(direction[2]), zero = vd_set1(0.0);
+    const vm is_xy = vd_ge(vd_max(x, y), z);
+    p.is_x = vm_and(is_xy, vd_ge(x, y)), p.is_y = vm_and_not(is_xy, p.is_x);
+    const vd most = vd_select(p.is_x, direction[0], vd_select(p.is_y, direction[1], direction[2]));
+    const vm is_front = vd_ge(most, zero), is_finite = vd_ge(vd_set1(DBL_MAX), vd_max(x, vd_max(y, z)));
+    const vm are_numbers = vm_and(vd_ge(x, zero), vm_and(vd_ge(y, zero), vd_ge(z, zero)));
+    p.is_there = vm_and(vm_and(is_finite, are_numbers), vm_and_not(vm_all(), vd_ge(zero, vd_abs(most))));
+    p.face = vi_select(p.is_x, vi_set1(0), vi_select(p.is_y, vi_set1(2), vi_set1(4)));
+    p.face = vi_add(p.face, vi_select(is_front, vi_set1(0), vi_set1(1)));
+    p.sign = vd_select(is_front, vd_set1(1.0), vd_set1(-1.0));
+    onto_face(&p, direction, p.along);
     for (int j = 0; j < 2; j++) {
-        const double at = p.along[j] / p.along[2], uv = at / 2.0 + 0.5;
-        p.uv[j] = uv < 0.0 ? 0.0 : uv > 1.0 ? 1.0 : uv;
-        for (int c = 0; by && c < 2; c++)
-            p.slopes[2 * j + c] = (p.by[j][c] - at * p.by[2][c]) / p.along[2] / 2.0;
+        const vd at = vd_add(vd_mul(vd_div(p.along[j], p.along[2]), vd_set1(0.5)), vd_set1(0.5));
+        p.uv[j] = vd_select(p.is_there, vd_min(vd_max(at, zero), vd_set1(1.0)), zero);
     }
     return p;
 }
 
-/* Gradients of the direction (3), and of what it changes by (3, 2), or NULL, from those of u, v and the slopes. */
-TL_INLINE void pull_cube(const cube_point *p, const double *g_uv, const double *g_slopes, double *g_direction,
-                         double *g_by)
+/* What u and v change by, from what directions change by along x and along y, (3, 2). */
+TL_INLINE void slopes_on_face(cube_point *p, const vd *by, vd *slopes)
 {
-    double along[3] = {0}, by[3][2] = {{0}};
-    const double d = p->along[2];
-    for (int j = 0; j < 2; j++) {
-        const double at = p->along[j] / d, uv = at / 2.0 + 0.5;
-        double g_at = uv >= 0.0 && uv <= 1.0 ? g_uv[j] / 2.0 : 0.0;
-        for (int c = 0; g_by && c < 2; c++) {
-            const double g = g_slopes[2 * j + c] / d / 2.0;
-            by[j][c] += g, by[2][c] -= g * at;
-            g_at -= g * p->by[2][c];
-            along[2] -= g_slopes[2 * j + c] * p->slopes[2 * j + c] / d;
-        }
-        along[j] += g_at / d;
-        along[2] -= g_at * at / d;
-    }
-    for (int k = 0; k < 3; k++) {
-        g_direction[k] = 0.0;
-        for (int c = 0; g_by && c < 2; c++)
-            g_by[2 * k + c] = 0.0;
-        for (int j = 0; j < 3; j++) {
-            g_direction[k] += cube_frames[p->face][j][k] * along[j];
-            for (int c = 0; g_by && c < 2; c++)
-                g_by[2 * k + c] += cube_frames[p->face][j][k] * by[j][c];
+    for (int c = 0; c < 2; c++) {
+        const vd one[3] = {by[c], by[2 + c], by[4 + c]};
+        vd along[3];
+        onto_face(p, one, along);
+        for (int j = 0; j < 3; j++)
+            p->slopes[j][c] = along[j];
+        for (int j = 0; j < 2; j++) {
+            const vd at = vd_div(p->along[j], p->along[2]), step = vd_sub(along[j], vd_mul(at, along[2]));
+            slopes[2 * j + c] = vd_mul(vd_div(step, p->along[2]), vd_set1(0.5));
         }
     }
 }
 
-/* Moves a texel that lies beyond one edge of its face to the face that is there. */
-static void cross_edge(int64_t n, int *face, int64_t *x, int64_t *y)
+/* Gradients of directions (3) and of what they change by (3, 2) from those of u, v and the slopes; has_slopes: whether
+ * they have any. */
+TL_INLINE void pull_cube(const cube_point *p, const vd *g_uv, const vd *g_slopes, vd *g_direction, vd *g_by,
+                         int has_slopes)
 {
-    const double middle[3] = {2.0 * ((double)*x + 0.5) / (double)n - 1.0, 2.0 * ((double)*y + 0.5) / (double)n - 1.0,
-                              1.0};
-    double direction[3] = {0};
-    for (int k = 0; k < 3; k++)
-        for (int j = 0; j < 3; j++)
-            direction[k] += middle[j] * cube_frames[*face][j][k];
-    const cube_point p = meet_cube(direction, 0);
+    const vd zero = vd_set1(0.0), half = vd_set1(0.5), d = p->along[2];
+    vd along[3] = {zero, zero, zero}, by[2][3] = {{zero, zero, zero}, {zero, zero, zero}};
+    for (int j = 0; j < 2; j++) {
+        const vd at = vd_div(p->along[j], d);
+        const vm is_in = vd_ge(vd_set1(1.0), vd_abs(at));
+        vd g_at = vd_select(is_in, vd_mul(g_uv[j], half), zero);
+        for (int c = 0; has_slopes && c < 2; c++) {
+            const vd g = vd_mul(vd_div(g_slopes[2 * j + c], d), half);
+            const vd slope = vd_div(vd_sub(p->slopes[j][c], vd_mul(at, p->slopes[2][c])), d);
+            by[c][j] = vd_add(by[c][j], g), by[c][2] = vd_sub(by[c][2], vd_mul(g, at));
+            g_at = vd_sub(g_at, vd_mul(g, p->slopes[2][c]));
+            along[2] = vd_sub(along[2], vd_mul(g, slope));
+        }
+        along[j] = vd_add(along[j], vd_div(g_at, d));
+        along[2] = vd_sub(along[2], vd_div(vd_mul(g_at, at), d));
+    }
+    off_face(p, along, g_direction);
+    for (int c = 0; has_slopes && c < 2; c++) {
+        vd one[3];
+        off_face(p, by[c], one);
+        for (int k = 0; k < 3; k++)
+            g_by[2 * k + c] = one[k];
+    }
+}
+
+/* Moves texels of columns x and rows y that lie beyond an edge of their face to the face that is there. */
+TL_INLINE void cross_edges(const cube_point *from, int64_t n, vi *face, vi *x, vi *y)
+{
+    const vd size = vd_set1((double)n), one = vd_set1(1.0), scale = vd_set1(2.0 / (double)n), half = vd_set1(0.5);
+    const vi last = vi_set1((int32_t)n - 1);
+    const vd along[3] = {vd_sub(vd_mul(vd_add(vd_from_vi(*x), half), scale), one),
+                         vd_sub(vd_mul(vd_add(vd_from_vi(*y), half), scale), one), one};
+    vd direction[3];
+    off_face(from, along, direction);
+    const cube_point p = meet_cube(direction);
     *face = p.face;
-    *x = (int64_t)(p.uv[0] * (double)n), *y = (int64_t)(p.uv[1] * (double)n);
-    *x = *x > n - 1 ? n - 1 : *x, *y = *y > n - 1 ? n - 1 : *y;
+    *x = vi_min(vi_round(vd_floor(vd_mul(p.uv[0], size))), last);
+    *y = vi_min(vi_round(vd_floor(vd_mul(p.uv[1], size))), last);
 }
 
 #endif

@@ -131,7 +131,10 @@ TL_INLINE double *sums_of(tl_grad_sums *sums, int64_t row)
     if (slot < 0) {
         slot = sums->slot_of[row] = (int32_t)sums->n++;
         sums->rows[slot] = (int32_t)row;
-        memset(sums->sums + slot * sums->n_columns, 0, (size_t)sums->n_columns * sizeof(double));
+        if (sums->n_columns == 4) /* without a call */
+            memset(sums->sums + 4 * (int64_t)slot, 0, 4 * sizeof(double));
+        else
+            memset(sums->sums + slot * sums->n_columns, 0, (size_t)sums->n_columns * sizeof(double));
     }
     return sums->sums + slot * sums->n_columns;
 }

@@ -1,188 +1,71 @@
 /* Textures at pixels: the nearest texel, four of them, and those of one or two halvings; and backwards.
- * In: levels, where to look, footprints.  Out: pictures; backward: gradients of what is looked up, sums by texel. */
+ * In: levels, where to look, footprints.  Out: pictures; backward: gradients of what is looked up, sums by texel.
+ *
+ * Pixels go in lanes; what they give to texels is added pixel by pixel, so that each sum has the order of pixels. */
 #ifndef TL_GRAD_TEXTURES_C
 #define TL_GRAD_TEXTURES_C
 
-#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
 #include "topleft.h"
-#include "lanes/inline.h"
-#include "grad/cube.c"
+#include "grad/looks.c"
 #include "grad/pixels.h"
+#include "grad/spans.h"
+#include "lanes/lanes.h"
+#include "lanes/quads.h"
 
-/* Texels of a level: their rows, shares, and what the shares change by with u and with v. */
-typedef struct {
-    int n;
-    int64_t row[4];
-    double share[4], by[2][4];
-} texel_shares;
-
-/* Where a pixel looks. */
-typedef struct {
-    int low, n_levels; /* the lower of one level or two */
-    double upper;      /* share of the upper one */
-    double uv[2];
-    int is_kept[2]; /* whether u, v are numbers */
-    cube_point cube;
-} looked_up;
-
-/* log2 of a positive number, by ln(m) = 2 atanh((m - 1) / (m + 1)), m from sqrt(1/2) to sqrt(2): those of libraries
- * differ from processor to processor. */
-TL_ONCE double log2_fully(double a)
+/* The first number of a pixel of a tensor with n numbers each. */
+TL_INLINE void *at_pixel(const void *p, int64_t n, int64_t pixel, int is_f64)
 {
-    int exponent;
-    double m = frexp(a, &exponent), sum = 0.0;
-    if (m < 0x1.6a09e667f3bcdp-1)
-        m *= 2.0, exponent--;
-    const double s = (m - 1.0) / (m + 1.0), square = s * s;
-    for (int k = 23; k > 0; k -= 2)
-        sum = sum * square + 1.0 / k;
-    return exponent + s * sum * 2.8853900817779268;
+    return p ? (char *)p + (is_f64 ? 8 : 4) * n * pixel : 0;
 }
 
-/* The texel of column x and row y: its row in the level; a share of 0 where nothing is there. */
-TL_INLINE int64_t place_texel(const tl_grad_texture *t, int level, int face, int64_t x, int64_t y, int *is_there)
+/* Channels [first, first + 4) of a texel of a level. */
+TL_INLINE void load_texels(const tl_grad_texture *t, int level, vi row, int64_t first, vd *channels, int is_f64)
 {
-    const int64_t width = t->widths[level], height = t->heights[level];
-    const int is_in = x >= 0 && x < width && y >= 0 && y < height;
-    *is_there = 1;
-    if (!is_in && t->edge == TL_EDGE_WRAP) { /* by one at most */
-        x = x < 0 ? width - 1 : x >= width ? 0 : x;
-        y = y < 0 ? height - 1 : y >= height ? 0 : y;
-    } else if (!is_in) {
-        *is_there = t->edge != TL_EDGE_ZERO;
-        if (t->edge == TL_EDGE_CUBE && (x >= 0 && x < width) != (y >= 0 && y < height))
-            cross_edge(width, &face, &x, &y);
-        else if (t->edge == TL_EDGE_CUBE)
-            *is_there = 0; /* beyond a corner: the mean of the others */
-        x = x < 0 ? 0 : x >= width ? width - 1 : x;
-        y = y < 0 ? 0 : y >= height ? height - 1 : y;
-    }
-    return (face * height + y) * width + x;
+    const int64_t n_faces = t->edge == TL_EDGE_CUBE ? 6 : 1;
+    load_look_rows(t->levels[level], n_faces * t->widths[level] * t->heights[level], t->n_channels, first, row,
+                   channels, is_f64);
 }
 
-/* The place along an axis in texels, and what it changes by with u. */
-TL_INLINE double along_axis(const tl_grad_texture *t, double u, int64_t size, double half, double *by)
+/* Four channels of the texture from `first` on. */
+TL_INLINE void mix_texels(const tl_grad_texture *t, const look_lanes *look, int64_t first, vd *sum, int is_f64)
 {
-    const double n = (double)size, last = n - 1.0;
-    if (t->edge == TL_EDGE_WRAP)
-        u -= floor(u);
-    const double at = u * n - half, low = t->edge == TL_EDGE_CLAMP ? 0.0 : -2.0;
-    const double high = t->edge == TL_EDGE_CLAMP ? last : n + 1.0;
-    *by = at >= low && at <= high ? n : 0.0;
-    return clamped(at, low, high);
-}
-
-/* The four texels about a point, or the nearest. */
-TL_INLINE texel_shares find_shares(const tl_grad_texture *t, const looked_up *at, int level, int is_nearest)
-{
-    texel_shares quad = {.n = is_nearest ? 1 : 4};
-    double by[2], place[2], part[2];
-    int64_t first[2];
-    int is_there[4], n_there = 0;
-    const int face = t->edge == TL_EDGE_CUBE ? at->cube.face : 0;
-    const int64_t size[2] = {t->widths[level], t->heights[level]};
-    for (int axis = 0; axis < 2; axis++) {
-        place[axis] = along_axis(t, at->uv[axis], size[axis], is_nearest ? 0.0 : 0.5, &by[axis]);
-        const double low = floor(place[axis]);
-        part[axis] = place[axis] - low, first[axis] = (int64_t)low;
-        by[axis] *= at->is_kept[axis];
-    }
-    if (is_nearest && t->edge == TL_EDGE_CUBE)
-        for (int axis = 0; axis < 2; axis++)
-            first[axis] = first[axis] >= size[axis] ? size[axis] - 1 : first[axis];
-    for (int k = 0; k < quad.n; k++) {
-        const int dx = k & 1, dy = k >> 1;
-        quad.row[k] = place_texel(t, level, face, first[0] + dx, first[1] + dy, &is_there[k]);
-        const double x = dx ? part[0] : 1.0 - part[0], y = dy ? part[1] : 1.0 - part[1];
-        quad.share[k] = is_nearest ? 1.0 : x * y;
-        quad.by[0][k] = is_nearest ? 0.0 : (dx ? by[0] : -by[0]) * y;
-        quad.by[1][k] = is_nearest ? 0.0 : (dy ? by[1] : -by[1]) * x;
-        n_there += is_there[k];
-    }
-    for (int k = 0; n_there < quad.n && k < quad.n; k++) {
-        if (is_there[k])
+    int level, end;
+    level_range(t, look, &level, &end);
+    for (int c = 0; c < 4; c++)
+        sum[c] = vd_set1(0.0);
+    for (; level < end; level++) {
+        vd share, found[4] = {sum[0], sum[0], sum[0], sum[0]}, texel[4];
+        const vm m = at_level(look, level, &share);
+        if (!vm_any(m))
             continue;
-        const double shared[3] = {quad.share[k] / 3.0, quad.by[0][k] / 3.0, quad.by[1][k] / 3.0};
-        for (int j = 0; t->edge == TL_EDGE_CUBE && n_there == 3 && j < 4; j++)
-            if (j != k)
-                quad.share[j] += shared[0], quad.by[0][j] += shared[1], quad.by[1][j] += shared[2];
-        quad.share[k] = quad.by[0][k] = quad.by[1][k] = 0.0;
+        const texel_shares quad = find_shares(t, look, level);
+        for (int c = 0; c < 4; c++)
+            found[c] = vd_set1(0.0);
+        for (int k = 0; k < quad.n; k++) {
+            load_texels(t, level, vi_select(m, quad.row[k], vi_set1(0)), first, texel, is_f64);
+            for (int c = 0; c < 4; c++)
+                found[c] = vd_add(found[c], vd_mul(quad.share[k], texel[c]));
+        }
+        for (int c = 0; c < 4; c++)
+            sum[c] = vd_select(m, vd_add(sum[c], vd_mul(share, found[c])), sum[c]);
     }
-    return quad;
-}
-
-/* The longer axis of a footprint in texels, as a level, and what that changes by with each slope. */
-TL_INLINE double footprint_level(const tl_grad_texture *t, const double *slopes, double *by)
-{
-    const double w = (double)t->widths[0], h = (double)t->heights[0];
-    const double s_x = slopes[0] * w, s_y = slopes[1] * w, t_x = slopes[2] * h, t_y = slopes[3] * h;
-    const double a = s_x * s_x + t_x * t_x, b = s_y * s_y + t_y * t_y, c = s_x * s_y + t_x * t_y;
-    const double e = (a - b) / 2.0, under = e * e + c * c;
-    const double root = sqrt(under > 1e-30 ? under : 1e-30), square = (a + b) / 2.0 + root;
-    const double scale = square > 1e-30 ? 0.72134752044448170 / square : 0.0,
-                 in_root = under > 1e-30 ? 0.5 / root : 0.0;
-    const double by_a = scale * (0.5 + e * in_root), by_b = scale * (0.5 - e * in_root),
-                 by_c = scale * 2.0 * c * in_root;
-    by[0] = w * (2.0 * by_a * s_x + by_c * s_y), by[1] = w * (2.0 * by_b * s_y + by_c * s_x);
-    by[2] = h * (2.0 * by_a * t_x + by_c * t_y), by[3] = h * (2.0 * by_b * t_y + by_c * t_x);
-    return 0.5 * log2_fully(square > 1e-30 ? square : 1e-30);
-}
-
-/* What a pixel looks at; `by` is what its level changes by with the slopes of u and v.  n_levels is 0 for nothing. */
-TL_INLINE looked_up look_at(const tl_grad_texture *t, int64_t pixel, double *by, int is_f64)
-{
-    looked_up at = {.n_levels = 1, .is_kept = {1, 1}};
-    double slopes[6], direction[3];
-    const int n_axes = t->edge == TL_EDGE_CUBE ? 3 : 2;
-    for (int k = 0; t->uv_da && k < 2 * n_axes; k++)
-        slopes[k] = get_real(t->uv_da, 2 * n_axes * pixel + k, is_f64);
-    for (int k = 0; k < n_axes; k++)
-        direction[k] = get_real(t->uv, n_axes * pixel + k, is_f64);
-    if (n_axes == 3) {
-        at.cube = meet_cube(direction, t->uv_da ? slopes : 0);
-        at.n_levels = at.cube.face >= 0;
-        memcpy(direction, at.cube.uv, sizeof at.cube.uv);
-        memcpy(slopes, at.cube.slopes, sizeof at.cube.slopes);
-    }
-    for (int k = 0; k < 2; k++) {
-        at.is_kept[k] = isfinite(direction[k]) != 0;
-        at.uv[k] = at.is_kept[k] ? direction[k] : 0.0;
-    }
-    by[0] = by[1] = by[2] = by[3] = 0.0;
-    if (t->filter < TL_TEXEL_LEVEL)
-        return at;
-    double level = t->uv_da ? footprint_level(t, slopes, by) : 0.0;
-    level += t->bias ? get_real(t->bias, pixel, is_f64) : 0.0;
-    if (!(level == level))
-        at.n_levels = 0;
-    level = clamped(level, 0.0, (double)(t->n_levels - 1));
-    at.low = (int)(t->filter == TL_TEXEL_LEVEL ? rint(level) : floor(level == level ? level : 0.0));
-    at.upper = t->filter == TL_TEXEL_LEVEL ? 0.0 : level - at.low;
-    at.n_levels += at.n_levels && at.upper > 0.0;
-    return at;
 }
 
 TL_INLINE void texels_of(const tl_grad_view *view, const tl_grad_texture *t, int is_f64)
 {
-    for (int64_t pixel = view->first_row * view->width; pixel < view->end_row * view->width; pixel++) {
-        double by[4];
-        const looked_up at = look_at(t, pixel, by, is_f64);
-        texel_shares quads[2];
-        for (int k = 0; k < at.n_levels; k++)
-            quads[k] = find_shares(t, &at, at.low + k, t->filter == TL_TEXEL_NEAREST);
-        for (int64_t c = 0; c < t->n_channels; c++) {
-            double sum = 0.0;
-            for (int k = 0; k < at.n_levels; k++) {
-                double found = 0.0;
-                for (int j = 0; j < quads[k].n; j++)
-                    found += quads[k].share[j] *
-                             get_real(t->levels[at.low + k], t->n_channels * quads[k].row[j] + c, is_f64);
-                sum += (k ? at.upper : 1.0 - at.upper) * found;
-            }
-            put_real(t->out, t->n_channels * pixel + c, sum, is_f64);
+    const int64_t end = view->end_row * view->width;
+    for (int64_t pixel = view->first_row * view->width; pixel < end; pixel += TL_LANES) {
+        const int n = end - pixel < TL_LANES ? (int)(end - pixel) : TL_LANES;
+        const look_lanes look = look_at(view, t, pixel, n, is_f64);
+        void *out = at_pixel(t->out, t->n_channels, pixel, is_f64);
+        for (int64_t first = 0; first < t->n_channels; first += 4) {
+            const int64_t rest = t->n_channels - first;
+            vd sum[4];
+            mix_texels(t, &look, first, sum, is_f64);
+            store_look_rows(out, t->n_channels, first, rest < 4 ? (int)rest : 4, vm_first(n), sum, is_f64);
         }
     }
 }
@@ -196,76 +79,147 @@ static void grad_texels(const tl_grad_view *view, const tl_grad_texture *texture
         texels_of(view, texture, 0);
 }
 
-/* Adds a pixel's gradients to its texels of a level; returns those of u and v, and the sum of gradient and value. */
-TL_INLINE double pull_shares(const tl_grad_texture *t, const texel_shares *quad, int level, int64_t pixel, double share,
-                             double *g_uv, tl_grad_sums *sums, int is_f64)
+/* Pixels that gradients come from: rows of g, those in m; n_left are in the picture from the first one on. */
+typedef struct {
+    const tl_grad_texture *t;
+    const void *g; /* of the first one */
+    int64_t n_left;
+    vi row;
+    vm m;
+} pulled_lanes;
+
+/* Adds the gradients of pixels to their texels of a level, `share` times. */
+TL_INLINE void scatter_shares(const pulled_lanes *p, const texel_shares *quad, int level, vm m, vd share,
+                              tl_grad_sums *sums, int is_f64)
 {
-    double total = 0.0;
-    for (int j = 0; j < quad->n; j++) {
-        if (quad->share[j] == 0.0 && quad->by[0][j] == 0.0 && quad->by[1][j] == 0.0)
-            continue;
-        double *to = sums_of(sums, t->first_texels[level] + quad->row[j]), by_value = 0.0;
-        for (int64_t c = 0; c < t->n_channels; c++) {
-            const double g = get_real(t->out, t->n_channels * pixel + c, is_f64);
-            to[c] += share * quad->share[j] * g;
-            by_value += g * get_real(t->levels[level], t->n_channels * quad->row[j] + c, is_f64);
+    const int64_t n = p->t->n_channels;
+    int32_t rows[4][TL_MAX_LANES];
+    double shares[4][TL_MAX_LANES];
+    for (int k = 0; k < quad->n; k++)
+        vi_spill(rows[k], quad->row[k]), vd_store(shares[k], vd_mul(share, quad->share[k]));
+    for (unsigned bits = vm_bits(m); bits; bits &= bits - 1) {
+        const int lane = __builtin_ctz(bits);
+        for (int64_t c = 0; c < n; c += 4) {
+            const int64_t at = n * lane + c;
+            const int is_last = at + 4 > n * p->n_left, n_some = n - c < 4 ? (int)(n - c) : 4;
+            four g;
+            if (is_f64)
+                for (int i = 0; i < 4; i++)
+                    g[i] = i < n_some ? ((const double *)p->g)[at + i] : 0.0;
+            else
+                g = __builtin_convertvector(
+                    is_last ? vq_load_some((const float *)p->g + at, n_some) : vq_load((const float *)p->g + at), four);
+            for (int k = 0; k < quad->n; k++) {
+                const double s = shares[k][lane];
+                if (s != 0.0)
+                    TL_FOUR(sums_of(sums, p->t->first_texels[level] + rows[k][lane]) + c) += s * g;
+            }
         }
-        total += quad->share[j] * by_value;
-        g_uv[0] += share * quad->by[0][j] * by_value, g_uv[1] += share * quad->by[1][j] * by_value;
     }
-    return total;
 }
 
-/* Writes the gradients of what a pixel looks at. */
-TL_INLINE void store_looks(const tl_grad_texture *t, const looked_up *at, int64_t pixel, double *g_uv, double g_level,
-                           const double *by, int is_f64)
+/* Gradients of u and v, and of the levels, from those of pixels by a level. */
+TL_INLINE void pull_shares(const pulled_lanes *p, const texel_shares *quad, int level, vm m, vd share, vd *g_uv,
+                           vd *total, int is_f64)
 {
-    double g_slopes[6] = {0}, g_direction[3] = {0};
+    vd value[4], g[4], texel[4];
     for (int k = 0; k < 4; k++)
-        g_slopes[k] = g_level * by[k];
-    if (t->edge == TL_EDGE_CUBE) {
-        double g_by[6] = {0};
-        if (at->n_levels)
-            pull_cube(&at->cube, g_uv, g_slopes, g_direction, t->g_uv_da ? g_by : 0);
-        memcpy(g_slopes, g_by, sizeof g_by);
-        g_uv = g_direction;
+        value[k] = vd_set1(0.0);
+    for (int64_t first = 0; first < p->t->n_channels; first += 4) {
+        load_look_rows(p->g, p->n_left, p->t->n_channels, first, p->row, g, is_f64);
+        for (int k = 0; k < quad->n; k++) {
+            load_texels(p->t, level, vi_select(m, quad->row[k], vi_set1(0)), first, texel, is_f64);
+            for (int64_t c = 0; c < 4 && c < p->t->n_channels - first; c++)
+                value[k] = vd_add(value[k], vd_mul(g[c], texel[c]));
+        }
     }
-    const int n_axes = t->edge == TL_EDGE_CUBE ? 3 : 2;
-    for (int k = 0; k < n_axes; k++)
-        put_real(t->g_uv, n_axes * pixel + k, g_uv[k], is_f64);
-    for (int k = 0; t->g_uv_da && k < 2 * n_axes; k++)
-        put_real(t->g_uv_da, 2 * n_axes * pixel + k, g_slopes[k], is_f64);
-    if (t->g_bias)
-        put_real(t->g_bias, pixel, g_level, is_f64);
+    vd sums[3] = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)};
+    for (int k = 0; k < quad->n; k++) {
+        sums[0] = vd_add(sums[0], vd_mul(quad->share[k], value[k]));
+        for (int axis = 0; axis < 2; axis++)
+            sums[1 + axis] = vd_add(sums[1 + axis], vd_mul(quad->by[axis][k], value[k]));
+    }
+    *total = sums[0];
+    for (int axis = 0; axis < 2; axis++)
+        g_uv[axis] = vd_select(m, vd_add(g_uv[axis], vd_mul(share, sums[1 + axis])), g_uv[axis]);
 }
 
-/* Whether some channel of a pixel has a gradient. */
-TL_INLINE int is_pulled(const tl_grad_texture *t, int64_t pixel, int is_f64)
+/* Writes the gradients of what pixels look at, from those of u, v and the level. */
+TL_INLINE void store_looks(const tl_grad_texture *t, const look_lanes *look, int64_t pixel, vm m, const vd *g_uv,
+                           vd g_level, int is_f64)
 {
-    int found = 0;
-    for (int64_t c = 0; c < t->n_channels; c++)
-        found |= get_real(t->out, t->n_channels * pixel + c, is_f64) != 0.0;
-    return found;
+    const int n_axes = t->edge == TL_EDGE_CUBE ? 3 : 2;
+    const vd zero = vd_set1(0.0);
+    vd g_slopes[6] = {zero, zero, zero, zero, zero, zero}, g_place[3] = {g_uv[0], g_uv[1], zero}, by[6];
+    for (int k = 0; k < 4; k++)
+        g_slopes[k] = vd_mul(g_level, look->by[k]);
+    if (n_axes == 3) {
+        pull_cube(&look->cube, g_uv, g_slopes, g_place, by, t->uv_da != 0);
+        for (int k = 0; k < 3; k++)
+            g_place[k] = vd_select(look->is_there, g_place[k], zero);
+        for (int k = 0; t->uv_da && k < 6; k++)
+            g_slopes[k] = vd_select(look->is_there, by[k], zero);
+    }
+    store_look_rows(at_pixel(t->g_uv, n_axes, pixel, is_f64), n_axes, 0, n_axes, m, g_place, is_f64);
+    if (t->g_uv_da)
+        store_look_rows(at_pixel(t->g_uv_da, 2 * n_axes, pixel, is_f64), 2 * n_axes, 0, 2 * n_axes, m, g_slopes,
+                        is_f64);
+    if (t->g_bias)
+        store_look_rows(at_pixel(t->g_bias, 1, pixel, is_f64), 1, 0, 1, m, &g_level, is_f64);
+}
+
+/* Which pixels have a gradient in some channel. */
+TL_INLINE vm find_pulled(const pulled_lanes *p, int is_f64)
+{
+    const vd zero = vd_set1(0.0);
+    vm is_zero = vm_all();
+    vd g[4];
+    for (int64_t first = 0; first < p->t->n_channels; first += 4) {
+        load_look_rows(p->g, p->n_left, p->t->n_channels, first, p->row, g, is_f64);
+        for (int64_t c = 0; c < 4 && c < p->t->n_channels - first; c++)
+            is_zero = vm_and(is_zero, vm_and(vd_ge(g[c], zero), vd_ge(zero, g[c])));
+    }
+    return vm_and_not(p->m, is_zero);
 }
 
 TL_INLINE void pull_texels(const tl_grad_view *view, const tl_grad_texture *t, tl_grad_sums *sums, int is_f64)
 {
+    const int64_t end_pixel = view->end_row * view->width;
     const int n_axes = t->edge == TL_EDGE_CUBE ? 3 : 2;
     clear_band(view, t->g_uv, n_axes);
     clear_band(view, t->g_uv_da, 2 * n_axes);
     clear_band(view, t->g_bias, 1);
-    for (int64_t pixel = view->first_row * view->width; pixel < view->end_row * view->width; pixel++) {
-        if (!is_pulled(t, pixel, is_f64))
+    for (int64_t pixel = view->first_row * view->width; pixel < end_pixel; pixel += TL_LANES) {
+        const int n = end_pixel - pixel < TL_LANES ? (int)(end_pixel - pixel) : TL_LANES;
+        pulled_lanes p = {t, at_pixel(t->out, t->n_channels, pixel, is_f64), view->width * view->height - pixel,
+                          vi_min(vi_iota(), vi_set1(n - 1)), vm_first(n)};
+        p.m = find_pulled(&p, is_f64);
+        if (!vm_any(p.m))
             continue;
-        double by[4], g_uv[3] = {0}, total[2] = {0};
-        const looked_up at = look_at(t, pixel, by, is_f64);
-        for (int k = 0; k < at.n_levels; k++) {
-            const texel_shares quad = find_shares(t, &at, at.low + k, t->filter == TL_TEXEL_NEAREST);
-            total[k] = pull_shares(t, &quad, at.low + k, pixel, k ? at.upper : 1.0 - at.upper, g_uv, sums, is_f64);
+        vd share, g_uv[2] = {vd_set1(0.0), vd_set1(0.0)}, g_level = vd_set1(0.0), total;
+        const look_lanes look = look_at(view, t, pixel, n, is_f64);
+        int level, end;
+        level_range(t, &look, &level, &end);
+        for (; level < end; level++) {
+            const vm m = vm_and(p.m, at_level(&look, level, &share));
+            if (!vm_any(m))
+                continue;
+            const texel_shares quad = find_shares(t, &look, level);
+            if (sums)
+                scatter_shares(&p, &quad, level, m, share, sums, is_f64);
+            if (!t->g_uv)
+                continue;
+            pull_shares(&p, &quad, level, m, share, g_uv, &total, is_f64);
+            const vm is_low = vi_eq(look.low, vi_set1(level)),
+                     has_upper = vm_and_not(m, vd_ge(vd_set1(0.0), look.upper));
+            const vd change = vd_select(is_low, vd_sub(vd_set1(0.0), total), total);
+            g_level = vd_select(has_upper, vd_add(g_level, change), g_level);
         }
-        store_looks(t, &at, pixel, g_uv, at.n_levels > 1 ? total[1] - total[0] : 0.0, by, is_f64);
+        if (t->g_uv)
+            store_looks(t, &look, pixel, p.m, g_uv, g_level, is_f64);
     }
-    leave_band(sums);
+    if (sums)
+        leave_band(sums);
 }
 
 /* See kernels.h. */

@@ -228,6 +228,8 @@ TL_INLINE hm hm_and(hm a, hm b) { return a & b; }
 TL_INLINE hm hm_or(hm a, hm b) { return a | b; }
 TL_INLINE int hm_any(hm a) { return a != 0; }
 TL_INLINE hm hi_gt(hi a, hi b) { return _mm256_cmpgt_epi32_mask(a, b); }
+TL_INLINE hi hi_add(hi a, hi b) { return _mm256_add_epi32(a, b); }
+TL_INLINE hi hi_max(hi a, hi b) { return _mm256_max_epi32(a, b); }
 TL_INLINE hi hi_load_masked(hm m, const int32_t *p) { return _mm256_maskz_loadu_epi32(m, p); }
 TL_INLINE void hi_store_masked(int32_t *p, hm m, hi a) { _mm256_mask_storeu_epi32(p, m, a); }
 TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room)

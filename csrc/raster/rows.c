@@ -126,7 +126,7 @@ TL_INLINE void put_lanes(const tl_target *target, tl_sink sink, int64_t at, vm m
     if (sink_has_depth(sink))
         put_depths(target, sink, at, m, sum_depth(z_row, z_col), id);
     else
-        put_numbers(target, sink, at, m, vi_set1(id));
+        put_numbers(target, sink, at, m, vi_set1(number_of(target, sink, id)));
 }
 
 /* Rows of a block of at most TL_BLOCK_COLS columns, of a mask TL_BIT_COLS; the depth of a sample is the sum of its
@@ -142,6 +142,12 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
         for (int row = 0; row < n_rows; row++, at += stride)
             put_depths_half(target, sink, at, (hm)bits[row * stride_of_rows],
                             hf_sum_depth(z_row[row * stride_of_rows], hd_lower(z_col)), hi_lower(vi_set1(id)));
+        return;
+    }
+    if (is_half && (sink == TL_SINK_COUNT || sink == TL_SINK_LABEL)) {
+        const hi number = hi_lower(vi_set1(number_of(target, sink, id)));
+        for (int row = 0; row < n_rows; row++, at += stride)
+            put_numbers_half(target, sink, at, (hm)bits[row * stride_of_rows], number);
         return;
     }
 #endif

@@ -108,16 +108,25 @@ TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm 
         put_buffers(target, sink, at, m, depth, vi_set1(id));
 }
 
-/* Counts or ids of the lanes in m. */
-TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm m, vi id)
+/* What a sample without depth adds to a count, or the number that it makes of a label. */
+TL_INLINE int32_t number_of(const tl_target *target, tl_sink sink, int32_t id)
 {
-    int32_t *pixels = (int32_t *)target->pixels + at;
-    const int has_room = at + TL_LANES <= target->n_samples;
-    const vi old = vi_load_some(m, pixels, has_room);
-    vi_store_some(pixels, m,
-                  sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_xor(id, vi_set1(target->flip))),
-                  has_room);
+    return sink == TL_SINK_COUNT ? 1 : id ^ target->flip;
 }
+
+/* Counts or labels of the lanes in m: `number` of each. */
+#define TL_PUT_NUMBERS(NAME, M, I, P)                                                                                \
+    TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, I number)                            \
+    {                                                                                                                \
+        int32_t *pixels = (int32_t *)target->pixels + at;                                                            \
+        const int has_room = at + TL_LANES <= target->n_samples;                                                     \
+        const I old = P##i_load_some(m, pixels, has_room);                                                           \
+        P##i_store_some(pixels, m, sink == TL_SINK_COUNT ? P##i_add(old, number) : P##i_max(old, number), has_room); \
+    }
+TL_PUT_NUMBERS(put_numbers, vm, vi, v)
+#if TL_HALF_LANES
+TL_PUT_NUMBERS(put_numbers_half, hm, hi, h)
+#endif
 
 /* Samples of a word, of labels that come from the last triangle to the first: `covered` ones can no longer change. */
 TL_INLINE void put_word(const tl_target *target, int64_t word, uint64_t samples, vi name)
@@ -166,14 +175,9 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
         put_uncovered(target, at, n, id);
         return;
     }
-    int32_t *pixels = (int32_t *)target->pixels + at;
-    const vi name = vi_set1(id ^ target->flip);
-    for (int64_t k = 0; k < n; k += TL_LANES) {
-        const vm m = vm_first(n - k);
-        const int has_room = at + k + TL_LANES <= target->n_samples;
-        const vi old = vi_load_some(m, pixels + k, has_room);
-        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name), has_room);
-    }
+    const vi number = vi_set1(number_of(target, sink, id));
+    for (int64_t k = 0; k < n; k += TL_LANES)
+        put_numbers(target, sink, at + k, vm_first(n - k), number);
 }
 
 /* The one rounding of depth to float32; + 0 makes -0 a 0. */

@@ -200,7 +200,16 @@ def values_backward(kept: Any, g: Any) -> Any:
 values.defvjp(values_forward, values_backward)
 
 
-def texture(tex: Array, uv: Array, filter_mode: str = "linear", boundary_mode: BoundaryOption = "wrap") -> Array:
+def texture(
+    tex: Array,
+    uv: Array,
+    filter_mode: str = "linear",
+    boundary_mode: BoundaryOption = "wrap",
+    *,
+    uv_da: Array | None = None,
+    mip_level_bias: Array | None = None,
+    max_mip_level: int | None = None,
+) -> Array:
     """Return what a texture is at each pixel.
 
     Parameters
@@ -209,23 +218,32 @@ def texture(tex: Array, uv: Array, filter_mode: str = "linear", boundary_mode: B
         Row 0 is at v = 0.
     uv : array, shape (B, H, W, 2); of a cube map directions (B, H, W, 3)
         Where to look.
-    filter_mode : "nearest" or "linear"
-        The nearest texel, or the four next to a point.
+    filter_mode : "nearest", "linear", "linear-mipmap-nearest" or "linear-mipmap-linear"
+        The nearest texel, the four next to a point, or those of the nearest halving or of two.
     boundary_mode : "wrap", "clamp", "zero" or "cube"
         What lies beyond 0 and 1.
+    uv_da : array, shape (B, H, W, 4); of a cube map (B, H, W, 6), optional
+        What `uv` changes by from pixel to pixel, of `interpolate`: finds the level of a mipmap.
+    mip_level_bias : array, shape (B, H, W), optional
+        Is added to the level; without `uv_da` it is the level.
+    max_mip_level : int, optional
+        The last level; without it the last is 1 x 1.
 
     Returns
     -------
     array, shape (B, H, W, C)
-        Gradients reach `tex` and `uv`.
+        Gradients reach `tex`, `uv`, `uv_da` and `mip_level_bias`.
 
     Raises
     ------
     TypeError, ValueError
-        For a wrong dtype or shape, or an unknown mode.
+        For a wrong dtype or shape, an unknown mode, a mipmap filter without `uv_da` or `mip_level_bias`, or a side of a
+        level that is odd and not 1.
     """
-    if filter_mode not in ("nearest", "linear"):
-        raise ValueError(f"filter_mode must be 'nearest' or 'linear', got {filter_mode!r}")
+    if filter_mode not in FILTERS:
+        raise ValueError(
+            f"filter_mode must be {', '.join(map(repr, FILTERS[:-1]))} or {FILTERS[-1]!r}, got {filter_mode!r}"
+        )
     if boundary_mode not in get_args(BoundaryOption):
         raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
     n_axes = 3 if boundary_mode == "cube" else 2
@@ -234,35 +252,81 @@ def texture(tex: Array, uv: Array, filter_mode: str = "linear", boundary_mode: B
     if n_axes == 3 and fits:
         fits = tex.shape[1] == 6 and tex.shape[2] == tex.shape[3]
     check("tex", tex, f"(1 or {len(uv)}, {'6, N, N' if n_axes == 3 else 'Ht, Wt'}, C)", fits)
-    dtype = jnp.result_type(tex, uv)
-    return texels((filter_mode, boundary_mode), tex.astype(dtype), uv.astype(dtype))
+    of_pixels = uv.shape[:3]
+    for name, given, shape in (
+        ("uv_da", uv_da, (*of_pixels, 2 * n_axes)),
+        ("mip_level_bias", mip_level_bias, of_pixels),
+    ):
+        if given is not None:
+            check(name, given, str(shape), given.shape == shape)
+    levels, where = [tex], [uv]
+    if filter_mode.startswith("linear-mipmap"):
+        if uv_da is None and mip_level_bias is None:
+            raise ValueError(f"filter_mode={filter_mode!r} needs uv_da or mip_level_bias")
+        levels = halvings(tex, max_mip_level)
+        where += [one for one in (uv_da, mip_level_bias) if one is not None]
+    dtype = jnp.result_type(tex, *where)
+    modes = filter_mode, boundary_mode, len(where), uv_da is not None
+    return texels(modes, *(one.astype(dtype) for one in (*where, *levels)))
 
 
-def look_of(modes: tuple[str, str], tex: Any, uv: Any) -> TexelLook:
-    """Return what the engine looks up."""
-    return TexelLook([tex], TexelFilter[modes[0].upper()], TexelsBeyond[modes[1].upper()], uv)
+#: The words of `TexelFilter`.
+FILTERS = tuple(one.name.lower().replace("_", "-") for one in TexelFilter)
+
+
+def halvings(tex: Array, max_mip_level: int | None) -> list[Array]:
+    """Return the levels of a mipmap: each texel is the mean of those that it covers."""
+    if max_mip_level is not None and max_mip_level < 0:
+        raise ValueError(f"max_mip_level must be at least 0, got {max_mip_level}")
+    levels = [tex]
+    while max(levels[-1].shape[-3:-1]) > 1 and (max_mip_level is None or len(levels) <= max_mip_level):
+        last = levels[-1]
+        for axis in (tex.ndim - 3, tex.ndim - 2):
+            n = last.shape[axis]
+            if n > 1 and n % 2:
+                raise ValueError(
+                    f"tex must have sides that halve down to level {len(levels)}, got {tuple(tex.shape[-3:-1])}; "
+                    f"max_mip_level={len(levels) - 1} stops before"
+                )
+            last = (
+                last.reshape(*last.shape[:axis], n // 2, 2, *last.shape[axis + 1 :]).mean(axis + 1) if n > 1 else last
+            )
+        levels.append(last)
+    return levels
+
+
+#: Filter, boundary, how many arrays say where to look, and whether footprints are among them.
+Modes = tuple[str, str, int, bool]
+
+
+def look_of(modes: Modes, *given: Any) -> TexelLook:
+    """Return what the engine looks up: `given` are uv, footprints, biases, and levels."""
+    filter_mode, boundary_mode, n, has_da = modes
+    where = list(given[:n]) if has_da or n == 1 else [given[0], None, given[1]]
+    beyond = TexelsBeyond[boundary_mode.upper()]
+    return TexelLook(given[n:], TexelFilter[filter_mode.upper().replace("-", "_")], beyond, *where)
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
-def texels(modes: tuple[str, str], tex: Array, uv: Array) -> Any:
+def texels(modes: Modes, *given: Array) -> Any:
     """Return a texture at each pixel."""
-    shape = shape_of(uv.dtype, *uv.shape[:3], tex.shape[-1])
-    return call(lambda tex, uv: tensors.texels(look_of(modes, tex, uv)), shape, tex, uv)
+    shape = shape_of(given[0].dtype, *given[0].shape[:3], given[-1].shape[-1])
+    return call(lambda *given: tensors.texels(look_of(modes, *given)), shape, *given)
 
 
-def texels_forward(modes: tuple[str, str], tex: Array, uv: Array) -> Any:
+def texels_forward(modes: Modes, *given: Array) -> Any:
     """Return the same, and what backward takes."""
-    return texels(modes, tex, uv), (tex, uv)
+    return texels(modes, *given), given
 
 
-def texels_backward(modes: tuple[str, str], kept: Any, g: Array) -> Any:
+def texels_backward(modes: Modes, kept: Any, g: Array) -> Any:
     """Return the gradients of what `texels` takes."""
 
-    def run(tex: Any, uv: Any, g: Any) -> Any:
-        (g_tex,), g_uv, _, _ = tensors.texels_vjp(look_of(modes, tex, uv), g)
-        return g_tex, g_uv
+    def run(*given: Any) -> Any:
+        g_levels, *where = tensors.texels_vjp(look_of(modes, *given[:-1]), given[-1])
+        return *(one for one in where if one is not None), *g_levels
 
-    return call(run, like(*kept), *kept, g)
+    return call(run, tuple(shape_of(one.dtype, *one.shape) for one in kept), *kept, g)
 
 
 texels.defvjp(texels_forward, texels_backward)

@@ -66,6 +66,30 @@ def test_gradients_are_those_of_torch():
         np.testing.assert_allclose(one, other.numpy(), rtol=1e-4, atol=1e-4 * np.abs(other.numpy()).max())
 
 
+@pytest.mark.parametrize("mode", ["linear-mipmap-nearest", "linear-mipmap-linear"])
+@pytest.mark.parametrize("given", [("uv_da", "mip_level_bias"), ("uv_da",), ("mip_level_bias",)])
+def test_mipmaps_and_their_gradients_are_those_of_torch(mode, given):
+    torch = pytest.importorskip("torch")
+    from topleft import torch as of_torch
+
+    rng = np.random.default_rng(4)
+    where = {"uv_da": rng.random((1, 5, 7, 4), np.float32) - 0.5, "mip_level_bias": rng.random((1, 5, 7), np.float32)}
+    uv, how = rng.random((1, 5, 7, 2), np.float32), {"filter_mode": mode, "boundary_mode": "clamp", "max_mip_level": 2}
+
+    def run(texture, tex, uv, *more):
+        return texture(tex, uv, **dict(zip(given, more, strict=True)), **how)
+
+    arrays = np.asarray(TEX), uv, *(where[name] for name in given)
+    found, pull = jax.vjp(lambda *a: run(dr.texture, *a), *map(jnp.asarray, arrays))
+    tensors = [torch.tensor(one, requires_grad=True) for one in arrays]
+    expected = run(of_torch.texture, *tensors)
+    np.testing.assert_allclose(found, expected.detach().numpy(), rtol=1e-6)
+    weights = rng.random(found.shape, np.float32)
+    of_torch_too = torch.autograd.grad((expected * torch.tensor(weights)).sum(), tensors)
+    for one, other in zip(pull(jnp.asarray(weights)), of_torch_too, strict=True):
+        np.testing.assert_allclose(one, other.numpy(), rtol=1e-5, atol=1e-6)
+
+
 def test_vmap_is_one_sample_after_the_other():
     pos, tri, colours = sphere(3)
     found = jax.vmap(lambda p: jax.grad(number)(p[None], colours, TEX, tri))(pos)
@@ -89,11 +113,31 @@ def test_attributes_without_derivatives_have_no_columns():
         (lambda pos, tri, c: dr.rasterize(pos.astype(int), tri, SIZE), TypeError, "pos must be float32 or float64"),
         (lambda pos, tri, c: dr.interpolate(c, pos, tri), ValueError, "rast must have shape (B, H, W, 4), got"),
         (lambda pos, tri, c: dr.texture(c, pos), ValueError, "uv must have shape (B, H, W, 2), got"),
-        (lambda pos, tri, c: dr.texture(c, pos, "cubic"), ValueError, "filter_mode must be 'nearest' or 'linear', got"),
+        (
+            lambda pos, tri, c: dr.texture(c, pos, "cubic"),
+            ValueError,
+            "filter_mode must be 'nearest', 'linear', 'linear-m",
+        ),
         (
             lambda pos, tri, c: dr.texture(c, pos, boundary_mode="a"),
             ValueError,
             "boundary_mode must be 'wrap', 'clamp'",
+        ),
+        (
+            lambda pos, tri, c: dr.texture(TEX, jnp.zeros((1, 2, 2, 2)), "linear-mipmap-linear"),
+            ValueError,
+            "filter_mode='linear-mipmap-linear' needs uv_da or mip_level_bias",
+        ),
+        (
+            lambda pos, tri, c: dr.texture(TEX, jnp.zeros((1, 2, 2, 2)), uv_da=jnp.zeros((1, 2, 2, 2))),
+            ValueError,
+            "uv_da must have shape (1, 2, 2, 4), got",
+        ),
+        (lambda pos, tri, c: dr.halvings(TEX, -1), ValueError, "max_mip_level must be at least 0, got -1"),
+        (
+            lambda pos, tri, c: dr.halvings(TEX[:, :6], None),
+            ValueError,
+            "halve down to level 2, got (6, 8); max_mip_le",
         ),
         (lambda pos, tri, c: dr.antialias(c, pos, pos, tri), ValueError, "color must have shape (B, H, W, C), got"),
     ],

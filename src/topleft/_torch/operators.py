@@ -244,9 +244,11 @@ def look_up(
 
 
 @operator(
-    "(Tensor[] levels, Tensor uv, Tensor? uv_da, Tensor? bias, int how, int beyond, Tensor g_out) -> Tensor[]",
-    lambda levels, uv, uv_da, bias, how, beyond, g_out: [  # noqa: ARG005
-        *(like(one, uv) for one in levels), like(uv, uv), like(uv_da, uv), like(bias, uv)
+    "(Tensor[] levels, Tensor uv, Tensor? uv_da, Tensor? bias, int how, int beyond, Tensor g_out, bool of_levels,"
+    " bool of_places) -> Tensor[]",
+    lambda levels, uv, uv_da, bias, how, beyond, g_out, of_levels, of_places: [  # noqa: ARG005
+        *(like(one if of_levels else None, uv) for one in levels),
+        *(like(one if of_places else None, uv) for one in (uv, uv_da, bias)),
     ],
 )  # fmt: skip
 def look_up_vjp(
@@ -257,11 +259,13 @@ def look_up_vjp(
     how: int,
     beyond: int,
     g_out: Tensor,
+    of_levels: bool,
+    of_places: bool,
 ) -> list[Tensor]:
-    """Return the gradients of the levels, of uv, of the footprints and of the biases."""
+    """Return the gradients of the levels, of uv, of the footprints and of the biases; those not wanted are empty."""
     look = look_of(levels, uv, uv_da, bias, how, beyond)
-    g_levels, *where = tensors.texels_vjp(look, numpy_of(g_out))
-    return [*map(torch.from_numpy, g_levels), *(tensor_of(one, uv) for one in where)]
+    g_levels, *where = tensors.texels_vjp(look, numpy_of(g_out), of_levels=of_levels, of_places=of_places)
+    return [tensor_of(one, uv) for one in (*(g_levels if of_levels else [None] * len(levels)), *where)]
 
 
 #: Triangles, and what lies across their edges, of the last calls.
@@ -424,11 +428,16 @@ def keep_look(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa:
 def pull_look(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
     """Return the gradients of what `look_up` takes."""
     uv, uv_da, bias, *levels = ctx.saved_tensors
-    found = look_up_vjp(levels, uv, uv_da, bias, ctx.how, ctx.beyond, g_out)
-    g_uv, g_da, g_bias = found[ctx.n_levels :]
+    of_levels, *of_places = ctx.needs_input_grad[:4]
+    wanted = any(of_levels) if isinstance(of_levels, list | tuple) else of_levels, any(of_places)
+    found = look_up_vjp(levels, uv, uv_da, bias, ctx.how, ctx.beyond, g_out, *wanted)
+    g_levels, where = found[: ctx.n_levels], found[ctx.n_levels :]
     return (
-        found[: ctx.n_levels], g_uv, None if uv_da is None else g_da, None if bias is None else g_bias, None, None
-    )  # fmt: skip
+        g_levels if wanted[0] else [None] * ctx.n_levels,
+        *(one if is_wanted else None for one, is_wanted in zip(where, of_places, strict=True)),
+        None,
+        None,
+    )
 
 
 def keep_edges(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001

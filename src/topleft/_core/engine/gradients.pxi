@@ -17,6 +17,23 @@ cdef const void *first_of(array: object):
     return data(flat)
 
 
+cdef tl_grad_texture looked_up(levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...]):
+    """Return a texture and where it is looked at, as `GradientView.texels` is given them."""
+    cdef tl_grad_texture t
+    cdef int64_t n_texels = 0
+    cdef int k
+    memset(&t, 0, sizeof(t))
+    t.n_levels, t.n_channels = len(levels), levels[0].shape[3]
+    for k in range(len(levels)):
+        t.levels[k], t.heights[k], t.widths[k] = first_of(levels[k]), levels[k].shape[1], levels[k].shape[2]
+        t.first_texels[k] = n_texels
+        n_texels += levels[k].shape[0] * levels[k].shape[1] * levels[k].shape[2]
+    t.filter, t.edge = <tl_texel_filter><int>codes[0], <tl_texel_edge><int>codes[1]
+    t.uv, t.uv_da, t.bias = first_of(arrays[0]), first_of(arrays[1]), first_of(arrays[2])
+    t.out = <void *>first_of(arrays[3])
+    return t
+
+
 cdef class GradientView:
     """A picture and the mesh in it: `tl_grad_view`."""
 
@@ -113,34 +130,32 @@ cdef class GradientView:
             bad = K.grad_colors_vjp(&view, &c)
         return bad
 
-    def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...],
-               GradientSums sums or None, int64_t first, int64_t end):
-        """Write rows of a texture, levels (., H, W, C); with sums, of its gradients.
+    def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...], int64_t first,
+               int64_t end):
+        """Write rows of a texture, levels (., H, W, C).
 
-        `codes`: of the filter and of the texture beyond its edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out,
-        and with sums g_uv, g_uv_da, g_bias; None for absent ones.
+        `codes`: of the filter and of the texture beyond its edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out;
+        None for absent ones.
         """
         cdef tl_grad_view view = self.rows(first, end)
-        cdef tl_grad_texture t
-        cdef int64_t n_texels = 0
-        cdef int k
-        memset(&t, 0, sizeof(t))
-        t.n_levels, t.n_channels = len(levels), levels[0].shape[3]
-        for k in range(len(levels)):
-            t.levels[k], t.heights[k], t.widths[k] = first_of(levels[k]), levels[k].shape[1], levels[k].shape[2]
-            t.first_texels[k] = n_texels
-            n_texels += levels[k].shape[0] * levels[k].shape[1] * levels[k].shape[2]
-        t.filter, t.edge = <tl_texel_filter><int>codes[0], <tl_texel_edge><int>codes[1]
-        t.uv, t.uv_da, t.bias = first_of(arrays[0]), first_of(arrays[1]), first_of(arrays[2])
-        t.out = <void *>first_of(arrays[3])
-        if sums is None:
-            with nogil:
-                K.grad_texels(&view, &t)
-            return
+        cdef tl_grad_texture t = looked_up(levels, codes, arrays)
+        with nogil:
+            K.grad_texels(&view, &t)
+
+    def texels_vjp(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...],
+                   GradientSums sums or None, int64_t first, int64_t end):
+        """Write rows of the gradients of where a texture is looked at, and sum up those of its texels.
+
+        `arrays`: those of `texels`, `out` a gradient, and g_uv, g_uv_da, g_bias; without g_uv, or without sums, those
+        gradients are left out. `sums` have a multiple of four columns, of which the first C count.
+        """
+        cdef tl_grad_view view = self.rows(first, end)
+        cdef tl_grad_texture t = looked_up(levels, codes, arrays)
         t.g_uv, t.g_uv_da = <void *>first_of(arrays[4]), <void *>first_of(arrays[5])
         t.g_bias = <void *>first_of(arrays[6])
+        cdef tl_grad_sums *of_texels = NULL if sums is None else &sums.sums
         with nogil:
-            K.grad_texels_vjp(&view, &t, &sums.sums)
+            K.grad_texels_vjp(&view, &t, of_texels)
 
     def outline(self, const int32_t[:, ::1] across, double[:, ::1] places, int32_t[::1] outline):
         """Write places of vertices (V, 2) in pixels, and the silhouette edges of triangles (T), for `edges`."""
@@ -218,8 +233,8 @@ cdef class GradientSums:
         self.sums.n, self.sums.n_columns = 0, sums.shape[1]
 
     def add_to(self, out: Array):
-        """Add the sums to the rows (N, K) that they belong to, and forget them."""
-        cdef int64_t i, c, n_columns = self.sums.n_columns
+        """Add the first K columns of the sums to the rows (N, K) that they belong to, and forget them."""
+        cdef int64_t i, c, n_columns = out.shape[1], n_sums = self.sums.n_columns
         cdef void *rows = <void *>first_of(out)
         cdef bint is_f64 = out.dtype == np.float64
         cdef int64_t at
@@ -228,9 +243,9 @@ cdef class GradientSums:
                 at = self.sums.rows[i] * n_columns
                 for c in range(n_columns):
                     if is_f64:
-                        (<double *>rows)[at + c] += self.sums.sums[i * n_columns + c]
+                        (<double *>rows)[at + c] += self.sums.sums[i * n_sums + c]
                     else:
-                        (<float *>rows)[at + c] = <float>((<float *>rows)[at + c] + self.sums.sums[i * n_columns + c])
+                        (<float *>rows)[at + c] = <float>((<float *>rows)[at + c] + self.sums.sums[i * n_sums + c])
         self.sums.n = 0
 
 

@@ -241,30 +241,42 @@ def texels(look: TexelLook) -> Array:
 
     def work(band: Band) -> None:
         i = band.picture
-        view.texels(look.of_picture(i), codes, look.arrays(i, out), None, band.first, band.end)
+        view.texels(look.of_picture(i), codes, look.arrays(i, out), band.first, band.end)
 
     grid.bands.run(work)
     return out
 
 
-def texels_vjp(look: TexelLook, g_out: Array) -> tuple[list[Array], Array, Array | None, Array | None]:
-    """Return the gradients of the levels, of uv, of the footprints and of the biases."""
+def texels_vjp(
+    look: TexelLook, g_out: Array, *, of_levels: bool = True, of_places: bool = True
+) -> tuple[list[Array], Array | None, Array | None, Array | None]:
+    """Return the gradients of the levels, of uv, of the footprints and of the biases.
+
+    Without `of_levels` the first list is empty; without `of_places` the others are None.
+    """
     grid, dtype = look.grid, look.uv.dtype
     view, codes = grid.view(np.empty((0, 4), dtype)), (int(look.filter), int(look.beyond))
     n_channels, n_pictures = g_out.shape[3], len(look.levels[0])
     ends = np.cumsum([level[0].size // n_channels if n_channels else 0 for level in look.levels])
-    sums_of = np.zeros((n_pictures, ends[-1], n_channels), dtype)
-    g_uv, g_da, g_bias = (None if one is None else empty(one.shape, dtype) for one in (look.uv, look.uv_da, look.bias))
+    places = (look.uv, look.uv_da, look.bias) if of_places else (None,) * 3
+    g_uv, g_da, g_bias = (None if one is None else empty(one.shape, dtype) for one in places)
 
-    def work(band: Band, sums: engine.GradientSums) -> None:
+    g_texels = np.zeros((n_pictures, ends[-1] if of_levels else 0, n_channels), dtype)
+
+    def make(room: Room) -> list[engine.GradientSums]:
+        per_px = 8 if look.filter is TexelFilter.LINEAR_MIPMAP_LINEAR else 4
+        columns = -(-n_channels // 4) * 4
+        return [room.sums("texels", g_texels.shape[1], columns, per_px)] if of_levels else []
+
+    def work(band: Band, sums: list[engine.GradientSums]) -> None:
         i = band.picture
         arrays = look.arrays(i, g_out, g_uv, g_da, g_bias)
-        view.texels(look.of_picture(i), codes, arrays, sums, band.first, band.end)
+        view.texels_vjp(look.of_picture(i), codes, arrays, sums[0] if sums else None, band.first, band.end)
 
-    grid.bands.add_up(work, sums_of, 4 if look.filter < TexelFilter.LINEAR_MIPMAP_LINEAR else 8)
-    parts = np.split(sums_of, ends[:-1], axis=1)
-    g_levels = [part.reshape(level.shape) for part, level in zip(parts, look.levels, strict=True)]
-    return g_levels, g_uv, g_da, g_bias  # type: ignore[return-value]
+    grid.bands.add_up_all(make, work, [g_texels] if of_levels else [])
+    parts = np.split(g_texels, ends[:-1], axis=1) if of_levels else []
+    g_levels = [part.reshape(level.shape) for part, level in zip(parts, look.levels, strict=of_levels)]
+    return g_levels, g_uv, g_da, g_bias
 
 
 @dataclass(frozen=True)
