@@ -106,7 +106,7 @@ U16: TypeAlias = NDArray[np.uint16]
 U32: TypeAlias = NDArray[np.uint32]
 U64: TypeAlias = NDArray[np.uint64]
 '''
-CLASS = r"^cdef class (?P<of>\w+)"
+CLASS = r"^cdef class (?P<of>\w+)(?P<base>\(\w+\))?"
 DEF = r"^(?P<indent> *)def (?P<name>\w+)\((?P<arguments>.*?)\)(?: -> (?P<returns>[^\n]*))?:(?: *#[^\n]*)?$"
 ATTRIBUTE = r"^    cdef readonly (?P<kind>\w+) (?P<attributes>[\w, ]+?)(?: *#: (?P<told>[^\n]*?)| *#[^\n]*)?$"
 VALUE = r"^(?P<values>[A-Z][A-Z_, ]+)(?:: (?P<annotation>[^=\n]+?))? = "
@@ -163,7 +163,7 @@ def stub() -> str:
     lines = []
     for found in STATEMENT.finditer(text):
         if found["of"]:
-            lines += [f"class {found['of']}:", '    """"""']
+            lines += [f"class {found['of']}{found['base'] or ''}:", '    """"""']
         elif found["decorator"]:
             lines.append(f"    @{found['decorator']}")
         elif found["values"]:

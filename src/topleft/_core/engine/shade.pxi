@@ -1,5 +1,8 @@
 # Shades pixels and tests their alpha: textures, materials and lights, and the passes that use them.
 
+cdef enum:
+    PROJECTED_BLOCK = 1 << 10  # vertices that are read twice while they are in the first cache
+
 
 cdef class Mipmap:
     """A picture of linear light and its halves: uint16 texels as `tl_texture` has them, a row (offset, width, height) a level."""
@@ -298,9 +301,16 @@ cdef class ShadingTable:
 
 
 def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out):
-    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped."""
+    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped.
+
+    Those of a `WaitingMesh` are written when it is drawn.
+    """
     cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
     if n == 0:
+        return
+    if isinstance(mesh, WaitingMesh):
+        (<WaitingMesh>mesh).rows, (<WaitingMesh>mesh).seen_rows = &rows[0, 0], &out[0, 0]
+        mesh.arrays = mesh.arrays, rows, out
         return
     if mesh.is_used is None:
         if n < HELD_VERTICES:
@@ -318,6 +328,27 @@ def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out)
             if end > i:
                 K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
             i = end + 1
+
+
+cdef class WaitingMesh(SnappedMesh):
+    """A mesh with room for its snapped vertices, which `ShadedScene.draw` fills."""
+
+    cdef const float *rows  # those of `set_inverse_w`, and where they go; NULL: there are none
+    cdef float *seen_rows
+
+    cdef bint project(self) noexcept nogil:
+        """Project the vertices, block by block with their 1/w; tells whether all of them are drawn where they lie."""
+        cdef const tl_source *source = self.snapped.mesh.source
+        cdef tl_vertex_counts counts
+        cdef int64_t i, end, n = source.n
+        for i from 0 <= i < n by PROJECTED_BLOCK:
+            end = min(i + <int64_t>PROJECTED_BLOCK, n)
+            counts = K.project(source, i, end, self.clip_view(), <tl_vertex *>self.snapped.mesh.vertices, NULL)
+            if counts.n_bad or counts.n_wide or counts.n_clipped:
+                return False
+            if self.rows != NULL:
+                K.set_inverse_w(source, self.rows, i, end, self.seen_rows)
+        return True
 
 
 cdef class ShadedScene:
@@ -341,6 +372,32 @@ cdef class ShadedScene:
             mesh, table = meshes[i], tables[i]
             instances[i].snapped, instances[i].shading, instances[i].first_id = &mesh.snapped, &table.shading, first_ids[i]
         self.scene.instances, self.scene.n, self.scene.view = instances, n, self.mesh.clip_view()
+
+    def draw(self, Target target, uint8_t[:, :, ::1] pixels) -> bool:
+        """Project, draw and shade the only mesh, a `WaitingMesh`, in one call: ids, depth and the picture (H, W, 4).
+
+        Returns False where a vertex or a triangle cannot be drawn as it is; there may be no picture then.
+        """
+        cdef WaitingMesh mesh = self.mesh
+        cdef tl_target rows = target.rows(0)
+        cdef tl_window window = mesh.window(0, target.height, target.width)
+        cdef uint8_t *picture = &pixels[0, 0, 0]
+        cdef bint is_drawn
+        if mesh.snapped.mesh.n_vertices < HELD_VERTICES and target.height * target.width <= HELD_PX:
+            is_drawn = self.draw_waiting(mesh, &window, &rows, picture)
+        else:
+            with nogil:
+                is_drawn = self.draw_waiting(mesh, &window, &rows, picture)
+        raise_if_given_up()
+        return is_drawn
+
+    cdef bint draw_waiting(self, WaitingMesh mesh, const tl_window *window, const tl_target *rows, uint8_t *pixels) noexcept nogil:
+        cdef tl_slice slice = no_slice()
+        slice.end, slice.is_first, slice.is_last = mesh.snapped.n_triangles, True, True
+        if not mesh.project() or K.draw(&mesh.snapped, window, rows, &slice) >= 0:
+            return False
+        K.shade(&self.scene, window, NULL, <const int32_t *>rows.pixels, rows.depth, pixels)
+        return True
 
     def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row,
               int64_t n_rows, const int32_t[::1] at=None):

@@ -135,6 +135,18 @@ def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
     return min(view.size[1], n_threads)
 
 
+def draws_at_once(view: View, n_triangles: int) -> bool:
+    """Tell whether one thread takes vertices to a shaded picture in one call: what shows decides nothing.
+
+    No other thread, no bands of rows; and no bounds of depth, as so many triangles have short rows.
+    """
+    costs, (width, height) = cost_table(), view.size
+    is_plain = view.sampling is Sampling.CENTER and view.single_sided is None and not view.is_exact
+    is_alone = view.threads == 1 or (view.threads is None and available_threads() == 1)
+    is_small = 0 < width * height <= min(costs.near_pixels, n_triangles * costs.bound_span)
+    return is_plain and is_alone and is_small
+
+
 def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
     """Return an estimate of how long one thread draws, from a guess of the visible area."""
     costs = cost_table()

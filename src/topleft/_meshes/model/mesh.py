@@ -243,6 +243,19 @@ class Mesh:
         """The clusters, from the second picture of a large mesh on; this counts as one."""
         return self.clusters if choices.pays_to_cluster(len(self.triangles), self.note_drawn()) else None
 
+    def is_drawn_whole(self) -> bool:
+        """Whether this picture needs no look at the clusters: there are none, or they have not paid lately."""
+        clusters = self.find_clusters()
+        if clusters is None:
+            return True
+        clusters.n_pictures += 1
+        return not clusters.backoff.is_over()
+
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """What pictures have found out of it, to find it at once."""
+        return {}
+
     @property
     def has_clusters(self) -> bool:
         """Whether `clusters` have been made."""

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -126,15 +125,12 @@ def color_rows(colors: npt.NDArray[np.uint8]) -> F32:
     return rows
 
 
-_shading_meshes: WeakKeyDictionary[Mesh, ShadingMesh] = WeakKeyDictionary()
-
-
 def shading_mesh_of(mesh: Mesh) -> ShadingMesh:
-    """The shading_mesh of a mesh in its own space, made once."""
-    shading_mesh = _shading_meshes.get(mesh)
-    if shading_mesh is None:
-        shading_mesh = _shading_meshes[mesh] = ShadingMesh(mesh)
-    return shading_mesh
+    """The shading mesh of a mesh in its own space, made once."""
+    found: ShadingMesh | None = mesh.known.get(ShadingMesh)
+    if found is None:
+        found = mesh.known[ShadingMesh] = ShadingMesh(mesh)
+    return found
 
 
 def is_full(material: Material) -> bool:

@@ -19,7 +19,8 @@ from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import WindowOptions
-from topleft._meshes.camera.camera import CameraLike
+from topleft._meshes.camera.camera import CameraLike, camera_for
+from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.blended import transparent_pass
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
@@ -27,6 +28,7 @@ from topleft._meshes.picture.edges import draw_all_edges
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.holes import draw_visible
 from topleft._meshes.picture.instances import rasterize_shot
+from topleft._meshes.picture.kept import kept_picture
 from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import LookOptions, ShadingOptions
 from topleft._meshes.picture.shot import Shot
@@ -121,9 +123,16 @@ def render(
     """
     for option in look.keys() - LookOptions.__annotations__:
         raise TypeError(f"render() got an unexpected keyword argument {option!r}")
-    shot = Shot.of(mesh, camera, size)
-    options = ShadingOptions.parse(shading, color, background, threads=threads, **look)
     view: dict[str, Any] = {"cull": cull, "sampling": sampling, "subpixel_bits": subpixel_bits, "threads": threads}
+    given: dict[str, Any] = {"shading": shading, "color": color, "background": background, "threads": threads, **look}
+    if isinstance(mesh, Mesh) and type(tolerance) is float and not (tolerance or edges):
+        size = as_size(size)
+        camera = camera_for(mesh, camera, size)
+        kept = kept_picture(mesh, size, view, given) if camera.lens is None else None
+        if kept is not None:
+            return kept.draw(mesh, camera, rasterizer)
+    shot = Shot.of(mesh, camera, size)
+    options = ShadingOptions.parse(**given)
     if shot.cloud is not None:
         if edges:
             raise ValueError("points have no edges")

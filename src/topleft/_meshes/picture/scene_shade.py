@@ -22,7 +22,7 @@ from topleft._meshes.model.points import Points
 from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture.cloud import shade_cloud
 from topleft._meshes.picture.fragments import counts_of, shown_of
-from topleft._meshes.picture.shade import Shading, ShadingOptions, shade_instances, shade_numbers
+from topleft._meshes.picture.shade import NUMBERS, ShadingOptions, shade_instances, shade_numbers
 from topleft._meshes.scene.scene import Scene, scene_of
 from topleft.typing import ShadingOption
 
@@ -115,7 +115,7 @@ def shade(
 
 def shade_by(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOptions) -> U8:
     """The picture of a visibility buffer by checked options."""
-    if options.mode in (Shading.IDS, Shading.DEPTH):
+    if options.mode in NUMBERS:
         return shade_numbers(frags, camera, options)
     return shade_instances(shown_of(frags, scene), frags._seen(), camera, options)
 

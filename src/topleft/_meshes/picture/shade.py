@@ -57,6 +57,9 @@ class Shading(StrEnum):
 
 
 SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
+NUMBERS = frozenset({Shading.IDS, Shading.DEPTH})
+"""Those that colour numbers of the buffer, without light."""
+
 PLAIN = (Material(),)
 """Fills the place of the materials in pictures of normals, which read none."""
 
