@@ -19,8 +19,7 @@ from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import WindowOptions
-from topleft._meshes.camera.camera import CameraLike, camera_for
-from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.blended import transparent_pass
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
@@ -125,13 +124,12 @@ def render(
         raise TypeError(f"render() got an unexpected keyword argument {option!r}")
     view: dict[str, Any] = {"cull": cull, "sampling": sampling, "subpixel_bits": subpixel_bits, "threads": threads}
     given: dict[str, Any] = {"shading": shading, "color": color, "background": background, "threads": threads, **look}
-    if isinstance(mesh, Mesh) and type(tolerance) is float and not (tolerance or edges):
-        size = as_size(size)
-        camera = camera_for(mesh, camera, size)
-        kept = kept_picture(mesh, size, view, given) if camera.lens is None else None
-        if kept is not None:
-            return kept.draw(mesh, camera, rasterizer)
     shot = Shot.of(mesh, camera, size)
+    is_whole = type(tolerance) is float and not (tolerance or edges)
+    if shot.is_mesh and is_whole and shot.camera.lens is None:
+        kept = kept_picture(shot.subject, shot.size, view, given)
+        if kept is not None:
+            return kept.draw(shot.subject, shot.camera, rasterizer)
     options = ShadingOptions.parse(**given)
     if shot.cloud is not None:
         if edges:
