@@ -491,13 +491,8 @@ def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: 
 
 
 def can_split(view: View, n_triangles: int) -> bool:
-    """Tell whether pixels that show one triangle keep its id and depth once, not by sample."""
+    """Tell whether pixels that show one triangle may keep its id and depth once, not by sample."""
     return view.is_split and view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_slice(view)
-
-
-def can_wait(view: View, snapped: Snapped) -> bool:
-    """Tell whether samples but the first may be drawn when they are read, or those of one triangle be kept once."""
-    return 0 not in view.size and snapped.n_triangles > 0 and can_slice(view) and not snapped.mesh.is_named
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:

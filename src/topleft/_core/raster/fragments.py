@@ -15,7 +15,7 @@ from topleft._core.base.arrays import as_array, as_checked_triangles, as_number,
 from topleft._core.base.memory import empty
 from topleft._core.base.texels import as_levels
 from topleft._core.raster.backward import Backward
-from topleft._core.raster.sampling import FirstSample, SplitSamples
+from topleft._core.raster.sampling import SplitSamples
 from topleft.typing import EdgesOption, EncodingOption, FilterOption, WrapOption
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
@@ -141,8 +141,6 @@ class Fragments:
     _samples: tuple[Fragments, ...] = ()
     #: Their ids and depths, until the planes are read.
     _split: SplitSamples | None = None
-    #: The first of them, until others are read.
-    _first: FirstSample | None = None
     #: The mesh that it was drawn from; None where that is not kept.
     corners: GivenCorners | None = None
     #: The subject that attributes belong to: "Mesh", "Scene" (one for each instance) or "Points".
@@ -173,10 +171,9 @@ class Fragments:
 
     def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
         """Return the fragments of each of several samples, and their planes (S, H, W), drawn now if they were not."""
-        waiting = self._split or self._first
-        if waiting is not None:
-            self._set_planes(*waiting.planes(), waiting.drawn.meshes)
-            self._split = self._first = None
+        if self._split is not None:
+            self._set_planes(*self._split.planes(), self._split.drawn.meshes)
+            self._split = None
         return self._samples, self._planes
 
     def _set_planes(
@@ -278,14 +275,10 @@ class Fragments:
         return frags
 
     @classmethod
-    def of_some(cls, some: SplitSamples | FirstSample, n_vertices: int, n_triangles: int) -> Fragments:
+    def of_split(cls, split: SplitSamples, n_vertices: int, n_triangles: int) -> Fragments:
         """Return the fragments of several samples; their planes are drawn on first access."""
-        if isinstance(some, SplitSamples):
-            frags = cls(some.ids, some.depth, some.drawn.meshes[0], n_vertices, n_triangles)
-            frags._split = some
-        else:
-            frags = cls(some.ids[0], some.depth[0], some.drawn.meshes[0], n_vertices, n_triangles)
-            frags._first = some
+        frags = cls(split.ids, split.depth, split.drawn.meshes[0], n_vertices, n_triangles)
+        frags._split = split
         return frags
 
     @overload

@@ -239,7 +239,6 @@ def draw_batch(
             transform = matrices[i] if matrices is not None and matrices.ndim == 3 else matrices
             pose, arrays = replace(one, transform=transform), tuple(None if to is None else to[i] for to in outs)
             found.append(draw_fragments(FRESH, own, corners, pose, depth_test, background_depth, arrays))
-            found[-1]._sampled()  # by this thread, not later by one for all poses
         return found
 
     drawn = [frags for part in run_parts(draw_some, n, n_threads) for frags in part] if n else []

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import as_number, as_out
-from topleft._core.base.memory import Memory, check_fits, empty
+from topleft._core.base.memory import Memory, MemoryOf, check_fits, empty
 from topleft._core.base.options import DepthTest, Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
@@ -24,15 +24,11 @@ from topleft._core.raster.classic import draw_classic
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.sampling import (
-    FirstSample,
     SamplePass,
-    SplitSamples,
-    draw_first,
     draw_planes,
     draw_sorted,
     draw_split,
     lay_background,
-    memory_of_samples,
     sample_positions,
     sum_areas,
 )
@@ -271,7 +267,7 @@ def draw_fragments(
     if frags is not None:
         return frags.drawn_from(corners)
     if view.sampling.n_samples > 1:  # samples are drawn from the snapped mesh on first access
-        memory = memory_of_samples(memory)
+        memory = MemoryOf(memory, "samples")
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     if names is not None:
         snapped = replace(snapped, mesh=snapped.mesh.named(names))
@@ -311,17 +307,17 @@ def draw_depth(memory: Memory, snapped: Snapped, view: View, options: FragmentOp
 
 
 def draw_samples(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
-    """Draw ids and depth of samples: the first, for pictures those of pixels that show several; or a plane a sample."""
+    """Draw ids and depth of every sample: those of the first, and of pixels that show several; or a plane a sample."""
     (width, height), n = view.size, view.sampling.n_samples
     own = SamplePass(memory, snapped.mesh, sample_positions(n, view.grid_bits), drawing.n_threads)
     check_fits((n, height, width), np.int32, np.float32)
-    if options.ids_out is None and options.depth_out is None and choices.can_wait(view, snapped):
-        given = own, drawing.sink, (height, width), options.background
-        some: SplitSamples | FirstSample | None = draw_split(*given) if view.is_split else draw_first(*given)
-        if some is None:
+    can_split = choices.can_split(view, snapped.n_triangles) and not snapped.mesh.is_named
+    if can_split and options.ids_out is None and options.depth_out is None:
+        split = draw_split(own, drawing.sink, (height, width), options.background)
+        if split is None:
             snapped.refuse()
         view.mark("draw")
-        return Fragments.of_some(some, snapped.n_vertices, snapped.n_triangles)
+        return Fragments.of_split(split, snapped.n_vertices, snapped.n_triangles)
     ids, depth = planes_of(memory, view)
     draw_all_samples(own, snapped, view, drawing.sink, ids, depth)
     lay_background(ids, depth, drawing.sink, options.background)
@@ -390,7 +386,7 @@ def draw_cluster_samples(
     (width, height), n = view.size, view.sampling.n_samples
     check_fits((n, height, width), np.int32, np.float32)
     samples = [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
-    memory = memory_of_samples(memory)
+    memory = MemoryOf(memory, "samples")
     ids, depth = planes_of(memory, view)
     bounds = memory.empty("bounds", engine.Target.bounds_shape(height, width), np.float32)
     for plane, z, sample in zip(ids, depth, samples, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.base.memory import FRESH, Memory, MemoryOf, check_fits, empty
+from topleft._core.base.memory import FRESH, Memory, check_fits, empty
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts
 from topleft._core.raster.costs import cost_table
@@ -29,12 +29,6 @@ POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
 
 #: Sub-pixel bits of the coarsest grid that all samples lie on.
 SAMPLE_GRID_BITS = 4
-
-#: What an error says of triangles that the caller has written into.
-CHANGED = "triangles must stay what they were drawn from until samples are asked for"
-
-#: Where a `Rasterizer` counts its pictures of several samples.
-TURN = "turn", (1,), np.int64
 
 #: Cells that are held at a time; a larger picture is drawn in several passes over the triangles.
 MAX_CELLS = 1 << 28
@@ -100,62 +94,6 @@ def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int,
 
 
 @dataclass(frozen=True, eq=False)
-class FirstSample:
-    """The first of several samples a pixel, drawn: plane 0 of ids and depth (S, H, W). The others wait to be read."""
-
-    ids: NDArray[np.int32]
-    depth: NDArray[np.float32]
-    drawn: SamplePass
-    sink: Sink
-    background: float
-    turn: NDArray[np.int64]
-    """Counts the pictures that lie in its memory, one after the other."""
-    own_turn: int
-
-    def draw(self, first: int, end: int) -> bool:
-        """Draw the planes of samples [first, end); returns as `draw_planes` does."""
-        ids, depth = self.ids[first:end], self.depth[first:end]
-        some = self.drawn._replace(positions=self.drawn.positions[first:end])
-        is_bad = draw_planes(some, self.sink, ids, depth, is_near=True)
-        lay_background(ids, depth, self.sink, self.background)
-        return is_bad
-
-    def planes(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Return the ids and depths of all samples, (S, H, W).
-
-        Raises
-        ------
-        IndexError
-            If the triangles have been changed since they were drawn.
-        RuntimeError
-            If the rasterizer that it was drawn with has drawn again.
-        """
-        if self.turn[0] != self.own_turn:
-            raise RuntimeError("samples must be read before the Rasterizer draws its next picture")
-        if self.draw(1, len(self.ids)):
-            raise IndexError(CHANGED)
-        return self.ids, self.depth
-
-
-def memory_of_samples(memory: Memory) -> Memory:
-    """Return the memory of a picture of several samples, whose turn begins: earlier ones that lie there have ended."""
-    own = MemoryOf(memory, "samples")
-    turn = own.empty(*TURN)
-    turn += 1
-    return own
-
-
-def draw_first(own: SamplePass, sink: Sink, shape: tuple[int, int], background: float) -> FirstSample | None:
-    """Draw the first sample and have the others wait; None as `draw_planes` tells. The mesh is near."""
-    planes = len(own.positions), *shape
-    ids: NDArray[np.int32] = own.memory.empty("sample ids", planes, np.int32)
-    depth: NDArray[np.float32] = own.memory.empty("sample depth", planes, np.float32)
-    turn = own.memory.empty(*TURN)
-    first = FirstSample(ids, depth, own, sink, background, turn, int(turn[0]))
-    return None if first.draw(0, 1) else first
-
-
-@dataclass(frozen=True, eq=False)
 class SplitSamples:
     """The ids and depths of several samples a pixel: the first in each, the others in pixels of several triangles."""
 
@@ -184,7 +122,7 @@ class SplitSamples:
         check_fits(shape, np.int32, np.float32)
         ids, depth = empty(shape, np.int32), empty(shape, np.float32)
         if draw_planes(self.drawn, self.sink, ids, depth, is_near=True):
-            raise IndexError(CHANGED)
+            raise IndexError("triangles must not change until samples are read")
         lay_background(ids, depth, self.sink, self.background)
         return ids, depth
 
