@@ -47,11 +47,15 @@ def test_picture_with_clipped_vertices_equals_its_stages(eye):
     assert (picture != 255).any()
 
 
-def test_picture_at_once_is_asked_for_where_nothing_else_is_to_be_chosen():
+def test_picture_at_once_is_asked_for_where_nothing_else_is_to_be_chosen(monkeypatch):
+    monkeypatch.setattr(choices, "available_threads", lambda: 4)
+
     def at_once(n_triangles, size, **options):
         return choices.draws_at_once(View.parse(size, options), n_triangles)
 
     assert at_once(70_000, (512, 512), threads=1)
+    assert at_once(1000, (64, 64))
+    assert not at_once(70_000, (512, 512))
     assert not at_once(70_000, (512, 512), threads=2)
     assert not at_once(70_000, (1920, 1080), threads=1)  # in bands, maybe
     assert not at_once(1000, (512, 512), threads=1)  # with bounds, maybe

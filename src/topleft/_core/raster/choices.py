@@ -142,9 +142,17 @@ def draws_at_once(view: View, n_triangles: int) -> bool:
     """
     costs, (width, height) = cost_table(), view.size
     is_plain = view.sampling is Sampling.CENTER and view.single_sided is None and not view.is_exact
-    is_alone = view.threads == 1 or (view.threads is None and available_threads() == 1)
     is_small = 0 < width * height <= min(costs.near_pixels, n_triangles * costs.bound_span)
-    return is_plain and is_alone and is_small
+    is_alone = is_worth_one(n_triangles, view.size) if view.threads is None else view.threads == 1
+    return is_plain and is_small and is_alone
+
+
+def is_worth_one(n_triangles: int, size: tuple[int, int]) -> bool:
+    """Tell whether a picture is the work of one thread, before it is known which of its triangles show."""
+    costs, n_layers = cost_table(), 2  # front and back of a closed surface
+    drawn_ns = costs.work_triangle * n_triangles + size[0] * size[1] * (n_layers * costs.work_ids[1] + costs.near_pixel)
+    is_short = count_threads(None, n_triangles) == 1 and drawn_ns < 2 * costs.thread_ns
+    return is_short or available_threads() == 1
 
 
 def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
