@@ -339,7 +339,7 @@ def squares(
 
     `ids` (B, H, W): row 0 is on top. float32 takes a few rows at a time, and makes no picture.
     """
-    if pos.dtype == np.float64:
+    if pos.dtype == np.float64 or attr.shape[1] * attr.shape[2] > np.iinfo(np.int32).max:  # lanes count in int32
         return squares_of_pictures(grid, rule, outline, pos, ids, attr, target)
     g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
     n, width, scale = attr.shape[2], grid.width, 2 / max(1, target.size)
