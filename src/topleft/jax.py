@@ -19,7 +19,7 @@ import numpy as np
 from topleft import rasterize as draw
 from topleft._core.base.arrays import as_checked_triangles, as_pair
 from topleft._core.gradients import tensors
-from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
+from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond, halved_axes
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption
 
@@ -276,21 +276,11 @@ FILTERS = tuple(one.name.lower().replace("_", "-") for one in TexelFilter)
 
 def halvings(tex: Array, max_mip_level: int | None) -> list[Array]:
     """Return the levels of a mipmap: each texel is the mean of those that it covers."""
-    if max_mip_level is not None and max_mip_level < 0:
-        raise ValueError(f"max_mip_level must be at least 0, got {max_mip_level}")
     levels = [tex]
-    while max(levels[-1].shape[-3:-1]) > 1 and (max_mip_level is None or len(levels) <= max_mip_level):
+    for axes in halved_axes(tex.shape, max_mip_level):
         last = levels[-1]
-        for axis in (tex.ndim - 3, tex.ndim - 2):
-            n = last.shape[axis]
-            if n > 1 and n % 2:
-                raise ValueError(
-                    f"tex must have sides that halve down to level {len(levels)}, got {tuple(tex.shape[-3:-1])}; "
-                    f"max_mip_level={len(levels) - 1} stops before"
-                )
-            last = (
-                last.reshape(*last.shape[:axis], n // 2, 2, *last.shape[axis + 1 :]).mean(axis + 1) if n > 1 else last
-            )
+        for axis in axes:
+            last = last.reshape(*last.shape[:axis], last.shape[axis] // 2, 2, *last.shape[axis + 1 :]).mean(axis)
         levels.append(last)
     return levels
 

@@ -20,7 +20,7 @@ from typing import Any, get_args
 from topleft import DepthLayers, peel
 from topleft._core.base.arrays import as_pair
 from topleft._core.base.threads import parse_threads
-from topleft._core.gradients.tensors import EdgeRule, TexelFilter, TexelsBeyond
+from topleft._core.gradients.tensors import EdgeRule, TexelFilter, TexelsBeyond, halved_axes
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption, LossOption
 
@@ -444,19 +444,11 @@ def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mo
         check("tex", tex, "(B, 6, N, N, C)", is_cube_map(tex), KINDS)
     else:
         check("tex", tex, "(B, Ht, Wt, C)", is_tensor(tex) and tex.ndim == 4 and 0 not in tex.shape[1:], KINDS)
-    if max_mip_level is not None and max_mip_level < 0:
-        raise ValueError(f"max_mip_level must be at least 0, got {max_mip_level}")
     levels: list[Tensor] = []
     last = tex
-    while max(last.shape[-3:-1]) > 1 and (max_mip_level is None or len(levels) < max_mip_level):
-        for axis in (tex.ndim - 3, tex.ndim - 2):
-            n = last.shape[axis]
-            if n > 1 and n % 2:
-                raise ValueError(
-                    f"tex must have sides that halve down to level {len(levels) + 1}, got {tuple(tex.shape[-3:-1])}; "
-                    f"max_mip_level={len(levels)} stops before"
-                )
-            last = last.unflatten(axis, (n // 2, 2)).mean(axis + 1) if n > 1 else last
+    for axes in halved_axes(tex.shape, max_mip_level):
+        for axis in axes:
+            last = last.unflatten(axis, (-1, 2)).mean(axis)
         levels.append(last)
     return levels
 

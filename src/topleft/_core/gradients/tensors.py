@@ -233,6 +233,30 @@ class TexelLook:
         return tuple(None if one is None else one[picture] for one in (self.uv, self.uv_da, self.bias, *more))
 
 
+def halved_axes(shape: Sequence[int], max_mip_level: int | None) -> list[list[int]]:
+    """Return the axes that each coarser level of a mipmap halves, from the end: -3 and -2 of (.., height, width, C).
+
+    Raises
+    ------
+    ValueError
+        If a side of a level is odd and not 1, or the last level is below 0.
+    """
+    if max_mip_level is not None and max_mip_level < 0:
+        raise ValueError(f"max_mip_level must be at least 0, got {max_mip_level}")
+    sides = {axis: shape[axis] for axis in (-3, -2)}
+    levels: list[list[int]] = []
+    while max(sides.values()) > 1 and (max_mip_level is None or len(levels) < max_mip_level):
+        axes = [axis for axis, n in sides.items() if n > 1]
+        if any(sides[axis] % 2 for axis in axes):
+            raise ValueError(
+                f"tex must have sides that halve down to level {len(levels) + 1}, got {tuple(shape[-3:-1])}; "
+                f"max_mip_level={len(levels)} stops before"
+            )
+        sides |= {axis: sides[axis] // 2 for axis in axes}
+        levels.append(axes)
+    return levels
+
+
 def texels(look: TexelLook) -> Array:
     """Return a texture at each pixel, (B, H, W, C)."""
     grid, dtype = look.grid, look.uv.dtype
@@ -339,7 +363,7 @@ def squares(
 
     `ids` (B, H, W): row 0 is on top. float32 takes a few rows at a time, and makes no picture.
     """
-    if pos.dtype == np.float64 or attr.shape[1] * attr.shape[2] > np.iinfo(np.int32).max:  # lanes count in int32
+    if pos.dtype == np.float64 or attr.shape[1] * attr.shape[2] > INT32_MAX:  # lanes count in int32
         return squares_of_pictures(grid, rule, outline, pos, ids, attr, target)
     g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
     n, width, scale = attr.shape[2], grid.width, 2 / max(1, target.size)
@@ -373,7 +397,7 @@ def squares(
 def squares_of_pictures(
     grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, ids: NDArray[np.int32], attr: Array, target: Array
 ) -> tuple[float, Array, Array]:
-    """Return what `squares` does, of float64 picture by picture."""
+    """Return what `squares` does, picture by picture."""
     rast, _ = points(grid, pos, [(one, 0) for one in ids], is_flipped=True, with_db=False)
     color, _ = values(grid, attr, rast)
     step = smooth(grid, rule, outline, pos, rast, color) - target
