@@ -1,11 +1,14 @@
 """Batches and rasters on a Dask cluster of processes: the same pictures, whatever dies."""
 
+import contextlib
 import functools
 import os
+import random
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -386,22 +389,31 @@ def test_worker_without_the_package_is_told_in_one_line(tmp_path):
     assert "has no topleft: install it there" in lines[0]
 
 
+def free_port():
+    """A port that no outgoing connection of another process takes: systems give those higher ones."""
+    for port in random.Random(os.getpid()).sample(range(20000, 32000), 100):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise RuntimeError("none of 100 ports from 20000 to 32000 is free")
+
+
 class Processes:
     """A scheduler and a worker in processes that a test kills and starts again."""
 
     def __init__(self):
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         self.address = f"tcp://127.0.0.1:{self.port}"
         self.scheduler, self.worker = self.started("scheduler"), self.started("worker")
 
     def started(self, what):
         env = {**os.environ, "PYTHONPATH": os.pathsep.join([SRC, SUPPORT])}
         command = [sys.executable, f"{SUPPORT}/dask_processes.py", what, str(self.port)]
-        made = subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-        if what == "scheduler":
-            assert made.stdout.readline() == b"ready\n"
+        with tempfile.TemporaryFile() as errors:
+            made = subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=errors)
+            if what == "scheduler" and made.stdout.readline() != b"ready\n":
+                errors.seek(0)
+                raise RuntimeError(f"no scheduler at port {self.port}: {errors.read().decode()[-2000:]}")
         return made
 
     def restart_scheduler(self):
