@@ -41,7 +41,7 @@
 #include "grad/area_vjp.c"
 #include "grad/colors.c"
 #include "grad/edges.c"
-#include "grad/loss.c"
+#include "grad/pictures.c"
 #include "grad/outline.c"
 #include "grad/points.c"
 #include "grad/textures.c"
@@ -170,7 +170,7 @@ const tl_kernels TL_KERNELS = {
     .grad_texels_vjp = grad_texels_vjp,
     .grad_outline = grad_outline,
     .grad_edges = grad_edges,
-    .grad_loss = grad_loss,
+    .grad_picture = grad_picture,
     .grad_area = grad_area,
     .touch_texels = touch_texels,
     .average_texels = average_texels,
