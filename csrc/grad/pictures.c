@@ -5,8 +5,9 @@
  *
  * A triangle that is seen is a face: planes in float64, about the first pixel that shows it and in units of its total
  * there, whose quotients are the attributes at its pixels; and the sums of colors.c.  A run of pixels begins in float64
- * and goes on in float32; one with a weight that is clamped goes by itself, as in points.c.  Pairs of pixels are found
- * once, for both ways: the picture leaves what backward needs.  A row is drawn, taken when the next one is drawn, led back when that one is taken. */
+ * and goes on in float32; one with a weight that is clamped goes by itself, as in points.c.  Runs, faces and pairs of
+ * pixels are found once for both ways.  A row is drawn, finished when the next one is drawn, led back when that one is
+ * finished. */
 #ifndef TL_GRAD_PICTURES_C
 #define TL_GRAD_PICTURES_C
 
