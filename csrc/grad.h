@@ -93,8 +93,8 @@ typedef struct {
     float *steps; /* of a pair: n_channels colours of the far pixel less those of the near one, unless NULL */
 } tl_grad_edges;
 
-/* A picture of attributes of float32 with smooth silhouettes: drawn, led back, or both beside another one.  Its band has
- * up to two rows more on either side, of n_px pixels; a face is a triangle that they show. */
+/* A picture of attributes of float32 with smooth silhouettes: drawn, led back, or both beside another one.  Its band
+ * has up to two rows more on either side, of n_px pixels; a face is a triangle that they show. */
 enum { TL_ROWS_KEPT = 12, TL_PAIR_BYTES = 152, TL_SUMS_OF_FACE = 24, TL_FACE_ROWS = 6 };
 typedef struct {
     const int32_t *ids; /* of row 0; -1: none */

@@ -420,8 +420,8 @@ typedef struct tl_kernels {
     /* A band with smooth silhouettes; or backward the gradients of its colours, and the sums by vertex. */
     void (*grad_edges)(const tl_grad_view *view, const tl_grad_edges *edges, tl_grad_sums *sums);
 
-    /* A band of attributes with smooth silhouettes; or the sums of its gradients; or these, and the sum of squares of its
-     * differences from another picture. */
+    /* A band of attributes with smooth silhouettes; or the sums of its gradients; or these, and the sum of squares of
+     * its differences from another picture. */
     double (*grad_picture)(const tl_grad_view *view, tl_grad_picture *picture);
 
     /* The gradients of vertices from those of areas. */
