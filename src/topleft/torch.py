@@ -43,7 +43,6 @@ from topleft._torch.checks import (
     len_of,
     same_dtype,
 )
-from topleft._torch.drawings import draw_attributes, squares
 from topleft._torch.operators import (
     draw_ids,
     each,
@@ -57,6 +56,7 @@ from topleft._torch.operators import (
     smooth,
     threads_of,
 )
+from topleft._torch.pictures import draw_attributes, squares
 
 __all__ = [
     "DepthPeeler",

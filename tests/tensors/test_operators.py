@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch")
 
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
-from topleft._torch import drawings  # noqa: E402
+from topleft._torch import pictures  # noqa: E402
 
 CTX = dr.RasterizeContext()
 EDGES = ("silhouette", "area", "straight-through")
@@ -387,19 +387,19 @@ def test_render_is_the_picture_of_its_parts(edges):
 def test_render_twice_backward_gives_the_same_bits_and_keeps_nothing():
     pos, tri, colours = sphere(2)
     pos.requires_grad_()
-    kept = len(drawings.kept)
+    kept = len(pictures.kept)
     out = dr.render(CTX, pos, tri, colours, (93, 70))
-    assert len(drawings.kept) == kept + 1
+    assert len(pictures.kept) == kept + 1
     first, second = (torch.autograd.grad(out.sum(), pos, retain_graph=True)[0] for _ in range(2))
     del out
     assert torch.equal(first, second)
-    assert len(drawings.kept) == kept
+    assert len(pictures.kept) == kept
 
 
 def test_render_draws_again_where_nothing_was_kept(monkeypatch):
     pos, tri, colours = sphere(2)
     found = drawn_gradients(pos, tri, colours)
-    monkeypatch.setattr(drawings, "kept_seen", lambda drawing: None)
+    monkeypatch.setattr(pictures, "kept_seen", lambda _: None)
     assert all(torch.equal(a, b) for a, b in zip(found, drawn_gradients(pos, tri, colours), strict=True))
 
 

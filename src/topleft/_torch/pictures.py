@@ -15,31 +15,31 @@ from torch import Tensor
 
 from topleft import rasterize as draw
 from topleft._core.gradients import tensors
-from topleft._core.gradients.drawing import Drawing, Seen
+from topleft._core.gradients.pictures import AttributePictures, Seen
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid
 from topleft._torch.operators import each, joined, like, numpy_of, once, operator, threads_of, triangles_of
 
-#: The sizes of drawings and what their pictures show, by the address of the ids, for as long as these live.
+#: The sizes of pictures and what they show, by the address of the ids, for as long as these live.
 kept: dict[int, tuple[list[Any], list[tuple[Seen, int]]]] = {}
 
 
-def sizes_of(drawing: Drawing) -> list[Any]:
-    """Return the shapes of the arrays of a drawing."""
-    return [one.shape for one in (drawing.ids, drawing.pos, drawing.attr, drawing.grid.tri)]
+def sizes_of(pictures: AttributePictures) -> list[Any]:
+    """Return the shapes of the arrays of pictures."""
+    return [one.shape for one in (pictures.ids, pictures.pos, pictures.attr, pictures.grid.tri)]
 
 
-def keep_seen(drawing: Drawing, seen: list[tuple[Seen, int]]) -> None:
-    """Keep what a picture shows for as long as its ids."""
-    ids = drawing.ids
+def keep_seen(pictures: AttributePictures, seen: list[tuple[Seen, int]]) -> None:
+    """Keep what pictures show for as long as their ids."""
+    ids = pictures.ids
     if seen and ids.size:
-        kept[ids.ctypes.data] = sizes_of(drawing), seen
+        kept[ids.ctypes.data] = sizes_of(pictures), seen
         weakref.finalize(ids if ids.base is None else ids.base, kept.pop, ids.ctypes.data, None)
 
 
-def kept_seen(drawing: Drawing) -> list[tuple[Seen, int]] | None:
-    """Return what a picture shows, None where the ids are a copy of its own."""
-    sizes, seen = kept.get(drawing.ids.ctypes.data, (None, None))
-    return seen if sizes == sizes_of(drawing) else None
+def kept_seen(pictures: AttributePictures) -> list[tuple[Seen, int]] | None:
+    """Return what pictures show, None where the ids are a copy."""
+    sizes, seen = kept.get(pictures.ids.ctypes.data, (None, None))
+    return seen if sizes == sizes_of(pictures) else None
 
 
 def draw_edges(pos: Tensor, tri: Tensor, across: Tensor, height: int, width: int, threads: int) -> tuple[Any, Any]:
@@ -50,13 +50,13 @@ def draw_edges(pos: Tensor, tri: Tensor, across: Tensor, height: int, width: int
     return joined(drawn, (height, width)), tensors.outline_of(grid, numpy_of(pos), numpy_of(across.to(torch.int32)))
 
 
-def drawing_of(
+def pictures_of(
     pos: Tensor, tri: Tensor, attr: Tensor, ids: Any, outline: tensors.Outline, rule: int, threads: int
-) -> Drawing:
+) -> AttributePictures:
     """Return what the engine draws of a mesh, and leads back."""
     triangles = triangles_of(tri, min(pos.shape[1], attr.shape[1]))
     grid = PixelGrid(triangles, len(ids), ids.shape[1], ids.shape[2], threads_of(threads, math.prod(ids.shape)))
-    return Drawing(grid, EdgeRule(rule), outline, numpy_of(pos), ids, numpy_of(attr))
+    return AttributePictures(grid, EdgeRule(rule), outline, numpy_of(pos), ids, numpy_of(attr))
 
 
 @operator(
@@ -73,7 +73,7 @@ def squares(
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return the mean squared difference from pictures, and the gradients of `pos` and `attr`."""
     ids, edges = draw_edges(pos, tri, across, target.shape[1], target.shape[2], threads)
-    loss, *gradients = drawing_of(pos, tri, attr, ids, edges, rule, threads).squares(numpy_of(target))
+    loss, *gradients = pictures_of(pos, tri, attr, ids, edges, rule, threads).squares(numpy_of(target))
     g_pos, g_attr = map(torch.from_numpy, gradients)
     return torch.tensor(loss, dtype=pos.dtype), g_pos, g_attr
 
@@ -93,9 +93,9 @@ def draw_attributes(
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return pictures of attributes with smooth silhouettes; their ids, and what `outline` returns."""
     ids, edges = draw_edges(pos, tri, across, height, width, threads)
-    drawing = drawing_of(pos, tri, attr, ids, edges, rule, threads)
-    drawn, seen = drawing.picture()
-    keep_seen(drawing, seen)
+    pictures = pictures_of(pos, tri, attr, ids, edges, rule, threads)
+    drawn, seen = pictures.picture()
+    keep_seen(pictures, seen)
     return torch.from_numpy(drawn), torch.from_numpy(ids), torch.from_numpy(edges.places), torch.from_numpy(edges.edges)
 
 
@@ -116,8 +116,8 @@ def draw_attributes_vjp(
 ) -> tuple[Tensor, Tensor]:
     """Return the gradients of `pos` and `attr`."""
     edges = tensors.Outline(*map(numpy_of, outline))
-    drawing = drawing_of(pos, tri, attr, numpy_of(ids), edges, rule, threads)
-    g_pos, g_attr = drawing.vjp(numpy_of(g_out), kept_seen(drawing))
+    pictures = pictures_of(pos, tri, attr, numpy_of(ids), edges, rule, threads)
+    g_pos, g_attr = pictures.vjp(numpy_of(g_out), kept_seen(pictures))
     return torch.from_numpy(g_pos), torch.from_numpy(g_attr)
 
 
@@ -134,14 +134,14 @@ def pull_squares(ctx: Any, g_loss: Tensor, *_: Any) -> tuple[Any, ...]:
     return g_loss * g_pos, None, g_loss * g_attr, None, None, None, None
 
 
-def keep_drawing(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:
+def keep_pictures(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:
     """Keep what `draw_attributes_vjp` takes."""
     pos, tri, attr, across, _, _, ctx.rule, ctx.threads = inputs
     ctx.mark_non_differentiable(*output[1:])
     ctx.save_for_backward(pos, tri, attr, output[1], across.to(torch.int32), *output[2:])
 
 
-def pull_drawing(ctx: Any, g_out: Tensor, *_: Any) -> tuple[Any, ...]:
+def pull_pictures(ctx: Any, g_out: Tensor, *_: Any) -> tuple[Any, ...]:
     """Return the gradients of what `draw_attributes` takes."""
     pos, tri, attr, ids, *outline = ctx.saved_tensors
     g_pos, g_attr = draw_attributes_vjp(pos, tri, attr, ids, outline, ctx.rule, ctx.threads, g_out)
@@ -149,5 +149,5 @@ def pull_drawing(ctx: Any, g_out: Tensor, *_: Any) -> tuple[Any, ...]:
 
 
 squares.register_autograd(pull_squares, setup_context=keep_squares)
-draw_attributes.register_autograd(pull_drawing, setup_context=keep_drawing)
+draw_attributes.register_autograd(pull_pictures, setup_context=keep_pictures)
 draw_attributes_vjp.register_autograd(once)

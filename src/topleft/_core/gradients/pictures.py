@@ -70,7 +70,7 @@ class Seen(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Drawing:
+class AttributePictures:
     """Pictures of attributes with smooth silhouettes.
 
     `ids` (B, H, W): row 0 is on top. `pos` (B or 1, V, 4), `attr` (B or 1, V, K).
