@@ -28,10 +28,7 @@ from benchmarks.run.study import STUDY as RUN
 from benchmarks.scenes.cases import CASES
 from benchmarks.small.batch import STUDY as BATCH
 from benchmarks.small.clients import STUDY as CLIENTS
-from benchmarks.small.cluster import STUDY as CLUSTER
-from benchmarks.small.explorer import STUDY as EXPLORER
 from benchmarks.small.gate import STUDY as GATE
-from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.instances import STUDY as INSTANCES
 from benchmarks.small.pairs import STUDIES as PAIRS
 from benchmarks.small.samplings import STUDY as SAMPLINGS
@@ -41,8 +38,8 @@ from benchmarks.static.study import STUDY as STATIC
 STUDIES = {
     study.kind: study
     for study in (
-        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, GROWTH, POLYGONS,
-        REAL_FILES, LANES, GATE, TILES, EXPLORER, CLUSTER, CLIENTS, INSTANCES, *PAIRS,
+        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, SAMPLINGS, PLANNER, POLYGONS,
+        REAL_FILES, LANES, GATE, TILES, CLIENTS, INSTANCES, *PAIRS,
     )
 }  # fmt: skip
 

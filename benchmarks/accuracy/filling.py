@@ -129,8 +129,7 @@ def measure_twin(
     cells = in_cells(family, 1, pure.FRAME_PX)
     n = twin.n_timed[family.name]
     pure.check(twin, (cells[0], cells[1][:n]), size)
-    timed = twin.entry.orient(strewn(family, n, pure.FRAME_PX))
-    (took,) = take_turns([turn_of(partial(twin.overdraw, timed, size))], min(3, options.rounds), 0.0)
+    took = pure.times_ms(twin, strewn(family, n, pure.FRAME_PX), size, options.rounds)
     entry = (twin.entry.method, twin.entry.precision)
     (kernel,) = (row for row in rows if (row["method"], row["precision"]) == entry)
     row = {"family": family.name, "twin": twin.name, "method": entry[0], "precision": entry[1]}

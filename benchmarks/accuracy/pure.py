@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 
 import numpy as np
+from numpy.typing import NDArray
 
+from benchmarks.harness.turns import turn_of
 from benchmarks.scenes.families import Entry, Triangles
 
 FRAME_PX = 512
@@ -47,6 +50,12 @@ TWINS = (
         for name in ("point_in_triangle", "bresenham_scanline", "lerp_scanline", "row_crossing", "float_barycentric")
     ),
 )
+
+
+def times_ms(twin: Twin, scene: Triangles, size: tuple[int, int], rounds: int) -> NDArray[np.float64]:
+    """Return the times of at most three calls, alone: beside pure code nothing else counts."""
+    call = partial(twin.overdraw, twin.entry.orient(scene), size)
+    return np.concatenate([turn_of(call)(0.0) for _ in range(min(3, rounds))])
 
 
 def check(twin: Twin, scene: Triangles, size: tuple[int, int]) -> None:

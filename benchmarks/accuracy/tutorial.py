@@ -54,9 +54,7 @@ def measure_tutorial(options: AccuracyOptions) -> dict[str, Any]:
         rows.append({"method": entry.method, "precision": entry.precision, "is_pure": False}
                     | per_second(float(np.median(one)), fill_ms))  # fmt: skip
     for twin in (twin for twin in pure.TWINS if twin.entry in chosen):
-        draw = partial(twin.overdraw, twin.entry.orient(eleven_triangles()), TUTORIAL_SIZE)
-        (took,) = take_turns([turn_of(draw)], min(3, options.rounds), 0.0)
-        ms = float(np.median(took))
+        ms = float(np.median(pure.times_ms(twin, eleven_triangles(), TUTORIAL_SIZE, options.rounds)))
         rows.append({"method": twin.name, "precision": twin.entry.precision, "is_pure": True} | per_second(ms, ms))
     return {"tutorial": rows}
 

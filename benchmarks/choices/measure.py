@@ -6,22 +6,23 @@ In: scenes of `scenes.py`, ways of `ways.py`. Out: a record with a row for each 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.choices.builds import BUILDS, is_concerned, load_builds, ways_with
+import topleft as tl
 from benchmarks.choices.scenes import Scene, scenes
-from benchmarks.choices.ways import CHOICES, THREADED
-from benchmarks.harness.arguments import Options, count, fraction, names, option, refuse_unknown, switch
+from benchmarks.choices.ways import CHOICES, THREADED, drawing
+from benchmarks.harness.arguments import Options, count, fraction, names, refuse_unknown, switch
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, forget, tell
 from benchmarks.harness.turns import digits, quartiles
-from benchmarks.harness.ways import Ways, check_same_bits, take_rounds
+from benchmarks.harness.ways import Way, Ways, check_same_bits, take_rounds
+
+OUTPUTS = {"rasterize": ("triangle", "depth"), "coverage": ("coverage",), "overdraw": ("overdraw",), "fill": ("color",)}
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,7 @@ class ChoiceOptions(Options):
     rounds: int = count(7, "--repeats", "rounds")
     seconds: float = fraction(0.002, "--seconds", "length of a turn, at least a call")
     scale: float = fraction(1.0, "--scale", "of triangles and frames", "X")
-    builds: Path | None = option(
-        None, "--builds", "build the library with other constants there unless it is, and measure it", type=Path,
-        metavar="FOLDER",
-    )  # fmt: skip
-    plans: bool = switch("--plans", "measure estimates and plans alone")
+    plans: bool = switch("--plans", "measure estimates of plans alone")
 
 
 def run_choices(options: ChoiceOptions, record: Record | None = None, save: Save = forget) -> Record:
@@ -48,13 +45,11 @@ def run_choices(options: ChoiceOptions, record: Record | None = None, save: Save
     AssertionError
         If two ways draw different bits.
     """
-    known = [*CHOICES, *BUILDS]
-    refuse_unknown("--choice", options.choices, known)
-    makers = makers_of(options)
+    refuse_unknown("--choice", options.choices, CHOICES)
     rows = []
     for scene in chosen_scenes(options):
-        for choice, ways_of in makers.items():
-            row = measure_choice(choice, scene, ways_of(scene), options)
+        for choice in options.choices or CHOICES:
+            row = measure_choice(choice, scene, CHOICES[choice](scene), options)
             if row:
                 rows.append(row)
                 tell(row_text(row))
@@ -62,15 +57,17 @@ def run_choices(options: ChoiceOptions, record: Record | None = None, save: Save
     return with_rows(record, rows)
 
 
-def makers_of(options: ChoiceOptions) -> dict[str, Callable[[Scene], Ways]]:
-    """Return the function that gives the ways of a scene, for each choice in question."""
-    wanted = list(options.choices) or [*CHOICES, *BUILDS]
-    makers = {name: CHOICES[name] for name in wanted if name in CHOICES}
-    for name in wanted:
-        if name in BUILDS and options.builds:
-            libraries = load_builds(name, options.builds)
-            makers[name] = lambda scene, own=libraries: ways_with(scene, own) if is_concerned(scene) else []
-    return makers
+def measure_estimates(options: ChoiceOptions, record: dict[str, Any] | None) -> dict[str, Any]:
+    """Return a record with estimated and measured milliseconds of every scene, on memory that is kept."""
+    rows = []
+    for scene in chosen_scenes(options):
+        plan = tl.plan(*scene.arrays, scene.size, outputs=OUTPUTS[scene.verb], **scene.asked())
+        [took] = take_rounds([Way("", drawing(scene))], options.rounds, options.seconds, time.thread_time)
+        rows.append(
+            {"scene": scene.name, "kind": scene.kind, "verb": scene.verb, "sampling": scene.sampling,
+             "estimated_ms": digits(plan.estimated_ms), "measured_ms": digits(np.median(took))}
+        )  # fmt: skip
+    return with_rows(record, []) | {"estimates": rows}
 
 
 def chosen_scenes(options: ChoiceOptions) -> Iterator[Scene]:
@@ -120,7 +117,7 @@ def with_rows(record: dict[str, Any] | None, rows: list[dict[str, Any]]) -> dict
     """Return a record with these rows in place of older ones of the same choice and scene."""
     new = {key_of(row): row for row in rows}
     old = {} if record is None else {key_of(row): row for row in record["rows"]}
-    order = {name: i for i, name in enumerate([*CHOICES, *BUILDS])}
+    order = {name: i for i, name in enumerate(CHOICES)}
     merged = sorted((old | new).values(), key=lambda row: order.get(row["choice"], len(order)))
     return {"kind": "choices"} | (record or {}) | describe() | {"rows": merged}
 

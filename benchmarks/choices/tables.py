@@ -20,7 +20,7 @@ def lines(record: Record) -> Iterator[str]:
     """The report of one record, Markdown."""
     yield facts_text(record)
     for name, text in PARTS.items():
-        if name != "choice-facts" and NEEDS.get(name, "rows") in record:
+        if name != "choice-facts" and ("estimates" if name == "plan-estimates" else "rows") in record:
             yield from ("", text(record))
 
 
@@ -103,25 +103,10 @@ def by_measured(row: Row) -> float:
     return float(row["estimated_ms"] / row["measured_ms"])
 
 
-def plans_text(record: Record) -> str:
-    """The time of a plan, and the time that drawing with one saves."""
-    rows = [
-        [row["scene"], f"{row['n_triangles']:,}", row["indices"], f"{row['plan_ms']:.3g}", f"{row['without_ms']:.3g}",
-         f"{row['with_ms']:.3g}", f"{row['saves_us']:.1f}"]
-        for row in record["plans"]
-        if row["n_triangles"] >= 1000  # the savings of smaller ones are lost in noise
-    ]  # fmt: skip
-    head = ["scene", "triangles", "indices", "`tl.plan` ms", "`rasterize` ms", "with `plan=` ms", "saves us"]
-    return table_text(head, rows)
-
-
 PARTS: Mapping[str, Callable[[Record], str]] = {
     "choice-facts": facts_text,
     "choice-summary": summary_text,
     "choice-misses": misses_text,
     "plan-estimates": estimates_text,
-    "plan-overhead": plans_text,
 }
 """The parts of the page by their markers."""
-
-NEEDS = {"plan-estimates": "estimates", "plan-overhead": "plans"}

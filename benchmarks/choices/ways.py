@@ -22,32 +22,27 @@ FAR_PX = 2**24
 """Beyond 2**30 sub-pixels with 8 bits: triangles there take 128 bits."""
 
 
-def drawing(scene: Scene, *, library: Any = tl, **changes: Any) -> Draw:
+def drawing(scene: Scene, **changes: Any) -> Draw:
     """Return the function that draws a scene on memory that is kept."""
-    vertices, triangles = changes.pop("arrays", None) or scene.arrays
-    return verb_of(scene, picture_of(library, scene.size), vertices, triangles, (), scene.asked(**changes))
+    arrays = changes.pop("arrays", None) or scene.arrays
+    draw, options = getattr(picture_of(scene.size), scene.verb), scene.asked(**changes)
+    if scene.verb != "rasterize":
+        extra = (scene.colors(),) if scene.verb == "fill" else ()
+        return lambda: (draw(*arrays, *extra, **options),)
+
+    def draw_ids() -> Picture:
+        frags = draw(*arrays, **options)
+        if scene.sampling == "center":
+            return frags.triangle, frags.depth
+        return frags.samples_triangle, frags.samples_depth
+
+    return draw_ids
 
 
 @lru_cache(maxsize=8)
-def picture_of(library: Any, size: tuple[int, int]) -> Any:
+def picture_of(size: tuple[int, int]) -> Any:
     """Return the one `Rasterizer` of a size: all ways draw into the same memory, wherever the system has put it."""
-    return library.Rasterizer(size)
-
-
-def verb_of(scene: Scene, owner: Any, vertices: Any, triangles: Any, size: tuple[Any, ...], options: Any) -> Draw:
-    """Return a call of a scene's verb of a module, which wants a size, or of a `Rasterizer`, which has one."""
-    if scene.verb == "rasterize":
-
-        def draw_ids() -> Picture:
-            frags = owner.rasterize(vertices, triangles, *size, **options)
-            if scene.sampling == "center":
-                return frags.triangle, frags.depth
-            return frags.samples_triangle, frags.samples_depth
-
-        return draw_ids
-    extra = (scene.colors(),) if scene.verb == "fill" else ()
-    function = getattr(owner, scene.verb)
-    return lambda: (function(vertices, triangles, *extra, *size, **options),)
+    return tl.Rasterizer(size)
 
 
 def other_than(scene: Scene, name: str, names: Mapping[bool, str], **changes: Any) -> Ways:

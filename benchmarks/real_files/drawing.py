@@ -1,6 +1,6 @@
 """Draws files, one after the other, as `topleft render` draws them: the other end of the study's pipe.
 
-In: paths. Out: for each an outcome, the line that was printed, seconds, and a small picture.
+In: paths. Out: for each an outcome, the line that was printed, and seconds.
 """
 
 from __future__ import annotations
@@ -15,9 +15,6 @@ from typing import Any
 
 SIZE = 384
 """Width and height of the picture, pixels."""
-
-THUMBNAIL = 192
-"""Of the picture on a contact sheet."""
 
 
 def serve(pipe: Connection, picture: Path, up: str) -> None:
@@ -43,21 +40,10 @@ def draw(path: Path, picture: Path, up: str = "y") -> dict[str, Any]:
     said = io.StringIO()
     picture.unlink(missing_ok=True)
     start = time.perf_counter()
-    arguments = [
-        "render",
-        str(path),
-        "-o",
-        str(picture),
-        "--size",
-        f"{SIZE}x{SIZE}",
-        "--up",
-        up,
-        "--background",
-        "none",
-    ]
+    options = ["--size", f"{SIZE}x{SIZE}", "--up", up, "--background", "none"]
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-            status = main(arguments)
+            status = main(["render", str(path), "-o", str(picture), *options])
     except SystemExit as error:
         status = int(error.code or 0)
     except Exception as error:
@@ -66,7 +52,8 @@ def draw(path: Path, picture: Path, up: str = "y") -> dict[str, Any]:
     line = shortened(said.getvalue(), path)
     if status or not picture.is_file():
         return {"outcome": "refused" if line else "crashed", "line": line, "command_s": round(seconds, 4)}
-    return {"outcome": "drawn", "line": line, "command_s": round(seconds, 4), **facts(path), **look(picture)}
+    row = {"outcome": "drawn", "line": line, "command_s": round(seconds, 4)}
+    return row | facts(path) | {"covered": covered(picture)}
 
 
 def shortened(text: str, path: Path) -> str:
@@ -89,14 +76,10 @@ def facts(path: Path) -> dict[str, Any]:
             "n_points": 0 if is_mesh else len(mesh.positions), "load_s": load_s}  # fmt: skip
 
 
-def look(picture: Path) -> dict[str, Any]:
-    """The share of a picture that is covered, and the picture itself, reduced, as the bytes of a PNG."""
+def covered(picture: Path) -> float:
+    """The share of a picture that is covered."""
     from PIL import Image
 
     with Image.open(picture) as image:
-        pixels = image.convert("RGBA")
-    covered = 1 - pixels.getchannel("A").histogram()[0] / (pixels.width * pixels.height)
-    pixels.thumbnail((THUMBNAIL, THUMBNAIL), Image.Resampling.BOX)
-    content = io.BytesIO()
-    pixels.save(content, "PNG")
-    return {"covered": round(covered, 4), "picture": content.getvalue()}
+        alpha = image.convert("RGBA").getchannel("A")
+    return round(1 - alpha.histogram()[0] / (alpha.width * alpha.height), 4)

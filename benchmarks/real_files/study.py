@@ -1,6 +1,6 @@
-"""Draws all files of folders, and writes a page: outcomes, warnings, times, and sheets.
+"""Draws all files of folders: outcomes, warnings, times.
 
-In: folders of files that are no part of the project. Out: a record, and a folder with a page and contact sheets.
+In: folders of files that are no part of the project. Out: a record.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from typing import Any
 
 from benchmarks.harness.arguments import Options, count, option
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record, Save, tell, write_text
-from benchmarks.real_files import drawing, sheets, tables
+from benchmarks.harness.records import Record, Save, tell
+from benchmarks.real_files import drawing, tables
 from benchmarks.report.study import Study
 
 SUFFIXES = (
@@ -86,54 +86,13 @@ def files_of(folder: Path, suffixes: tuple[str, ...] = SUFFIXES) -> list[Path]:
 
 
 def draw_folder(label: str, folder: Path, painter: Painter, suffixes: tuple[str, ...]) -> Iterator[dict[str, Any]]:
-    """A row for each file of a folder, with its picture."""
+    """A row for each file of a folder."""
     paths = files_of(folder, suffixes)
     for i, path in enumerate(paths):
         row = painter.draw(path)
         if i % 20 == 19 or row["outcome"] == "crashed":
             tell(f"{label}: {i + 1} of {len(paths)}: {path.name}: {row['outcome']}")
-        yield {"file": path.relative_to(folder).as_posix(), **row}
-
-
-def run_real_files(
-    folders: dict[str, Path], out: Path, *, seconds: float = 60, suffixes: tuple[str, ...] = SUFFIXES, up: str = "y"
-) -> Record:
-    """Draw all files of folders; write a page and contact sheets into a folder.
-
-    Parameters
-    ----------
-    folders : dict
-        By their names: a repository and its commit, say.
-    out : path
-    seconds : float
-        How long a file may take.
-    suffixes : tuple of str
-        Of the files that are drawn.
-    up : str
-        The axis that points up.
-    """
-    for label, folder in folders.items():
-        if not files_of(folder, suffixes):
-            raise ValueError(f"{label!r} must be a folder with files that end in one of {' '.join(suffixes)}")
-    record: Record = {"kind": "real-files", **describe("pillow", "trimesh"), "size": drawing.SIZE, "files": []}
-    with Painter(seconds, up) as painter:
-        for number, (label, folder) in enumerate(folders.items()):
-            rows = list(draw_folder(label, folder, painter, suffixes))
-            pictures = [row.pop("picture", None) for row in rows]
-            captions = [Path(row["file"]).name for row in rows]
-            marks = [mark_of(row) for row in rows]
-            names = sheets.write_sheets(out, f"sheet-{number}", pictures, captions, marks)
-            for row, name in zip(rows, names, strict=True):
-                record["files"].append({"folder": label, **row, "sheet": name})
-            write_text(out / "index.md", tables.page(record))
-    return record
-
-
-def mark_of(row: dict[str, Any]) -> str:
-    """One letter for a contact sheet: R refused, C crashed, W warned of, B nothing to be seen, or none."""
-    if row["outcome"] != "drawn":
-        return row["outcome"][0].upper()
-    return "B" if not row["covered"] else "W" if row["line"] else ""
+        yield {"folder": label, "file": path.relative_to(folder).as_posix(), **row}
 
 
 def folder_of(text: str) -> tuple[str, Path]:
@@ -150,22 +109,26 @@ class FileOptions(Options):
     folders: Sequence[tuple[str, Path]] = option(
         (), "", "files, in folders within it too", nargs="+", type=folder_of, metavar="[LABEL=]FOLDER"
     )
-    page: Path = option(
-        Path("real-files"), "--page", "where index.md and the contact sheets go (%(default)s)", type=Path,
-        metavar="FOLDER",
-    )  # fmt: skip
     seconds: int = count(60, "--seconds", "a file may take", "S")
     suffix: Sequence[str] = option(SUFFIXES, "--suffix", "files that are drawn", nargs="+", metavar=".SUFFIX")
     up: str = option("y", "--up", "the axis that points up (%(default)s)", choices=["y", "z"])
 
 
 def run(options: FileOptions, _: Save) -> Record:
-    """Draw."""
+    """Draw all files of the folders.
+
+    Raises
+    ------
+    ValueError
+        If a folder has none.
+    """
     suffixes = tuple(suffix.lower() for suffix in options.suffix)
-    folders, page = dict(options.folders), options.page
-    return run_real_files(folders, page, seconds=options.seconds, suffixes=suffixes, up=options.up)
+    for label, folder in options.folders:
+        if not files_of(folder, suffixes):
+            raise ValueError(f"{label!r} must be a folder with files that end in one of {' '.join(suffixes)}")
+    with Painter(options.seconds, options.up) as painter:
+        rows = [row for own in options.folders for row in draw_folder(*own, painter, suffixes)]
+    return {"kind": "real-files", **describe("pillow", "trimesh"), "size": drawing.SIZE, "files": rows}
 
 
-STUDY = Study(
-    "real-files", "draw all files of folders, with contact sheets", FileOptions, run, tables.lines, tables.PARTS
-)
+STUDY = Study("real-files", "draw all files of folders", FileOptions, run, tables.lines, tables.PARTS)

@@ -1,4 +1,4 @@
-"""The page of a run, and the tables of the documentation."""
+"""The tables of a run, printed and in the documentation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ N_EXAMPLES = 2
 """Files that a row of a table of lines names."""
 
 N_LINES = 10
-"""Lines that the documentation shows, of the most files; the page of a run has all."""
+"""Lines that the documentation shows, of the most files; a run prints all."""
 
 Row = dict[str, Any]
 
@@ -73,35 +73,6 @@ def kinds_of(line: str, file: str, outcome: str) -> Iterator[str]:
             yield re.sub(r"\b\d+\b", "N", re.sub(r"^cannot (read|draw) FILE: ", "", text))[:160]
 
 
-def page(record: Record) -> str:
-    """The page of a run: summary, lines, sheets, and every file."""
-    parts = ["# Files, drawn", facts_text(record), summary(record)]
-    for outcome, head in (("crashed", "Crashed"), ("refused", "Refused"), ("drawn", "Warnings")):
-        parts += [f"## {head}", lines_of(record, outcome)]
-    parts.append("R: refused, C: crashed, W: with a warning, B: nothing to be seen.")
-    for label, rows in folders(record).items():
-        parts.append(f"## {label}")
-        parts += [f"![{name}]({name})" for name in dict.fromkeys(row["sheet"] for row in rows)]
-        parts.append(
-            left_table(["file", "outcome", "triangles", "load s", "command s", "line"], [cells(row) for row in rows])
-        )
-    return "\n\n".join(parts) + "\n"
-
-
-def cells(row: Row) -> list[str]:
-    """The cells of a file."""
-    n = row.get("n_triangles", 0)
-    many = f"{n:,}" if n else f"{row['n_points']:,} points" if row.get("n_points") else ""
-    times = [number(row[key]) if key in row else "" for key in ("load_s", "command_s")]
-    return [
-        row["file"].replace("|", "/"),
-        row["outcome"],
-        many,
-        *times,
-        row["line"].replace("|", "/").replace("`", "'"),
-    ]
-
-
 def suffixes(record: Record) -> str:
     """A row a suffix."""
     rows = []
@@ -117,8 +88,9 @@ def suffixes(record: Record) -> str:
 def lines(record: Record) -> Iterator[str]:
     """The printed lines."""
     yield summary(record)
-    yield ""
-    yield lines_of(record, "crashed")
+    for outcome in ("crashed", "refused", "drawn"):
+        yield f"\n{outcome}\n"
+        yield lines_of(record, outcome)
 
 
 PARTS = {

@@ -1,15 +1,12 @@
 """Run programs of other libraries on topleft: `python -m benchmarks clients pyrender=FOLDER mujoco=FOLDER`.
 
 FOLDER is a checkout that the user has; nothing of it is kept.  pyrender: its unit tests, with `topleft.compat.pyrender`
-for `import pyrender`.  trimesh: its tests of scenes and pictures, and its models, by topleft and, where there is a
-display (xvfb-run) and pyglet 1, by its own window: CPU time of a picture, and how far its numbers are off.  mujoco: the
-models under FOLDER, each drawn by `mujoco.Renderer` and by topleft: pixels whose object differs, depth away from
-outlines, and CPU time in turns.  Clients of arrays, bop=FOLDER say: array_clients.py.
+for `import pyrender`.  mujoco: the models under FOLDER, each drawn by `mujoco.Renderer` and by topleft: pixels whose
+object differs, depth away from outlines, and CPU time in turns.
 """
 
 from __future__ import annotations
 
-import io
 import os
 import re
 import statistics
@@ -22,25 +19,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from benchmarks.harness.arguments import Options, count, option, switch
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
 from benchmarks.report.tables import table
-from benchmarks.small.array_clients import ARRAY_CLIENTS, lines_of
 
 MODES = ("color", "depth", "segmentation")
 WANTED = 1e-4
 """How far depth may be off, relative."""
 
 
-def run_tests(name: str, folder: Path, pattern: str) -> list[Record]:
-    """The tests of a checkout, each file by itself, on topleft."""
+def run_pyrender(folder: Path, _: Any) -> Record:
+    """The tests of a checkout of pyrender, each file by itself, on topleft."""
     rows = []
-    for path in sorted(folder.glob(pattern)):
-        command = [sys.executable, "-m", "topleft.compat", name, "-m", "pytest", "-q", "-c", os.devnull]
+    for path in sorted(folder.glob("tests/unit/test_*.py")):
+        command = [sys.executable, "-m", "topleft.compat", "pyrender", "-m", "pytest", "-q", "-c", os.devnull]
         command += ["--rootdir", str(folder), "-p", "no:cacheprovider", "-k", "not INCLUDE_RENDERING"]  # which says: do
         done = subprocess.run([*command, str(path.relative_to(folder))], cwd=folder, capture_output=True, text=True)
         last = (done.stdout.strip() or done.stderr.strip()).splitlines()[-1]
@@ -48,48 +43,7 @@ def run_tests(name: str, folder: Path, pattern: str) -> list[Record]:
         rows.append(
             {"file": path.name, "passed": int(passed[1]) if passed else 0, "other": int(failed[1]) if failed else 0}
         )
-    return rows
-
-
-def run_pyrender(folder: Path, _: Any) -> Record:
-    """The tests of a checkout of pyrender."""
-    return {"tests": run_tests("pyrender", folder, "tests/unit/test_*.py")}
-
-
-def run_trimesh(folder: Path, options: Any) -> Record:
-    """The tests of a checkout of trimesh that make scenes and pictures, and its models beside its own window."""
-    import trimesh
-
-    from topleft.compat.trimesh import save_image
-
-    rows: list[Record] = []
-    ways = [save_image] + ([trimesh.Scene.save_image] if os.environ.get("DISPLAY") else [])
-    for path in sorted(folder.glob("models/*"))[: options.models]:
-        try:
-            scene = trimesh.load_scene(str(path))
-            bounds = scene.bounds
-        except Exception:  # a format that needs another package, or a file that is broken on purpose
-            continue
-        if bounds is None or not any(hasattr(own, "faces") for own in scene.geometry.values()):
-            continue
-        pictures, times = [], []
-        for way in ways:
-            found = []
-            for _ in range(options.rounds):
-                start = time.process_time()
-                png = way(scene.copy(), resolution=(640, 480))
-                found.append(1e3 * (time.process_time() - start))
-            pictures.append(np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int))
-            times.append(statistics.median(found))
-        off = np.abs(pictures[0] - pictures[-1])
-        faces = sum(len(getattr(own, "faces", ())) for own in scene.geometry.values())
-        rows.append({"model": path.name, "faces": faces, "ms": times, "off": float(off.mean())})
-    tests = [
-        row
-        for name in ["scene", "viewer", "camera", "light", "render"]
-        for row in run_tests("trimesh", folder, f"tests/test_{name}.py")
-    ]
-    return {"tests": tests, "models": rows}
+    return {"tests": rows}
 
 
 def run_mujoco(folder: Path, options: Any) -> Record:
@@ -156,7 +110,7 @@ def draw(mujoco: Any, renderer: Any, data: Any, mode: str, shadows: bool) -> np.
     return renderer.render()
 
 
-CLIENTS = {"pyrender": run_pyrender, "trimesh": run_trimesh, "mujoco": run_mujoco, **ARRAY_CLIENTS}
+CLIENTS = {"pyrender": run_pyrender, "mujoco": run_mujoco}
 
 
 def run(options: Any, save: Save) -> Record:
@@ -173,18 +127,10 @@ def run(options: Any, save: Save) -> Record:
 
 def lines(record: Record) -> Iterator[str]:
     """A table for each client."""
-    for name in ("pyrender", "trimesh"):
-        if name in record:
-            yield f"tests of {name} on topleft.compat.{name}"
-            rows = [[row["file"], str(row["passed"]), str(row["other"])] for row in record[name]["tests"]]
-            yield from table(["file", "passed", "failed"], rows)
-    if "trimesh" in record:
-        yield "models of trimesh beside its window, 640x480: CPU time of a PNG, mean difference of its numbers"
-        rows = [
-            [row["model"], str(row["faces"]), f"{row['ms'][0]:.1f}", f"{row['ms'][-1] / row['ms'][0]:.1f}",
-             f"{row['off']:.2f}"] for row in record["trimesh"]["models"]
-        ]  # fmt: skip
-        yield from table(["model", "faces", "ms", "times", "off"], rows)
+    if "pyrender" in record:
+        yield "tests of pyrender on topleft.compat.pyrender"
+        rows = [[row["file"], str(row["passed"]), str(row["other"])] for row in record["pyrender"]["tests"]]
+        yield from table(["file", "passed", "failed"], rows)
     if "mujoco" in record:
         yield f"models of MuJoCo beside its own renderer, shadows {'on' if record['shadows'] else 'off'}"
         head = ["model", "geoms", "pixels off", "inside", "depth off by", *(f"{mode}, ms, times" for mode in MODES)]
@@ -194,9 +140,6 @@ def lines(record: Record) -> Iterator[str]:
             counts = [str(row[name]) for name in ("geoms", "off", "off_inside")]
             rows.append([row["model"], *counts, f"{row['depth_error']:.1e}", *speed])
         yield from table(head, rows)
-    for name in ARRAY_CLIENTS:
-        if name in record:
-            yield from lines_of(name, record[name])
 
 
 @dataclass(frozen=True)

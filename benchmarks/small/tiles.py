@@ -231,35 +231,9 @@ def in_process(way: str, folder: Path, side: int) -> dict[str, float]:
     return json.loads(done.stdout)
 
 
-def predict(folder: Path, side: int, n_triangles: int) -> dict[str, dict[str, float]]:
-    """Unit costs of an eighth of the work, their estimate for the whole, and its time; the fastest of three."""
-    small, large = folder / "small", folder / "large"
-    eighth = round(side / 8**0.5)
-    for place, n, length in ((small, n_triangles // 8, eighth), (large, n_triangles, side)):
-        place.mkdir()
-        write_mesh(place, n, length)
-    rounds = [(draw_windows(small, eighth), draw_windows(large, side)) for _ in range(3)]
-    one, all_of = ({key: min(row[key] for row in rows) for key in rows[0]} for rows in zip(*rounds, strict=True))
-    per_triangle = one["index_s"] / len(mesh_of(small)[1])
-    per_pixel = (one["seconds"] - one["index_s"]) / eighth**2
-    said = per_triangle * len(mesh_of(large)[1]) + per_pixel * side**2
-    costs = {"seconds": one["seconds"], "pixels": eighth**2, "index_ns": 1e9 * per_triangle, "draw_ns": 1e9 * per_pixel}
-    costs["index_cpu_ns"] = 1e9 * one["index_cpu_s"] / len(mesh_of(small)[1])
-    costs["draw_cpu_ns"] = 1e9 * (one["all_cpu_s"] - one["index_cpu_s"]) / eighth**2
-    return {
-        "an eighth": costs,
-        "predicted": {"seconds": said, "pixels": side**2},
-        "measured": {"seconds": all_of["seconds"], "pixels": side**2, "bytes_at_peak": peak_bytes()},
-    }
-
-
 def run(options: TileOptions, _: Save) -> Record:
     """Make the mesh and measure."""
     rows: dict[str, dict[str, float]] = {}
-    if options.predict:
-        with tempfile.TemporaryDirectory(dir=options.folder) as name:
-            rows = predict(Path(name), options.side, options.triangles)
-        return {"kind": "tiles", "triangles": options.triangles, "side": options.side, "rows": rows, **describe()}
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder, side = Path(name), options.side
         write_mesh(folder, options.triangles, side)
@@ -288,9 +262,6 @@ def lines(record: Record) -> list[str]:
                 f"all windows in turns with it: {row['run_s']:.2f} s, {row['ratio']:.2f} of its pixels a second; "
                 f"in CPU time {row['run_cpu_s']:.2f} s, {row['cpu_ratio']:.2f}"
             )
-        if "index_ns" in row:
-            more.append(f"{row['index_ns']:.0f} ns a triangle, {row['draw_ns']:.1f} ns a pixel")
-            more.append(f"CPU time {row['index_cpu_ns']:.0f} ns a triangle, {row['draw_cpu_ns']:.1f} ns a pixel")
         more += [f"{row['wrong']:,} pixels differ"] if "wrong" in row else []
         made.append(f"| {way} | {row['seconds']:.2f} | {rate:.0f} | {peak:.2f} | {', '.join(more)} |")
     return made
@@ -301,7 +272,6 @@ class TileOptions(Options):
     triangles: int = count(20_000_000, "--triangles", "about so many")
     side: int = count(40_000, "--side", "of the raster, pixels")
     peers: bool = switch("--peers", "beside other programs, the raster as a whole in memory")
-    predict: bool = switch("--predict", "measure an eighth of the work, and check the estimate of the whole")
     folder: str | None = option(None, "--folder", "where mesh and store go for the time (the system's)", metavar="DIR")
 
 

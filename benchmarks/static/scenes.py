@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -58,10 +58,10 @@ class StaticScene:
         """Vertices and triangles of the mesh."""
         return made(self.make)
 
-    @cached_property
+    @property
     def camera(self) -> tl.Camera:
         """The camera."""
-        return self.look(self.arrays, self.size)
+        return seen(self.look, self.make, self.size)
 
     def fresh(self) -> tl.Mesh | tl.Scene:
         """Return the mesh, or its instances, as if never drawn, of the same arrays."""
@@ -73,6 +73,12 @@ class StaticScene:
 def made(make: Callable[[], Arrays]) -> Arrays:
     """Return the result of a maker; that of the last one is kept."""
     return make()
+
+
+@lru_cache(maxsize=8)
+def seen(look: Look, make: Callable[[], Arrays], size: tuple[int, int]) -> tl.Camera:
+    """Return the camera of a view; those of the last mesh are kept, for each way to cull has the same."""
+    return look(made(make), size)
 
 
 def shifted(place: Sequence[float]) -> NDArray[np.float64]:
@@ -100,7 +106,7 @@ def looking(eye: Sequence[float], target: Sequence[float] = (0, 0, 0), fov_y_deg
 def zoomed(share: float, arrays: Arrays, size: tuple[int, int]) -> tl.Camera:
     """Return a camera that looks at the origin with the field of view that a share of the triangles lies in."""
     low, high = 0.01, 120.0
-    for _ in range(30):
+    for _ in range(14):  # to a hundredth of a degree
         middle = (low + high) / 2
         clip = tl.Camera.look_at(EYE, fov_y_deg=middle, **DEPTHS).clip_from_world(size)
         low, high = (low, middle) if share_in_view(*arrays, clip) > share else (middle, high)

@@ -1,8 +1,8 @@
 """Small scenes on which methods fail, with the right picture and those that the methods draw.
 
-They stand in failure_scenes.json. `python -m benchmarks atlas --scenes` shrank them from the first failure of each
-method along the families of the atlas (docs/measured/atlas.md); `tests/methods/test_failure_scenes.py` draws them
-all. The production methods are right on each.
+They stand in failure_scenes.json: the first failure of each method along the families of the atlas
+(docs/measured/atlas.md), triangles left out and coordinates rounded as far as it stayed;
+`tests/methods/test_failure_scenes.py` draws them all. The production methods are right on each.
 """
 
 from __future__ import annotations

@@ -118,13 +118,26 @@ def names_of(path):
     return found
 
 
+@cache
+def nodes_of(path):
+    """The imports of a file, and the attributes of plain names."""
+    imports, attributes = [], []
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            imports.append(node)
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            attributes.append(node)
+    return imports, attributes
+
+
+@cache
 def taken_by(path):
     """The modules of ours that a file imports, by the names it gives them, and what it takes out of others."""
     modules, taken = {}, set()
-    for node in ast.walk(parsed(path)):
+    for node in nodes_of(path)[0]:
         if isinstance(node, ast.Import):
             modules |= {alias.asname: alias.name for alias in node.names if alias.asname and file_of(alias.name)}
-        elif isinstance(node, ast.ImportFrom) and file_of(node.module):
+        elif file_of(node.module):
             for alias in node.names:
                 module = f"{node.module}.{alias.name}"
                 if file_of(module):
@@ -137,8 +150,8 @@ def taken_by(path):
 def used_by(path):
     """The attributes of modules of ours that a file uses."""
     modules = taken_by(path)[0]
-    for node in ast.walk(parsed(path)):
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in modules:
+    for node in nodes_of(path)[1]:
+        if node.value.id in modules:
             module = modules[node.value.id]
             if not node.attr.startswith("__") and not file_of(f"{module}.{node.attr}"):
                 yield module, node.attr
@@ -277,8 +290,10 @@ def resolves(name):
     return True
 
 
-@pytest.mark.parametrize(("allowed", "status"), [("", 1), ("* this Python has a GIL\n", 0)])
-@pytest.mark.parametrize("options", [[], ["-n", "1"]])
+GIL = "* this Python has a GIL\n"
+
+
+@pytest.mark.parametrize(("allowed", "status", "options"), [("", 1, []), ("", 1, ["-n", "1"]), (GIL, 0, ["-n", "1"])])
 def test_gate_fails_when_more_tests_skip_than_its_list_allows(tmp_path, allowed, status, options):
     (tmp_path / "may_skip.txt").write_text("# none of these\n" + allowed)
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *options, "-k", "test_python_without_a_gil"]

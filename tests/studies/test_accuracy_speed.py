@@ -21,7 +21,7 @@ from benchmarks.harness.turns import SLOW_MS, SLOW_ROUNDS, take_turns
 from benchmarks.scenes.families import FAMILIES, in_cells
 
 FRAME_PX = 128
-LITTLE = AccuracyOptions(["auto", "point_in_triangle"], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001)
+LITTLE = AccuracyOptions(["auto", "point_in_triangle"], [], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001)
 
 
 def test_take_turns_slow_ones_take_fewer_rounds():

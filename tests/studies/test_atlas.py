@@ -1,4 +1,4 @@
-"""The atlas: its exact pictures, its scenes, its counts against the record, shrinking, the page."""
+"""The atlas: its exact pictures, its scenes, its counts against the record, the page."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from benchmarks import cli
 from benchmarks.atlas import measure as atlas
-from benchmarks.atlas import shrink as atlas_shrink
 from benchmarks.atlas.depth import DEPTH_FAMILIES, DepthScene, Picture, draw, draw_clip, draw_pieces, judge_depth
-from benchmarks.harness.machine import IMAGES, PAGES, RECORDS, ROOT
+from benchmarks.harness.machine import IMAGES, PAGES, RECORDS
 
 from topleft._apps.explore.race import PRODUCTION, Entry, entries
-from topleft.failure_scenes import FAILURE_SCENES, picture
+from topleft.failure_scenes import FAILURE_SCENES
 from topleft.methods import CLASSICS
 from topleft.methods.reference.integers import ExactPicture
 from topleft.scene_families import FAMILIES
@@ -126,47 +125,6 @@ def test_atlas_exact_claims_hold(record):
     counts = [n for row in record["maps"] if row["entry"] in exact for n in row["inexact"] if n is not None]
     assert len(counts) > 100
     assert sum(counts) == 0
-
-
-# ---- shrinking ------------------------------------------------------------------------------------------------------
-
-
-def test_first_failures_gaps_and_overdraw_before_wrong_pixels():
-    row = {"family": "far", "entry": "lerp_scanline", "wrong": [1, 2], "gaps": [0, 1], "overdrawn": [None, 0]}
-    (found,) = atlas_shrink.first_failures({"maps": [row]})
-    assert (found.kind, found.step, found.entry.method) == ("gap", 1, "lerp_scanline")
-
-
-def test_simpler_values_have_fewer_bits():
-    assert list(atlas_shrink.simpler(-5.5, -4)) == [0, -4, -5]
-    assert list(atlas_shrink.simpler(0.0, -4)) == []
-
-
-def test_shrink_float32_edge_through_centres_is_two_triangles_on_small_numbers():
-    entry = Entry("float_barycentric", "float_barycentric")
-    kept = atlas_shrink.Shrinker(atlas_shrink.Failure("edge", 13, "overdraw", entry), 0.0)
-    small = kept.shrink(kept.start(FAMILIES["edge"]))
-    assert len(small.triangles) == 2
-    assert kept.fails(small)
-    assert np.abs(small.vertices[np.unique(small.triangles)]).max() <= 600
-    assert len(atlas_shrink.compact(small).vertices) == 4
-
-
-def test_failure_scenes_file_is_what_is_written_of_them():
-    path = ROOT / "src/topleft/failure_scenes.json"
-    assert atlas_shrink.scenes_text(FAILURE_SCENES.values()) == path.read_text(encoding="utf-8")
-
-
-def test_first_failures_of_the_record_each_have_their_scene(record):
-    for failure in atlas_shrink.first_failures(record):
-        kinds = {scene.kind for scene in FAILURE_SCENES.values() if atlas_shrink.has_method(scene, failure.entry)}
-        assert failure.kind in kinds
-
-
-@pytest.mark.parametrize("name", ["any-gap", "any-overdraw"])
-def test_rows_of_a_picture_are_read_back(name):
-    rows = FAILURE_SCENES[name].expected
-    assert atlas_shrink.rows_of(picture(rows)) == rows
 
 
 # ---- the page -------------------------------------------------------------------------------------------------------

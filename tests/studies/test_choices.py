@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import numpy as np
 import pytest
 from benchmarks import cli
 from benchmarks.choices import measure as bench
-from benchmarks.choices import plans as choices_plans
 from benchmarks.choices import tables as choices_tables
-from benchmarks.choices.builds import BUILDS, imported_from, with_constant
 from benchmarks.choices.scenes import Scene, scenes
 from benchmarks.choices.ways import CHOICES
-from benchmarks.harness.machine import ROOT
 from benchmarks.harness.ways import Way, answers_of, check_same_bits, take_rounds
 from benchmarks.scenes.arrays import strewn_arrays
 
@@ -29,7 +25,7 @@ def record():
     pytest.importorskip("scipy")
     found = bench.run_choices(TINY)
     some = bench.ChoiceOptions(scenes=["mesh 1k,", "flat 20000"], rounds=1, seconds=0.0, scale=0.02)
-    return choices_plans.run_plans(some, found)
+    return bench.measure_estimates(some, found)
 
 
 def flat_scene(size=(300, 300)):
@@ -98,14 +94,12 @@ def test_rows_replace_those_of_the_same_scene(record):
     again = bench.with_rows(record, [row])
     assert len(again["rows"]) == len(record["rows"])
     assert again["rows"][0]["ratio"] == 7.0
-    assert again["plans"] == record["plans"]
+    assert again["estimates"] == record["estimates"]
 
 
 def test_tables_hold_each_choice_and_scene(record):
     summary = choices_tables.summary_text(record)
     assert all(f"| {name} " in summary for name in CHOICES)
-    n_plans = sum(row["n_triangles"] >= 1000 for row in record["plans"])
-    assert choices_tables.plans_text(record).count("\n") == 1 + n_plans
     verbs = {(row["verb"], row["sampling"]) for row in record["estimates"]}
     assert choices_tables.estimates_text(record).count("\n") == 1 + len(verbs) == 9
     assert "no way" in choices_tables.misses_text({"rows": []}).lower()
@@ -128,28 +122,3 @@ def test_command_measures_and_adds_to_its_file(tmp_path, capsys):
     assert {row["choice"] for row in json.loads(out.read_text())["rows"]} == {"divide", "clip"}
     assert cli.main(["choices", "--choice", "none such", *tiny]) == 2
     assert "--choice must be some of method" in capsys.readouterr().err
-
-
-def test_constant_is_replaced_once():
-    assert with_constant("#define TL_A (1 << 3) /* why */\n", "TL_A", "5") == "#define TL_A 5 /* why */\n"
-    with pytest.raises(ValueError, match="TL_A must be defined once, got 0 times"):
-        with_constant("#define TL_AB 1\n", "TL_A", "5")
-
-
-@pytest.mark.parametrize("choice", BUILDS)
-def test_constants_of_builds_are_in_the_sources(choice):
-    file, name, values = BUILDS[choice]
-    text = (ROOT / "csrc" / file).read_text(encoding="utf-8")
-    for value in values.values():
-        assert with_constant(text, name, value) != text
-
-
-def test_library_of_a_folder_stands_beside_this_one(tmp_path):
-    (tmp_path / "topleft").mkdir()
-    (tmp_path / "topleft/__init__.py").write_text("from topleft import other\n")
-    (tmp_path / "topleft/other.py").write_text("value = 7\n")
-    own = sys.modules["topleft"]
-    with imported_from(tmp_path) as library:
-        assert library.other.value == 7
-    assert sys.modules["topleft"] is own
-    assert "topleft.other" not in sys.modules

@@ -1,4 +1,4 @@
-"""Files of others, drawn: what comes of each, the contact sheets and the page; all from files made here."""
+"""Files of others, drawn: what comes of each; all from files made here."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import time
 
 import pytest
 from benchmarks import cli
-from benchmarks.real_files import drawing, sheets, tables
-from benchmarks.real_files.study import Painter, files_of, mark_of
-from PIL import Image
+from benchmarks.real_files import drawing, tables
+from benchmarks.real_files.study import Painter, files_of
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -41,7 +40,6 @@ def test_drawing_says_what_came_of_a_file(folder, tmp_path):
     assert str(folder) not in rows["broken.PLY"]["line"]
     assert (rows["plain.obj"]["n_triangles"], rows["plain.obj"]["line"]) == (1, "")
     assert 0.1 < rows["plain.obj"]["covered"] < 0.9
-    assert [mark_of(row) for row in rows.values()] == ["R", "", "W"]
 
 
 def test_drawing_that_raises_is_a_crash(folder, tmp_path, monkeypatch):
@@ -73,34 +71,20 @@ def test_painter_goes_on_after_a_file_that_ends_or_stops_its_process(monkeypatch
     assert lines == ["the process ended with status 3", "", "not done after 0.2 seconds", ""]
 
 
-def test_sheets_hold_all_pictures(tmp_path, folder):
-    picture = drawing.draw(folder / "plain.obj", tmp_path / "a.png")["picture"]
-    n = sheets.N_COLUMNS * sheets.N_ROWS + 1
-    names = sheets.write_sheets(tmp_path, "s", [picture, None] + [picture] * (n - 2), ["é" * 99] * n, [""] * n)
-    assert names == ["s-0.png"] * (n - 1) + ["s-1.png"]
-    with Image.open(tmp_path / "s-0.png") as sheet:
-        pixels = sheet.convert("RGB")
-        middle = sheets.GAP + drawing.THUMBNAIL // 2
-        assert pixels.getpixel((middle, middle)) != sheets.BOARD
-        assert pixels.getpixel((middle + drawing.THUMBNAIL + sheets.GAP, middle)) == sheets.BOARD
-
-
-def test_command_writes_record_page_and_sheets(folder, tmp_path, capsys):
+def test_command_writes_a_record_and_prints_lines(folder, tmp_path, capsys):
     out = tmp_path / "out.json"
-    assert cli.main(["real-files", f"mine={folder}", "--page", str(tmp_path / "page"), "-o", str(out)]) == 0
+    assert cli.main(["real-files", f"mine={folder}", "-o", str(out)]) == 0
     record = json.loads(out.read_text())
-    assert [(row["file"], row["outcome"]) for row in record["files"]] == [
-        ("deeper/broken.PLY", "refused"), ("plain.obj", "drawn"), ("warned.obj", "drawn"),
+    assert [(row["folder"], row["file"], row["outcome"]) for row in record["files"]] == [
+        ("mine", "deeper/broken.PLY", "refused"), ("mine", "plain.obj", "drawn"), ("mine", "warned.obj", "drawn"),
     ]  # fmt: skip
-    page = (tmp_path / "page" / "index.md").read_text()
-    assert "![sheet-0-0.png](sheet-0-0.png)" in page
-    assert "`material libraries not found`" in page
-    assert (tmp_path / "page" / "sheet-0-0.png").is_file()
-    assert "| mine   | 3     |     2 |              1 |       1 |" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "`material libraries not found`" in said
+    assert "| mine   | 3     |     2 |              1 |       1 |" in said
 
 
 def test_command_without_files_is_refused(tmp_path, capsys):
-    assert cli.main(["real-files", str(tmp_path), "--page", str(tmp_path / "page")]) == 2
+    assert cli.main(["real-files", str(tmp_path)]) == 2
     assert "must be a folder with files that end in" in capsys.readouterr().err
 
 

@@ -15,6 +15,9 @@ from benchmarks.static import tables as static_tables
 from topleft._core.raster import choices
 
 SCALE = 0.02
+SOME = ["blob 10M", "blob 100k, whole", "cube, whole", "hills 100k", "soup, large",
+        "blob 70k, 200 in rows, cull none, rasterize, "]  # fmt: skip
+"""Beginnings of the labels of those that are drawn: every kind, every view of the blob, both verbs."""
 CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n" + "".join(
     f"f {' '.join(map(str, face))}\n"
     for face in ((4, 3, 2, 1), (5, 6, 7, 8), (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8))
@@ -23,10 +26,10 @@ CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
-    """Every scene and a cube, at a hundredth of the size."""
+    """Some scenes of every kind and a cube, at a hundredth of the size."""
     path = tmp_path_factory.mktemp("static") / "cube.obj"
     path.write_text(CUBE)
-    options = static.StaticOptions(files=[path], rounds=1, seconds=0.0, most_seconds=0.0, scale=SCALE / 2)
+    options = static.StaticOptions(SOME, [path], rounds=1, seconds=0.0, most_seconds=0.0, scale=SCALE / 2)
     return static.run(options, forget)
 
 
@@ -35,10 +38,18 @@ def scene_named(label, scale=SCALE):
     return next(scene for scene in static_scenes.scenes(scale) if scene.label.startswith(label))
 
 
-def test_every_scene_has_a_row(record):
+def test_every_kind_of_scene_has_rows(record):
     assert {row["kind"] for row in record["rows"]} == {"blob", "file", "hills", "soup", "instances"}
-    assert len({static.key_of(row) for row in record["rows"]}) == len(record["rows"]) > 140
+    assert len({static.key_of(row) for row in record["rows"]}) == len(record["rows"]) > 25
     assert all(row["faster"][1] > 0 for row in record["rows"])
+
+
+def test_scenes_are_told_apart_by_what_their_rows_say():
+    found = [
+        (scene.model, scene.view, scene.cull, scene.sampling, scene.verb, *scene.size)
+        for scene in static_scenes.scenes(SCALE)
+    ]
+    assert len(set(found)) == len(found) > 120
 
 
 def test_clusters_end_in_one_way_each(record):
