@@ -66,7 +66,7 @@ def draw(
 
     if in_bands:
         own = SamplePass(memory, snapped.mesh, sample_positions(1, view.grid_bits), n_parts)
-        is_bad = draw_sorted(own, [target], (height, width), pixels.nbytes + (0 if depth is None else depth.nbytes))
+        is_bad = draw_sorted(own, [target], (height, width))
     elif is_sliced and snapped.can_slice:
         is_bad = max(draw_sliced(memory, snapped, target, height, n_parts)) >= 0
     else:

@@ -80,16 +80,16 @@ def draw_planes(
             for s, t in zip(own.meshes, targets, strict=True)
         ]
         return max(bad_rows) >= 0
-    return draw_sorted(own, targets, (height, width), pixels.nbytes + (0 if depth is None else depth.nbytes))
+    return draw_sorted(own, targets, (height, width))
 
 
-def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int, int], n_bytes: int) -> bool:
+def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int, int]) -> bool:
     """Draw each sample into its target, band after band of rows; returns as `draw_planes` does. The mesh is near.
 
     Where all targets have so many bytes that they do not stay in a cache, a band is drawn in memory that does.
     """
     costs = cost_table()
-    is_far = n_bytes > costs.far_bytes
+    is_far = sum(target.n_bytes for target in targets) > costs.far_bytes
     bins = own.sort_bands(shape, int(costs.plane_bytes) // 8, with_columns=is_far)
     if bins.bad_row >= 0:
         return True
