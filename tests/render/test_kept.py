@@ -64,6 +64,15 @@ def test_picture_at_once_is_asked_for_where_nothing_else_is_to_be_chosen(monkeyp
     assert not at_once(70_000, (0, 512), threads=1)
 
 
+@pytest.mark.parametrize("least", [0, 20_481])
+def test_mesh_drawn_at_once_makes_clusters_where_they_may_pay(least):
+    mesh, camera = tl.Mesh(*tl.scenes.icosphere(5)), tl.Camera.look_at((0, 0, 4))
+    with choices.forced(cluster_shaded=least):
+        first, second = (tl.render(mesh, camera, SIZE, threads=1) for _ in range(2))
+    assert mesh.has_clusters == (least == 0)
+    assert np.array_equal(first, second)
+
+
 def test_equal_numbers_of_other_types_are_other_colors():
     mesh, camera = tl.Mesh(*BALL), tl.Camera.look_at((0.3, 1, 2))
     dark, red = (

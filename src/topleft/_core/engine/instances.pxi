@@ -74,6 +74,26 @@ def project_instances(meshes: Sequence[tuple[Array, I32]], const double[:, :, ::
     return found
 
 
+def joined(SnappedMesh like, room: Array, const int32_t[:, ::1] triangles) -> SnappedMesh:
+    """Return instances that `project_instances` placed in a room as one mesh, for drawing alone.
+
+    `like`: one of them, which tells the rest. `triangles`: of all, by vertices of the whole room.
+    """
+    cdef uint8_t[::1] raw = as_bytes(room)
+    cdef SnappedMesh made = like.copy()
+    made.arrays = room, triangles
+    made.snapped.mesh.source, made.snapped.first_id = NULL, 0
+    made.snapped.triangles, made.snapped.n_triangles = &triangles[0, 0], triangles.shape[0]
+    if like.exact is not None:
+        made.snapped.mesh.n_vertices = raw.shape[0] // <int64_t>(TL_PLACED * sizeof(double))
+        made.exact = whole_points(<double *>&raw[0], made.snapped.mesh.n_vertices, triangles, made.arrays)
+        made.snapped.mesh.exact = &made.exact.points
+    else:
+        made.snapped.mesh.n_vertices = raw.shape[0] // <int64_t>sizeof(tl_vertex)
+        made.snapped.mesh.vertices = <tl_vertex *>&raw[0]
+    return made
+
+
 cdef inline tl_vertex_counts project_whole(const tl_source *source, Viewport viewport, uint8_t *place,
                                            bint is_exact) noexcept nogil:
     """Project all vertices of a mesh into points or records."""

@@ -147,6 +147,11 @@ def draws_at_once(view: View, n_triangles: int) -> bool:
     return is_plain and is_small and is_alone
 
 
+def pays_to_cluster_shaded(n_triangles: int) -> bool:
+    """Tell whether a picture that one call draws and shades looks at the clusters of its mesh first."""
+    return n_triangles >= cost_table().cluster_shaded
+
+
 def is_worth_one(n_triangles: int, size: tuple[int, int]) -> bool:
     """Tell whether a picture is the work of one thread, before it is known which of its triangles show."""
     costs, n_layers = cost_table(), 2  # front and back of a closed surface

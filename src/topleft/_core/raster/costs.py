@@ -125,6 +125,7 @@ class Costs:
 
     # clusters, by (of how many triangles: fewer, the share outside without culling, with it)
     cluster_triangles: float = row(20_000, "triangles", "a mesh drawn again, for sorting to pay", STATIC)
+    cluster_shaded: float = row(150_000, "triangles", "the same, where one call draws and shades it", "blobs, 512x512")
     cluster_instances: float = row(16, "instances", "one sorted before its first picture", STATIC)
     cluster_front: float = row(0.8, "share", "clusters that face the view, at most", STATIC)
     cluster_small: Numbers = row((60_000, 0.1, 0.6), "triangles, shares", "clusters outside, of small meshes", STATIC)

@@ -20,6 +20,7 @@ from topleft._core.base.arrays import as_aligned, as_array, as_values, set_align
 from topleft._core.base.memory import empty
 from topleft._core.raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
 from topleft._core.raster.peel import DepthLayers
+from topleft._core.raster.sampling import split_ranges
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.shade import ShownInstance
@@ -165,8 +166,8 @@ class SceneFragments(InstanceIds, Fragments):
 
     _subject_kind = "Scene"
 
-    #: The fragments of the only instance, at the first sample; None where they are not kept.
-    _one: Fragments | None = None
+    #: The fragments of all instances as one mesh, at the first sample; None where they are not kept.
+    _whole_scene: Fragments | None = None
 
     def __init__(
         self, ids: Ids, depth: NDArray[np.float32], placed: PlacedScene, positions: Sequence[tuple[int, int]]
@@ -179,8 +180,13 @@ class SceneFragments(InstanceIds, Fragments):
 
     @property
     def drawn_planes(self) -> tuple[Ids, NDArray[np.float32]]:
-        """The drawn planes (S, H, W); those of one instance are drawn now, if they were not."""
-        return self._given if self._one is None else (self._one._sampled()[1] or self._given)
+        """The drawn planes (S, H, W); drawn now, if they were not."""
+        return self._given if self._whole_scene is None else (self._whole_scene._sampled()[1] or self._given)
+
+    @property
+    def _one(self) -> Fragments | None:
+        """The fragments of the only instance, if there is one."""
+        return self._whole_scene if len(self.placed.first_ids) == 2 else None
 
     @cached_property
     def _planes(self) -> Any:  # type: ignore[override]
@@ -195,7 +201,9 @@ class SceneFragments(InstanceIds, Fragments):
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes the parts itself: they refer to memory of this one."""
         own = vars(self) | {"_given": self.drawn_planes}
-        return {name: value for name, value in own.items() if name not in ("parts", "_one", "_snapped_instances")}
+        return {
+            name: value for name, value in own.items() if name not in ("parts", "_whole_scene", "_snapped_instances")
+        }
 
     __setstate__ = set_aligned
 
@@ -235,7 +243,7 @@ class SceneFragments(InstanceIds, Fragments):
         return self.placed.whole_ids(ids)
 
     def _seen(self) -> SeenSamples:
-        return SeenSamples.of(*self._given) if self._one is None else self._one._seen()
+        return SeenSamples.of(*self._given) if self._whole_scene is None else self._whole_scene._seen()
 
     def _counts(self) -> list[tuple[int, int]]:
         return counts_of(self.whole)
@@ -250,7 +258,8 @@ class SceneFragments(InstanceIds, Fragments):
     def _snapped_instances(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
         if self._one is not None:
             return tuple(self._one._drawn())
-        ids, first_ids = self.drawn_planes[0], self.placed.first_ids
+        seen, first_ids = self._seen(), self.placed.first_ids
+        ids = seen.ids
         width, height = ids.shape[:0:-1]
         if len(first_ids) == 2:  # there is one, wherever it shows
             boxes = np.array([[0, 0, width, height]], np.int32)
@@ -258,6 +267,9 @@ class SceneFragments(InstanceIds, Fragments):
             boxes = np.tile(np.array([width, height, 0, 0], np.int32), (len(first_ids) - 1, 1))
             for plane in ids:
                 find_instances(np.ascontiguousarray(as_aligned(plane)), first_ids, boxes)
+            if seen.split is not None:  # which has the other samples, not where they lie
+                for at in split_ranges(seen.split.rows):
+                    find_instances(np.ascontiguousarray(seen.split.ids[:, at]), first_ids, boxes)
         found = []
         for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
             left, top, right, bottom = boxes[i].tolist()

@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, set_aligned, shown
 from topleft._core.base.memory import FRESH, SCRATCH, Memory, check_fits, empty
-from topleft._core.base.options import Cull, DepthTest, Sampling, Sink, parse
+from topleft._core.base.options import Cull, Sampling, Sink
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh, equal_bands
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.peel import DepthLayers, check_peel, draw_layers_of, peel_meshes
-from topleft._core.raster.rasterize import canvas_of, draw_coverage, draw_fragments, refuse_many
-from topleft._core.raster.sampling import sample_positions, sum_areas
-from topleft._core.raster.snap import snap_mesh
+from topleft._core.raster.rasterize import FragmentOptions, canvas_of, draw_coverage, draw_fragments, refuse_many
+from topleft._core.raster.sampling import SamplePass, draw_sorted, draw_split, sample_positions, sum_areas
+from topleft._core.raster.snap import refuse_changed, snap_mesh
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
@@ -40,6 +40,9 @@ from topleft.typing import DepthTestOption
 
 #: Snapped vertices that are held at a time: 16 bytes each.
 VERTICES_AT_ONCE = 1 << 20
+
+#: Triangles of a scene that are kept in one array, 12 bytes each.
+TRIANGLES_AT_ONCE = 1 << 21
 
 #: `tl_kernels.draw` begins a mask anew after 2**31 pixels, which one that is drawn in several calls must not meet.
 MOST_PIXELS_OF_PART = 1 << 30
@@ -143,7 +146,7 @@ class PlacedScene:
     def fragments_of(self, drawn: Fragments, view: View) -> SceneFragments:
         """Return the same of the only instance, which was drawn alone."""
         frags = self.fragments(drawn.id[None], drawn.depth[None], self.positions(view))
-        frags._one = drawn
+        frags._whole_scene = drawn
         return frags
 
     @staticmethod
@@ -166,30 +169,50 @@ class PlacedScene:
 
     def _snap(self, first: int, end: int) -> list[engine.SnappedMesh]:
         """Return instances [first, end) in the same way: in one call, except those that are snapped alone."""
+        found, _ = self._project(first, end)
+        snapped = [self._snap_alone(first + k) if mesh is None else mesh for k, mesh in enumerate(found)]
+        if self._n_kept < VERTICES_AT_ONCE:
+            firsts = self.scene.first_vertices
+            self._kept.update(zip(range(first, end), snapped, strict=True))
+            self._n_kept += int(firsts[end] - firsts[first])
+        return snapped
+
+    def _project(self, first: int, end: int) -> tuple[list[engine.SnappedMesh | None], NDArray[Any] | None]:
+        """Return instances [first, end), with vertices in one room, and that; None for those to be snapped alone."""
         view, n = self._view, end - first
-        firsts = self._first_vertices[first : end + 1] - self._first_vertices[first]
-        found: list[engine.SnappedMesh | None] = [None] * n
+        firsts = self.scene.first_vertices[first : end + 1] - self.scene.first_vertices[first]
         n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
         is_sliced = n_threads <= n  # fewer instances than threads: each is the work of all of them
-        if is_sliced and view.plan is None and view.grid_bits == view.subpixel_bits and 0 not in view.size:
-            points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
-            shape = int(firsts[-1]) * engine.VERTEX_BYTES
-            room = FRESH.empty("records", (shape,), np.uint8) if points is None else points
-            meshes = [(one.mesh.vertices, one.mesh.triangles) for one in self.scene.instances[first:end]]
-            culls, numbers = self._sides[0][first:end], self._numbers[first:end]
-            given = meshes, self._clip_from_objects[first:end], culls, numbers, view.engine_viewport(), view.how
-            parts = run_parts(lambda k, end: engine.project_instances(*given, room, firsts, k, end), n, n_threads)
-            found = [mesh for part in parts for mesh in part]
-        has_some_sides = self._sides[1]
-        for k, mesh in enumerate(found):
-            i = first + k
-            if mesh is None or has_some_sides[i]:
-                found[k] = self._snap_alone(i)
-        snapped = cast("list[engine.SnappedMesh]", found)
-        if self._n_kept < VERTICES_AT_ONCE:
-            self._kept.update(zip(range(first, end), snapped, strict=True))
-            self._n_kept += int(firsts[-1])
-        return snapped
+        if not (is_sliced and view.plan is None and view.grid_bits == view.subpixel_bits) or 0 in view.size:
+            return [None] * n, None
+        points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
+        shape = int(firsts[-1]) * engine.VERTEX_BYTES
+        room = FRESH.empty("records", (shape,), np.uint8) if points is None else points
+        meshes = [(one.mesh.vertices, one.mesh.triangles) for one in self.scene.instances[first:end]]
+        (culls, has_some_sides), numbers = self._sides, self._numbers[first:end]
+        given = meshes, self._clip_from_objects[first:end], culls[first:end], numbers, view.engine_viewport(), view.how
+        parts = run_parts(lambda k, end: engine.project_instances(*given, room, firsts, k, end), n, n_threads)
+        found = [mesh for part in parts for mesh in part]
+        for k in np.flatnonzero(has_some_sides[first:end]).tolist():
+            found[k] = None
+        return found, room
+
+    @cached_property
+    def joined(self) -> engine.SnappedMesh | None:
+        """All instances as one mesh, whose triangles are ids; None of large scenes, or where some are snapped alone."""
+        firsts, n = self.scene.first_vertices, self.scene.n_triangles
+        culls = self._sides[0]
+        if firsts[-1] > VERTICES_AT_ONCE or not 0 < n <= TRIANGLES_AT_ONCE or (culls != culls[0]).any():
+            return None
+        found, room = self._project(0, len(self.scene))
+        drawn = [mesh for mesh in found if mesh is not None]
+        if room is None or sum(mesh.n_triangles for mesh in drawn) < n:
+            return None
+        self._kept.update((i, mesh) for i, mesh in enumerate(found) if mesh is not None)
+        self._n_kept = int(firsts[-1])
+        first_id = int(self._numbers[0])
+        mesh = engine.joined(drawn[0], room, self.scene.joined_triangles)
+        return mesh.numbered_from(first_id) if first_id else mesh
 
     def _snap_alone(self, i: int) -> engine.SnappedMesh:
         mesh = self.scene[i].mesh
@@ -197,11 +220,6 @@ class PlacedScene:
             FRESH, mesh.vertices, mesh.triangles, self.view_of(i), with_depth=self._with_depth, out=None
         )
         return snapped.mesh.numbered_from(int(self._numbers[i]))
-
-    @cached_property
-    def _first_vertices(self) -> NDArray[np.int64]:
-        """Where the vertices of each instance begin when all are counted, and the number of all: (N + 1,)."""
-        return np.cumsum([0, *(len(one.mesh.vertices) for one in self.scene.instances)], dtype=np.int64)
 
     @cached_property
     def _numbers(self) -> NDArray[np.int64]:
@@ -222,7 +240,7 @@ class PlacedScene:
                 is_mixed[at] = is_single is not None
             known[key] = sides, is_mixed
         culls, is_mixed = known[key]
-        is_mirrored = np.array([one.is_mirrored for one in self.scene.instances], np.bool_)
+        is_mirrored = self.scene.are_mirrored
         return (np.where(is_mirrored, MIRRORED[culls], culls) if is_mirrored.any() else culls), is_mixed
 
     def _sides_of(self, whole: Instance) -> tuple[int, NDArray[np.uint8] | None]:
@@ -244,7 +262,7 @@ class PlacedScene:
 
     def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
         """Return an instance snapped; only the part with some triangles, if its mesh is drawn in clusters."""
-        if self.scene[i].mesh.has_clusters and self._can_cluster(Sink.NEAREST):
+        if i not in self._kept and self.scene[i].mesh.has_clusters and self._can_cluster(Sink.NEAREST):
             return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i)
 
@@ -344,13 +362,42 @@ class PlacedScene:
 
     def chunks(self) -> Iterator[list[engine.SnappedMesh]]:
         """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
-        first, firsts = 0, self._first_vertices
+        first, firsts = 0, self.scene.first_vertices
         while first < len(self.scene):
             end = int(np.searchsorted(firsts, firsts[first] + VERTICES_AT_ONCE))
             end = min(max(end, first + 1), len(self.scene))
             is_kept = len(self._kept) == len(self.scene)
             yield [self._kept[i] for i in range(first, end)] if is_kept else self._snap(first, end)
             first = end
+
+    def meshes(self) -> Iterator[list[engine.SnappedMesh]]:
+        """Yield what is drawn, in the order of ids: all instances as one mesh, or else `chunks`."""
+        return self.chunks() if self.joined is None else iter([[self.joined]])
+
+    @cached_property
+    def _pays_in_clusters(self) -> bool:
+        is_group = self._first_id > 0  # of a scene so large that clusters pay for it
+        return is_group or pays_in_clusters(self, self._clip_from_world, self._view)
+
+    def _n_parts(self, height: int) -> int:
+        """How many threads draw."""
+        n_parts = count_threads(self._view.threads, self.scene.n_triangles)
+        return min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
+
+    def draw_split(self, sink: Sink, background: float) -> SceneFragments | None:
+        """Draw several samples as those of a mesh are; None where that takes planes: of clusters, or of many meshes."""
+        view = self._view.but(is_split=True)
+        is_clustered = self._can_cluster(sink) and self._pays_in_clusters
+        if is_clustered or self.joined is None or not choices.can_split(view, self.scene.n_triangles):
+            return None
+        (width, height), positions = view.size, self.positions(view)
+        own = SamplePass(FRESH, self.joined, np.array(positions, np.int32), self._n_parts(height))
+        split = draw_split(own, sink, (height, width), background)
+        if split is None:
+            refuse_changed()
+        frags = self.fragments(split.ids[None], split.depth[None], positions)
+        frags._whole_scene = Fragments.of_split(split, int(self.scene.first_vertices[-1]), self.scene.n_triangles)
+        return frags
 
     def draw(
         self, targets: list[engine.Target], positions: Sequence[tuple[int, int]], height: int, *, is_first: bool = True
@@ -359,11 +406,8 @@ class PlacedScene:
 
         `is_first`: clear them before; otherwise their samples stay unless something lies before them.
         """
-        n_parts = count_threads(self._view.threads, self.scene.n_triangles)
-        n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
-        seen = self._clip_from_world, self._view
-        is_group = self._first_id > 0  # of a scene so large that clusters pay for it
-        if self._can_cluster(Sink(targets[0].sink)) and (is_group or pays_in_clusters(self, *seen)):
+        n_parts = self._n_parts(height)
+        if self._can_cluster(Sink(targets[0].sink)) and self._pays_in_clusters:
             order = front_to_back(self.scene, self._clip_from_world)
             if is_first and Sink(targets[0].sink) in (Sink.NEAREST, Sink.FARTHEST):
                 shape = engine.Target.bounds_shape(height, self._view.size[0])
@@ -371,8 +415,13 @@ class PlacedScene:
                     target.keep_bounds(FRESH.empty("bounds", shape, np.float32))
             if draw_placed(self, order, targets, positions, height, n_parts, is_first=is_first):
                 return
-        n_left = len(self.scene)
-        for chunk in self.chunks():
+        if len(targets) > 1 and self.joined is not None and choices.can_slice(self._view) and is_first:
+            own = SamplePass(FRESH, self.joined, np.array(positions, np.int32), n_parts)
+            if draw_sorted(own, targets, (height, self._view.size[0])):
+                refuse_changed()
+            return
+        n_left = len(self.scene) if self.joined is None else 1
+        for chunk in self.meshes():
             n_left -= len(chunk)
             for target, at in zip(targets, positions, strict=True):
                 scenes = [mesh.at_sample(*at) for mesh in chunk]
@@ -471,9 +520,12 @@ def draw_nearest(
         return placed.fragments_of(draw_one(memory, placed, depth_test, background_depth, is_split=is_split), view)
     (width, height), positions = view.size, placed.positions(view)
     n = len(positions)
-    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
-    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    options = FragmentOptions.parse(depth_test, background_depth, None)
+    sink = choices.fragment_sink(options.test, has_depth=True)
     check_fits((n, height, width), np.int32, np.float32)
+    found = placed.draw_split(sink, options.background) if is_split else None
+    if found is not None:
+        return found
     ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
     targets = [engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True) if width and height]
@@ -521,7 +573,7 @@ def peel_shot(
         mesh = shot.scene[0].mesh
         return draw_layers_of(mesh.vertices, mesh.triangles, placed.view_of(0), layers, depth_test)
     n, is_farthest = check_peel(view, layers, depth_test)
-    return SceneDepthLayers(*peel_meshes(SCRATCH, placed.chunks(), view, n, is_farthest=is_farthest), placed)
+    return SceneDepthLayers(*peel_meshes(SCRATCH, placed.meshes(), view, n, is_farthest=is_farthest), placed)
 
 
 def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:

@@ -50,8 +50,9 @@ class KeptPicture:
     def draw_in(self, memory: Memory, mesh: Mesh, camera: Camera) -> U8:
         """The same; ids and depth lie in this memory."""
         view = self.view.but(transform=camera.clip_from_world(self.view.size), static=mesh)
-        at_once = self.options.mode not in NUMBERS and choices.draws_at_once(view, len(mesh.triangles))
-        if at_once and mesh.is_drawn_whole():
+        n = len(mesh.triangles)
+        at_once = self.options.mode not in NUMBERS and choices.draws_at_once(view, n)
+        if at_once and (not choices.pays_to_cluster_shaded(n) or mesh.is_drawn_whole()):
             picture = self.draw_at_once(memory, mesh, camera, view)
             if picture is not None:
                 return picture

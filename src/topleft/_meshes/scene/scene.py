@@ -199,6 +199,30 @@ class Scene:
         many, kinds = "s" * (n > 1), "es" * (n_meshes > 1)
         return f"Scene({n} instance{many} of {n_meshes} mesh{kinds}, {self.n_triangles} triangles)"
 
+    @property
+    def first_vertices(self) -> npt.NDArray[np.int64]:
+        """Where the vertices of each instance begin when all are counted, and the number of all: (N + 1,) int64."""
+        found = self.known.get("first vertices")
+        if found is None:
+            counts = [len(instance.mesh.vertices) for instance in self.instances]
+            found = self.known["first vertices"] = np.cumsum([0, *counts], dtype=np.int64)
+        return found
+
+    @property
+    def joined_triangles(self) -> npt.NDArray[np.int32]:
+        """The triangles of all instances, by vertices as `first_vertices` counts them: (T, 3) int32."""
+        found = self.known.get("joined triangles")
+        if found is None:
+            found = np.concatenate([instance.mesh.triangles for instance in self.instances])
+            found += np.repeat(self.first_vertices[:-1].astype(np.int32), np.diff(self.first_ids))[:, None]
+            self.known["joined triangles"] = found
+        return found
+
+    @cached_property
+    def are_mirrored(self) -> npt.NDArray[np.bool_]:
+        """Which matrices turn the winding of triangles over, (N,)."""
+        return np.array([instance.is_mirrored for instance in self.instances], np.bool_)
+
     @cached_property
     def backoff(self) -> Backoff:
         """How long to go on drawing the meshes whole."""
@@ -317,11 +341,12 @@ class Scene:
         for k in np.flatnonzero(np.abs(volumes) <= 1e-12 * largest**3):  # the others are regular, far beyond rounding
             check_regular(f"transforms[{k}]", placed[k])
         scene = object.__new__(Scene)
-        parts = zip(self.instances, placed, (volumes < 0).tolist(), strict=True)
+        are_mirrored = volumes < 0
+        parts = zip(self.instances, placed, are_mirrored.tolist(), strict=True)
         instances = tuple(one.at(matrix, is_mirrored=is_mirrored) for one, matrix, is_mirrored in parts)
         vars(scene).update(instances=instances, transforms=placed)
         kept = {"first_ids": self.first_ids, "meshes": self.meshes, "boxes": self.boxes, "backoff": self.backoff}
-        vars(scene).update(kept, known=self.known)
+        vars(scene).update(kept, known=self.known, are_mirrored=are_mirrored)
         return scene
 
     def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
