@@ -19,6 +19,9 @@ from topleft.typing import EdgesOption
 Floats = NDArray[np.float64]
 
 
+LOG_OF_2 = 0.6931471805599453
+
+
 class Given(Protocol):
     """The mesh that a visibility buffer was drawn from: `GivenCorners`."""
 
@@ -133,8 +136,9 @@ class Backward:
         step = np.zeros((*at.shape, 2)) if slopes is None else slopes * np.array(sizes[0][::-1], float)[:, None]
         squares = (step**2).sum(axis=-2)
         longer = squares.max(axis=-1)
-        level = np.clip(np.log2(np.maximum(longer, 1)) / 2, 0, len(arrays) - 1)
-
+        level = np.zeros(longer.shape)
+        if slopes is not None:
+            engine.levels_seen(levels.rows, slopes.reshape(-1, 2, 2), level.reshape(-1))
         beyond = TexelsBeyond.WRAP if wrap == WRAP_CODES["repeat"] else TexelsBeyond.CLAMP
         g_arrays, g_at, g_level = [np.zeros_like(one) for one in arrays], np.zeros_like(at), np.zeros_like(level)
         for texel_filter, is_used in ways_to_look(code, level):
@@ -152,7 +156,7 @@ class Backward:
             g_texture = finer + spread(spread(g_texture, len(finer), 0), finer.shape[1], 1)
         is_between = (longer > 1) & (level < len(arrays) - 1)
         step = np.where(is_between[..., None, None], step, 0)
-        g_squares = np.where(is_between, g_level / (2 * np.log(2) * np.maximum(longer, 1)), 0)
+        g_squares = np.where(is_between, g_level / (2 * LOG_OF_2 * np.maximum(longer, 1)), 0)
         is_longer = np.arange(2) == squares.argmax(axis=-1)[..., None]
         g_slopes = (
             2 * step * np.array(sizes[0][::-1], float)[:, None] * (g_squares[..., None] * is_longer)[..., None, :]
