@@ -115,7 +115,7 @@ def draw_rounds(
 ) -> bool:
     """Draw a sample into a target, as `draw_placed` does.
 
-    In rounds, each of which leaves out the instances that lie outside, between samples, or behind those of earlier ones.
+    In rounds, each of which leaves out instances that lie outside, between samples, or behind those of earlier ones.
     """
     keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
     order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
