@@ -26,6 +26,7 @@
 #include "pixels/composite.c"
 #include "pixels/instances.c"
 #include "pixels/paint.c"
+#include "pixels/lay.c"
 #include "pixels/planes.c"
 #include "pixels/points.c"
 #include "pixels/resolve.c"
@@ -85,6 +86,7 @@ const tl_kernels TL_KERNELS = {
     .bin = bin,
     .list_bins = list_bins,
     .find_columns = find_columns,
+    .lay_rows = lay_rows,
     .split_pixels = split_pixels,
     .spread_ids = spread_ids,
     .find_instances = find_instances,

@@ -110,6 +110,9 @@ typedef struct tl_kernels {
     /* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach. */
     void (*find_columns)(const tl_bins *bins, int64_t n_bands, int32_t *columns);
 
+    /* Writes rows of a picture of that width, from their first number on, past the caches. */
+    void (*lay_rows)(const tl_laid_rows *rows, int32_t *to, int64_t width);
+
     /* Lists pixels that show several triangles, from place `at` on, where there is room for 16 more than there
      * are; returns where they end. */
     int64_t (*split_pixels)(const tl_seen_samples *seen, const tl_split *split, int64_t at);
