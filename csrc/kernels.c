@@ -116,6 +116,7 @@ const tl_kernels TL_KERNELS = {
     .composite = composite,
     .fill_slopes = fill_slopes,
     .fill_texels = fill_texels,
+    .levels_seen = levels_seen,
     .halve_rows = halve_rows,
     .set_inverse_w = set_inverse_w,
     .shade = shade,

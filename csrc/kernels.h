@@ -167,6 +167,9 @@ typedef struct tl_kernels {
     void (*fill_texels)(const tl_levels *array, const int32_t *ids, const float *uv, const float *slopes,
                         float background, int64_t n, float *out);
 
+    /* Which level n pixels look at. */
+    void (*levels_seen)(const tl_levels *array, const float *slopes, int64_t n, double *out);
+
     /* Rows [first, end) of the halving of a level of such an array, (max(1, height / 2), max(1, width / 2)). */
     void (*halve_rows)(const float *level, int64_t width, int64_t height, int n_channels, int64_t first, int64_t end,
                        float *out);
