@@ -12,6 +12,7 @@
  *   v?_load_some(m, p, has_room)    the lanes in m; with room for a vector the others are read, too, or are anything
  *   v?_store_some(p, m, a, has_room)    the lanes in m; with room for a vector the others may be written as they are
  *   vi_gather(m, p, i)      p[i] in the lanes of m
+ *   vi_stream(p, v)         a store past the caches to an aligned place; end_stream() after the last of them
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
  *   v4_, vi_load_quads, vi_store_quads    four int32; TL_LANES of them as four vectors, lane k in slot vi_quad_slot(k)

@@ -73,6 +73,49 @@ def test_camera_rays_are_products_and_inverses(has_perspective):
     assert np.array_equal(rows, np.vstack([eye, ray, view[:3, :3] / scale, origin]))
 
 
+def random_turn(rng):
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return turn * np.sign(np.linalg.det(turn))
+
+
+STRETCHED = {
+    "ellipsoid": np.diag([2.0, 0.5, 3.0]),
+    "mirror": np.diag([-1.0, 1, 1]),
+    "flat": np.diag([1.0, 1e-6, 1e5]),
+    "sheared": np.array([[1.0, 2, 0], [0, 1, 0.5], [0, 0, -3]]),
+    "sheared flat": np.array([[1.0, 1, 1], [0, 1e-7, 0], [0, 0, 1e-7]]),
+}
+
+
+@pytest.mark.parametrize("linear", STRETCHED.values(), ids=STRETCHED.keys())
+def test_stretch_leaves_a_rotation_of_a_matrix(linear):
+    rng = np.random.default_rng(3)
+    views = np.tile(np.eye(4), (20, 1, 1))
+    views[:, :3, :3] = [random_turn(rng) @ linear for _ in views]
+    views[:, :3, 3] = rng.normal(size=(20, 3))
+    for view, (is_mirrored, stretch) in zip(views, engine.stretches(views), strict=True):
+        assert is_mirrored == (np.linalg.det(linear) < 0)
+        rest = engine.product(view, engine.inverse(stretch))
+        # 40 bits, and what inverting a matrix of condition 1e7 loses
+        assert np.allclose(rest[:3, :3] @ rest[:3, :3].T, np.eye(3), rtol=0, atol=4e-9)
+        assert np.linalg.det(rest[:3, :3]) > 0
+        assert rest[:, 3].tolist() == view[:, 3].tolist()
+
+
+def test_stretch_is_the_same_wherever_an_instance_turns():
+    rng = np.random.default_rng(4)
+    views = np.tile(np.eye(4), (50, 1, 1))
+    views[:, :3, :3] = [random_turn(rng) @ np.diag([0.3, 0.7, 1.9]) for _ in views]
+    first, *others = (stretch.tolist() for _, stretch in engine.stretches(views))
+    assert all(stretch == first for stretch in others)
+
+
+def test_stretch_of_a_rotation_times_a_scale_is_none():
+    view = np.eye(4)
+    view[:3, :3] = 3 * random_turn(np.random.default_rng(5))
+    assert engine.stretches(view[None]) == [(False, None)]
+
+
 def test_wrong_matrices_are_refused():
     with pytest.raises(np.linalg.LinAlgError):
         engine.inverse(np.array([[1.0, 2.0], [2.0, 4.0]]))

@@ -31,6 +31,7 @@ MAX_SCRATCH_BYTES = 64 << 20
 #: Scratch that no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
 SCRATCH_NAMES = frozenset(
     {
+        "band rows",
         "bands",
         "bins",
         "covered",

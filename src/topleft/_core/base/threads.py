@@ -83,7 +83,9 @@ def threads_for(threads: object, n_triangles: int) -> int:
 
 def threads_of_rows(n: int, threads: int | None = None) -> int:
     """Return how many threads are worth it to measure or move, not draw, some triangles or vertices."""
-    return max(1, min(count_threads(None, n), n // MIN_ROWS_PER_THREAD)) if threads is None else threads
+    if threads is not None:
+        return threads
+    return 1 if n < 2 * MIN_ROWS_PER_THREAD else min(count_threads(None, n), n // MIN_ROWS_PER_THREAD)
 
 
 def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Part]:

@@ -5,7 +5,7 @@
 
 from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from cpython.buffer cimport PyBUF_STRIDED_RO, PyBuffer_Release, PyObject_GetBuffer
-from libc.math cimport INFINITY, NAN, isinf, isnan, sqrt
+from libc.math cimport INFINITY, NAN, frexp, isinf, isnan, ldexp, rint, sqrt
 from libc.string cimport memcpy, memset
 
 import numpy as np

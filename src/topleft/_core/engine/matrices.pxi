@@ -137,7 +137,7 @@ cdef struct Rays:
 
 
 @cython.cdivision(True)  # IEEE: no number where there is none
-cdef int find_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width, double height,
+cdef int find_rays(const double[:, ::1] clip_from_eye, const double[:, ::1] view, const double *center, double width, double height,
                    Rays *out) except -1:
     """Find how a camera sees a space with its origin at `center`; `view`: (4, 4), to eye space."""
     cdef double[4][4] clip
@@ -189,24 +189,66 @@ cdef int find_rays(const double[:, :] clip_from_eye, const double[:, :] view, co
     return 0
 
 
-def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width,
+def camera_rays(const double[:, ::1] clip_from_eye, const double[:, ::1] view, const double[::1] center, double width,
                 double height) -> tuple[bool, F64, float]:
     """Return how a camera sees a space with its origin at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
 
     `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale.
     """
     cdef Rays rays
-    find_rays(clip_from_eye, view, center, width, height, &rays)
+    find_rays(clip_from_eye, view, &center[0], width, height, &rays)
     result = np.empty((9, 3))
     cdef double[:, ::1] out = result
     memcpy(&out[0, 0], rays.rows, sizeof(rays.rows))
     return rays.has_perspective, result, rays.scale
 
 
-def turns(const double[:, :] view) -> tuple[bool, bool]:
-    """Return whether a matrix (4, 4) keeps angles and does not mirror, and whether it mirrors."""
+def stretches(const double[:, :, ::1] views) -> list[tuple[bool, F64 | None]]:
+    """Return whether each matrix (N, 4, 4) mirrors, and the stretch (4, 4) of those that are no rotation times a scale.
+
+    The matrix times the inverse of the stretch is a rotation, and a translation.
+    """
+    cdef const double[:, ::1] view
+    cdef double[:, ::1] stretch, turned
+    cdef double[3][3] g
+    cdef double turn
+    cdef Py_ssize_t n
+    cdef int i, j
+    cdef bint is_fine
+    cdef list found = []
+    for n in range(views.shape[0]):
+        view = views[n]
+        turn = determinant_of(view)
+        if turn > 0.0 and keeps_angles(view):
+            found.append((False, None))
+            continue
+        for i in range(3):
+            for j in range(i, 3):
+                g[i][j] = (view[0, i] * view[0, j] + view[1, i] * view[1, j]) + view[2, i] * view[2, j]
+        for i in range(3):
+            for j in range(2, i - 1, -1):  # the diagonal last
+                g[i][j] = rounded_beside(g[i][j], g[i][i] if i == j else sqrt(g[i][i] * g[j][j]))
+        made = np.eye(4)
+        stretch = made
+        root_of(g, stretch)
+        if turn < 0.0:
+            for j in range(3):
+                stretch[0, j] = -stretch[0, j]
+        is_fine = stretch[1, 1] > 0.0 and stretch[2, 2] > 0.0  # nor NaN
+        if is_fine:
+            turned = product(view, inverse(made))
+            is_fine = keeps_angles(turned)
+        for i in range(3 if not is_fine else 0):
+            for j in range(3):
+                stretch[i, j] = view[i, j]
+        found.append((not turn > 0.0, made))
+    return found
+
+
+cdef bint keeps_angles(const double[:, ::1] view) noexcept:
+    """Whether a matrix (4, 4) is a rotation times a scale, and a translation; or that and a mirror."""
     cdef double[3] squares, products
-    cdef double scale, error = 0.0, turn = determinant_of(view)
+    cdef double scale, error = 0.0
     cdef int i, j
     for i in range(3):
         j = (i + 1) % 3
@@ -215,7 +257,26 @@ def turns(const double[:, :] view) -> tuple[bool, bool]:
     scale = ((squares[0] + squares[1]) + squares[2]) / 3
     for i in range(3):
         error = max(error, fabs(products[i]), fabs(squares[i] - scale))
-    return error <= 1e-9 * scale and turn > 0.0, not turn > 0.0
+    return error <= 1e-9 * scale
+
+
+cdef double rounded_beside(double number, double unit) noexcept:
+    """A number rounded to 40 bits of another."""
+    cdef int exponent
+    frexp(unit, &exponent)
+    return ldexp(rint(ldexp(number, 40 - exponent)), exponent - 40)
+
+
+@cython.cdivision(True)  # IEEE: no number where there is none
+cdef void root_of(double[3] *g, double[:, ::1] out) noexcept:
+    """Write the upper triangular matrix that gives g if it is multiplied by its transpose from the left (Cholesky)."""
+    cdef double a = sqrt(g[0][0])
+    cdef double b = g[0][1] / a, c = g[0][2] / a
+    cdef double d = sqrt(g[1][1] - b * b)
+    cdef double e = (g[1][2] - b * c) / d
+    out[0, 0], out[0, 1], out[0, 2] = a, b, c
+    out[1, 1], out[1, 2] = d, e
+    out[2, 2] = sqrt((g[2][2] - c * c) - e * e)
 
 
 def row_products(a: ArrayLike, b: ArrayLike) -> F64:

@@ -56,37 +56,31 @@ cdef void copy_floats(float *out, values, int n) except *:
         out[k] = values[k]
 
 
-cdef void turn(double *way, const double[:, :] view) noexcept:
-    """Multiply by the first three rows and columns."""
-    cdef double[3] given = [way[0], way[1], way[2]]
-    cdef double total
-    cdef Py_ssize_t i, j
-    for i in range(3):
-        total = 0.0
-        for j in range(3):
-            total = total + view[i, j] * given[j]
-        way[i] = total
-
-
 cdef class ShadingTable:
     """`tl_shading`; keeps the arrays that it points to alive."""
 
     cdef tl_shading shading
     cdef object arrays
+    cdef const float[:, ::1] normals
+    cdef double[3] center
+    cdef int64_t n_vertices
     cdef uint8_t[::1] materials
     cdef uint8_t[::1] lights
     cdef tl_light headlight
     cdef Rays rays
 
-    def __init__(self, const float[:, ::1] normals, bint finds_inverse_w,
+    def __init__(self, const float[:, ::1] normals, center: Sequence[float],
                  const int32_t[:, ::1] normal_of_corner or None, const float[:, ::1] corner_normals or None,
                  const float[:, ::1] face_normals or None, positions: Array, const uint8_t[::1] is_turned or None,
                  const float[:, ::1] uv or None, const float[:, ::1] uv1 or None, const float[:, ::1] colors or None,
                  bint has_alpha, float front_side, const int32_t[::1] material_of or None, const float[::1] decode or None):
+        """`center`: the origin of the shading space, in the axes of the mesh."""
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef tl_shading *s = &self.shading
         self.arrays = (normals, normal_of_corner, corner_normals, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
-        s.normals, s.finds_inverse_w = &normals[0, 0] if normals.shape[0] else NULL, finds_inverse_w
+        self.normals, self.n_vertices = normals, positions.shape[0]
+        self.center = center
+        s.normals, s.finds_inverse_w = &normals[0, 0] if normals.shape[0] else NULL, False
         s.normal_of_corner = NULL
         if normal_of_corner is not None and normal_of_corner.shape[0]:
             s.normal_of_corner, s.corner_normals = &normal_of_corner[0, 0], &corner_normals[0, 0]
@@ -124,20 +118,14 @@ cdef class ShadingTable:
                 m[k].normal_map, m[k].emission_map = texture_of(full[8]), texture_of(full[9])
         self.shading.materials, self.shading.n_materials = m, len(materials)
 
-    def seen(self, const float[:, ::1] normals or None, bint finds_inverse_w, const double[:, :] clip_from_eye,
-             const double[:, :] view, const double[:] center, double width, double height) -> ShadingTable:
-        """Return the same, seen by a camera in a whole picture of this size, in a space with its origin at `center`.
-
-        `view`: (4, 4), to eye space. `normals`: those of the vertices with 1/w, or None.
-        """
+    cdef ShadingTable seen(self, const double[:, ::1] clip_from_eye, const double[:, ::1] view, double width, double height):
+        """Return the same, seen by a camera in a whole picture of this size; `view`: (4, 4), to eye space."""
         cdef ShadingTable own = ShadingTable.__new__(ShadingTable)
         cdef tl_shading *s = &own.shading
         cdef int i, k
-        own.shading, own.materials, own.arrays = self.shading, self.materials, (self.arrays, normals)
-        s.finds_inverse_w = finds_inverse_w
-        if normals is not None:
-            s.normals = &normals[0, 0] if normals.shape[0] else NULL
-        find_rays(clip_from_eye, view, center, width, height, &own.rays)
+        own.shading, own.materials, own.arrays = self.shading, self.materials, self.arrays
+        own.center = self.center
+        find_rays(clip_from_eye, view, self.center, width, height, &own.rays)
         s.has_perspective = own.rays.has_perspective
         for k in range(3):
             s.eye[k] = <float>own.rays.rows[0][k]
@@ -152,9 +140,8 @@ cdef class ShadingTable:
         """Return `camera_rays` of the camera that sees it."""
         return self.rays.has_perspective, np.array([[self.rays.rows[i][k] for k in range(3)] for i in range(9)]), self.rays.scale
 
-    def set_headlight(self, to_light: Any, float color, float ambient):
+    cdef void set_headlight(self, const double *at, float color, float ambient) noexcept:
         """Take one light in a direction of eye space, which wraps round surfaces, and light from all sides."""
-        cdef double[3] at = to_light
         cdef double total
         cdef int i, k
         for i in range(3):
@@ -167,8 +154,8 @@ cdef class ShadingTable:
         self.shading.lights, self.shading.n_lights = &self.headlight, 1
 
     @cython.cdivision(True)  # IEEE: no number where there is none
-    def set_lights(self, const double[:, ::1] lights, const double[:, :] world_from_mesh, const double[:, :] view,
-                   const double[:] center, bint is_in_eye_space, float ambient):
+    cdef int set_lights(self, const double[:, ::1] lights, const double[:, ::1] world_from_mesh,
+                        float ambient, tl_light *light) except -1:
         """Take lights as they are in the world or in eye space, and light from all sides.
 
         Parameters
@@ -176,23 +163,17 @@ cdef class ShadingTable:
         lights
             Rows (kind, x, y, z, falloff, red, green, blue, direction of a spot (3), cone scale, cone offset, whether it
             is in eye space).
-        world_from_mesh, view
-            (4, 4): where the mesh stands; to eye space, from the mesh.
-        center
-            The origin of the shading space, in its own axes.
-        is_in_eye_space
-            Whether these are those of eye space, otherwise of the mesh.
+        world_from_mesh
+            (4, 4): where the mesh stands.
+        light
+            Room for them.
         """
         cdef Py_ssize_t n = lights.shape[0], i, j, k
         cdef double[4][8] rows
         cdef double[3] at, way
         cdef double scale, total
-        cdef tl_light *light
         cdef bint in_eye, is_far
-        self.lights = np.zeros(max(1, n) * sizeof(tl_light), np.uint8)
-        light = <tl_light *>&self.lights[0]
-        # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
-        scale = 1.0 if is_in_eye_space else cube_root(fabs(determinant_of(world_from_mesh)))
+        scale = cube_root(fabs(determinant_of(world_from_mesh)))  # distances are measured in the space of the mesh
         for i in range(4):
             for j in range(4):
                 rows[i][j] = world_from_mesh[i, j]
@@ -212,7 +193,7 @@ cdef class ShadingTable:
                         total = total + rows[i][4 + j] * lights[k, 8 + j]
                     way[i] = total
             if is_far:
-                self.direct(at, view, in_eye, is_in_eye_space)
+                self.direct(at, in_eye)
             elif in_eye:
                 for i in range(3):
                     at[i] = at[i] - self.rays.rows[8][i]
@@ -220,14 +201,10 @@ cdef class ShadingTable:
                 for i in range(3):
                     at[i] = at[i] / self.rays.scale
             else:
-                if is_in_eye_space:
-                    turn(at, view)
-                    for i in range(3):
-                        at[i] = at[i] + view[i, 3]
                 for i in range(3):
-                    at[i] = at[i] - center[i]
+                    at[i] = at[i] - self.center[i]
             if way[0] != 0.0 or way[1] != 0.0 or way[2] != 0.0:
-                self.direct(way, view, in_eye, is_in_eye_space)
+                self.direct(way, in_eye)
             light[k].kind, light[k].falloff = <tl_light_kind><int>lights[k, 0], <float>(lights[k, 4] * (scale * scale))
             for i in range(3):
                 light[k].at[i], light[k].color[i], light[k].axis[i] = <float>at[i], <float>lights[k, 5 + i], <float>way[i]
@@ -235,6 +212,7 @@ cdef class ShadingTable:
         for i in range(3):
             self.shading.ambient[i] = ambient
         self.shading.lights, self.shading.n_lights = light, <int>n
+        return 0
 
     cdef void from_eye(self, double *way) noexcept:
         """Turn what is in eye space to shading space, but for the scale."""
@@ -248,13 +226,11 @@ cdef class ShadingTable:
             way[i] = total
 
     @cython.cdivision(True)
-    cdef void direct(self, double *way, const double[:, :] view, bint in_eye, bint is_in_eye_space) noexcept:
+    cdef void direct(self, double *way, bint in_eye) noexcept:
         """Make a direction of the mesh, or of eye space, a unit vector of shading space."""
         cdef double total = 0.0
         cdef Py_ssize_t i
-        if in_eye or is_in_eye_space:
-            if not in_eye:
-                turn(way, view)
+        if in_eye:
             self.from_eye(way)
         for i in range(3):
             total = total + way[i] * way[i]
@@ -267,15 +243,12 @@ cdef class ShadingTable:
         self.arrays += (surroundings,)
         self.shading.surroundings = &surroundings.surroundings
 
-    def set_wants_opacity(self):
-        """Have the opacity of the surface in the picture's alpha; the materials are full."""
-        self.shading.wants_opacity = True
-
-    def set_picture(self, int show, Mipmap matcap or None, background: Sequence[float], background_bytes: Sequence[int]):
-        """Take the quantity that the picture shows, and its background."""
+    def set_picture(self, int show, Mipmap matcap or None, background: Sequence[float], background_bytes: Sequence[int],
+                    bint wants_opacity):
+        """Take the quantity that the picture shows, its background, and whether its alpha is the opacity of full materials."""
         cdef tl_shading *s = &self.shading
         cdef int k
-        s.show = <tl_show>show
+        s.show, s.wants_opacity = <tl_show>show, wants_opacity
         s.matcap = &matcap.texture if matcap is not None else NULL
         self.arrays += (matcap,)
         copy_floats(s.background, background, 4)
@@ -296,25 +269,76 @@ cdef class ShadingTable:
         s.fog_near, s.fog_scale, s.distance_start, s.distance_scale = near, scale, distance_start, distance_scale
 
 
-def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out):
+def see(meshes: Sequence[SnappedMesh], kept: Sequence[ShadingTable], const double[:, ::1] clip_from_eye,
+        const double[:, :, ::1] views, bint has_w, bint finds_inverse_w, double width, double height,
+        empty: Callable[..., Array]) -> list[ShadingTable]:
+    """Return the tables of meshes as a camera sees them in a whole picture of this size.
+
+    `views`: (N, 4, 4), to eye space. `has_w`: with perspective; `finds_inverse_w`: 1/w is found for the vertices that
+    show, where it can be; otherwise for all, in memory of `empty(shape, dtype)`.
+    """
+    cdef int64_t i, first = 0, n = 0
+    cdef SnappedMesh mesh
+    cdef ShadingTable own
+    cdef float[:, ::1] rows
+    cdef const double[:, ::1] view
+    cdef const uint8_t[::1] finds = np.array([finds_inverse_w and (<SnappedMesh>mesh).can_find_inverse_w for mesh in meshes], np.uint8)
+    cdef list found = []
+    for i in range(len(meshes)):
+        own = kept[i]
+        n += 0 if not has_w or finds[i] else own.n_vertices
+    if n:
+        rows = empty((n, 4), np.float32)
+    for i in range(len(meshes)):
+        mesh, own = meshes[i], kept[i]
+        n = own.n_vertices
+        view = views[i]
+        own = own.seen(clip_from_eye, view, width, height)
+        own.shading.finds_inverse_w = has_w and finds[i]
+        if has_w and not finds[i] and n:
+            set_inverse_w(mesh, (<ShadingTable>kept[i]).normals[:n], rows[first:first + n])
+            own.arrays, own.shading.normals = (own.arrays, rows), &rows[first, 0]
+            first += n
+        found.append(own)
+    return found
+
+
+def light_all(tables: Sequence[ShadingTable], const double[:, ::1] lights or None, to_headlight: Any, float ambient,
+              const double[:, :, ::1] places):
+    """Light the meshes of tables by rows of `ShadingTable.set_lights`, or by a headlight; and from all sides.
+
+    `places`: (N, 4, 4), where each mesh stands.
+    """
+    cdef double[3] at = to_headlight
+    cdef int64_t i, n = lights.shape[0] if lights is not None else 0
+    cdef uint8_t[::1] room = np.zeros(max(1, n * len(tables)) * sizeof(tl_light), np.uint8)
+    cdef ShadingTable own
+    for i in range(len(tables)):
+        own = tables[i]
+        if lights is None:
+            own.set_headlight(at, max(0.0, 1.0 - ambient), ambient)
+        else:
+            own.lights = room
+            own.set_lights(lights, places[i], ambient, <tl_light *>&room[0] + i * n)
+
+
+cdef int set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out) except -1:
     """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped.
 
     Those of a `WaitingMesh` are written when it is drawn.
     """
     cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
-    if n == 0:
-        return
     if isinstance(mesh, WaitingMesh):
         (<WaitingMesh>mesh).projected.rows, (<WaitingMesh>mesh).projected.seen_rows = &rows[0, 0], &out[0, 0]
         mesh.arrays = mesh.arrays, rows, out
-        return
+        return 0
     if mesh.is_used is None:
         if n < HELD_VERTICES:
             K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
         else:
             with nogil:
                 K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
-        return
+        return 0
     n_blocks = mesh.is_used.shape[0]
     with nogil:
         while i < n_blocks:
@@ -324,6 +348,7 @@ def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out)
             if end > i:
                 K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
             i = end + 1
+    return 0
 
 
 cdef enum:

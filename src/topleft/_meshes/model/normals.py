@@ -214,7 +214,7 @@ def box_of_triangles(vertices: FloatArray, triangles: I32, *, threads: int | Non
 
     _over_faces(vertices, triangles, threads, measure)
     both = np.reshape(boxes, (-1, 2, 3))
-    return np.stack([both[:, 0].min(axis=0), both[:, 1].max(axis=0)])
+    return both[0] if len(both) == 1 else np.stack([both[:, 0].min(axis=0), both[:, 1].max(axis=0)])
 
 
 def unit_or_zero(vectors: FloatArray) -> F64:
@@ -269,4 +269,4 @@ def _over_faces(
 
 
 def _contiguous(rows: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(rows, rows.dtype if rows.dtype in (np.float32, np.float64) else np.float64)
+    return np.ascontiguousarray(rows, rows.dtype if rows.dtype.char in "fd" else np.float64)

@@ -33,6 +33,7 @@ from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
 from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.holes import Mask, cuts_of, draw_solid
 from topleft._meshes.picture.instances import PlacedScene, place
+from topleft._meshes.picture.look import kept_look
 from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
@@ -73,9 +74,12 @@ def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | 
     """The blended triangles of each instance; None where there are none, or the shading ignores them."""
     if options.mode not in BLENDING:
         return None
-    masks = [
-        blended_triangles(one.mesh, one.material if options.material is None else options.material) for one in scene
-    ]
+    material = options.material
+
+    def make() -> list[Mask | None]:
+        return [blended_triangles(one.mesh, one.material if material is None else material) for one in scene]
+
+    masks = kept_look(scene.known, blended_masks, material, make)
     return None if all(mask is None for mask in masks) else masks
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -29,7 +30,7 @@ from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.instances import PlacedScene, draw_nearest, lent, place, rasterize_shot
-from topleft._meshes.picture.look import ShadingInputs, Surface
+from topleft._meshes.picture.look import ShadingInputs, Surface, kept_look
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
 
@@ -43,6 +44,11 @@ class Cut:
     materials: Sequence[Material]
     rows: I32 | None
     is_cut: Mask
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The materials, without light."""
+        return Surface(self.materials, self.rows is not None, is_unlit=True)
 
     @property
     def triangles(self) -> I32:
@@ -64,7 +70,12 @@ class MaskedInstance(NamedTuple):
 
 
 def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
-    """The materials with holes of a mesh, or this one, and their triangles; None if there are none."""
+    """The materials with holes of a mesh, or this one, and their triangles, kept; None if there are none."""
+    return kept_look(mesh.known, Cut, material, lambda: find_cut(mesh, material))
+
+
+def find_cut(mesh: Mesh, material: Material | None) -> Cut | None:
+    """The same, found now."""
     materials = mesh.materials if material is None else (material,)
     holes = [has_holes(one, mesh) for one in materials]
     if not any(holes):
@@ -76,7 +87,11 @@ def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
 
 def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
     """The materials with holes, or this one, of the mesh of each instance."""
-    return [cut_of(one.mesh, one.material if material is None else material) for one in scene]
+
+    def make() -> list[Cut | None]:
+        return [cut_of(one.mesh, one.material if material is None else material) for one in scene]
+
+    return kept_look(scene.known, Cut, material, make)
 
 
 def draw_visible(
@@ -137,10 +152,8 @@ def solid_scene(scene: Scene, holed: Sequence[MaskedInstance], masks: Sequence[M
 def inputs_of(scene: engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
     """The kernel's inputs of materials with holes."""
     finds_inverse_w = len(mesh.vertices) > size[0] * size[1]
-    surface = Surface(cut.materials, cut.rows is not None, is_unlit=True)
-    inputs = ShadingInputs(
-        scene, mesh, camera, camera.view, (size[0], size[1]), surface, finds_inverse_w=finds_inverse_w
-    )
+    shown, places = [(scene, mesh, cut.surface)], np.eye(4)[None]
+    inputs = ShadingInputs(shown, camera, places, (size[0], size[1]), finds_inverse_w=finds_inverse_w)
     inputs.set_picture(0, None, (0, 0, 0, 0))
     return inputs
 
@@ -160,7 +173,7 @@ def draw_holed(
     def draw(i: int, mesh: Mesh, camera: Camera, cut: Cut) -> None:
         snapped = placed.snap(i).at_sample(*at)
         inputs = inputs_of(snapped, mesh, camera, ids.shape[:0:-1], cut)
-        given = snapped, inputs.shading, cut.triangles, ids, depth, is_peeled
+        given = snapped, inputs.tables[0], cut.triangles, ids, depth, is_peeled
         n_threads = threads_for(threads, len(mesh.triangles))
         run_parts(lambda first, end: engine.cut_out(*given, first, end - first), ids.shape[1], n_threads)
 

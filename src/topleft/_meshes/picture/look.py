@@ -6,10 +6,10 @@ Input: a mesh, its materials, lights, a camera and the size of the whole picture
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +36,10 @@ from topleft._meshes.model.texture import Texture
 
 LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1, LightKind.SPOT: 3}  # tl_light_kind in csrc/shading.h
 
-EYE = np.eye(4)
+Kept = TypeVar("Kept")
+
+MOST_STRETCHED = 1 << 18
+"""Vertices of stretched copies that are kept of a mesh, 40 bytes each and 20 for each of its triangles."""
 
 MOST_TABLES = 256
 """Tables that are kept of a mesh: instances differ in material, and whether faces are flat, lit, mirrored."""
@@ -76,7 +79,7 @@ class ShadingMesh:
     Attributes
     ----------
     positions : (V, 3) float
-        As in the mesh, or in eye space.
+        As in the mesh, or stretched.
     center : (3,) float64
         The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
         float32 is fine enough.
@@ -86,24 +89,24 @@ class ShadingMesh:
         sRGB of the vertices, 0 to 255, or their light, 0 to 1, and opacity, 0 to 1.
     """
 
-    def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
-        """`view`: (4, 4), takes the mesh to eye space first."""
+    def __init__(self, mesh: Mesh, stretch: F64 | None = None) -> None:
+        """`stretch`: an affine matrix (4, 4) that acts on the mesh first."""
         corners = None if mesh.is_faceted else mesh.corner_normals()
         if mesh.is_faceted:  # nobody reads normals of vertices where every face has its own
             self.normals = np.ones((len(mesh.vertices), 4), np.float32)
         else:
             normals = mesh.vertex_normals() if corners is None else corners.rows
-            self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
+            self.normals = unit_rows(normals, None if stretch is None else turn_of_normals(stretch))
         self._triangles = mesh.triangles
         self.normal_of_corner = None if corners is None else corners.of_corner
-        self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
+        self.positions = mesh.vertices if stretch is None else moved(mesh.vertices, stretch)
         box = box_of_triangles(self.positions, self._triangles) if len(mesh.triangles) else np.zeros((2, 3))
         low, high = box.astype(self.positions.dtype)
         self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
         if self.colors is not None and mesh.color_interpolation == "linear":
             self.colors[:, :3] = LIGHT_OF_SRGB[mesh.colors[:, :3]]  # type: ignore[index]
-        self.tables: dict[tuple[object, ...], tuple[Sequence[Material], engine.ShadingTable]] = {}  # see `table_of`
+        self.tables: dict[tuple[Surface, bool], engine.ShadingTable] = {}  # see `table_of`
 
     @cached_property
     def face_normals(self) -> F32:
@@ -125,11 +128,15 @@ def color_rows(colors: npt.NDArray[np.uint8]) -> F32:
     return rows
 
 
-def shading_mesh_of(mesh: Mesh) -> ShadingMesh:
-    """The shading mesh of a mesh in its own space, made once."""
-    found: ShadingMesh | None = mesh.known.get(ShadingMesh)
+def shading_mesh_of(mesh: Mesh, stretch: F64 | None) -> ShadingMesh:
+    """The shading mesh of a mesh in its own space or stretched, made once; of many stretched ones the last are kept."""
+    known: dict[bytes, ShadingMesh] = mesh.known.setdefault(ShadingMesh, {})
+    key = b"" if stretch is None else stretch.tobytes()
+    found = known.get(key)
     if found is None:
-        found = mesh.known[ShadingMesh] = ShadingMesh(mesh)
+        if len(known) * len(mesh.vertices) > MOST_STRETCHED:
+            known.clear()
+        found = known[key] = ShadingMesh(mesh, stretch)
     return found
 
 
@@ -159,8 +166,9 @@ def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
     return (*numbers, material.emission, *compiled_maps)
 
 
-class Surface(NamedTuple):
-    """The materials of a mesh, the same in every view."""
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The materials of a mesh, the same in every view; tables are kept by it."""
 
     materials: Sequence[Material]
     is_by_triangle: bool
@@ -170,17 +178,34 @@ class Surface(NamedTuple):
     all_full: bool = False
     """For an environment that lights them all, or their opacity; others are full where they need it."""
 
+    @cached_property
+    def is_metallic(self) -> bool:
+        """Whether one of them is."""
+        return any(one.is_metallic_rough for one in self.materials)
+
+
+def kept_look(
+    known: dict[Any, Any], kind: Any, material: Material | None, make: Callable[[], Kept], *key: object
+) -> Kept:
+    """A value that a mesh or a scene has in a material, made once; the last ones are kept."""
+    values = known.setdefault(kind, {})
+    found = values.get((id(material), *key))
+    if found is None:
+        if len(values) == MOST_TABLES:
+            values.clear()
+        found = values[(id(material), *key)] = make(), material  # which keeps its id
+    return found[0]
+
 
 def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: bool) -> engine.ShadingTable:
     """The kernels' inputs of a mesh, without a view; the last ones are kept."""
-    key = (*map(id, surface.materials), *surface[1:], is_mirrored)
-    kept = own.tables.get(key)
+    kept = own.tables.get((surface, is_mirrored))
     if kept is not None:
-        return kept[1]
+        return kept
     is_flat = surface.is_flat or mesh.is_faceted
     table = engine.ShadingTable(
         own.normals,
-        False,
+        own.center.tolist(),
         own.normal_of_corner,
         own.normals,
         own.face_normals if is_flat else None,
@@ -198,7 +223,7 @@ def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: boo
     table.set_materials([material_row(one, mesh, surface, back_side) for one in surface.materials])
     if len(own.tables) == MOST_TABLES:
         own.tables.clear()
-    own.tables[key] = surface.materials, table
+    own.tables[surface, is_mirrored] = table
     return table
 
 
@@ -229,52 +254,54 @@ def light_rows(lights: Sequence[Light]) -> F64:
 
 
 class ShadingInputs:
-    """The numbers of one instance in a picture, as the kernels read them.
+    """The numbers of instances in a picture, as the kernels read them, a table each.
 
     Parameters
     ----------
-    snapped, mesh
-        The mesh snapped, as drawn, and the mesh itself.
+    shown
+        The mesh of each snapped, as drawn, the mesh itself, and its surface.
     camera : Camera
-        The camera of the projection.
-    view : (4, 4) float64
-        Eye space from that of the mesh.
+    places : (N, 4, 4) float64
+        Where each mesh stands in the world.
     size : (width, height), pixels
-    surface : Surface
     finds_inverse_w : bool
         Whether 1/w is found for the vertices that show, where it can be; otherwise for all.
+
+    Notes
+    -----
+    Light needs angles and lengths as they are in eye space. A mesh whose matrix to it changes angles, or mirrors, is
+    stretched first, by a triangular matrix that leaves a rotation of the other. That comes from the products of its
+    columns, rounded to 40 bits, so that it stays wherever the instance and the camera turn.
     """
 
     def __init__(
         self,
-        snapped: engine.SnappedMesh,
-        mesh: Mesh,
+        shown: Sequence[tuple[engine.SnappedMesh, Mesh, Surface]],
         camera: Camera,
-        view: F64,
+        places: F64,
         size: tuple[int, int],
-        surface: Surface,
         *,
         finds_inverse_w: bool,
     ) -> None:
-        keeps_angles, is_mirrored = engine.turns(view)
-        self.is_in_eye_space, self.view, self.camera = not keeps_angles, view, camera
-        self.mesh = shading_mesh_of(mesh) if keeps_angles else ShadingMesh(mesh, view)
-        viewport, normals = snapped.viewport, None
-        has_w = viewport is not None and any(camera.projection[3, :3].tolist())
-        finds_inverse_w = has_w and finds_inverse_w and snapped.can_find_inverse_w
-        if has_w and not finds_inverse_w:
-            own = self.mesh.normals[: len(mesh.vertices)]
-            normals = empty(own.shape, np.float32)
-            engine.set_inverse_w(snapped, own, normals)
+        columns = engine.product(camera.view, places.transpose(1, 0, 2).reshape(4, -1))
+        views = np.ascontiguousarray(columns.reshape(4, -1, 4).transpose(1, 0, 2))
+        self.camera, self.places, self.views, kept = camera, places, views, []
+        for k, (is_mirrored, stretch) in enumerate(engine.stretches(views)):
+            _, mesh, surface = shown[k]
+            kept.append(table_of(shading_mesh_of(mesh, stretch), mesh, surface, is_mirrored=is_mirrored))
+            if stretch is not None:
+                back = engine.inverse(stretch)
+                views[k], places[k] = engine.product(views[k], back), engine.product(places[k], back)
+        meshes = [snapped for snapped, _, _ in shown]
+        viewport = meshes[0].viewport
         frame = size if viewport is None else viewport.size
-        place = (view if keeps_angles else EYE), self.mesh.center
-        table = table_of(self.mesh, mesh, surface, is_mirrored=is_mirrored)
-        self.shading = table.seen(normals, finds_inverse_w, camera.clip_from_eye(frame), *place, *frame)
+        has_w = viewport is not None and any(camera.projection[3, :3].tolist())
+        clip_from_eye = camera.clip_from_eye(frame)
+        self.tables = engine.see(meshes, kept, clip_from_eye, views, has_w, finds_inverse_w, *frame, empty)
 
-    @cached_property
-    def rays(self) -> CameraRays:
-        """How the camera sees shading space."""
-        has_perspective, rows, scale = self.shading.camera_rays
+    def rays(self, k: int) -> CameraRays:
+        """How the camera sees the shading space of an instance."""
+        has_perspective, rows, scale = self.tables[k].camera_rays
         if has_perspective:
             start, way = 0.0, 1.0 / -float(self.camera.projection[3, 2])
         else:
@@ -283,46 +310,39 @@ class ShadingInputs:
             start, way = near, far - near
         return CameraRays(has_perspective, rows[0], rows[1:5], rows[5:8], rows[8], scale, start, way)
 
-    def set_opacity(self) -> None:
-        """Have the opacity of the surface in the alpha of the picture; all materials are full."""
-        self.shading.set_wants_opacity()
+    def set_lights(self, lights: F64 | None, ambient: float) -> None:
+        """Take `light_rows`, or the headlight."""
+        engine.light_all(self.tables, lights, TO_HEADLIGHT, ambient, self.places)
 
-    def set_lights(self, lights: F64 | None, ambient: float, world_from_mesh: F64) -> None:
-        """Take `light_rows`, in shading space; `world_from_mesh`: (4, 4), where the mesh stands."""
-        if lights is None:
-            self.shading.set_headlight(TO_HEADLIGHT, max(0.0, 1 - ambient), ambient)
-        else:
-            place = world_from_mesh, self.view, self.mesh.center
-            self.shading.set_lights(lights, *place, self.is_in_eye_space, ambient)
-
-    def set_environment(self, environment: Environment | None, world_from_mesh: F64) -> None:
-        """Take the environment, or the default one, which only metallic surfaces mirror.
-
-        `world_from_mesh`: as for `set_lights`.
-        """
+    def set_environment(self, k: int, environment: Environment | None) -> None:
+        """Have an instance take the environment, or the default one, which only metallic surfaces mirror."""
         own = DEFAULT_ENVIRONMENT if environment is None else environment
-        rows = self.rays.eye_from
+        rows = self.rays(k).eye_from
         if own.space is LightSpace.WORLD:
-            rows = engine.product(engine.inverse(self.view[:3, :3]), rows)
-            rows = engine.product(world_from_mesh[:3, :3], rows)
+            rows = engine.product(engine.inverse(self.views[k, :3, :3]), rows)
+            rows = engine.product(self.places[k, :3, :3], rows)
         rows = engine.product(own.axes, rows / engine.cube_root(abs(engine.determinant(rows))))
         texels, table = own.levels or (None, None)
         diffuse = 0.0 if environment is None else 1.0
-        self.shading.set_surroundings(engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
+        self.tables[k].set_surroundings(engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
 
-    def set_picture(self, show: int, matcap: Texture | None, background: Color) -> None:
-        """Take the kind of picture, its matcap and its background."""
+    def set_picture(
+        self, show: int, matcap: Texture | None, background: Color, fog: Fog | None = None, *, has_opacity: bool = False
+    ) -> None:
+        """Take the kind of picture, its matcap, its background and the depth cue.
+
+        `has_opacity`: the picture's alpha is the opacity of the surfaces; all materials are full.
+        """
         compiled = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").compiled
-        self.shading.set_picture(show, compiled, light_of(background), background)
+        light = light_of(background)
+        for k, table in enumerate(self.tables):
+            table.set_picture(show, compiled, light, background, has_opacity)
+            if fog is not None:
+                rays, scale = self.rays(k), 1 / (fog.far - fog.near)
+                table.set_fog(light_of(fog.color), fog.near, scale, rays.distance_start, rays.distance_scale)
 
     def set_turn(self, show: int, turn: F64) -> None:
         """Take the kind of picture, in a space that the matrix (3, 3) takes eye space to."""
-        self.shading.set_turn(engine.product(turn, self.rays.eye_from).tolist())
-        self.shading.set_picture(show, None, (0, 0, 0, 0), (0, 0, 0, 0))
-
-    def set_fog(self, fog: Fog | None) -> None:
-        """Take the depth cue, if there is one."""
-        if fog is not None:
-            rays = self.rays
-            scale = 1 / (fog.far - fog.near)
-            self.shading.set_fog(light_of(fog.color), fog.near, scale, rays.distance_start, rays.distance_scale)
+        self.set_picture(show, None, (0, 0, 0, 0))
+        for k, table in enumerate(self.tables):
+            table.set_turn(engine.product(turn, self.rays(k).eye_from).tolist())

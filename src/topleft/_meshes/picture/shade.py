@@ -37,7 +37,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import ShadingInputs, Surface, light_rows, material_row
+from topleft._meshes.picture.look import ShadingInputs, Surface, kept_look, light_rows, material_row
 from topleft.typing import ShadingOption
 
 MIN_PX_PER_THREAD = 1 << 14
@@ -60,7 +60,7 @@ SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.
 NUMBERS = frozenset({Shading.IDS, Shading.DEPTH})
 """Those that colour numbers of the buffer, without light."""
 
-PLAIN = (Material(),)
+PLAIN = Surface((Material(),), is_by_triangle=False)
 """Fills the place of the materials in pictures of normals, which read none."""
 
 GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
@@ -170,12 +170,14 @@ class ShownInstance(NamedTuple):
     """Its number in the scene."""
 
 
-def views_of(shown: Sequence[ShownInstance], camera: Camera) -> list[F64]:
-    """Eye from object of each instance, (4, 4), as a camera without a lens sees it."""
-    if len(shown) == 1:
-        return [engine.product(camera.view, shown[0].place)]
-    places = np.concatenate([one.place for one in shown], axis=1)
-    return list(np.ascontiguousarray(engine.product(camera.view, places).reshape(4, -1, 4).transpose(1, 0, 2)))
+def inputs_of(
+    shown: Sequence[ShownInstance], surfaces: Sequence[Surface], camera: Camera, size: tuple[int, int]
+) -> ShadingInputs:
+    """The kernels' inputs of instances, as a camera without a lens sees them."""
+    finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
+    places = np.array([one.place for one in shown])
+    given = [(one.snapped, one.mesh, surface) for one, surface in zip(shown, surfaces, strict=True)]
+    return ShadingInputs(given, camera, places, size, finds_inverse_w=finds_inverse_w)
 
 
 class Lit:
@@ -188,13 +190,15 @@ class Lit:
         self.n_triangles = sum(len(one.mesh.triangles) for one in shown)
         if self.n_triangles and all(size):
             self.subpixel_bits = shown[0].snapped.subpixel_bits
-            finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
-            lights = None if options.lights is None else light_rows(options.lights)
-            tables = [
-                look_of(one, view, camera, size, options, lights, finds_inverse_w=finds_inverse_w).shading
-                for one, view in zip(shown, views_of(shown, camera), strict=True)
-            ]
-            self.scene = scene_of_tables(shown, tables)
+            surfaces = [surface_of(one, options) for one in shown]
+            inputs = inputs_of(shown, surfaces, camera, size)
+            inputs.set_lights(None if options.lights is None else light_rows(options.lights), options.ambient)
+            for k, surface in enumerate(surfaces):
+                if options.environment is not None or surface.is_metallic:
+                    inputs.set_environment(k, options.environment)
+            show = SHOW_CODES.get(options.mode, 0), options.matcap, options.background, options.fog
+            inputs.set_picture(*show, has_opacity=options.shows_opacity)
+            self.scene = scene_of_tables(shown, inputs.tables)
 
     def picture(self, seen: SeenSamples, at: I32 | None = None) -> U8:
         """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
@@ -261,37 +265,19 @@ def scene_of_tables(shown: Sequence[ShownInstance], tables: Sequence[engine.Shad
     return engine.ShadedScene([one.snapped for one in shown], tables, [one.first_id for one in shown])
 
 
-def look_of(
-    shown: ShownInstance,
-    view: F64,
-    camera: Camera,
-    size: tuple[int, int],
-    options: ShadingOptions,
-    lights: F64 | None,
-    *,
-    finds_inverse_w: bool,
-) -> ShadingInputs:
-    """The kernels' inputs of an instance that is seen by `view`, eye from object, in lights of `light_rows`."""
+def surface_of(shown: ShownInstance, options: ShadingOptions) -> Surface:
+    """The surface of an instance, kept with its mesh."""
     mesh = shown.mesh
     material = shown.material if options.material is None else options.material
-    own = mesh.materials if material is None else (material,)
-    own = own or (plain_material(options.color if mesh.colors is None else None),)
-    surface = Surface(
-        own,
-        own is mesh.materials and len(own) > 1,
-        options.mode is Shading.FLAT,
-        options.mode is Shading.UNLIT,
-        options.environment is not None or options.shows_opacity,
-    )
-    look = ShadingInputs(shown.snapped, mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
-    look.set_lights(lights, options.ambient, shown.place)
-    if options.environment is not None or any(one.is_metallic_rough for one in own):
-        look.set_environment(options.environment, shown.place)
-    if options.shows_opacity:
-        look.set_opacity()
-    look.set_picture(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
-    look.set_fog(options.fog)
-    return look
+    is_full = options.environment is not None or options.shows_opacity
+    look = options.mode is Shading.FLAT, options.mode is Shading.UNLIT, is_full
+
+    def make() -> Surface:
+        own = mesh.materials if material is None else (material,)
+        plain = own or (plain_material(options.color if mesh.colors is None else None),)
+        return Surface(plain, own is mesh.materials and len(own) > 1, *look)
+
+    return kept_look(mesh.known, Surface, material, make, *look, options.color)
 
 
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
@@ -392,14 +378,9 @@ def shade_normals(
     if not n_triangles or 0 in ids.shape:
         return np.zeros((*ids.shape, 3), np.float32)
     out = empty((*ids.shape, 3), np.float32)
-    finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > ids.size
-    tables, size = [], (ids.shape[1], ids.shape[0])
-    for one, view in zip(shown, views_of(shown, camera), strict=True):
-        surface = Surface(PLAIN, is_by_triangle=False)
-        look = ShadingInputs(one.snapped, one.mesh, camera, view, size, surface, finds_inverse_w=finds_inverse_w)
-        look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
-        tables.append(look.shading)
-    scene = scene_of_tables(shown, tables)
+    inputs = inputs_of(shown, [PLAIN] * len(shown), camera, (ids.shape[1], ids.shape[0]))
+    inputs.set_turn(SHOW_CODES[Shading.NORMALS], turn)
+    scene = scene_of_tables(shown, inputs.tables)
     run_parts(lambda first, end: scene.shade_normals(ids, out, first, end - first), len(ids),
               threads_for(threads, n_triangles))  # fmt: skip
     return out

@@ -20,7 +20,7 @@ from topleft._core.raster.choices import ClusterRoute, Drawing, Route
 from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.costs import cost_table
-from topleft._core.raster.sampling import area_cells, sample_positions, split_bytes
+from topleft._core.raster.sampling import area_cells, band_bytes, sample_positions, split_bytes
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.mesh import Mesh
@@ -310,8 +310,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     elif facts.is_split:
         scratch |= split_bytes(n, (height, width), n_samples, facts.drawing.n_threads)[0]
     elif facts.draws_bands and not is_empty and n and choices.can_slice(view) and not facts.is_large_shapes:
-        scratch["bins"] = 12 * (n + 16)
-        scratch["bands"] = 4 * (n + 1)
+        scratch |= band_bytes(n, (height, width), sum(results.values()), facts.drawing.n_threads)
     found = facts.clusters
     if facts.in_clusters or (facts.route is Route.DEPTH and facts.drawing.is_bounded):
         rows, segments = engine.Target.bounds_shape(height, width)
@@ -320,7 +319,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
         scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
     elif facts.in_bands:
-        scratch |= {"bins": 12 * (n + 16), "bands": 4 * (n + 1)}
+        scratch |= band_bytes(n, (height, width), sum(results.values()), facts.drawing.n_threads)
     elif facts.is_sliced:
         scratch["outside"] = 4 * (n + 16 * facts.drawing.n_threads)
     if found is not None and found.meshlet_bytes:

@@ -1,0 +1,39 @@
+/* Lay: rows that were drawn in near memory into the picture, which is written once, past the caches.
+ * In: some columns of a band of rows.  Out: all columns of these rows. */
+#ifndef TL_LAY_C
+#define TL_LAY_C
+
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+
+/* How many numbers lie before a whole vector of memory. */
+TL_INLINE int64_t until_aligned(const int32_t *p) { return (int64_t)((0 - (uintptr_t)p / sizeof *p) % TL_LANES); }
+
+/* Writes n numbers of a row: those that were drawn, if there are any, or `blank`. */
+TL_INLINE void lay_row(int32_t *to, const int32_t *drawn, int64_t n, int32_t blank)
+{
+    const vi blanks = vi_set1(blank);
+    int64_t k = min64(until_aligned(to), n);
+    if (k > 0)
+        vi_store_masked(to, vm_first(k), drawn ? vi_load_masked(vm_first(k), drawn) : blanks);
+    for (; k + TL_LANES <= n; k += TL_LANES)
+        vi_stream(to + k, drawn ? vi_load(drawn + k) : blanks);
+    if (k < n)
+        vi_store_masked(to + k, vm_first(n - k), drawn ? vi_load_masked(vm_first(n - k), drawn + k) : blanks);
+}
+
+static void lay_rows(const tl_laid_rows *rows, int32_t *to, int64_t width)
+{
+    const int64_t end = rows->col0 + rows->n_cols;
+    for (int64_t row = 0; row < rows->n_rows; row++, to += width) {
+        lay_row(to, 0, rows->col0, rows->blank);
+        lay_row(to + rows->col0, rows->drawn + row * rows->stride, rows->n_cols, rows->blank);
+        lay_row(to + end, 0, width - end, rows->blank);
+    }
+    end_stream();
+}
+
+#endif
