@@ -90,27 +90,36 @@ typedef struct {
     void *out;         /* forward */
     const void *g_out; /* backward, NULL forward */
     void *g_color;
+    float *steps; /* of a pair: n_channels colours of the far pixel less those of the near one, unless NULL */
 } tl_grad_edges;
 
-/* A picture of attributes of float32 with smooth silhouettes beside another one; its band has two rows more on either
- * side, of n_px pixels.  Scratch has no bounds of its own. */
-enum { TL_LOSS_WINDOW = 12, TL_PAIR_BYTES = 152, TL_SUMS_OF_FACE = 24 };
+/* A picture of attributes of float32 with smooth silhouettes: drawn, led back, or both beside another one.  Its band
+ * has up to two rows more on either side, of n_px pixels; a face is a triangle that they show. */
+enum { TL_ROWS_KEPT = 12, TL_PAIR_BYTES = 152, TL_SUMS_OF_FACE = 24, TL_FACE_ROWS = 6 };
 typedef struct {
     const int32_t *ids; /* of row 0; -1: none */
     int64_t step;       /* from row to row */
     const float *attr;  /* (n_attr, n_columns) */
     int64_t n_attr, n_columns;
     tl_grad_edges edges; /* but for its pictures */
-    const float *target; /* (height, width, n_columns) */
-    double scale;        /* gradients are those of the sum of squares times half of it */
-    int64_t *rows;       /* scratch: 2 (rows + 1) of them; then int32, 2 (n_px + TL_IDS_ROOM), and five times
-                          * min(n_px, n_triangles) + TL_IDS_ROOM */
-    void *pairs;         /* scratch: 2 n_px of TL_PAIR_BYTES */
-    float *window;       /* scratch: 3 TL_LOSS_WINDOW rows of n_columns numbers a pixel */
-    float *rast;         /* scratch: a row of four numbers a pixel */
-    tl_grad_sums *faces; /* by triangle, 12 columns and TL_SUMS_OF_FACE for each three attributes: scratch */
-    tl_grad_sums *of_points, *of_attr;
-} tl_grad_loss;
+    /* (height, width, n_columns), one of three: the picture, its gradients, or another one and twice the weight of the
+     * squares of the difference from that one */
+    float *out;
+    const float *g_out, *target;
+    double scale;
+    /* What is seen: written; read where gradients are given, as the picture left it. */
+    int64_t *row_runs, *row_pairs; /* (rows + 1): the first run, the first pair of each row */
+    int32_t *begins, *run_faces;   /* (n_px + TL_IDS_ROOM): of runs */
+    int32_t *of_faces;             /* (TL_FACE_ROWS, face_step), face_step >= n_faces + TL_IDS_ROOM */
+    int64_t face_step, n_faces;
+    void *pairs;  /* (2 n_px, TL_PAIR_BYTES) */
+    float *steps; /* (2 n_px, n_columns): of pairs */
+    /* Scratch. */
+    float *window;                     /* 3 times TL_ROWS_KEPT rows of n_columns numbers a pixel, + TL_IDS_ROOM */
+    float *rast;                       /* a row of four numbers a pixel */
+    tl_grad_sums *faces;               /* by triangle, 12 columns and TL_SUMS_OF_FACE for each three attributes */
+    tl_grad_sums *of_points, *of_attr; /* not scratch; NULL where the picture is drawn alone */
+} tl_grad_picture;
 
 /* Areas of triangles in pixels, each times the values of the triangle, NULL for 1. */
 typedef struct {

@@ -42,7 +42,7 @@
 #include "grad/area_vjp.c"
 #include "grad/colors.c"
 #include "grad/edges.c"
-#include "grad/loss.c"
+#include "grad/pictures.c"
 #include "grad/outline.c"
 #include "grad/points.c"
 #include "grad/textures.c"
@@ -116,6 +116,7 @@ const tl_kernels TL_KERNELS = {
     .composite = composite,
     .fill_slopes = fill_slopes,
     .fill_texels = fill_texels,
+    .levels_seen = levels_seen,
     .halve_rows = halve_rows,
     .set_inverse_w = set_inverse_w,
     .shade = shade,
@@ -172,7 +173,7 @@ const tl_kernels TL_KERNELS = {
     .grad_texels_vjp = grad_texels_vjp,
     .grad_outline = grad_outline,
     .grad_edges = grad_edges,
-    .grad_loss = grad_loss,
+    .grad_picture = grad_picture,
     .grad_area = grad_area,
     .touch_texels = touch_texels,
     .average_texels = average_texels,

@@ -168,6 +168,9 @@ typedef struct tl_kernels {
     void (*fill_texels)(const tl_levels *array, const int32_t *ids, const float *uv, const float *slopes,
                         float background, int64_t n, float *out);
 
+    /* Which level n pixels look at. */
+    void (*levels_seen)(const tl_levels *array, const float *slopes, int64_t n, double *out);
+
     /* Rows [first, end) of the halving of a level of such an array, (max(1, height / 2), max(1, width / 2)). */
     void (*halve_rows)(const float *level, int64_t width, int64_t height, int n_channels, int64_t first, int64_t end,
                        float *out);
@@ -424,8 +427,9 @@ typedef struct tl_kernels {
     /* A band with smooth silhouettes; or backward the gradients of its colours, and the sums by vertex. */
     void (*grad_edges)(const tl_grad_view *view, const tl_grad_edges *edges, tl_grad_sums *sums);
 
-    /* The sum of squares of a band's differences from a picture, and the sums of its gradients. */
-    double (*grad_loss)(const tl_grad_view *view, const tl_grad_loss *loss);
+    /* A band of attributes with smooth silhouettes; or the sums of its gradients; or these, and the sum of squares of
+     * its differences from another picture. */
+    double (*grad_picture)(const tl_grad_view *view, tl_grad_picture *picture);
 
     /* The gradients of vertices from those of areas. */
     void (*grad_area)(const tl_grad_area *area);

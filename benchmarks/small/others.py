@@ -173,7 +173,11 @@ def gradients_beside_deodr() -> Scenes:
     makers: dict[str, Callable[..., Callable[[], object]]] = {
         f"topleft.torch, {edges}": partial(step_of_topleft, edges=edges)
         for edges in ("silhouette", "area", "straight-through")
-    } | {"topleft.torch, a loss in one, area": step_of_loss, "DEODR": step_of_deodr}
+    } | {
+        "topleft.torch, a picture in one, area": step_of_render,
+        "topleft.torch, a loss in one, area": step_of_loss,
+        "DEODR": step_of_deodr,
+    }
     for n_triangles, size in ((10_000, (512, 512)), (70_000, (512, 512)), (100_000, HD)):
         clip, triangles = wavy_ball(n_triangles, *size)
         steps = {name: partial(make, clip, triangles, size) for name, make in makers.items()}
@@ -294,10 +298,8 @@ def step_of_topleft(clip: Any, triangles: Any, size: tuple[int, int], edges: str
 
     import topleft.torch as dr
 
-    torch.set_num_threads(1)
-    context, tri = dr.RasterizeContext(threads=1, output_db=False), torch.from_numpy(triangles)
-    pos, colors = torch.from_numpy(clip)[None].requires_grad_(), torch.rand(1, len(clip), 3, requires_grad=True)
-    across, g = dr.antialias_construct_topology_hash(tri), torch.rand(1, size[1], size[0], 3)
+    context, tri, pos, colors, across = in_one(clip, triangles)
+    g = torch.rand(1, size[1], size[0], 3)
 
     def step() -> None:
         pos.grad = colors.grad = None
@@ -308,21 +310,48 @@ def step_of_topleft(clip: Any, triangles: Any, size: tuple[int, int], edges: str
     return step
 
 
+def step_of_render(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:
+    """The same of `topleft.torch` in one."""
+    import torch
+
+    import topleft.torch as dr
+
+    context, tri, pos, colors, across = in_one(clip, triangles)
+    g = torch.rand(1, size[1], size[0], 3)
+
+    def step() -> None:
+        pos.grad = colors.grad = None
+        dr.render(context, pos, tri, colors, size[::-1], across).backward(g)
+
+    return step
+
+
 def step_of_loss(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:
     """Return a call of a loss with its gradients, in one."""
     import torch
 
     import topleft.torch as dr
 
-    context, tri = dr.RasterizeContext(threads=1, output_db=False), torch.from_numpy(triangles)
-    pos, colors = torch.from_numpy(clip)[None].requires_grad_(), torch.rand(1, len(clip), 3, requires_grad=True)
-    across, target = dr.antialias_construct_topology_hash(tri), torch.rand(1, size[1], size[0], 3)
+    context, tri, pos, colors, across = in_one(clip, triangles)
+    target = torch.rand(1, size[1], size[0], 3)
 
     def step() -> None:
         pos.grad = colors.grad = None
         dr.photometric_loss(context, pos, tri, colors, target, across).backward()
 
     return step
+
+
+def in_one(clip: Any, triangles: Any) -> tuple[Any, ...]:
+    """What calls of `topleft.torch` take that draw in one: context, triangles, vertices, colours, edges."""
+    import torch
+
+    import topleft.torch as dr
+
+    torch.set_num_threads(1)
+    context, tri = dr.RasterizeContext(threads=1, output_db=False), torch.from_numpy(triangles)
+    pos, colors = torch.from_numpy(clip)[None].requires_grad_(), torch.rand(1, len(clip), 3, requires_grad=True)
+    return context, tri, pos, colors, dr.antialias_construct_topology_hash(tri)
 
 
 def step_of_deodr(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:

@@ -65,27 +65,28 @@ TL_INLINE void set_color_quads(grad_span *s, const tl_grad_values *v, int64_t fi
     }
 }
 
-/* Gradients of n attributes, n_columns numbers a pixel, at four pixels; zeros beyond the n_pixels. */
-TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_t n_columns)
+/* Gradients of n attributes, n_columns numbers a pixel, at four pixels; zeros, or anything, beyond the n_pixels. */
+TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_t n_columns, int has_room)
 {
     float some[16] = {0};
     if (n == n_columns)
-        return vq4_load(g_out, n_pixels, n);
+        return vq4_load(g_out, has_room ? TL_VQ4_ROOM : n_pixels, n);
     for (int64_t k = 0; k < 4 && k < n_pixels; k++)
         memcpy(some + 4 * k, g_out + n_columns * k, (size_t)n * sizeof *some);
     return vq4_load(some, 4, 4);
 }
 
 /* Sums up the gradients of n attributes at TL_SUMMED of the n_pixels that are left of a run, none of which is clamped:
- * as they are, and times the number of the pixel; `from` the beginning of the plane on. */
+ * as they are, and times the number of the pixel; `from` the beginning of the plane on.  has_room: five pixels can be
+ * read. */
 TL_INLINE void sum_up_pixels(const run_plane *plane, int from, const float *g_out, int n_pixels, int n,
-                             int64_t n_columns, vq4 sums[2])
+                             int64_t n_columns, int has_room, vq4 sums[2])
 {
     const vq4 zero = vq4_all(vq_set1(0.0f));
     sums[0] = sums[1] = zero;
     for (int i = 0; i < TL_SUMMED && i < n_pixels; i += 4) {
         const vq4 at = plane_at_pixels(plane, from + i), inverse = vq4_inverse_of_last(at);
-        const vq4 g = vq4_mul(load_gradients(g_out + n_columns * i, n_pixels - i, n, n_columns), inverse);
+        const vq4 g = vq4_mul(load_gradients(g_out + n_columns * i, n_pixels - i, n, n_columns, has_room), inverse);
         const vq4 of_total = vq4_sub(zero, vq4_sum(vq4_mul(g, vq4_mul(at, inverse))));
         const vq4 h = vq4_first(TL_VQ4_BLEND(g, of_total, 8), n_pixels - i);
         sums[0] = vq4_add(sums[0], h), sums[1] = vq4_add(sums[1], vq4_mul(h, columns_from(i)));
@@ -100,7 +101,7 @@ TL_INLINE void pull_three(const tl_grad_view *view, const grad_span *s, int r, c
     const int n_pixels = s->begins[r + 1] - s->begins[r];
     for (int first = 0; first < n_pixels; first += TL_SUMMED) {
         vq4 sums[2];
-        sum_up_pixels(&plane, first, g_out + n_columns * first, n_pixels - first, n, n_columns, sums);
+        sum_up_pixels(&plane, first, g_out + n_columns * first, n_pixels - first, n, n_columns, 0, sums);
         add_moments(view, s, r, first, s->inverses[r], begins, moments, sums[0], sums[1]);
     }
 }
@@ -210,31 +211,37 @@ TL_INLINE void load_closing(const tl_grad_view *view, const tl_grad_colors *p, c
 TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l, vd by_q[3][3])
 {
     const int64_t n = p->values.n_columns;
-    for (int64_t c = 0; c < n; c++) {
-        double some[6][TL_MAX_LANES], found[3][TL_MAX_LANES];
-        vd m[6], at[3];
-        for (int j = 0; j < 6; j++) {
-            for (int i = 0; i < TL_LANES; i++)
-                some[j][i] = i < l->n ? l->sums[i * l->n_columns + l->moments + c / 3 * l->stride +
-                                                (j < 3 ? 4 * j + c % 3 : 4 * (j - 3) + 3)]
-                                      : 0.0;
-            m[j] = vd_mul(vd_load(some[j]), l->units[j % 3]);
-        }
-        for (int k = 0; k < 3; k++) {
-            const vi row = vi_mul(vi_load(l->rows[k]), vi_set1((int32_t)n));
-            at[k] = vd_from_vf(vf_of_bits(vi_gather(vm_first(l->n), (const int32_t *)p->values.attr + c, row)));
-            vd_store(found[k],
-                     sum_of_three(vd_mul(l->q[k][0], m[0]), vd_mul(l->q[k][1], m[1]), vd_mul(l->q[k][2], m[2])));
-        }
-        for (int j = 0; j < 3; j++) {
-            by_q[0][j] = vd_add(by_q[0][j], vd_mul(vd_sub(at[0], at[2]), m[j]));
-            by_q[1][j] = vd_add(by_q[1][j], vd_mul(vd_sub(at[1], at[2]), m[j]));
-            for (int k = 0; k < 3 && c % 3 == 0; k++)
-                by_q[k][j] = vd_add(by_q[k][j], m[3 + j]);
-        }
+    double *to[3][TL_MAX_LANES];
+    for (int i = 0; i < l->n; i++)
+        for (int k = 0; k < 3; k++)
+            to[k][i] = sums_of(p->attr, l->rows[k][i]);
+    for (int64_t first = 0; first < n; first += 3) {
+        double some[12][TL_MAX_LANES] = {{0}}, found[3][TL_MAX_LANES];
+        vd m[12];
         for (int i = 0; i < l->n; i++)
-            for (int k = 0; k < 3; k++)
-                sums_of(p->attr, l->rows[k][i])[c] += found[k][i];
+            for (int j = 0; j < 12; j++)
+                some[j][i] = l->sums[i * l->n_columns + l->moments + first / 3 * l->stride + j];
+        for (int j = 0; j < 12; j++)
+            m[j] = vd_mul(vd_load(some[j]), l->units[j / 4]);
+        for (int64_t c = first; c < n && c < first + 3; c++) {
+            vd at[3];
+            for (int k = 0; k < 3; k++) {
+                const vi row = vi_mul(vi_load(l->rows[k]), vi_set1((int32_t)n));
+                at[k] = vd_from_vf(vf_of_bits(vi_gather(vm_first(l->n), (const int32_t *)p->values.attr + c, row)));
+                vd_store(found[k], sum_of_three(vd_mul(l->q[k][0], m[c - first]), vd_mul(l->q[k][1], m[4 + c - first]),
+                                                vd_mul(l->q[k][2], m[8 + c - first])));
+            }
+            for (int i = 0; i < l->n; i++)
+                for (int k = 0; k < 3; k++)
+                    to[k][i][c] += found[k][i];
+            const vd by_u = vd_sub(at[0], at[2]), by_v = vd_sub(at[1], at[2]);
+            for (int j = 0; j < 3; j++) {
+                by_q[0][j] = vd_add(by_q[0][j], vd_mul(by_u, m[4 * j + c - first]));
+                by_q[1][j] = vd_add(by_q[1][j], vd_mul(by_v, m[4 * j + c - first]));
+                for (int k = 0; k < 3 && c == first; k++)
+                    by_q[k][j] = vd_add(by_q[k][j], m[4 * j + 3]);
+            }
+        }
     }
 }
 

@@ -33,6 +33,15 @@ TL_INLINE void take_color(const tl_grad_edges *e, int64_t to, int64_t from, doub
     }
 }
 
+/* Column c of the colour of the far pixel of a pair less that of the near one. */
+TL_INLINE double color_step(const tl_grad_edges *e, const tl_pair *pair, int64_t c, int is_f64)
+{
+    if (e->steps)
+        return (double)e->steps[c];
+    return get_real(e->color, e->n_channels * pair->far + c, is_f64) -
+           get_real(e->color, e->n_channels * pair->near + c, is_f64);
+}
+
 /* Whether a pixel lies in the band. */
 TL_INLINE int in_band(const tl_grad_view *view, int64_t pixel)
 {
@@ -48,7 +57,7 @@ TL_INLINE void pull_pair(const tl_grad_view *view, const tl_grad_edges *e, const
     const int has_near = in_band(view, pair->near), has_far = in_band(view, pair->far);
     for (int64_t c = 0; c < e->n_channels; c++) {
         const double a = get_real(e->g_out, near + c, is_f64), b = get_real(e->g_out, far + c, is_f64);
-        const double step = get_real(e->color, far + c, is_f64) - get_real(e->color, near + c, is_f64);
+        const double step = color_step(e, pair, c, is_f64);
         const double moved = edge->far * b - edge->near * a;
         g_near += a * step, g_far -= b * step;
         if (has_near)
@@ -96,7 +105,7 @@ static void pull_straight(const tl_grad_view *view, const tl_grad_edges *e, cons
     for (int64_t c = 0; c < e->n_channels; c++) {
         const int64_t near = e->n_channels * pair->near + c, far = e->n_channels * pair->far + c;
         const double both = get_real(e->g_out, near, view->is_f64) + get_real(e->g_out, far, view->is_f64);
-        step += (get_real(e->color, near, view->is_f64) - get_real(e->color, far, view->is_f64)) * 0.5 * both;
+        step -= color_step(e, pair, c, view->is_f64) * 0.5 * both;
     }
     for (int k = 0; k < 3; k++) {
         double g_px[2] = {0};

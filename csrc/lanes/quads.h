@@ -4,6 +4,7 @@
  *
  *   vq_set1 vq_load vq_store    as their names say; + - * / are those of the compiler
  *   vq_load_some(p, n)          the first n of four numbers, zeros beyond
+ *   vq_above_zero(a)            bit k: number k is above 0
  *   vq4_all(a)                  a quad, four times
  *   vq4_add vq4_sub vq4_mul vq4_div    as their names say
  *   TL_VQ4_PERMUTE(a, i, j, k, l)      the lanes i, j, k, l of each quad
@@ -11,7 +12,8 @@
  *   vq4_pixels()                0, 1, 2, 3: each in all lanes of its quad
  *   vq4_first(a, n)             the first n quads, zeros beyond
  *   vq4_fold(a)                 the sum of the four: the first and the third, the second and the fourth, both
- *   vq4_load(p, n, columns)     n rows of so many numbers, at most four, zeros beyond; and vq4_store */
+ *   vq4_load(p, n, columns)     n rows of so many numbers, at most four, zeros beyond; and vq4_store.  n = TL_VQ4_ROOM
+ *                               loads four rows where a row more can be read */
 #ifndef TL_QUADS_H
 #define TL_QUADS_H
 
@@ -19,6 +21,8 @@
 #include <string.h>
 
 #include "lanes/lanes.h"
+
+#define TL_VQ4_ROOM 5
 
 typedef float vq __attribute__((vector_size(16)));
 typedef float vq_there __attribute__((vector_size(16), aligned(4), may_alias));
@@ -30,6 +34,16 @@ TL_INLINE vq vq_load_some(const float *p, int n)
 {
     return n > 3 ? vq_load(p) : (vq){p[0], n > 1 ? p[1] : 0.0f, n > 2 ? p[2] : 0.0f, 0.0f};
 }
+
+#ifdef __AVX2__
+TL_INLINE unsigned vq_above_zero(vq a) { return (unsigned)_mm_movemask_ps(_mm_cmpgt_ps((__m128)a, _mm_setzero_ps())); }
+#else
+TL_INLINE unsigned vq_above_zero(vq a)
+{
+    return (unsigned)(a[0] > 0.0f) | (unsigned)(a[1] > 0.0f) << 1 | (unsigned)(a[2] > 0.0f) << 2 |
+           (unsigned)(a[3] > 0.0f) << 3;
+}
+#endif
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__AVX512VL__)
 typedef __m512 vq4;
@@ -74,6 +88,55 @@ TL_INLINE void vq4_store(float *p, vq4 a, int64_t n, int columns)
         a = _mm512_permutexvar_ps(columns == 3 ? three : columns == 2 ? two : one, a);
     _mm512_mask_storeu_ps(p, vq4_mask(n, columns), a);
 }
+#elif defined(__AVX2__)
+typedef struct {
+    __m256 of[2];
+} vq4;
+TL_INLINE __m256 two_quads(__m128 a, __m128 b) { return _mm256_insertf128_ps(_mm256_castps128_ps256(a), b, 1); }
+TL_INLINE vq4 vq4_all(vq a) { return (vq4){{two_quads((__m128)a, (__m128)a), two_quads((__m128)a, (__m128)a)}}; }
+#define TL_VQ4_EACH(a, b, of_two) ((vq4){{of_two((a).of[0], (b).of[0]), of_two((a).of[1], (b).of[1])}})
+TL_INLINE vq4 vq4_add(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_add_ps); }
+TL_INLINE vq4 vq4_sub(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_sub_ps); }
+TL_INLINE vq4 vq4_mul(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_mul_ps); }
+TL_INLINE vq4 vq4_div(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_div_ps); }
+#define TL_VQ4_PERMUTE(a, i, j, k, l)                                           \
+    ((vq4){{_mm256_permute_ps((a).of[0], (i) | (j) << 2 | (k) << 4 | (l) << 6), \
+            _mm256_permute_ps((a).of[1], (i) | (j) << 2 | (k) << 4 | (l) << 6)}})
+#define TL_VQ4_BLEND(a, b, bits) \
+    ((vq4){                      \
+        {_mm256_blend_ps((a).of[0], (b).of[0], (bits) * 0x11), _mm256_blend_ps((a).of[1], (b).of[1], (bits) * 0x11)}})
+TL_INLINE vq4 vq4_pixels(void)
+{
+    return (vq4){{_mm256_setr_ps(0, 0, 0, 0, 1, 1, 1, 1), _mm256_setr_ps(2, 2, 2, 2, 3, 3, 3, 3)}};
+}
+TL_INLINE vq4 vq4_first(vq4 a, int64_t n)
+{
+    const __m256 end = _mm256_set1_ps((float)n);
+    const vq4 pixels = vq4_pixels();
+    for (int k = 0; k < 2; k++)
+        a.of[k] = _mm256_and_ps(a.of[k], _mm256_cmp_ps(pixels.of[k], end, _CMP_LT_OQ));
+    return a;
+}
+TL_INLINE vq vq4_fold(vq4 a)
+{
+    const __m256 both = _mm256_add_ps(a.of[0], a.of[1]);
+    return (vq)_mm_add_ps(_mm256_castps256_ps128(both), _mm256_extractf128_ps(both, 1));
+}
+TL_INLINE vq4 vq4_load(const float *p, int64_t n, int columns)
+{
+    vq a[4];
+    for (int k = 0; k < 4; k++)
+        a[k] = k < n - 1 && columns > 2 ? vq_load(p + columns * k)
+               : k < n                  ? vq_load_some(p + columns * k, columns)
+                                        : vq_set1(0.0f);
+    vq4 all = {{two_quads((__m128)a[0], (__m128)a[1]), two_quads((__m128)a[2], (__m128)a[3])}};
+    return columns == 3 ? TL_VQ4_BLEND(all, vq4_all(vq_set1(0.0f)), 8) : all;
+}
+TL_INLINE vq vq4_at(vq4 a, int k)
+{
+    return (vq)(k & 1 ? _mm256_extractf128_ps(a.of[k / 2], 1) : _mm256_castps256_ps128(a.of[k / 2]));
+}
+#define TL_VQ4_HAS_NO_STORE
 #else
 #ifdef __clang__
 #define TL_VQ_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
@@ -119,13 +182,20 @@ TL_INLINE vq4 vq4_load(const float *p, int64_t n, int columns)
                                             : vq_load_some(p + columns * k, columns);
     return a;
 }
+TL_INLINE vq vq4_at(vq4 a, int k) { return a.of[k]; }
+#define TL_VQ4_HAS_NO_STORE
+#endif
+
+#ifdef TL_VQ4_HAS_NO_STORE
+/* Three numbers are four, of which the next pixel writes over the last. */
 TL_INLINE void vq4_store(float *p, vq4 a, int64_t n, int columns)
 {
     for (int k = 0; k < 4 && k < n; k++) {
-        if (columns == 4)
-            vq_store(p + 4 * k, a.of[k]);
-        for (int c = 0; columns < 4 && c < columns; c++)
-            p[columns * k + c] = a.of[k][c];
+        const vq at = vq4_at(a, k);
+        if (columns == 4 || (columns == 3 && k < n - 1 && k < 3))
+            vq_store(p + columns * k, at);
+        else
+            memcpy(p + columns * k, &at, (size_t)columns * sizeof *p);
     }
 }
 #endif

@@ -161,6 +161,13 @@ static void fill_texels(const tl_levels *t, const int32_t *ids, const float *uv,
     }
 }
 
+/* Which level n pixels look at, from 0 to the last. */
+static void levels_seen(const tl_levels *t, const float *slopes, int64_t n, double *out)
+{
+    for (int64_t i = 0; i < n; i++)
+        out[i] = level_of(t, slopes + 4 * i);
+}
+
 /* The texels of an axis that texel i of its halving is the mean over, and their weights: 1 to 3 of them. */
 typedef struct {
     int64_t first;

@@ -54,9 +54,9 @@ from topleft._torch.operators import (
     outline,
     points_of_ids,
     smooth,
-    squares,
     threads_of,
 )
+from topleft._torch.pictures import draw_attributes, squares
 
 __all__ = [
     "DepthPeeler",
@@ -69,6 +69,7 @@ __all__ = [
     "interpolate",
     "photometric_loss",
     "rasterize",
+    "render",
     "set_log_level",
     "texture",
     "texture_construct_mip",
@@ -543,6 +544,74 @@ def antialias(
     of_edges = [across.to(torch.int32), *outline(mesh.detach(), tri, across, *color.shape[1:3])]
     out = smooth(given, points_of, mesh, tri, of_edges, int(rule), float(pos_gradient_boost))
     return out.to(color.dtype)
+
+
+def render(
+    glctx: RasterizeContext,
+    pos: Tensor,
+    tri: Tensor,
+    attr: Tensor,
+    resolution: Sequence[int],
+    topology_hash: Tensor | None = None,
+    *,
+    edges: EdgesOption = "area",
+) -> Tensor:
+    """Return pictures of a mesh for a loss of your own: `rasterize`, `interpolate` and `antialias` in one.
+
+    It takes half the time of the functions one after the other, and keeps the ids of pixels instead of their pictures.
+    Its gradients differ from theirs by rounding, below 1e-6 of the largest.
+
+    Parameters
+    ----------
+    glctx : RasterizeContext
+        As in `rasterize`.
+    pos : tensor of float32 or float64, shape (B, V, 4)
+        As in `rasterize`.
+    tri : tensor of int32 or int64, shape (T, 3)
+        Indices of rows of `pos` and of `attr`.
+    attr : tensor of float32 or float64, shape (V, K), (1, V, K) or (B, V, K)
+        Colours, or other numbers, of the vertices; a column of ones for the silhouette.
+    resolution : (int, int)
+        Height and width.
+    topology_hash : tensor, shape (T, 3), optional
+        As in `antialias`.
+    edges : {"area", "silhouette", "straight-through"}
+        As in `antialias`.
+
+    Returns
+    -------
+    tensor, shape (B, H, W, K)
+        Row 0 is the bottom row; 0 where nothing is. Gradients reach `pos` and `attr`.
+
+    Raises
+    ------
+    TypeError
+        For what is no tensor, is not on the CPU, or has a wrong dtype.
+    ValueError
+        For a wrong shape, an unknown option, or a vertex in use that is not finite.
+    IndexError
+        For a triangle that names a vertex or a row of `attr` that does not exist.
+
+    See Also
+    --------
+    photometric_loss : the same with the mean of squared differences from other pictures, which makes no picture.
+
+    Examples
+    --------
+    >>> pos = torch.tensor([[[-1.0, -2, 0, 1], [0.25, -2, 0, 1], [0.25, 4, 0, 1], [-1, 4, 0, 1]]])
+    >>> tri = torch.tensor([[0, 1, 2], [0, 2, 3]])
+    >>> render(RasterizeContext(), pos, tri, torch.ones(4, 1), (1, 4)).flatten()
+    tensor([1.0000, 1.0000, 0.5000, 0.0000])
+    """
+    check_mesh(glctx, pos, tri, None)
+    is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, len(pos))
+    check("attr", attr, f"(V, K), with 1 or {len(pos)} before", is_table)
+    height, width = as_pair("resolution", resolution)
+    across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
+    mesh, values = same_dtype(pos, attr if attr.ndim == 3 else attr[None])
+    options = int(rule_of(edges)), glctx.threads or 0
+    drawn: Tensor = draw_attributes(mesh, tri, values, across, height, width, *options)[0]
+    return drawn
 
 
 def photometric_loss(

@@ -117,6 +117,44 @@ def test_depth_vjp_is_differences(columns, options):
     np.testing.assert_allclose(frags.depth_vjp(g), expected, rtol=1e-6, atol=1e-6)
 
 
+WAYS = [(how, "repeat") for how in ("nearest", "bilinear", "trilinear", "pixelated")]
+WAYS += [("trilinear", "clamp"), ("bilinear", "mirror"), ("trilinear", "mirror")]
+
+
+@pytest.mark.parametrize(("how", "wrap"), WAYS)
+@pytest.mark.parametrize("size", [(4, 3), (15, 7), (1, 2)])
+def test_sample_vjp_is_differences(how, wrap, size):
+    vertices, triangles = clip_scene()
+    frags = tl.rasterize(vertices, triangles, (9, 8), viewport=(14, 11), subpixel_bits=16)
+    rng = np.random.default_rng(5)
+    texture, uv, g = rng.normal(size=(*size[::-1], 2)), 1.7 * rng.normal(size=(6, 2)), rng.normal(size=(8, 9, 2))
+    by_texture, by_uv, by_vertices = frags.sample_vjp(texture, uv, g, filter=how, wrap=wrap)
+
+    def number(texture, uv):
+        return (g * frags.sample(texture, uv, filter=how, wrap=wrap)).sum(dtype=np.float64)
+
+    # Linear in the texture, and otherwise smooth but for edges of texels: most differences are derivatives.
+    expected = by_differences(lambda at: number(at, uv), texture, step=1.0)
+    np.testing.assert_allclose(by_texture, expected, atol=1e-5)
+    steps = [by_differences(lambda at: number(texture, at), uv, step) for step in (3e-4, 1e-3)]
+    is_smooth = np.isclose(*steps, rtol=0.02, atol=0.02)
+    assert is_smooth.mean() > 0.5
+    np.testing.assert_allclose(by_uv[is_smooth], steps[0][is_smooth], rtol=0.03, atol=0.05)
+    assert bool(by_vertices.any()) == bool(by_uv.any())
+    assert how == "pixelated" or by_uv.any() != (how == "nearest")  # of which some pixels look between texels
+
+
+def test_sample_vjp_of_one_channel_and_of_a_texture():
+    vertices, triangles = clip_scene()
+    rng = np.random.default_rng(5)
+    frags, uv, g = tl.rasterize(vertices, triangles, (12, 10)), rng.random((6, 2)), rng.normal(size=(10, 12))
+    flat = frags.sample_vjp(rng.random((4, 4)), uv, g)
+    assert [one.shape for one in flat] == [(4, 4), (6, 2), (6, 4)]
+    own = tl.Texture(rng.integers(0, 256, (5, 4, 4)).astype(np.uint8))
+    by_texture, *_ = frags.sample_vjp(own, uv, np.tile(g[..., None], 4))
+    np.testing.assert_allclose(by_texture.sum(axis=(0, 1)), g[frags.mask].sum(), rtol=1e-9)  # weights sum to 1
+
+
 def test_gradients_of_triangles_without_area_are_0():
     vertices = np.array([[0.0, 0], [8, 0], [0, 8], [2, 2], [4, 4], [6, 6]])
     frags = tl.rasterize(vertices, [[0, 1, 2], [3, 4, 5]], (8, 8))
@@ -300,6 +338,10 @@ FRAGS = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
         (lambda: FRAGS.interpolate_vjp([1, 2, 3], np.ones((2, 4)), grad_derivatives=np.ones((2, 4))), ValueError,
          "grad_derivatives must have shape (2, 4, 2)"),
         (lambda: FRAGS.barycentric_vjp(np.ones((2, 4))), ValueError, "grad must have shape (2, 4, 3)"),
+        (lambda: FRAGS.sample_vjp([[1.0]], np.eye(3, 2), np.ones((4, 2))), ValueError, "grad must have shape (2, 4)"),
+        (lambda: FRAGS.sample_vjp([[1.0]], np.eye(3), np.ones((2, 4))), ValueError, "uv must have two columns"),
+        (lambda: FRAGS.sample_vjp([[1.0]], np.eye(3, 2), np.ones((2, 4)), wrap=("clamp", "repeat")), ValueError,
+         "wrap must be the same for u and v where gradients are asked for"),
         (lambda: FRAGS.antialias(np.ones((3, 4))), ValueError, "picture must have shape (2, 4) or (2, 4, 'C')"),
         (lambda: FRAGS.antialias(np.ones((2, 4)), edges="all"), ValueError, "edges must be 'silhouette', 'area' or"),
         (lambda: tl.area_vjp(np.ones((3, 4)), [[0, 1, 2]], 4, np.ones((4, 4))), ValueError, "vertices must have shape"),

@@ -339,7 +339,7 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
     mask_options = {"threads": 3, "sampling": ["center", "outer", "msaa4"][seed % 3]}
     mask = tl.silhouette(tl.Scene(standing), camera, (60, 40), **mask_options)
     force(pays_to_cluster=True, pays_to_draw_instances=True, pays_to_share_instances=True)
-    monkeypatch.setattr(rounds, "FIRST_ROUND", int(rng.choice([1, 4])))
+    monkeypatch.setattr(rounds, "ROUND", int(rng.choice([1, 4])))
     for module in (placed, instances):
         monkeypatch.setattr(module, "INT32_MAX", most_ids)
     with on(isa):

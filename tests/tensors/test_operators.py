@@ -11,6 +11,7 @@ torch = pytest.importorskip("torch")
 
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
+from topleft._torch import pictures  # noqa: E402
 
 CTX = dr.RasterizeContext()
 EDGES = ("silhouette", "area", "straight-through")
@@ -270,6 +271,13 @@ def loss_in_one(pos, tri, attr, target, edges="area"):
     return loss.detach(), *torch.autograd.grad(5 * loss, given)
 
 
+def loss_of_render(pos, tri, attr, target, edges="area"):
+    """The same of pictures drawn in one call."""
+    given = [one.clone().requires_grad_() for one in (pos, attr)]
+    loss = (dr.render(CTX, given[0], tri, given[1], target.shape[1:3], edges=edges) - target).square().mean()
+    return loss.detach(), *torch.autograd.grad(5 * loss, given)
+
+
 def loss_of_parts(pos, tri, attr, target, edges="area"):
     """The same of the functions one after the other."""
     given = [one.clone().requires_grad_() for one in (pos, attr)]
@@ -279,6 +287,9 @@ def loss_of_parts(pos, tri, attr, target, edges="area"):
     return loss.detach(), *torch.autograd.grad(5 * loss, given)
 
 
+IN_ONE = pytest.mark.parametrize("in_one", [loss_in_one, loss_of_render])
+
+
 def check_near(found, wanted, share):
     """Each number is within a share of the largest one."""
     for own, other in zip(found, wanted, strict=True):
@@ -286,24 +297,26 @@ def check_near(found, wanted, share):
         assert (own - other).abs().max() <= share * other.abs().max()
 
 
+@IN_ONE
 @pytest.mark.parametrize("edges", EDGES)
 @pytest.mark.parametrize(("dtype", "channels"), [(torch.float32, 3), (torch.float32, 5), (torch.float64, 1)])
 @pytest.mark.parametrize("size", [(93, 70), (600, 300)])
-def test_loss_in_one_has_the_gradients_of_its_parts(edges, dtype, channels, size):
+def test_drawing_in_one_has_the_gradients_of_its_parts(in_one, edges, dtype, channels, size):
     pos, tri, _ = sphere(2, dtype)
     generator = torch.Generator().manual_seed(3)
     attr = torch.rand(pos.shape[1], channels, generator=generator, dtype=dtype)
     target = torch.rand(2, *size, channels, generator=generator, dtype=dtype)
-    found, parts = (way(pos, tri, attr, target, edges) for way in (loss_in_one, loss_of_parts))
+    found, parts = (way(pos, tri, attr, target, edges) for way in (in_one, loss_of_parts))
     check_near(found, parts, 1e-14 if dtype == torch.float64 else 1e-6)
     wanted = loss_of_parts(*(one if one is tri else one.double() for one in (pos, tri, attr, target)), edges)
     check_near(found, wanted, 1e-6)
 
 
+@IN_ONE
 @ON_EACH_ISA
 @pytest.mark.parametrize("channels", [1, 3, 5])
 @pytest.mark.parametrize("edges", EDGES)
-def test_loss_in_one_has_the_same_bits_on_every_instruction_set(isa, edges, channels):
+def test_drawing_in_one_has_the_same_bits_on_every_instruction_set(in_one, isa, edges, channels):
     pos, tri, _ = sphere(2)
     attr, target = (
         torch.sin(torch.arange(pos.shape[1] * channels)).reshape(-1, channels),
@@ -312,29 +325,31 @@ def test_loss_in_one_has_the_same_bits_on_every_instruction_set(isa, edges, chan
     hashes = []
     for name in ("scalar", isa):
         with on(name):
-            parts = loss_in_one(pos, tri, attr, target, edges)
+            parts = in_one(pos, tri, attr, target, edges)
         hashes.append([hashlib.sha256(one.numpy().tobytes()).hexdigest() for one in parts])
     assert hashes[0] == hashes[1]
 
 
+@IN_ONE
 @pytest.mark.parametrize("size", [(600, 300), (7, 3), (1, 1)])
-def test_loss_in_one_has_the_same_bits_with_any_number_of_threads(threads, size):
+def test_drawing_in_one_has_the_same_bits_with_any_number_of_threads(in_one, threads, size):
     pos, tri, colours = sphere()
     target, found = torch.zeros(1, *size, 3), []
     for n in (1, 3):
         threads(n)
-        found.append(loss_in_one(pos, tri, colours, target))
+        found.append(in_one(pos, tri, colours, target))
     assert all(torch.equal(a, b) for a, b in zip(*found, strict=True))
 
 
+@IN_ONE
 @pytest.mark.parametrize("edges", EDGES)
-def test_loss_in_one_of_triangles_behind_the_eye_and_slivers_has_the_gradients_of_its_parts(edges):
+def test_drawing_in_one_of_triangles_behind_the_eye_and_slivers_has_the_gradients_of_its_parts(in_one, edges):
     pos = torch.tensor([[[-1.0, -1, 0, 1], [3, -1, 0, -1], [-1, 3, 0, 1], [0, 0, 0.5, 1], [0.9, 0.001, 0.5, 1]]])
     pos = torch.cat([pos, torch.tensor([[[0.9, 0.0, 0.5, 1], [-0.5, -0.5, 0.5, 40], [30, -0.5, 0.9, 40]]])], 1)
     tri = torch.tensor([[0, 1, 2], [3, 4, 5], [3, 6, 7], [3, 3, 4]])
     attr = torch.sin(torch.arange(24.0)).reshape(8, 3)
     given = pos, tri, attr, torch.zeros(1, 300, 280, 3)
-    check_near(loss_in_one(*given, edges), loss_of_parts(*given, edges), 2e-6)
+    check_near(in_one(*given, edges), loss_of_parts(*given, edges), 2e-6)
 
 
 @pytest.mark.parametrize(
@@ -352,3 +367,89 @@ def test_loss_of_wrong_arguments_raises(change, kind, message):
     given = {"pos": pos, "tri": tri, "attr": torch.ones(3, 3), "target": torch.zeros(1, 4, 4, 3)} | change
     with pytest.raises(kind, match=re.escape(message)):
         dr.photometric_loss(CTX, **given)
+
+
+def drawn_gradients(pos, tri, attr, **options):
+    """A picture drawn in one, and gradients of some number that it gives."""
+    given = [one.clone().requires_grad_() for one in (pos, attr)]
+    out = dr.render(CTX, given[0], tri, given[1], (93, 70), **options)
+    weights = torch.sin(torch.arange(out.numel(), dtype=out.dtype)).reshape(out.shape)
+    return out.detach(), *torch.autograd.grad((out * weights).sum(), given)
+
+
+@pytest.mark.parametrize("edges", EDGES)
+def test_render_is_the_picture_of_its_parts(edges):
+    pos, tri, colours = sphere(2)
+    parts = picture(pos, tri, colours, edges=edges, size=(93, 70))
+    assert (dr.render(CTX, pos, tri, colours, (93, 70), edges=edges) - parts).abs().max() < 1e-6
+
+
+def test_render_twice_backward_gives_the_same_bits_and_keeps_nothing():
+    pos, tri, colours = sphere(2)
+    pos.requires_grad_()
+    kept = len(pictures.kept)
+    out = dr.render(CTX, pos, tri, colours, (93, 70))
+    assert len(pictures.kept) == kept + 1
+    first, second = (torch.autograd.grad(out.sum(), pos, retain_graph=True)[0] for _ in range(2))
+    del out
+    assert torch.equal(first, second)
+    assert len(pictures.kept) == kept
+
+
+def test_render_draws_again_where_nothing_was_kept(monkeypatch):
+    pos, tri, colours = sphere(2)
+    found = drawn_gradients(pos, tri, colours)
+    monkeypatch.setattr(pictures, "kept_seen", lambda _: None)
+    assert all(torch.equal(a, b) for a, b in zip(found, drawn_gradients(pos, tri, colours), strict=True))
+
+
+def test_render_refuses_vertices_that_were_changed_before_backward():
+    pos, tri, colours = sphere()
+    colours.requires_grad_()
+    out = dr.render(CTX, pos, tri, colours, (20, 20))
+    pos += 0.1
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        out.sum().backward()
+
+
+def test_render_is_compiled_and_taken_over_batches():
+    pos, tri, colours = sphere(2)
+
+    def run(pos):
+        return dr.render(CTX, pos, tri, colours, (93, 70)).square().sum()
+
+    found = []
+    for step in (run, torch.compile(run, fullgraph=True, backend="aot_eager")):
+        own = pos.clone().requires_grad_()
+        step(own).backward()
+        found.append(own.grad)
+    assert torch.equal(*found)
+    each = torch.vmap(lambda p: dr.render(CTX, p[None], tri, colours, (93, 70))[0])(pos)
+    assert torch.equal(each, dr.render(CTX, pos, tri, colours, (93, 70)))
+
+
+@pytest.mark.parametrize("n", [0, 1])
+def test_render_of_no_triangles_or_no_channels_has_no_gradient(n):
+    pos, tri, _ = sphere(level=1)
+    out, g_pos, g_attr = drawn_gradients(pos, tri[: 0 if n else None], torch.ones(pos.shape[1], n))
+    assert out.shape == (1, 93, 70, n)
+    assert not out.any()
+    assert not g_pos.any()
+    assert not g_attr.any()
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "message"),
+    [
+        ({"attr": torch.zeros(2, 3, 1)}, ValueError, "attr must have shape (V, K), with 1 or 1 before, got (2, 3, 1)"),
+        ({"resolution": (4,)}, TypeError, "resolution must be two integers, got (4,)"),
+        ({"edges": "none"}, ValueError, "edges must be 'silhouette', 'area' or 'straight-through', got 'none'"),
+        ({"attr": torch.zeros(2, 3)}, IndexError, "[0, 2)"),
+        ({"topology_hash": torch.zeros(2, 3)}, ValueError, "topology_hash must have shape (1, 3), got (2, 3)"),
+    ],
+)
+def test_render_of_wrong_arguments_raises(change, kind, message):
+    pos, tri = torch.tensor([[[-1.0, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]]]), torch.tensor([[0, 1, 2]])
+    given = {"pos": pos, "tri": tri, "attr": torch.ones(3, 3), "resolution": (4, 4)} | change
+    with pytest.raises(kind, match=re.escape(message)):
+        dr.render(CTX, **given)

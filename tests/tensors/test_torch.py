@@ -394,6 +394,29 @@ def test_antialias_of_an_upright_edge_is_the_exact_area(shift, axes):
     np.testing.assert_allclose(row.numpy(), [1, 1, 1, 1, shift, 0, 0, 0], atol=1e-6)  # edges are float32
 
 
+def layers(n=9):
+    """Triangles one over the other, each at a depth and a w of its own: none cuts another."""
+    rng = np.random.default_rng(5)
+    corners = rng.uniform(-0.8, 0.8, (n, 1, 2)) + rng.uniform(-0.9, 0.9, (n, 3, 2))
+    w, z = rng.uniform(0.5, 2, (n, 1, 1)) * np.ones((n, 3, 1)), np.linspace(-0.9, 0.9, n)[:, None, None]
+    pos = np.concatenate([corners * w, z * w, w], axis=2).reshape(1, -1, 4)
+    return torch.tensor(pos), torch.arange(3 * n, dtype=torch.int32).reshape(n, 3)
+
+
+@pytest.mark.parametrize("scene", [cube, layers])
+def test_straight_through_is_the_loop(scene):
+    pos, tri = scene()
+    pos.requires_grad_()
+    rast, _ = dr.rasterize(CTX, pos, tri, (20, 28))
+    color, grad = random(1, 20, 28, 3), random(1, 20, 28, 3, seed=1)
+    out = dr.antialias(color, rast.detach(), pos, tri, edges="straight-through")
+    assert torch.equal(out, color)
+    (found,) = torch.autograd.grad(out, pos, grad)
+    given = (one[0].detach().numpy() for one in (color, grad, rast, pos))
+    expected = reference.straight_through(*given, tri.numpy())
+    np.testing.assert_allclose(found[0].numpy(), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
 def test_antialias_leaves_edges_within_a_surface():
     pos, tri = soup(1)
     pos = torch.tensor([[[-1.0, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]]])

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -329,33 +328,6 @@ def smooth_vjp(
     return torch.from_numpy(g_color), torch.from_numpy(g_pos)
 
 
-@operator(
-    "(Tensor pos, Tensor tri, Tensor attr, Tensor target, Tensor across, int rule, int threads)"
-    " -> (Tensor, Tensor, Tensor)",
-    lambda pos, tri, attr, target, across, rule, threads: (  # noqa: ARG005
-        pos.new_empty(()),
-        like(pos, pos),
-        like(attr, attr),
-    ),
-)
-def squares(
-    pos: Tensor, tri: Tensor, attr: Tensor, target: Tensor, across: Tensor, rule: int, threads: int
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Return the mean squared difference from pictures, and the gradients of `pos` and `attr`."""
-    height, width = target.shape[1:3]
-    n = threads_of(threads, height * width)
-    drawn = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, None)]
-    grid = replace(
-        grid_of(tri, target, min(pos.shape[1], attr.shape[1])), threads=threads_of(threads, target[..., 0].numel())
-    )
-    vertices = numpy_of(pos)
-    edges = tensors.outline_of(grid, vertices, numpy_of(across.to(torch.int32)))
-    ids = joined(drawn, (height, width))
-    loss, *gradients = tensors.squares(grid, EdgeRule(rule), edges, vertices, ids, numpy_of(attr), numpy_of(target))
-    g_pos, g_attr = map(torch.from_numpy, gradients)
-    return torch.tensor(loss, dtype=pos.dtype), g_pos, g_attr
-
-
 # What backward calls
 
 
@@ -453,20 +425,6 @@ def pull_edges(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
     return g_color, None, g_pos if ctx.boost == 1 else ctx.boost * g_pos, None, [None] * 3, None, None
 
 
-def keep_squares(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:  # noqa: ARG001
-    """Keep the gradients, which `squares` has found."""
-    ctx.set_materialize_grads(False)
-    ctx.mark_non_differentiable(*output[1:])
-    ctx.save_for_backward(*output[1:])
-
-
-def pull_squares(ctx: Any, g_loss: Tensor, *_: Any) -> tuple[Any, ...]:
-    """Return the gradients of what `squares` takes."""
-    g_pos, g_attr = ctx.saved_tensors
-    return g_loss * g_pos, None, g_loss * g_attr, None, None, None, None
-
-
-squares.register_autograd(pull_squares, setup_context=keep_squares)
 points_of_ids.register_autograd(pull_points, setup_context=keep_points)
 interpolate_values.register_autograd(pull_values, setup_context=keep_values)
 interpolate_colors.register_autograd(pull_colors, setup_context=keep_colors)

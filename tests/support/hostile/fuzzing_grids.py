@@ -21,7 +21,7 @@ def values_of(draw: Draw, *shape: int) -> Any:
 def gradients_case(draw: Draw) -> Case:
     """`area_vjp`, and the gradients of fragments whose ids their owner may have changed."""
     size = draw.source.integer(1, 40), draw.source.integer(1, 30)
-    kind = draw.of(["area", "interpolate", "derivatives", "barycentric", "antialias"])
+    kind = draw.of(["area", "interpolate", "derivatives", "barycentric", "antialias", "sample"])
     if kind == "area":
         vertices, triangles, _, n_triangles = mesh_arrays(draw, size, (2, 3))
         n_channels = draw.of([None, 1, 3])
@@ -36,10 +36,12 @@ def gradients_case(draw: Draw) -> Case:
     if draw.chance(3):
         at = draw.source.integer(0, size[1] - 1), draw.source.integer(0, size[0] - 1)
         frags.triangle[at] = draw.of([n_triangles, -2, 10**8])
-    n = draw.of([2, 1, 4])
+    n = 2 if kind == "sample" else draw.of([2, 1, 4])
     values = values_of(draw, *((*size[::-1], n) if kind == "antialias" else (n_vertices, n)))
     n_out = {"derivatives": 2 * n, "barycentric": 3}.get(kind, n)
     grad = values_of(draw, *size[::-1], n_out)
+    texture = rng.normal(size=(draw.source.integer(1, 9), draw.source.integer(1, 9), 2))
+    how, wrap = draw.of(["nearest", "bilinear", "trilinear", "pixelated"]), draw.of(["repeat", "clamp", "mirror"])
     edges = draw.mostly(["area", "silhouette", "straight-through"], ["all"])
 
     def call(values: Any, grad: Any) -> Any:
@@ -47,6 +49,8 @@ def gradients_case(draw: Draw) -> Case:
             return []
         if kind == "barycentric":
             return frags.barycentric_vjp(grad)
+        if kind == "sample":
+            return list(frags.sample_vjp(texture, values, grad, filter=how, wrap=wrap))
         if kind == "antialias":
             return [frags.antialias(values, edges=edges), *frags.antialias_vjp(values, grad, edges=edges)]
         if kind == "derivatives":

@@ -5,8 +5,9 @@ SUMS_OF_POINTS = TL_SUMS_OF_POINTS
 SUMS_OF_THREE = TL_SUMS_OF_THREE
 IDS_ROOM = TL_IDS_ROOM
 SUMS_OF_FACE = TL_SUMS_OF_FACE
-LOSS_WINDOW = TL_LOSS_WINDOW
+ROWS_KEPT = TL_ROWS_KEPT
 PAIR_BYTES = TL_PAIR_BYTES
+FACE_ROWS = TL_FACE_ROWS
 
 
 cdef const void *first_of(array: object):
@@ -188,34 +189,40 @@ cdef class GradientView:
         with nogil:
             K.grad_edges(&view, &e, &sums.sums)
 
-    def loss(self, const int32_t[:, ::1] ids, const float[:, ::1] attr, mesh: tuple[Array, Array, Array],
-             codes: tuple[int, float], const float[:, :, ::1] target, scratch: tuple[Array, ...],
-             sums: tuple[GradientSums, GradientSums, GradientSums], int64_t first, int64_t end) -> float:
-        """Return the sum of squared differences of rows of a picture of `attr` (V, K) from `target`; adds gradients to sums.
+    def picture(self, const int32_t[:, ::1] ids, attr: Array, mesh: tuple[Array, Array, Array],
+                codes: tuple[int, float], pixels: tuple[Array | None, Array | None, Array | None],
+                seen: tuple[Array, ...], int64_t n_faces, scratch: tuple[Array, Array, Array],
+                sums: tuple[GradientSums, GradientSums, GradientSums], int64_t first, int64_t end) -> tuple[float, int]:
+        """Write rows of a picture of `attr` (V, K) float32, or add their gradients to sums.
 
-        `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, `codes` the rule and the weight of squares;
-        the rest of `scratch` is that of ``tl_grad_loss``. `sums`: by triangle, 12 columns and SUMS_OF_FACE for each three
-        attributes; by vertex; by row of `attr`.
+        `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, `codes` the rule and the weight of squares.
+        `pixels`, one of them: the picture; its gradients; another one, whose squared differences count. `seen` and the
+        rest of `scratch` are those of ``tl_grad_picture``. `sums`: by triangle, 12 columns and SUMS_OF_FACE for each
+        three attributes; by vertex; by row of `attr`. Returns the sum of squares, and how many faces are seen.
         """
         cdef tl_grad_view view = self.rows(first, end)
-        cdef tl_grad_loss l
+        cdef tl_grad_picture l
         cdef GradientSums faces = sums[0], points = sums[1], values = sums[2]
         cdef double found
         memset(&l, 0, sizeof(l))
-        if first >= end or view.width == 0 or attr.shape[0] == 0 or attr.shape[1] == 0:
-            return 0.0
+        if first >= end or view.width == 0 or attr.shape[1] == 0:
+            return 0.0, 0
         l.ids, l.step = &ids[ids.shape[0] - 1, 0], -view.width
-        l.attr, l.n_attr, l.n_columns = &attr[0, 0], attr.shape[0], attr.shape[1]
+        l.attr, l.n_attr, l.n_columns = <const float *>first_of(attr), attr.shape[0], attr.shape[1]
         l.edges.across, l.edges.places = <const int32_t *>first_of(mesh[0]), <const double *>first_of(mesh[1])
         l.edges.outline, l.edges.rule = <const int32_t *>first_of(mesh[2]), <tl_pair_rule><int>codes[0]
         l.edges.ids, l.edges.n_channels = <int32_t *>first_of(scratch[0]), l.n_columns
-        l.target, l.scale = &target[0, 0, 0], codes[1]
-        l.rows, l.pairs = <int64_t *>first_of(scratch[1]), <void *>first_of(scratch[2])
-        l.window, l.rast = <float *>first_of(scratch[3]), <float *>first_of(scratch[4])
+        l.out, l.g_out = <float *>first_of(pixels[0]), <const float *>first_of(pixels[1])
+        l.target, l.scale = <const float *>first_of(pixels[2]), codes[1]
+        l.row_runs, l.row_pairs = <int64_t *>first_of(seen[0]), <int64_t *>first_of(seen[1])
+        l.begins, l.run_faces = <int32_t *>first_of(seen[2]), <int32_t *>first_of(seen[3])
+        l.of_faces, l.face_step, l.n_faces = <int32_t *>first_of(seen[4]), seen[4].shape[1], n_faces
+        l.pairs, l.steps = <void *>first_of(seen[5]), <float *>first_of(seen[6])
+        l.window, l.rast = <float *>first_of(scratch[1]), <float *>first_of(scratch[2])
         l.faces, l.of_points, l.of_attr = &faces.sums, &points.sums, &values.sums
         with nogil:
-            found = K.grad_loss(&view, &l)
-        return found
+            found = K.grad_picture(&view, &l)
+        return found, l.n_faces
 
 
 cdef class GradientSums:

@@ -75,9 +75,9 @@ def project_instances(meshes: Sequence[tuple[Array, I32]], const double[:, :, ::
 
 
 def joined(SnappedMesh like, room: Array, const int32_t[:, ::1] triangles) -> SnappedMesh:
-    """Return instances that `project_instances` placed in a room as one mesh, for drawing alone.
+    """Return some of the instances that `project_instances` placed in a room as one mesh, for drawing alone.
 
-    `like`: one of them, which tells the rest. `triangles`: of all, by vertices of the whole room.
+    `like`: one of them, which tells the rest. `triangles`: of theirs, by vertices of the whole room.
     """
     cdef uint8_t[::1] raw = as_bytes(room)
     cdef SnappedMesh made = like.copy()

@@ -178,6 +178,16 @@ def fill_texels(const float[:, ::1] texels, const int64_t[:, ::1] rows, codes: t
         K.fill_texels(&levels, &ids[0], &uv[0, 0], first, background, n, &out[0, 0])
 
 
+def levels_seen(const int64_t[:, ::1] rows, const float[:, :, ::1] slopes, double[::1] out):
+    """Write which level of an array pixels (N,) look at; `rows` and `slopes` are those of `fill_texels`."""
+    cdef tl_levels levels
+    cdef int64_t n = slopes.shape[0]
+    if n:
+        levels.rows, levels.n_levels = &rows[0, 0], <int>rows.shape[0]
+        with nogil:
+            K.levels_seen(&levels, &slopes[0, 0, 0], n, &out[0])
+
+
 def halve_rows(const float[:, ::1] level, int64_t width, int64_t height, int64_t first, int64_t end, float[:, ::1] out):
     """Write rows [first, end) of the halving of a level (height * width, C)."""
     if first < end and level.shape[1]:

@@ -60,6 +60,8 @@ cdef class SnappedMesh:
 
     def at_sample(self, int32_t x_fx, int32_t y_fx) -> SnappedMesh:
         """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
+        if self.snapped.mesh.sample_x_fx == x_fx and self.snapped.mesh.sample_y_fx == y_fx:
+            return self
         cdef SnappedMesh seen = self.copy()
         seen.snapped.mesh.sample_x_fx, seen.snapped.mesh.sample_y_fx = x_fx, y_fx
         return seen

@@ -14,7 +14,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -354,60 +353,6 @@ def smooth_vjp(
 
     grid.bands.add_up(work, g_pos, 6)
     return g_color, g_pos
-
-
-def squares(
-    grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, ids: NDArray[np.int32], attr: Array, target: Array
-) -> tuple[float, Array, Array]:
-    """Return the mean squared difference of pictures of attributes from others, and the gradients of `pos` and `attr`.
-
-    `ids` (B, H, W): row 0 is on top. float32 takes a few rows at a time, and makes no picture.
-    """
-    if pos.dtype == np.float64 or attr.shape[1] * attr.shape[2] > INT32_MAX:  # lanes count in int32
-        return squares_of_pictures(grid, rule, outline, pos, ids, attr, target)
-    g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
-    n, width, scale = attr.shape[2], grid.width, 2 / max(1, target.size)
-
-    def make(room: Room) -> list[Any]:
-        beyond = room.n_px + 4 * width
-        n_faces, n_rows = min(len(grid.tri), beyond) + engine.IDS_ROOM, beyond // max(1, width)
-        around = Room(room.number, beyond)
-        return [
-            around.sums("points", pos.shape[1], 4, 9),
-            around.sums("rows", attr.shape[1], n, 3),
-            around.sums("faces", len(grid.tri), 12 + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
-            empty((3, width + engine.IDS_ROOM), np.int32),
-            empty((2 * (n_rows + 1) + beyond + engine.IDS_ROOM + (5 * n_faces + 1) // 2,), np.int64),
-            empty((2 * beyond * engine.PAIR_BYTES,), np.uint8),
-            empty((3 * engine.LOSS_WINDOW * width * n,), np.float32),
-            empty((4 * width,), np.float32),
-        ]
-
-    def work(band: Band, made: list[Any]) -> float:
-        i, (points, rows, faces, *scratch) = band.picture, made
-        return grid.view(of(pos, i)).loss(
-            ids[i], of(attr, i), outline.of_picture(i), (int(rule), scale), target[i], tuple(scratch),
-            (faces, points, rows), band.first, band.end,
-        )  # fmt: skip
-
-    found = sum(grid.bands.add_up_all(make, work, [g_pos, g_attr]))
-    return found / max(1, target.size), g_pos, g_attr
-
-
-def squares_of_pictures(
-    grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, ids: NDArray[np.int32], attr: Array, target: Array
-) -> tuple[float, Array, Array]:
-    """Return what `squares` does, picture by picture."""
-    rast, _ = points(grid, pos, [(one, 0) for one in ids], is_flipped=True, with_db=False)
-    color, _ = values(grid, attr, rast)
-    step = smooth(grid, rule, outline, pos, rast, color) - target
-    g_color, of_edges = smooth_vjp(grid, rule, outline, pos, rast, color, step * (2 / max(1, target.size)))
-    g_attr, g_rast, _ = values_vjp(grid, attr, rast, g_color)
-    return (
-        float(np.square(step).mean()) if step.size else 0.0,
-        points_vjp(grid, pos, rast, g_rast, None) + of_edges,
-        g_attr,
-    )
 
 
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -10,12 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_real, as_size, shown
+from topleft._core.base.texels import FILTER_CODES, WRAP_CODES, ValueLevels
 from topleft._core.base.threads import parse_threads, run_parts, threads_of_rows
 from topleft._core.gradients import tensors
-from topleft._core.gradients.tensors import EdgeRule, PixelGrid
+from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
 from topleft.typing import EdgesOption
 
 Floats = NDArray[np.float64]
+
+
+LOG_OF_2 = 0.6931471805599453
 
 
 class Given(Protocol):
@@ -108,6 +112,58 @@ class Backward:
         g_pos = tensors.points_vjp(self.grid, self.pos, self.rast, g_rast, g_db)
         return g_attr.reshape(values.shape), self.to_vertices(g_pos)
 
+    def sample(
+        self, levels: ValueLevels, uv: NDArray[Any], found: NDArray[Any], slopes: NDArray[Any] | None, grad: ArrayLike
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return the gradients of a texture, of uv and of the vertices from that of `sample`.
+
+        `found`, `slopes`: uv at pixels and its derivatives, where there are halvings.
+        """
+        code, wrap, other_wrap = levels.codes
+        if wrap != other_wrap:
+            raise ValueError("wrap must be the same for u and v where gradients are asked for")
+        columns = () if levels.is_flat else (levels.n_channels,)
+        g_out = self.as_grad("grad", grad, *columns).reshape(*self.grid.shape(), levels.n_channels)
+        g_out = g_out * (self.rast[..., 3:] > 0)
+        at, turns = found.astype(np.float64), np.array([1.0, -1.0])  # v from the top down
+        at[..., 1] = 1 - at[..., 1]
+        if wrap == WRAP_CODES["mirror"]:
+            at %= 2
+            at, turns = np.where(at > 1, 2 - at, at), np.where(at > 1, -turns, turns)
+        sizes = levels.rows[:, :0:-1].tolist()
+        texels = np.split(levels.texels.astype(np.float64), levels.rows[1:, 0])
+        arrays = [one.reshape(1, *size, -1) for one, size in zip(texels, sizes, strict=True)]
+        step = np.zeros((*at.shape, 2)) if slopes is None else slopes * np.array(sizes[0][::-1], float)[:, None]
+        squares = (step**2).sum(axis=-2)
+        longer = squares.max(axis=-1)
+        level = np.zeros(longer.shape)
+        if slopes is not None:
+            engine.levels_seen(levels.rows, slopes.reshape(-1, 2, 2), level.reshape(-1))
+        beyond = TexelsBeyond.WRAP if wrap == WRAP_CODES["repeat"] else TexelsBeyond.CLAMP
+        g_arrays, g_at, g_level = [np.zeros_like(one) for one in arrays], np.zeros_like(at), np.zeros_like(level)
+        for texel_filter, is_used in ways_to_look(code, level):
+            has_levels = texel_filter is TexelFilter.LINEAR_MIPMAP_LINEAR
+            own = arrays if has_levels else arrays[:1]
+            look = TexelLook(own, texel_filter, beyond, at[None], None, level[None] if has_levels else None)
+            g_own, g_uv, _, g_bias = tensors.texels_vjp(look, g_out * is_used[..., None])
+            for made, more in zip(g_arrays, g_own, strict=False):
+                made += more
+            g_at += 0 if g_uv is None else g_uv[0]
+            g_level += 0 if g_bias is None else g_bias[0]
+        g_texture = g_arrays.pop()[0]
+        while g_arrays:
+            finer = g_arrays.pop()[0]
+            g_texture = finer + spread(spread(g_texture, len(finer), 0), finer.shape[1], 1)
+        is_between = (longer > 1) & (level < len(arrays) - 1)
+        step = np.where(is_between[..., None, None], step, 0)
+        g_squares = np.where(is_between, g_level / (2 * LOG_OF_2 * np.maximum(longer, 1)), 0)
+        is_longer = np.arange(2) == squares.argmax(axis=-1)[..., None]
+        g_slopes = (
+            2 * step * np.array(sizes[0][::-1], float)[:, None] * (g_squares[..., None] * is_longer)[..., None, :]
+        )
+        by_uv, by_vertices = self.interpolate(uv, g_at * turns, g_slopes)
+        return g_texture[..., 0] if levels.is_flat else g_texture, by_uv, by_vertices
+
     def smooth(self, picture: ArrayLike, edges: EdgesOption) -> NDArray[Any]:
         """Return a picture with smooth silhouettes."""
         given, color = self.as_picture(picture)
@@ -141,6 +197,31 @@ class Backward:
         if given.shape != shape:
             raise ValueError(f"{name} must have shape {shape}, got {given.shape}")
         return given[None]
+
+
+def ways_to_look(code: int, level: Floats) -> list[tuple[TexelFilter, NDArray[np.bool_]]]:
+    """Return the filters of a code of `FILTER_CODES`, and the pixels that look by each."""
+    every, is_level_0 = np.ones(level.shape, np.bool_), level == 0
+    if code in (FILTER_CODES["nearest"], FILTER_CODES["bilinear"]):
+        return [(TexelFilter.NEAREST if code == FILTER_CODES["nearest"] else TexelFilter.LINEAR, every)]
+    if code == FILTER_CODES["trilinear"]:
+        return [(TexelFilter.LINEAR_MIPMAP_LINEAR, every)]
+    return [(TexelFilter.NEAREST, is_level_0), (TexelFilter.LINEAR_MIPMAP_LINEAR, ~is_level_0)]
+
+
+def spread(halved: Floats, n: int, axis: int) -> Floats:
+    """Return the gradient of n texels along an axis from that of their halving, each a mean over its area."""
+    m = halved.shape[axis]
+    if m == n:
+        return halved
+    own = np.moveaxis(halved, axis, 0)
+    made = np.zeros((n, *own.shape[1:]))
+    part = np.arange(m).reshape(-1, 1, 1) / m if n % 2 else np.zeros((m, 1, 1))  # of the first texel lies before
+    made[0 : 2 * m : 2] += (1 - part) * own
+    made[1 : 2 * m : 2] += own
+    if n % 2:
+        made[2::2] += (part + 1 / m) * own
+    return np.moveaxis(made * (m / n), 0, axis)
 
 
 def as_pixels(name: str, values: ArrayLike) -> Floats:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_number, as_places, as_values, shown
 from topleft._core.base.memory import empty
-from topleft._core.base.texels import as_levels
+from topleft._core.base.texels import ValueLevels, as_levels
 from topleft._core.raster.backward import Backward
 from topleft._core.raster.sampling import SplitSamples
 from topleft.typing import EdgesOption, EncodingOption, FilterOption, WrapOption
@@ -352,15 +352,20 @@ class Fragments:
             return self._at_sample(texture)
         levels = as_levels(texture, filter, wrap, encoding)
         ground = as_number("background", background)
+        found, slopes = self._places(levels, uv)
+        of_pixels = None if slopes is None else slopes.reshape(-1, 2, 2)
+        out = levels.look_up(self._ids().reshape(-1), found.reshape(-1, 2), of_pixels, ground)
+        return out.reshape(self.id.shape if levels.is_flat else (*self.id.shape, levels.n_channels))
+
+    def _places(self, levels: ValueLevels, uv: Any) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return where pixels lie in a texture, and how that changes from one to the next if it has halvings."""
         if len(levels.rows) > 1:
             found, slopes = self.interpolate(uv, derivatives=True)
         else:
             found, slopes = self.interpolate(uv), None
         if found.shape[2:] != (2,):
             raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
-        of_pixels = None if slopes is None else slopes.reshape(-1, 2, 2)
-        out = levels.look_up(self._ids().reshape(-1), found.reshape(-1, 2), of_pixels, ground)
-        return out.reshape(self.id.shape if levels.is_flat else (*self.id.shape, levels.n_channels))
+        return found, slopes
 
     def _at_sample(self, i: int) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
@@ -439,6 +444,52 @@ class Fragments:
         (array([2.25 , 1.625, 1.125]), array([-2.25 , -1.625, -1.125]))
         """
         return Backward.of(self).interpolate(self._checked(values), grad, grad_derivatives)
+
+    def sample_vjp(
+        self,
+        texture: object,
+        uv: Any,
+        grad: ArrayLike,
+        *,
+        filter: FilterOption = "trilinear",  # noqa: A002
+        wrap: WrapOption = "repeat",
+        encoding: EncodingOption | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return gradients of a texture, of uv and of the vertices from those of `sample`: vector-Jacobian products.
+
+        Parameters
+        ----------
+        texture, uv, filter, wrap, encoding
+            As in `sample`; `wrap` is one word, and a `Texture` has the same for u and v.
+        grad : array_like, shape (H, W, C), or (H, W) for a texture of shape (H, W)
+            Gradient of some number with respect to the values that `sample` returns.
+
+        Returns
+        -------
+        (ndarray of float64, ndarray of float64, ndarray of float64)
+            Its gradients with respect to the values of the texture, to uv and to the vertices, in their shapes. Values
+            are those that are looked up: bytes are 0 to 1, a `Texture` and sRGB are linear light.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As in `sample`; for layers, and for a wrap of u that is not that of v.
+
+        References
+        ----------
+        L. Williams, Pyramidal Parametrics, 1983; S. Laine et al., Modular Primitives for High-Performance
+        Differentiable Rendering, 2020.
+
+        Examples
+        --------
+        >>> import numpy as np, topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+        >>> texture, uv = [[0.0, 10.0]], [[0, 0], [1, 0], [0, 1]]
+        >>> frags.sample_vjp(texture, uv, np.ones((2, 4)), filter="nearest")[0]  # one of five looks at the second
+        array([[4., 1.]])
+        """
+        levels = as_levels(texture, filter, wrap, encoding)
+        return Backward.of(self).sample(levels, self._checked(uv), *self._places(levels, uv), grad)
 
     def barycentric_vjp(self, grad: ArrayLike) -> NDArray[np.float64]:
         """Return the gradient of the vertices from that of the weights, (H, W, 3), as `interpolate_vjp` does.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
@@ -270,14 +270,14 @@ class SceneFragments(InstanceIds, Fragments):
             if seen.split is not None:  # which has the other samples, not where they lie
                 for at in split_ranges(seen.split.rows):
                     find_instances(np.ascontiguousarray(seen.split.ids[:, at]), first_ids, boxes)
-        found = []
-        for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
+        firsts, sample = first_ids.tolist(), self.positions[0]
+
+        def part(i: int) -> NDArray[np.int32]:
             left, top, right, bottom = boxes[i].tolist()
-            first, end = first_ids[i : i + 2].tolist()
-            part = ids[:, top:bottom, left:right]
-            mesh = self.placed.snap_part(i, lambda part=part, first=first, end=end: local_part(part, first, end))
-            found.append((i, mesh.at_sample(*self.positions[0]), first))
-        return tuple(found)
+            return local_part(ids[:, top:bottom, left:right], firsts[i], firsts[i + 1])
+
+        shown = np.flatnonzero(boxes[:, 2] > 0).tolist()
+        return tuple((i, self.placed.snap_part(i, partial(part, i)).at_sample(*sample), firsts[i]) for i in shown)
 
     def _at_sample(self, i: int) -> Self:
         """Return ids, depth and attributes at one sample of each pixel."""

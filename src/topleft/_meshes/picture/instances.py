@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -43,6 +44,9 @@ VERTICES_AT_ONCE = 1 << 20
 
 #: Triangles of a scene that are kept in one array, 12 bytes each.
 TRIANGLES_AT_ONCE = 1 << 21
+
+#: Runs of instances that cull alike, each drawn as one mesh.
+MOST_JOINED = 8
 
 #: `tl_kernels.draw` begins a mask anew after 2**31 pixels, which one that is drawn in several calls must not meet.
 MOST_PIXELS_OF_PART = 1 << 30
@@ -198,21 +202,26 @@ class PlacedScene:
         return found, room
 
     @cached_property
-    def joined(self) -> engine.SnappedMesh | None:
-        """All instances as one mesh, whose triangles are ids; None of large scenes, or where some are snapped alone."""
-        firsts, n = self.scene.first_vertices, self.scene.n_triangles
-        culls = self._sides[0]
-        if firsts[-1] > VERTICES_AT_ONCE or not 0 < n <= TRIANGLES_AT_ONCE or (culls != culls[0]).any():
-            return None
-        found, room = self._project(0, len(self.scene))
-        drawn = [mesh for mesh in found if mesh is not None]
-        if room is None or sum(mesh.n_triangles for mesh in drawn) < n:
-            return None
-        self._kept.update((i, mesh) for i, mesh in enumerate(found) if mesh is not None)
-        self._n_kept = int(firsts[-1])
-        first_id = int(self._numbers[0])
-        mesh = engine.joined(drawn[0], room, self.scene.joined_triangles)
-        return mesh.numbered_from(first_id) if first_id else mesh
+    def joined(self) -> list[engine.SnappedMesh]:
+        """All instances as a few meshes, one for each run that culls alike; none of large scenes or clipped ones."""
+        scene, culls = self.scene, self._sides[0]
+        starts = np.flatnonzero(np.diff(culls, prepend=-1)).tolist()
+        is_small = scene.first_vertices[-1] <= VERTICES_AT_ONCE and 0 < scene.n_triangles <= TRIANGLES_AT_ONCE
+        if not is_small or len(starts) > MOST_JOINED:
+            return []
+        found, room = self._project(0, len(scene))
+        drawn = {i: mesh for i, mesh in enumerate(found) if mesh is not None}
+        if room is None or sum(mesh.n_triangles for mesh in drawn.values()) < scene.n_triangles:
+            return []
+        self._kept.update(drawn)
+        self._n_kept = int(scene.first_vertices[-1])
+        meshes = []
+        for first, end in pairwise([*starts, len(scene)]):
+            triangles = scene.joined_triangles[slice(*scene.first_ids[[first, end]].tolist())]
+            if len(triangles):
+                like = next(drawn[i] for i in range(first, end) if i in drawn)
+                meshes.append(engine.joined(like, room, triangles).numbered_from(int(self._numbers[first])))
+        return meshes
 
     def _snap_alone(self, i: int) -> engine.SnappedMesh:
         mesh = self.scene[i].mesh
@@ -371,8 +380,8 @@ class PlacedScene:
             first = end
 
     def meshes(self) -> Iterator[list[engine.SnappedMesh]]:
-        """Yield what is drawn, in the order of ids: all instances as one mesh, or else `chunks`."""
-        return self.chunks() if self.joined is None else iter([[self.joined]])
+        """Yield what is drawn, in the order of ids: all instances joined, or else `chunks`."""
+        return iter([self.joined]) if self.joined else self.chunks()
 
     @cached_property
     def _pays_in_clusters(self) -> bool:
@@ -388,10 +397,10 @@ class PlacedScene:
         """Draw several samples as those of a mesh are; None where that takes planes: of clusters, or of many meshes."""
         view = self._view.but(is_split=True)
         is_clustered = self._can_cluster(sink) and self._pays_in_clusters
-        if is_clustered or self.joined is None or not choices.can_split(view, self.scene.n_triangles):
+        if is_clustered or len(self.joined) != 1 or not choices.can_split(view, self.scene.n_triangles):
             return None
         (width, height), positions = view.size, self.positions(view)
-        own = SamplePass(FRESH, self.joined, np.array(positions, np.int32), self._n_parts(height))
+        own = SamplePass(FRESH, self.joined[0], np.array(positions, np.int32), self._n_parts(height))
         split = draw_split(own, sink, (height, width), background)
         if split is None:
             refuse_changed()
@@ -415,12 +424,12 @@ class PlacedScene:
                     target.keep_bounds(FRESH.empty("bounds", shape, np.float32))
             if draw_placed(self, order, targets, positions, height, n_parts, is_first=is_first):
                 return
-        if len(targets) > 1 and self.joined is not None and choices.can_slice(self._view) and is_first:
-            own = SamplePass(FRESH, self.joined, np.array(positions, np.int32), n_parts)
+        if len(targets) > 1 and len(self.joined) == 1 and choices.can_slice(self._view) and is_first:
+            own = SamplePass(FRESH, self.joined[0], np.array(positions, np.int32), n_parts)
             if draw_sorted(own, targets, (height, self._view.size[0])):
                 refuse_changed()
             return
-        n_left = len(self.scene) if self.joined is None else 1
+        n_left = len(self.joined) or len(self.scene)
         for chunk in self.meshes():
             n_left -= len(chunk)
             for target, at in zip(targets, positions, strict=True):

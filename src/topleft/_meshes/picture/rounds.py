@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 #: Instances surveyed for the share that a picture shows, and clusters of each: less than a tenth of a millisecond.
 SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
 
-#: Instances that are drawn before others are tested against their depths.
-FIRST_ROUND = 16
+#: Instances that each thread draws before the next ones are tested against their depths.
+ROUND = 16
 
 #: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
 CELLS = 128
@@ -115,20 +115,18 @@ def draw_rounds(
 ) -> bool:
     """Draw a sample into a target, as `draw_placed` does.
 
-    In rounds, each of about as many instances as those before it together: it leaves out the instances that lie
-    outside, between samples, or behind earlier ones.
+    In rounds, each of which leaves out instances that lie outside, between samples, or behind those of earlier ones.
     """
     keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
     order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
-    first, n = 0, FIRST_ROUND if keeps_order else len(order)
-    while first < len(order):
-        end = min(first + n, len(order))
-        ends = {"is_first": is_first and first == 0, "is_last": end == len(order)}
-        if not draw_round(placed, order[first:end], target, height, at, memories, **ends):
+    n = ROUND * len(memories) if keeps_order else len(order)
+    for first in range(0, len(order), n):
+        some = order[first : first + n]
+        if first:
+            some = placed.shown(some, target, at, is_drawn=True)
+        ends = {"is_first": is_first and first == 0, "is_last": first + n >= len(order)}
+        if len(some) and not draw_round(placed, some, target, height, at, memories, **ends):
             return False
-        if end < len(order):
-            order = np.append(order[:end], placed.shown(order[end:], target, at, is_drawn=True))
-        first = n = end
     return True
 
 

@@ -352,7 +352,7 @@ class Scene:
     def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
         """Return the scene with other meshes, which stand where these do."""
         instances = [one.with_mesh(mesh) for one, mesh in zip(self.instances, meshes, strict=True)]
-        return unchecked_scene(instances, transforms=self.transforms)
+        return unchecked_scene(instances, transforms=self.transforms, are_mirrored=self.are_mirrored)
 
     @property
     def bounds(self) -> F64:

@@ -53,12 +53,13 @@ class Painter:
         self._sampling: Any = next((word for n, word in SAMPLES if model.vis.quality.offsamples >= n), "center")
         self._subjects: dict[tuple[Any, ...], Subject] = {}
         self._sky: tuple[Any, Any] = (None, None)
+        self._lights: tuple[Any, Any] = (None, None)
 
     def colors(self, scene: Any, size: tuple[int, int]) -> U8:
         """The picture (H, W, 3)."""
         camera, eye = camera_of(scene.camera, size)
         sky = self._sky_seen(scene, camera, size)
-        lights, ambient, gloss = lights_of(scene, self.model.stat.center)
+        lights, ambient, gloss = self._lights_seen(scene)
         subject = self._subject(scene, [*scene.geoms[: scene.ngeom]], eye, gloss)
         if subject is None:
             return np.broadcast_to(np.asarray(sky, np.uint8), (*size[::-1], 4))[..., :3].copy()
@@ -129,6 +130,17 @@ class Painter:
                 instances.append(tl.Instance(mesh, material=look))
                 rows.append(k)
         return Subject(tl.Scene(instances) if instances else None, np.array(rows, np.intp))
+
+    def _lights_seen(self, scene: Any) -> tuple[list[tl.Light], float, float]:
+        """The lights, as `lights_of` returns them; kept while they stay as they are."""
+        names = ("pos", "dir", "attenuation", "ambient", "diffuse", "specular")
+        lights = scene.lights[: scene.nlight]
+        key = [
+            (one.type, one.cutoff, one.exponent, *(getattr(one, name).tobytes() for name in names)) for one in lights
+        ]
+        if self._lights[0] != key:
+            self._lights = key, lights_of(scene, self.model.stat.center)
+        return self._lights[1]
 
     def _sky_seen(self, scene: Any, camera: tl.Camera, size: tuple[int, int]) -> Any:
         """What is behind everything, (H, W, 4) uint8, or black; kept while the camera looks the same way."""

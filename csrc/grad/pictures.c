@@ -1,13 +1,15 @@
-/* The mean squared difference of a picture from another one, and its gradients: attributes of float32, smooth edges,
- * and both backwards, in one pass over the rows of a band while they are in the cache.
- * In: ids of a picture, a mesh with attributes, the other picture.  Out: a sum of squares; sums by vertex, attribute.
+/* Pictures of attributes of float32 with smooth edges, and backwards: from the gradients of a picture, or at once from
+ * its mean squared difference from another one.  A band goes row by row while they are in the cache.
+ * In: ids of a picture, a mesh with attributes; backward: gradients, or the other picture.  Out: the picture; backward:
+ * sums by vertex and by row of attributes, a sum of squares.
  *
  * A triangle that is seen is a face: planes in float64, about the first pixel that shows it and in units of its total
  * there, whose quotients are the attributes at its pixels; and the sums of colors.c.  A run of pixels begins in float64
- * and goes on in float32; one with a weight that is clamped goes by itself, as in points.c.  Pairs of pixels are found
- * once, for both ways.  A row is drawn, compared when the next one is drawn, led back when that one is compared. */
-#ifndef TL_GRAD_LOSS_C
-#define TL_GRAD_LOSS_C
+ * and goes on in float32; one with a weight that is clamped goes by itself, as in points.c.  Runs, faces and pairs of
+ * pixels are found once for both ways.  A row is drawn, finished when the next one is drawn, led back when that one is
+ * finished. */
+#ifndef TL_GRAD_PICTURES_C
+#define TL_GRAD_PICTURES_C
 
 #include <stdint.h>
 #include <string.h>
@@ -21,103 +23,106 @@
 #include "lanes/lanes.h"
 #include "lanes/quads.h"
 
-/* Planes of a face: by column, by row, and at its first pixel; four numbers each. */
-enum { FACE_U, FACE_V, FACE_ZW, FACE_TOTAL, FACE_PLANE = 12 };
+/* Planes of a face: by column, by row, and at its first pixel; four numbers each.  Where the last is above 0 the sum of
+ * the weights is below 1. */
+enum { FACE_U, FACE_V, FACE_ZW, FACE_REST, FACE_TOTAL = FACE_REST, FACE_PLANE = 12 };
 
-/* A band, with two rows on either side of it, [lowest, end): runs of pixels of equal id, faces, pairs. */
+/* A band, with the rows on either side of it that it takes part in: runs of pixels of equal id, faces, pairs. */
 typedef struct {
     const tl_grad_view *view;
-    const tl_grad_loss *l;
-    tl_grad_view all;        /* of those rows */
-    int64_t *row_runs;       /* the first run of each row */
-    int64_t *row_pairs;      /* the first pair of a row with the one below or within the row */
-    int32_t *begins, *faces; /* of runs: the column; twice the face, 1 more where clamped, less than 0 for none */
-    int32_t *corners[3], *column, *row; /* of faces */
+    tl_grad_picture *l;
+    tl_grad_view all;                        /* of those rows */
+    int32_t *faces;                          /* of runs: twice the face, 1 more where clamped, less than 0 for none */
+    int32_t *corners[3], *column, *row, *id; /* of faces */
     tl_met_pair *pairs;
-    float *colors, *g_out, *g_color; /* TL_LOSS_WINDOW rows from `base` on */
+    float *colors, *g_out, *g_color; /* TL_ROWS_KEPT rows from `base` on */
     int64_t base;
-} loss_pass;
+} picture_pass;
 
 _Static_assert(sizeof(tl_met_pair) == TL_PAIR_BYTES, "callers make room for pairs");
 
-static loss_pass open_loss(const tl_grad_view *view, const tl_grad_loss *l)
+static picture_pass open_pass(const tl_grad_view *view, tl_grad_picture *l)
 {
-    loss_pass p = {.view = view, .l = l, .all = *view};
-    p.all.first_row = view->first_row > 2 ? view->first_row - 2 : 0;
-    p.all.end_row = view->end_row + 2 < view->height ? view->end_row + 2 : view->height;
-    const int64_t n_rows = p.all.end_row - p.all.first_row, n_px = n_rows * view->width;
-    const int64_t n_faces = (view->n_triangles < n_px ? view->n_triangles : n_px) + TL_IDS_ROOM;
-    int32_t *next = (int32_t *)(l->rows + 2 * (n_rows + 1));
-    p.row_runs = l->rows, p.row_pairs = l->rows + n_rows + 1;
-    p.begins = next, p.faces = next + n_px + TL_IDS_ROOM;
-    next += 2 * (n_px + TL_IDS_ROOM);
-    for (int k = 0; k < 3; k++, next += n_faces)
-        p.corners[k] = next;
-    p.column = next, p.row = next + n_faces;
-    p.pairs = l->pairs;
-    p.colors = l->window, p.g_out = p.colors + TL_LOSS_WINDOW * view->width * l->n_columns;
-    p.g_color = p.g_out + TL_LOSS_WINDOW * view->width * l->n_columns;
+    picture_pass p = {.view = view, .l = l, .all = *view, .faces = l->run_faces, .pairs = l->pairs};
+    const int64_t reach = l->target ? 2 : 1;
+    p.all.first_row = view->first_row > reach ? view->first_row - reach : 0;
+    p.all.end_row = view->end_row + reach < view->height ? view->end_row + reach : view->height;
+    int32_t **const of_faces[TL_FACE_ROWS] = {&p.corners[0], &p.corners[1], &p.corners[2], &p.column, &p.row, &p.id};
+    for (int k = 0; k < TL_FACE_ROWS; k++)
+        *of_faces[k] = l->of_faces + k * l->face_step;
+    const int64_t n_kept = TL_ROWS_KEPT * view->width * l->n_columns + TL_IDS_ROOM;
+    p.colors = l->window, p.g_out = p.colors + n_kept, p.g_color = p.g_out + n_kept;
     p.base = p.all.first_row;
     return p;
 }
 
 /* The ids of a row with room beyond: -1 for none, less for what is no triangle. */
-TL_INLINE void copy_ids(const loss_pass *p, int64_t row, int32_t *ids)
+TL_INLINE void copy_ids(const picture_pass *p, int64_t row, int32_t *ids)
 {
     const int32_t *from = p->l->ids + p->l->step * row;
     const vi end = vi_set1(clamped_to_int(p->view->n_triangles)), none = vi_set1(-1);
     for (int64_t x = 0; x < p->view->width; x += TL_LANES) {
-        vi id = vi_load_masked(vm_first(p->view->width - x), from + x);
+        const int64_t n = p->view->width - x;
+        vi id = n < TL_LANES ? vi_load_masked(vm_first(n), from + x) : vi_load(from + x);
         id = vi_select(vi_gt(id, none), id, none);
         vi_store(ids + x, vi_select(vi_gt(end, id), id, vi_set1(TL_NO_ID)));
     }
 }
 
 /* The face of a triangle that a pixel shows; -1 if its corners do not exist. */
-TL_INLINE int32_t find_face(loss_pass *p, int32_t id, int32_t column, int64_t row)
+TL_INLINE int32_t find_face(picture_pass *p, int32_t id, int32_t column, int64_t row)
 {
     const tl_grad_view *view = p->view;
     const int64_t n_rows = p->l->n_attr < view->n_vertices ? p->l->n_attr : view->n_vertices;
     int32_t face = id < 0 ? -1 : p->l->faces->slot_of[id];
     if (face >= 0 || id < 0 || !has_corners(view, n_rows, id))
         return face;
-    face = (int32_t)p->l->faces->n;
-    sums_of(p->l->faces, id);
+    face = p->l->faces->slot_of[id] = (int32_t)p->l->faces->n++;
+    p->l->faces->rows[face] = id;
     for (int k = 0; k < 3; k++)
         p->corners[k][face] = view->tri[3 * (int64_t)id + k];
-    p->column[face] = column, p->row[face] = (int32_t)row;
+    p->column[face] = column, p->row[face] = (int32_t)row, p->id[face] = id;
     return face;
 }
 
 /* Lists runs, row by row, and faces in the order of their first pixels. */
-static void list_faces(loss_pass *p)
+static void list_faces(picture_pass *p)
 {
     int32_t *ids = p->l->edges.ids;
     int64_t n_runs = 0;
     for (int64_t row = p->all.first_row; row < p->all.end_row; row++) {
         const int64_t first = n_runs;
         vi before = vi_set1(INT32_MIN);
-        p->row_runs[row - p->all.first_row] = n_runs;
+        p->l->row_runs[row - p->all.first_row] = n_runs;
         copy_ids(p, row, ids);
         for (int64_t x = 0; x < p->view->width; x += TL_LANES) {
             const vi id = vi_load(ids + x);
             const vm starts = vm_and_not(vm_first(p->view->width - x), vi_eq(id, vi_shift_in(id, before)));
-            vi_compress(p->begins + n_runs, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
+            vi_compress(p->l->begins + n_runs, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
             n_runs += __builtin_popcount(vm_bits(starts));
             before = id;
         }
         for (int64_t r = first; r < n_runs; r++)
-            p->faces[r] = 2 * find_face(p, ids[p->begins[r]], p->begins[r], row);
+            p->faces[r] = 2 * find_face(p, ids[p->l->begins[r]], p->l->begins[r], row);
     }
-    p->row_runs[p->all.end_row - p->all.first_row] = n_runs;
+    p->l->row_runs[p->all.end_row - p->all.first_row] = n_runs;
     for (int k = 0; k < TL_IDS_ROOM; k++) {
         const int64_t at = p->l->faces->n + k;
         p->corners[0][at] = p->corners[1][at] = p->corners[2][at] = p->column[at] = p->row[at] = 0;
     }
+    p->l->n_faces = p->l->faces->n;
+}
+
+/* Takes the faces that the picture has left. */
+static void take_faces(const picture_pass *p)
+{
+    tl_grad_sums *faces = p->l->faces;
+    for (faces->n = 0; faces->n < p->l->n_faces; faces->n++)
+        faces->rows[faces->n] = p->id[faces->n];
 }
 
 /* Planes of TL_LANES faces: of the weights, of z/w and of the total. */
-TL_INLINE void set_face_planes(const loss_pass *p, int64_t first, vd planes[FACE_PLANE])
+TL_INLINE void set_face_planes(const picture_pass *p, int64_t first, vd planes[FACE_PLANE])
 {
     const tl_grad_view *view = p->view;
     const int32_t *const corners[3] = {p->corners[0] + first, p->corners[1] + first, p->corners[2] + first};
@@ -136,20 +141,24 @@ TL_INLINE void set_face_planes(const loss_pass *p, int64_t first, vd planes[FACE
     }
 }
 
-/* Stores planes of lanes. */
-TL_INLINE void store_planes(const loss_pass *p, int64_t first, int64_t at, const vd planes[FACE_PLANE])
+/* Stores planes of lanes, and zeros for as many sums of attributes. */
+TL_INLINE void store_planes(const picture_pass *p, int64_t first, int64_t at, const vd planes[FACE_PLANE])
 {
     const tl_grad_sums *faces = p->l->faces;
     double some[FACE_PLANE][TL_MAX_LANES];
     for (int k = 0; k < FACE_PLANE; k++)
         vd_store(some[k], planes[k]);
     for (int64_t i = 0; i < TL_LANES && first + i < faces->n; i++)
-        for (int k = 0; k < FACE_PLANE; k++)
-            faces->sums[(first + i) * faces->n_columns + at + k] = some[k][i];
+        for (int k = 0; k < FACE_PLANE; k++) {
+            double *to = faces->sums + (first + i) * faces->n_columns + at + k;
+            to[0] = some[k][i];
+            if (at > 0)
+                to[FACE_PLANE] = 0.0;
+        }
 }
 
 /* Planes of each three attributes are those less that of the last corner. */
-TL_INLINE void set_attr_planes(const loss_pass *p, int64_t first, int64_t column, vd planes[FACE_PLANE])
+TL_INLINE void set_attr_planes(const picture_pass *p, int64_t first, int64_t column, vd planes[FACE_PLANE])
 {
     const int64_t n_columns = p->l->n_columns;
     const vm m = vm_first(p->l->faces->n - first);
@@ -170,12 +179,16 @@ TL_INLINE void set_attr_planes(const loss_pass *p, int64_t first, int64_t column
             planes[4 * j + c] = attr[c][j];
 }
 
-static void set_up_faces(const loss_pass *p)
+static void set_up_faces(const picture_pass *p)
 {
     for (int64_t first = 0; first < p->l->faces->n; first += TL_LANES) {
         vd of_points[FACE_PLANE], planes[FACE_PLANE];
         set_face_planes(p, first, of_points);
-        store_planes(p, first, 0, of_points);
+        memcpy(planes, of_points, sizeof planes);
+        for (int j = 0; j < FACE_PLANE; j += 4)
+            planes[j + FACE_REST] = vd_sub(vd_mul(of_points[j + FACE_TOTAL], vd_set1(TL_ALMOST_ONE)),
+                                           vd_add(of_points[j + FACE_U], of_points[j + FACE_V]));
+        store_planes(p, first, 0, planes);
         for (int64_t c = 0; c < p->l->n_columns; c += 3) {
             memcpy(planes, of_points, sizeof planes);
             set_attr_planes(p, first, c, planes);
@@ -185,11 +198,11 @@ static void set_up_faces(const loss_pass *p)
 }
 
 /* The planes and sums of a face: of points, then of each three attributes those and sums of as many. */
-TL_INLINE double *face_at(const loss_pass *p, int64_t face)
+TL_INLINE double *face_at(const picture_pass *p, int64_t face)
 {
     return p->l->faces->sums + face * p->l->faces->n_columns;
 }
-TL_INLINE double zw_at(const loss_pass *p, int32_t id, int64_t column, int64_t row)
+TL_INLINE double zw_at(const picture_pass *p, int32_t id, int64_t column, int64_t row)
 {
     const int32_t face = p->l->faces->slot_of[id];
     const double *plane = face_at(p, face) + FACE_ZW;
@@ -197,7 +210,7 @@ TL_INLINE double zw_at(const loss_pass *p, int32_t id, int64_t column, int64_t r
 }
 
 /* Finds the pairs of a row of ids with others; returns how many there are then. */
-static int64_t meet_pairs(const loss_pass *p, const meeting *m, int64_t n, int64_t n_pairs)
+static int64_t meet_pairs(const picture_pass *p, const meeting *m, int64_t n, int64_t n_pairs)
 {
     int32_t *columns = p->l->edges.ids + 2 * (p->view->width + TL_IDS_ROOM);
     const int64_t n_listed = list_pairs(m->edges, m->ids, m->others, n, columns);
@@ -211,7 +224,7 @@ static int64_t meet_pairs(const loss_pass *p, const meeting *m, int64_t n, int64
     return n_pairs;
 }
 
-static void list_met_pairs(const loss_pass *p)
+static void list_met_pairs(const picture_pass *p)
 {
     const int64_t width = p->view->width, lowest = p->all.first_row;
     int64_t n = 0;
@@ -219,26 +232,33 @@ static void list_met_pairs(const loss_pass *p)
         int32_t *ids = p->l->edges.ids + row % 2 * (width + TL_IDS_ROOM);
         const int32_t *below = p->l->edges.ids + (row + 1) % 2 * (width + TL_IDS_ROOM);
         copy_ids(p, row, ids);
-        p->row_pairs[row - lowest] = n;
+        p->l->row_pairs[row - lowest] = n;
         if (row > lowest)
             n = meet_pairs(p, &(meeting){&p->all, &p->l->edges, 0, row - 1, 1, below, ids}, width, n);
         n = meet_pairs(p, &(meeting){&p->all, &p->l->edges, 0, row, 0, ids, ids + 1}, width - 1, n);
     }
-    p->row_pairs[p->all.end_row - lowest] = n;
+    p->l->row_pairs[p->all.end_row - lowest] = n;
 }
 
 /* Blends the pairs of a row, or leads them back. */
-static void blend_row(const loss_pass *p, const tl_grad_view *view, int64_t row, int is_back)
+static void blend_row(const picture_pass *p, const tl_grad_view *view, int64_t row, int is_back)
 {
-    const int64_t before = p->base * p->view->width * p->l->n_columns;
+    const int64_t n = p->l->n_columns, before = p->base * p->view->width * n;
     tl_grad_edges e = p->l->edges;
     e.color = (const void *)((uintptr_t)p->colors - 4 * (uintptr_t)before);
     e.out = (void *)((uintptr_t)p->g_out - 4 * (uintptr_t)before);
     e.g_out = is_back ? e.out : 0;
     e.g_color = (void *)((uintptr_t)p->g_color - 4 * (uintptr_t)before);
     row -= p->all.first_row;
-    for (int64_t i = p->row_pairs[row]; i < p->row_pairs[row + 1]; i++)
+    for (int64_t i = p->l->row_pairs[row]; i < p->l->row_pairs[row + 1]; i++) {
+        const tl_pair *pair = &p->pairs[i].pair;
+        float *steps = p->l->steps + n * i;
+        e.steps = 0;
+        for (int64_t c = 0; c < n && !is_back; c++)
+            steps[c] = (float)color_step(&e, pair, c, 0);
+        e.steps = steps;
         blend_pair(view, &e, p->pairs + i, p->l->of_points, 0);
+    }
 }
 
 /* A plane of a face from a pixel on, x and y off its first one. */
@@ -248,15 +268,18 @@ TL_INLINE run_plane plane_of_face(const double *plane, int64_t x, int64_t y)
     return (run_plane){vq4_all(__builtin_convertvector(begin, vq)), vq4_all(__builtin_convertvector(by_x, vq))};
 }
 
-/* Whether a pixel lies well within its triangle. */
-TL_INLINE int is_within(const double *face, int64_t x, int64_t y)
+/* Whether the pixels of a run, x and y off the first one of the face, lie well within their triangle. */
+TL_INLINE int is_within(const double *face, int64_t x, int64_t y, int64_t n)
 {
     const four at = TL_FOUR(face + 8) + TL_FOUR(face) * (double)x + TL_FOUR(face + 4) * (double)y;
-    return at[FACE_U] > 0.0 && at[FACE_V] > 0.0 && at[FACE_U] + at[FACE_V] < TL_ALMOST_ONE * at[FACE_TOTAL];
+    const four last = at + TL_FOUR(face) * (double)(n - 1);
+    const unsigned wanted = 1u << FACE_U | 1u << FACE_V | 1u << FACE_REST;
+    return (vq_above_zero(__builtin_convertvector(at, vq)) & vq_above_zero(__builtin_convertvector(last, vq)) &
+            wanted) == wanted;
 }
 
 /* `rast` of a run that is clamped somewhere, of which row 0 of the picture would stand there. */
-static const float *points_of_clamped(const loss_pass *p, const pixel_run *run)
+static const float *points_of_clamped(const picture_pass *p, const pixel_run *run)
 {
     void *const out[2] = {(void *)((uintptr_t)p->l->rast - 16 * (uintptr_t)(run->row * p->view->width)), 0};
     grad_triangle t;
@@ -267,18 +290,18 @@ static const float *points_of_clamped(const loss_pass *p, const pixel_run *run)
 }
 
 /* Run r of a row, the face's. */
-TL_INLINE pixel_run run_of_face(const loss_pass *p, int64_t r, int64_t end, int64_t row)
+TL_INLINE pixel_run run_of_face(const picture_pass *p, int64_t r, int64_t end, int64_t row)
 {
     const int32_t face = p->faces[r] >> 1;
-    const int64_t column = p->begins[r];
+    const int64_t column = p->l->begins[r];
     return (pixel_run){.id = face < 0 ? -1 : p->l->faces->rows[face],
                        .row = row,
                        .column = column,
                        .at = row * p->view->width + column,
-                       .n = (r + 1 < end ? p->begins[r + 1] : p->view->width) - column};
+                       .n = (r + 1 < end ? p->l->begins[r + 1] : p->view->width) - column};
 }
 
-static void draw_clamped(const loss_pass *p, const pixel_run *run, float *colors)
+static void draw_clamped(const picture_pass *p, const pixel_run *run, float *colors)
 {
     const int64_t n = p->l->n_columns;
     int64_t rows[3];
@@ -291,7 +314,7 @@ static void draw_clamped(const loss_pass *p, const pixel_run *run, float *colors
 }
 
 /* n of n_columns attributes from `first` on at the pixels of a run; x and y off the first pixel of the face. */
-TL_INLINE void draw_three(const loss_pass *p, int32_t face, int64_t first, int n, int64_t n_columns, int64_t x,
+TL_INLINE void draw_three(const picture_pass *p, int32_t face, int64_t first, int n, int64_t n_columns, int64_t x,
                           int64_t y, int64_t n_pixels, float *colors)
 {
     const float *attr = (const float *)p->l->attr + n_columns * p->corners[2][face] + first;
@@ -304,18 +327,18 @@ TL_INLINE void draw_three(const loss_pass *p, int32_t face, int64_t first, int n
             const vq4 color = vq4_add(vq4_mul(at, vq4_inverse_of_last(at)), last);
             const int64_t n_left = n_pixels - begin - i;
             float some[16], *to = colors + n_columns * (begin + i) + first;
-            vq4_store(n == n_columns ? to : some, color, n_left, n);
+            vq4_store(n == n_columns ? to : some, color, 4, n); /* pixels to the right are drawn later */
             for (int64_t k = 0; n < n_columns && k < 4 && k < n_left; k++)
                 memcpy(to + n_columns * k, some + n * k, (size_t)n * sizeof *some);
         }
     }
 }
 
-TL_INLINE void draw_row(const loss_pass *p, int64_t row, int64_t n_columns)
+TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
 {
-    const int64_t end = p->row_runs[row + 1 - p->all.first_row], n = p->view->width * n_columns;
+    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], n = p->view->width * n_columns;
     float *colors = p->colors + (row - p->base) * n;
-    for (int64_t r = p->row_runs[row - p->all.first_row]; r < end; r++) {
+    for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
         const pixel_run run = run_of_face(p, r, end, row);
         float *to = colors + n_columns * run.column;
         const int32_t face = p->faces[r] >> 1;
@@ -324,7 +347,7 @@ TL_INLINE void draw_row(const loss_pass *p, int64_t row, int64_t n_columns)
             continue;
         }
         const int64_t x = run.column - p->column[face], y = row - p->row[face];
-        if (!is_within(face_at(p, face), x, y) || !is_within(face_at(p, face), x + run.n - 1, y)) {
+        if (!is_within(face_at(p, face), x, y, run.n)) {
             p->faces[r] |= 1;
             draw_clamped(p, &run, colors);
             continue;
@@ -335,34 +358,61 @@ TL_INLINE void draw_row(const loss_pass *p, int64_t row, int64_t n_columns)
     memcpy(p->g_out + (row - p->base) * n, colors, (size_t)n * sizeof *colors);
 }
 
-/* Writes the gradient of a row over the row, and again; returns the sum of squares, in sixteen parts. */
-static double compare_row(const loss_pass *p, int64_t row)
+/* Writes the gradient of 16 numbers over them, and again; returns their squares. */
+TL_INLINE vq4 compare_some(float *out, float *again, const float *target, vq4 scale)
+{
+    const vq4 step = vq4_sub(vq4_load(out, 4, 4), vq4_load(target, 4, 4)), g = vq4_mul(step, scale);
+    vq4_store(out, g, 4, 4);
+    vq4_store(again, g, 4, 4);
+    return vq4_mul(step, step);
+}
+
+/* The same of a row; squares are summed up in float32, each eight in float64. */
+static double compare_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
     float *restrict out = p->g_out + (row - p->base) * n, *restrict again = p->g_color + (row - p->base) * n;
     const float *restrict target = p->l->target + row * n;
-    const float scale = (float)p->l->scale;
-    double sums[16] = {0}, sum = 0.0;
-    int64_t i = 0;
-    for (; i + 16 <= n; i += 16)
-        for (int k = 0; k < 16; k++) {
-            const float step = out[i + k] - target[i + k];
-            sums[k] += (double)step * (double)step;
-            out[i + k] = again[i + k] = step * scale;
+    const vq4 scale = vq4_all(vq_set1((float)p->l->scale));
+    double sum = 0.0;
+    for (int64_t first = 0; first < n; first += 128) {
+        vq4 squares = vq4_all(vq_set1(0.0f));
+        float some[4], last[3][16] = {{0}};
+        int64_t i = first;
+        for (; i + 16 <= n && i < first + 128; i += 16)
+            squares = vq4_add(squares, compare_some(out + i, again + i, target + i, scale));
+        if (i < n && i < first + 128) {
+            const size_t size = (size_t)(n - i) * sizeof(float);
+            memcpy(last[0], out + i, size), memcpy(last[2], target + i, size);
+            squares = vq4_add(squares, compare_some(last[0], last[1], last[2], scale));
+            memcpy(out + i, last[0], size), memcpy(again + i, last[1], size);
         }
-    for (; i < n; i++) {
-        const float step = out[i] - target[i];
-        sums[i % 16] += (double)step * (double)step;
-        out[i] = again[i] = step * scale;
+        vq_store(some, vq4_fold(squares));
+        sum += ((double)some[0] + (double)some[2]) + ((double)some[1] + (double)some[3]);
     }
-    for (int k = 0; k < 16; k++)
-        sum += sums[k];
     return sum;
 }
 
-static tl_grad_colors colors_of(const loss_pass *p)
+/* Takes a row that is finished: to the picture, beside the other one, or its gradients as given. */
+static double take_row(const picture_pass *p, int64_t row)
 {
-    const tl_grad_loss *l = p->l;
+    const tl_grad_picture *l = p->l;
+    const int64_t n = p->view->width * l->n_columns, at = (row - p->base) * n;
+    const size_t size = (size_t)n * sizeof(float);
+    if (l->target)
+        return compare_row(p, row);
+    if (l->out) {
+        memcpy(l->out + row * n, p->g_out + at, size);
+        return 0.0;
+    }
+    memcpy(p->g_out + at, l->g_out + row * n, size);
+    memcpy(p->g_color + at, l->g_out + row * n, size);
+    return 0.0;
+}
+
+static tl_grad_colors colors_of(const picture_pass *p)
+{
+    const tl_grad_picture *l = p->l;
     const int64_t before = p->base * p->view->width * l->n_columns;
     return (tl_grad_colors){.values = {.attr = l->attr,
                                        .n_attr = l->n_attr,
@@ -375,11 +425,11 @@ static tl_grad_colors colors_of(const loss_pass *p)
 }
 
 /* Adds the gradients of a row to the sums of its faces. */
-TL_INLINE void pull_row(const loss_pass *p, int64_t row, int64_t n_columns)
+TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
 {
-    const int64_t end = p->row_runs[row + 1 - p->all.first_row];
+    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row];
     const float *g_color = p->g_color + (row - p->base) * p->view->width * n_columns;
-    for (int64_t r = p->row_runs[row - p->all.first_row]; r < end; r++) {
+    for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
         const pixel_run run = run_of_face(p, r, end, row);
         const int32_t face = p->faces[r] >> 1;
         if (run.id < 0)
@@ -398,7 +448,7 @@ TL_INLINE void pull_row(const loss_pass *p, int64_t row, int64_t n_columns)
                 const float *g = g_color + n_columns * (run.column + first) + c;
                 vq4 sums[2];
                 sum_up_pixels(&plane, 0, g, (int)(run.n - first), n_columns - c < 3 ? (int)(n_columns - c) : 3,
-                              n_columns, sums);
+                              n_columns, 1, sums);
                 const four whole = __builtin_convertvector(vq4_fold(sums[0]), four);
                 TL_FOUR(moments) += __builtin_convertvector(vq4_fold(sums[1]), four) + whole * (double)(x + first);
                 TL_FOUR(moments + 4) += whole * (double)y;
@@ -409,7 +459,7 @@ TL_INLINE void pull_row(const loss_pass *p, int64_t row, int64_t n_columns)
 }
 
 /* Ends a band: from sums of faces to those of corners. */
-static void close_faces(const loss_pass *p)
+static void close_faces(const picture_pass *p)
 {
     const tl_grad_colors colors = colors_of(p);
     for (int64_t i = 0; i < p->l->faces->n; i++) {
@@ -419,51 +469,59 @@ static void close_faces(const loss_pass *p)
     close_colors(p->view, &colors, 2 * FACE_PLANE, 2 * FACE_PLANE, 1);
 }
 
-/* Rows drawn, compared and led back, one after the other. */
-TL_INLINE double pass_rows(loss_pass *p, int64_t n_columns)
+/* Rows drawn, taken and led back, one after the other. */
+TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
 {
     const tl_grad_view *view = p->view;
     const int64_t n = view->width * n_columns;
-    const int64_t compared = view->first_row > 0 ? view->first_row - 1 : 0;
-    const int64_t compared_end = view->end_row < view->height ? view->end_row + 1 : view->height;
+    const int is_back = !p->l->out;
+    const int64_t taken = view->first_row > 0 && is_back ? view->first_row - 1 : view->first_row;
+    const int64_t taken_end = view->end_row < view->height && is_back ? view->end_row + 1 : view->end_row;
     double sum = 0.0;
     for (int64_t row = p->all.first_row; row < view->end_row + 2; row++) {
-        if (row - p->base == TL_LOSS_WINDOW) { /* two rows stay */
+        if (row - p->base == TL_ROWS_KEPT) { /* two rows stay */
             float *const windows[3] = {p->colors, p->g_out, p->g_color};
             for (int k = 0; k < 3; k++)
-                memcpy(windows[k], windows[k] + (TL_LOSS_WINDOW - 2) * n, (size_t)(2 * n) * sizeof(float));
+                memcpy(windows[k], windows[k] + (TL_ROWS_KEPT - 2) * n, (size_t)(2 * n) * sizeof(float));
             p->base = row - 2;
         }
-        if (row < p->all.end_row) {
+        if (row < p->all.end_row && !p->l->g_out) {
             draw_row(p, row, n_columns);
             blend_row(p, &p->all, row, 0);
         }
-        if (row > compared && row <= compared_end) {
-            const double found = compare_row(p, row - 1);
+        if (row > taken && row <= taken_end) {
+            const double found = take_row(p, row - 1);
             sum += row > view->first_row && row <= view->end_row ? found : 0.0;
-            if (row > view->first_row)
+            if (is_back && row > view->first_row)
                 blend_row(p, view, row - 1, 1);
         }
-        if (row - 2 >= view->first_row)
+        if (is_back && row - 2 >= view->first_row)
             pull_row(p, row - 2, n_columns);
     }
     return sum;
 }
 
 /* See kernels.h. */
-static double grad_loss(const tl_grad_view *view, const tl_grad_loss *l)
+static double grad_picture(const tl_grad_view *view, tl_grad_picture *l)
 {
-    loss_pass p = open_loss(view, l);
+    picture_pass p = open_pass(view, l);
     double sum;
-    list_faces(&p);
+    if (l->g_out)
+        take_faces(&p);
+    else
+        list_faces(&p);
     set_up_faces(&p);
-    list_met_pairs(&p);
+    if (!l->g_out)
+        list_met_pairs(&p);
     switch (l->n_columns) {
     case 1: sum = pass_rows(&p, 1); break;
     case 3: sum = pass_rows(&p, 3); break;
     default: sum = pass_rows(&p, l->n_columns);
     }
-    close_faces(&p);
+    if (l->out)
+        forget_band(l->faces);
+    else
+        close_faces(&p);
     return sum;
 }
 

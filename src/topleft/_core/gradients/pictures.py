@@ -1,0 +1,164 @@
+"""Pictures of attributes with smooth silhouettes in one, and backward: `points`, `values` and `smooth` of `tensors.py`.
+
+float32 takes a few rows at a time. The picture leaves what it has seen, so that backward need not look again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft._core import engine
+from topleft._core.base.arrays import INT32_MAX
+from topleft._core.base.memory import empty
+from topleft._core.gradients.bands import Array, Band, Room
+from topleft._core.gradients.tensors import (
+    EdgeRule,
+    Outline,
+    PixelGrid,
+    of,
+    points,
+    points_vjp,
+    smooth,
+    smooth_vjp,
+    values,
+    values_vjp,
+)
+
+
+class Seen(NamedTuple):
+    """What a band shows, as ``tl_grad_picture`` has it: runs of pixels, `faces` (FACE_ROWS, N), pairs."""
+
+    row_runs: NDArray[np.int64]
+    row_pairs: NDArray[np.int64]
+    begins: NDArray[np.int32]
+    run_faces: NDArray[np.int32]
+    faces: NDArray[np.int32]
+    pairs: NDArray[np.uint8]
+    steps: NDArray[np.float32]
+
+    @classmethod
+    def room(cls, n_rows: int, n_px: int, n_triangles: int, n_columns: int) -> Seen:
+        """Return memory for any band of so many rows and pixels."""
+        n_faces = min(n_triangles, n_px) + engine.IDS_ROOM
+        return cls(
+            empty((n_rows + 1,), np.int64),
+            empty((n_rows + 1,), np.int64),
+            empty((n_px + engine.IDS_ROOM,), np.int32),
+            empty((n_px + engine.IDS_ROOM,), np.int32),
+            empty((engine.FACE_ROWS, n_faces), np.int32),
+            empty((2 * n_px, engine.PAIR_BYTES), np.uint8),
+            empty((2 * n_px, n_columns), np.float32),
+        )
+
+    def copy(self, n_rows: int, n_faces: int) -> Seen:
+        """Return what was written, of so many rows and faces."""
+        n_runs, n_pairs = int(self.row_runs[n_rows]), int(self.row_pairs[n_rows])
+        return Seen(
+            self.row_runs[: n_rows + 1].copy(),
+            self.row_pairs[: n_rows + 1].copy(),
+            self.begins[:n_runs].copy(),
+            self.run_faces[:n_runs].copy(),
+            self.faces[:, : n_faces + engine.IDS_ROOM].copy(),
+            self.pairs[:n_pairs].copy(),
+            self.steps[:n_pairs].copy(),
+        )
+
+
+@dataclass(frozen=True)
+class AttributePictures:
+    """Pictures of attributes with smooth silhouettes.
+
+    `ids` (B, H, W): row 0 is on top. `pos` (B or 1, V, 4), `attr` (B or 1, V, K).
+    """
+
+    grid: PixelGrid
+    rule: EdgeRule
+    outline: Outline
+    pos: Array
+    ids: NDArray[np.int32]
+    attr: Array
+
+    @property
+    def is_in_rows(self) -> bool:
+        """Whether a few rows are taken at a time; lanes count in int32."""
+        return self.pos.dtype == np.float32 and self.attr.shape[1] * self.attr.shape[2] <= INT32_MAX
+
+    def parts(self) -> tuple[Array, Array]:
+        """Return `rast` and the colours."""
+        rast, _ = points(self.grid, self.pos, [(one, 0) for one in self.ids], is_flipped=True, with_db=False)
+        return rast, values(self.grid, self.attr, rast)[0]
+
+    def picture(self) -> tuple[Array, list[tuple[Seen, int]]]:
+        """Return the pictures (B, H, W, K); and of each band what it shows with its number of faces, for `vjp`."""
+        if not self.is_in_rows:
+            return smooth(self.grid, self.rule, self.outline, self.pos, *self.parts()), []
+        out = empty(self.grid.shape(self.attr.shape[2]), np.float32)
+        found = self.run([], lambda i: (out[i], None, None))
+        return out, [(seen, n_faces) for _, seen, n_faces in found]
+
+    def vjp(self, g_out: Array, seen: list[tuple[Seen, int]] | None = None) -> tuple[Array, Array]:
+        """Return the gradients of `pos` and `attr`; without `seen`, which `picture` returned, it draws again."""
+        if not self.is_in_rows:
+            rast, color = self.parts()
+            g_color, of_edges = smooth_vjp(self.grid, self.rule, self.outline, self.pos, rast, color, g_out)
+            g_attr, g_rast, _ = values_vjp(self.grid, self.attr, rast, g_color)
+            return points_vjp(self.grid, self.pos, rast, g_rast, None) + of_edges, g_attr
+        g_pos, g_attr = np.zeros_like(self.pos), np.zeros_like(self.attr)
+        self.run([g_pos, g_attr], lambda i: (None, g_out[i], None), self.picture()[1] if seen is None else seen)
+        return g_pos, g_attr
+
+    def squares(self, target: Array) -> tuple[float, Array, Array]:
+        """Return the mean squared difference from other pictures, and the gradients of `pos` and `attr`."""
+        n = max(1, target.size)
+        if not self.is_in_rows:
+            step = self.picture()[0] - target
+            return float(np.square(step).sum()) / n, *self.vjp(step * (2 / n))
+        g_pos, g_attr = np.zeros_like(self.pos), np.zeros_like(self.attr)
+        found = self.run([g_pos, g_attr], lambda i: (None, None, target[i]), weight=2 / n)
+        return sum(one for one, _, _ in found) / n, g_pos, g_attr
+
+    def run(
+        self,
+        outs: Sequence[Array],
+        pixels: Callable[[int], tuple[Array | None, Array | None, Array | None]],
+        seen: list[tuple[Seen, int]] | None = None,
+        weight: float = 0.0,
+    ) -> list[tuple[float, Seen, int]]:
+        """Call the engine for each band, and add the sums to `outs`; returns what it does, and what bands show.
+
+        `seen` where `pixels` are gradients; it is kept where they are a picture.
+        """
+        n, width, n_triangles = self.attr.shape[2], self.grid.width, len(self.grid.tri)
+        numbers = {band: i for i, band in enumerate(self.grid.bands.all)}
+
+        def make(room: Room) -> list[Any]:
+            beyond = room.n_px + 4 * width
+            around = Room(room.number, beyond)
+            return [
+                around.sums("points", self.pos.shape[1], 4, 9),
+                around.sums("rows", self.attr.shape[1], n, 3),
+                around.sums("faces", n_triangles, 12 + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
+                None if seen else Seen.room(beyond // max(1, width), beyond, n_triangles, n),
+                empty((3, width + engine.IDS_ROOM), np.int32),
+                empty((3 * (engine.ROWS_KEPT * width * n + engine.IDS_ROOM),), np.float32),
+                empty((4 * width,), np.float32),
+            ]
+
+        def work(band: Band, made: list[Any]) -> tuple[float, Seen, int]:
+            i, (points, rows, faces, room, *scratch) = band.picture, made
+            own, n_faces = seen[numbers[band]] if seen else (room, 0)
+            of_pixels = pixels(i)
+            found, n_faces = self.grid.view(of(self.pos, i)).picture(
+                self.ids[i], of(self.attr, i), self.outline.of_picture(i), (int(self.rule), weight), of_pixels, own,
+                n_faces, tuple(scratch), (faces, points, rows), band.first, band.end,
+            )  # fmt: skip
+            n_rows = min(band.end + 1, self.grid.height) - max(band.first - 1, 0)
+            is_picture = of_pixels[0] is not None and n > 0
+            return found, own.copy(n_rows, n_faces) if is_picture else own, n_faces
+
+        return self.grid.bands.add_up_all(make, work, outs)

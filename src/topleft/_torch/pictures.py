@@ -1,0 +1,153 @@
+"""Operators of PyTorch that draw attributes with smooth silhouettes in one, and what backward calls.
+
+`threads` is that of a context, 0 where PyTorch's number counts.
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from topleft import rasterize as draw
+from topleft._core.gradients import tensors
+from topleft._core.gradients.pictures import AttributePictures, Seen
+from topleft._core.gradients.tensors import EdgeRule, PixelGrid
+from topleft._torch.operators import each, joined, like, numpy_of, once, operator, threads_of, triangles_of
+
+#: The sizes of pictures and what they show, by the address of the ids, for as long as these live.
+kept: dict[int, tuple[list[Any], list[tuple[Seen, int]]]] = {}
+
+
+def sizes_of(pictures: AttributePictures) -> list[Any]:
+    """Return the shapes of the arrays of pictures."""
+    return [one.shape for one in (pictures.ids, pictures.pos, pictures.attr, pictures.grid.tri)]
+
+
+def keep_seen(pictures: AttributePictures, seen: list[tuple[Seen, int]]) -> None:
+    """Keep what pictures show for as long as their ids."""
+    ids = pictures.ids
+    if seen and ids.size:
+        kept[ids.ctypes.data] = sizes_of(pictures), seen
+        weakref.finalize(ids if ids.base is None else ids.base, kept.pop, ids.ctypes.data, None)
+
+
+def kept_seen(pictures: AttributePictures) -> list[tuple[Seen, int]] | None:
+    """Return what pictures show, None where the ids are a copy."""
+    sizes, seen = kept.get(pictures.ids.ctypes.data, (None, None))
+    return seen if sizes == sizes_of(pictures) else None
+
+
+def draw_edges(pos: Tensor, tri: Tensor, across: Tensor, height: int, width: int, threads: int) -> tuple[Any, Any]:
+    """Return the ids of pictures, row 0 on top, and their outlines."""
+    n = threads_of(threads, height * width)
+    drawn = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, None)]
+    grid = PixelGrid(triangles_of(tri, pos.shape[1]), len(pos), height, width, n)
+    return joined(drawn, (height, width)), tensors.outline_of(grid, numpy_of(pos), numpy_of(across.to(torch.int32)))
+
+
+def pictures_of(
+    pos: Tensor, tri: Tensor, attr: Tensor, ids: Any, outline: tensors.Outline, rule: int, threads: int
+) -> AttributePictures:
+    """Return what the engine draws of a mesh, and leads back."""
+    triangles = triangles_of(tri, min(pos.shape[1], attr.shape[1]))
+    grid = PixelGrid(triangles, len(ids), ids.shape[1], ids.shape[2], threads_of(threads, math.prod(ids.shape)))
+    return AttributePictures(grid, EdgeRule(rule), outline, numpy_of(pos), ids, numpy_of(attr))
+
+
+@operator(
+    "(Tensor pos, Tensor tri, Tensor attr, Tensor target, Tensor across, int rule, int threads)"
+    " -> (Tensor, Tensor, Tensor)",
+    lambda pos, tri, attr, target, across, rule, threads: (  # noqa: ARG005
+        pos.new_empty(()),
+        like(pos, pos),
+        like(attr, attr),
+    ),
+)
+def squares(
+    pos: Tensor, tri: Tensor, attr: Tensor, target: Tensor, across: Tensor, rule: int, threads: int
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return the mean squared difference from pictures, and the gradients of `pos` and `attr`."""
+    ids, edges = draw_edges(pos, tri, across, target.shape[1], target.shape[2], threads)
+    loss, *gradients = pictures_of(pos, tri, attr, ids, edges, rule, threads).squares(numpy_of(target))
+    g_pos, g_attr = map(torch.from_numpy, gradients)
+    return torch.tensor(loss, dtype=pos.dtype), g_pos, g_attr
+
+
+@operator(
+    "(Tensor pos, Tensor tri, Tensor attr, Tensor across, int height, int width, int rule, int threads)"
+    " -> (Tensor, Tensor, Tensor, Tensor)",
+    lambda pos, tri, attr, across, height, width, rule, threads: (  # noqa: ARG005
+        pos.new_empty((len(pos), height, width, attr.shape[2])),
+        pos.new_empty((len(pos), height, width), dtype=torch.int32),
+        pos.new_empty((*pos.shape[:2], 2), dtype=torch.float64),
+        tri.new_empty((len(pos), len(tri)), dtype=torch.int32),
+    ),
+)
+def draw_attributes(
+    pos: Tensor, tri: Tensor, attr: Tensor, across: Tensor, height: int, width: int, rule: int, threads: int
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return pictures of attributes with smooth silhouettes; their ids, and what `outline` returns."""
+    ids, edges = draw_edges(pos, tri, across, height, width, threads)
+    pictures = pictures_of(pos, tri, attr, ids, edges, rule, threads)
+    drawn, seen = pictures.picture()
+    keep_seen(pictures, seen)
+    return torch.from_numpy(drawn), torch.from_numpy(ids), torch.from_numpy(edges.places), torch.from_numpy(edges.edges)
+
+
+@operator(
+    "(Tensor pos, Tensor tri, Tensor attr, Tensor ids, Tensor[] outline, int rule, int threads, Tensor g_out)"
+    " -> (Tensor, Tensor)",
+    lambda pos, tri, attr, ids, outline, rule, threads, g_out: (like(pos, pos), like(attr, attr)),  # noqa: ARG005
+)
+def draw_attributes_vjp(
+    pos: Tensor,
+    tri: Tensor,
+    attr: Tensor,
+    ids: Tensor,
+    outline: Sequence[Tensor],
+    rule: int,
+    threads: int,
+    g_out: Tensor,
+) -> tuple[Tensor, Tensor]:
+    """Return the gradients of `pos` and `attr`."""
+    edges = tensors.Outline(*map(numpy_of, outline))
+    pictures = pictures_of(pos, tri, attr, numpy_of(ids), edges, rule, threads)
+    g_pos, g_attr = pictures.vjp(numpy_of(g_out), kept_seen(pictures))
+    return torch.from_numpy(g_pos), torch.from_numpy(g_attr)
+
+
+def keep_squares(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:  # noqa: ARG001
+    """Keep the gradients, which `squares` has found."""
+    ctx.set_materialize_grads(False)
+    ctx.mark_non_differentiable(*output[1:])
+    ctx.save_for_backward(*output[1:])
+
+
+def pull_squares(ctx: Any, g_loss: Tensor, *_: Any) -> tuple[Any, ...]:
+    """Return the gradients of what `squares` takes."""
+    g_pos, g_attr = ctx.saved_tensors
+    return g_loss * g_pos, None, g_loss * g_attr, None, None, None, None
+
+
+def keep_pictures(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:
+    """Keep what `draw_attributes_vjp` takes."""
+    pos, tri, attr, across, _, _, ctx.rule, ctx.threads = inputs
+    ctx.mark_non_differentiable(*output[1:])
+    ctx.save_for_backward(pos, tri, attr, output[1], across.to(torch.int32), *output[2:])
+
+
+def pull_pictures(ctx: Any, g_out: Tensor, *_: Any) -> tuple[Any, ...]:
+    """Return the gradients of what `draw_attributes` takes."""
+    pos, tri, attr, ids, *outline = ctx.saved_tensors
+    g_pos, g_attr = draw_attributes_vjp(pos, tri, attr, ids, outline, ctx.rule, ctx.threads, g_out)
+    return g_pos, None, g_attr, None, None, None, None, None
+
+
+squares.register_autograd(pull_squares, setup_context=keep_squares)
+draw_attributes.register_autograd(pull_pictures, setup_context=keep_pictures)
+draw_attributes_vjp.register_autograd(once)
