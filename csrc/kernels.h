@@ -81,10 +81,10 @@ typedef struct tl_kernels {
      * rounded to 2^-bits px, and those beyond 2^62 of these cannot be drawn. */
     int64_t (*take_points)(const tl_source *source, int64_t first, int64_t end, int bits, double *points);
 
-    /* The clip space, or object space by the matrix, of vertices [first, end) to points in pixels, not snapped,
-     * TL_PLACED numbers each.  One that cannot be drawn has x NaN, and y says why: a tl_special. */
-    tl_vertex_counts (*project_points)(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-                                       double *points);
+    /* As project.  Points have TL_PLACED numbers each; one that cannot be drawn has x NaN, and y says why: a
+     * tl_special. */
+    tl_vertex_counts (*project_to)(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                   const tl_projected *out);
 
     /* Cuts the triangles that have such a vertex; with pieces->points NULL only counts. */
     void (*clip_points)(const tl_source *source, const double *points, const int32_t *triangles, int64_t n_triangles,

@@ -67,6 +67,16 @@ typedef struct {
     int64_t n_bad, n_wide, n_clipped;
 } tl_vertex_counts;
 
+/* Where projected vertices go: records, with a table of wide ones or NULL; or, not snapped, points (n, TL_PLACED). */
+typedef struct {
+    tl_vertex *records;
+    tl_wide *wide;
+    double *points;
+    /* rows of four numbers, one a vertex, that go to seen_rows with 1/w in place of the fourth; or NULL */
+    const float *rows;
+    float *seen_rows;
+} tl_projected;
+
 /* ---- clip space ---------------------------------------------------------------------------------------- */
 
 typedef struct {

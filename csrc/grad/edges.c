@@ -116,7 +116,7 @@ static void pull_straight(const tl_grad_view *view, const tl_grad_edges *e, cons
     }
 }
 
-/* Ids of a row of pixels: -1 for none, less for a number that is no triangle's. */
+/* Ids of a row of pixels: -1 for none, less for a number that is no triangle's, and in a vector beyond the row. */
 TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *ids, int is_f64)
 {
     const int64_t first = row * view->width;
@@ -132,6 +132,7 @@ TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_
         const int32_t id = id_of_label(get_label(e->rast, first + x, is_f64), is_f64);
         ids[x] = id < view->n_triangles ? id : TL_NO_ID;
     }
+    vi_store(ids + view->width, vi_set1(TL_NO_ID));
 }
 
 /* Whether the surface plainly runs on from one triangle to another, or neither has an edge that counts. */
@@ -151,7 +152,7 @@ TL_INLINE vm runs_on(const tl_grad_edges *e, vm m, vi id, vi other, vi outlines)
     return found;
 }
 
-/* Lists the columns below n where two rows of ids have a pair to look at; returns how many. */
+/* Lists the columns where two rows of n ids have a pair to look at; returns how many. */
 TL_INLINE int64_t list_pairs(const tl_grad_edges *e, const int32_t *ids, const int32_t *others, int64_t n,
                              int32_t *columns)
 {
@@ -159,8 +160,7 @@ TL_INLINE int64_t list_pairs(const tl_grad_edges *e, const int32_t *ids, const i
     int64_t n_listed = 0, n_found = 0;
     for (int64_t x = 0; x < n; x += TL_LANES) {
         const vi id = vi_load(ids + x), other = vi_load(others + x);
-        const vm differs = vm_and_not(vm_first(n - x), vi_eq(id, other));
-        const vm m = vm_and(differs, vm_and(vi_gt(id, beyond), vi_gt(other, beyond)));
+        const vm m = vm_and_not(vm_and(vi_gt(id, beyond), vi_gt(other, beyond)), vi_eq(id, other));
         vi_compress(columns + n_listed, m, vi_add(vi_iota(), vi_set1((int32_t)x)));
         n_listed += __builtin_popcount(vm_bits(m));
     }

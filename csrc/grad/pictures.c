@@ -56,17 +56,19 @@ static picture_pass open_pass(const tl_grad_view *view, tl_grad_picture *l)
     return p;
 }
 
-/* The ids of a row with room beyond: -1 for none, less for what is no triangle. */
+/* The ids of a row: -1 for none, less for what is no triangle and in a vector beyond. */
 TL_INLINE void copy_ids(const picture_pass *p, int64_t row, int32_t *ids)
 {
     const int32_t *from = p->l->ids + p->l->step * row;
-    const vi end = vi_set1(clamped_to_int(p->view->n_triangles)), none = vi_set1(-1);
-    for (int64_t x = 0; x < p->view->width; x += TL_LANES) {
-        const int64_t n = p->view->width - x;
-        vi id = n < TL_LANES ? vi_load_masked(vm_first(n), from + x) : vi_load(from + x);
-        id = vi_select(vi_gt(id, none), id, none);
-        vi_store(ids + x, vi_select(vi_gt(end, id), id, vi_set1(TL_NO_ID)));
+    const vi end = vi_set1(clamped_to_int(p->view->n_triangles)), none = vi_set1(-1), beyond = vi_set1(TL_NO_ID);
+    const int64_t n_whole = p->view->width / TL_LANES * TL_LANES, n_left = p->view->width - n_whole;
+    for (int64_t x = 0; x < n_whole; x += TL_LANES) {
+        const vi id = vi_max(vi_load(from + x), none);
+        vi_store(ids + x, vi_select(vi_gt(end, id), id, beyond));
     }
+    const vi id = vi_max(vi_load_masked(vm_first(n_left), from + n_whole), none);
+    vi_store(ids + n_whole, vi_select(vm_and(vm_first(n_left), vi_gt(end, id)), id, beyond));
+    vi_store(ids + p->view->width, beyond);
 }
 
 /* The face of a triangle that a pixel shows; -1 if its corners do not exist. */
@@ -97,11 +99,12 @@ static void list_faces(picture_pass *p)
         copy_ids(p, row, ids);
         for (int64_t x = 0; x < p->view->width; x += TL_LANES) {
             const vi id = vi_load(ids + x);
-            const vm starts = vm_and_not(vm_first(p->view->width - x), vi_eq(id, vi_shift_in(id, before)));
+            const vm starts = vm_and_not(vm_all(), vi_eq(id, vi_shift_in(id, before)));
             vi_compress(p->l->begins + n_runs, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
             n_runs += __builtin_popcount(vm_bits(starts));
             before = id;
         }
+        n_runs -= n_runs > first && p->l->begins[n_runs - 1] == p->view->width;
         for (int64_t r = first; r < n_runs; r++)
             p->faces[r] = 2 * find_face(p, ids[p->l->begins[r]], p->l->begins[r], row);
     }
@@ -246,8 +249,8 @@ static void blend_row(const picture_pass *p, const tl_grad_view *view, int64_t r
     const int64_t n = p->l->n_columns, before = p->base * p->view->width * n;
     tl_grad_edges e = p->l->edges;
     e.color = (const void *)((uintptr_t)p->colors - 4 * (uintptr_t)before);
-    e.out = (void *)((uintptr_t)p->g_out - 4 * (uintptr_t)before);
-    e.g_out = is_back ? e.out : 0;
+    e.out = p->l->out ? (void *)p->l->out : (void *)((uintptr_t)p->g_out - 4 * (uintptr_t)before);
+    e.g_out = !is_back ? 0 : p->l->g_out ? p->l->g_out : e.out;
     e.g_color = (void *)((uintptr_t)p->g_color - 4 * (uintptr_t)before);
     row -= p->all.first_row;
     for (int64_t i = p->l->row_pairs[row]; i < p->l->row_pairs[row + 1]; i++) {
@@ -355,58 +358,59 @@ TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
         for (int64_t c = 0; c < n_columns; c += 3)
             draw_three(p, face, c, n_columns - c < 3 ? (int)(n_columns - c) : 3, n_columns, x, y, run.n, to);
     }
-    memcpy(p->g_out + (row - p->base) * n, colors, (size_t)n * sizeof *colors);
+    if (!p->l->out)
+        memcpy(p->g_out + (row - p->base) * n, colors, (size_t)n * sizeof *colors);
+    else if (row >= p->view->first_row && row < p->view->end_row)
+        memcpy(p->l->out + row * n, colors, (size_t)n * sizeof *colors);
 }
 
-/* Writes the gradient of 16 numbers over them, and again; returns their squares. */
-TL_INLINE vq4 compare_some(float *out, float *again, const float *target, vq4 scale)
+/* Writes the gradient of sixteen numbers over them, and again; adds the squares of their differences. */
+TL_INLINE void compare_some(float *out, float *again, const float *target, vf scale, vf *squares)
 {
-    const vq4 step = vq4_sub(vq4_load(out, 4, 4), vq4_load(target, 4, 4)), g = vq4_mul(step, scale);
-    vq4_store(out, g, 4, 4);
-    vq4_store(again, g, 4, 4);
-    return vq4_mul(step, step);
+    for (int k = 0; k < 16; k += TL_LANES) {
+        const vf step = vf_sub(vf_load(out + k), vf_load(target + k)), g = vf_mul(step, scale);
+        vf_store(out + k, g), vf_store(again + k, g);
+        squares[k / TL_LANES] = vf_add(squares[k / TL_LANES], vf_mul(step, step));
+    }
 }
 
-/* The same of a row; squares are summed up in float32, each eight in float64. */
+/* The same of a row; returns the sum of squares, of which each eight are summed up in float32. */
 static double compare_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
     float *restrict out = p->g_out + (row - p->base) * n, *restrict again = p->g_color + (row - p->base) * n;
     const float *restrict target = p->l->target + row * n;
-    const vq4 scale = vq4_all(vq_set1((float)p->l->scale));
+    const vf scale = vf_set1((float)p->l->scale);
     double sum = 0.0;
     for (int64_t first = 0; first < n; first += 128) {
-        vq4 squares = vq4_all(vq_set1(0.0f));
-        float some[4], last[3][16] = {{0}};
+        vf squares[16 / TL_LANES];
+        float some[16], last[3][16] = {{0}};
         int64_t i = first;
+        for (int k = 0; k < 16 / TL_LANES; k++)
+            squares[k] = vf_set1(0.0f);
         for (; i + 16 <= n && i < first + 128; i += 16)
-            squares = vq4_add(squares, compare_some(out + i, again + i, target + i, scale));
+            compare_some(out + i, again + i, target + i, scale, squares);
         if (i < n && i < first + 128) {
             const size_t size = (size_t)(n - i) * sizeof(float);
             memcpy(last[0], out + i, size), memcpy(last[2], target + i, size);
-            squares = vq4_add(squares, compare_some(last[0], last[1], last[2], scale));
+            compare_some(last[0], last[1], last[2], scale, squares);
             memcpy(out + i, last[0], size), memcpy(again + i, last[1], size);
         }
-        vq_store(some, vq4_fold(squares));
-        sum += ((double)some[0] + (double)some[2]) + ((double)some[1] + (double)some[3]);
+        for (int k = 0; k < 16 / TL_LANES; k++)
+            vf_store(some + k * TL_LANES, squares[k]);
+        for (int k = 0; k < 8; k++)
+            sum += (double)(some[k] + some[k + 8]);
     }
     return sum;
 }
 
-/* Takes a row that is finished: to the picture, beside the other one, or its gradients as given. */
+/* Takes a row of gradients: those beside the other picture, or as given. */
 static double take_row(const picture_pass *p, int64_t row)
 {
-    const tl_grad_picture *l = p->l;
-    const int64_t n = p->view->width * l->n_columns, at = (row - p->base) * n;
-    const size_t size = (size_t)n * sizeof(float);
-    if (l->target)
+    const int64_t n = p->view->width * p->l->n_columns;
+    if (p->l->target)
         return compare_row(p, row);
-    if (l->out) {
-        memcpy(l->out + row * n, p->g_out + at, size);
-        return 0.0;
-    }
-    memcpy(p->g_out + at, l->g_out + row * n, size);
-    memcpy(p->g_color + at, l->g_out + row * n, size);
+    memcpy(p->g_color + (row - p->base) * n, p->l->g_out + row * n, (size_t)n * sizeof(float));
     return 0.0;
 }
 
@@ -469,14 +473,14 @@ static void close_faces(const picture_pass *p)
     close_colors(p->view, &colors, 2 * FACE_PLANE, 2 * FACE_PLANE, 1);
 }
 
-/* Rows drawn, taken and led back, one after the other. */
+/* Rows drawn, their gradients taken and led back, one after the other. */
 TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
 {
     const tl_grad_view *view = p->view;
     const int64_t n = view->width * n_columns;
     const int is_back = !p->l->out;
-    const int64_t taken = view->first_row > 0 && is_back ? view->first_row - 1 : view->first_row;
-    const int64_t taken_end = view->end_row < view->height && is_back ? view->end_row + 1 : view->end_row;
+    const int64_t taken = view->first_row > 0 ? view->first_row - 1 : 0;
+    const int64_t taken_end = view->end_row < view->height ? view->end_row + 1 : view->height;
     double sum = 0.0;
     for (int64_t row = p->all.first_row; row < view->end_row + 2; row++) {
         if (row - p->base == TL_ROWS_KEPT) { /* two rows stay */
@@ -487,12 +491,12 @@ TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
         }
         if (row < p->all.end_row && !p->l->g_out) {
             draw_row(p, row, n_columns);
-            blend_row(p, &p->all, row, 0);
+            blend_row(p, is_back ? &p->all : view, row, 0);
         }
-        if (row > taken && row <= taken_end) {
+        if (is_back && row > taken && row <= taken_end) {
             const double found = take_row(p, row - 1);
             sum += row > view->first_row && row <= view->end_row ? found : 0.0;
-            if (is_back && row > view->first_row)
+            if (row > view->first_row)
                 blend_row(p, view, row - 1, 1);
         }
         if (is_back && row - 2 >= view->first_row)

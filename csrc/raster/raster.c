@@ -216,8 +216,10 @@ TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const 
     const void *vertices = g == TL_FIXED ? (const void *)s->snapped->mesh.vertices : (const void *)s->points->points;
     const size_t n_bytes = g == TL_FIXED ? sizeof(tl_vertex) : (size_t)s->points->stride * sizeof(double);
     const tl_snapped *snapped = s->snapped;
-    int32_t corners[3 * TL_LANES];
-    int is_given_up = 0;
+    /* of this batch and of the next: it takes a while until a number of a vector that was stored can be loaded */
+    int32_t corners[2][3 * TL_LANES];
+    int is_given_up = 0, turn = 0;
+    slice_corners(snapped, part, part->first, corners[0]);
     for (int64_t i = part->first; i < part->end && s->bad_row < 0 && !is_given_up; i += TL_LANES) {
         tl_count_work(s->window, TL_SETUP_PX * TL_LANES);
         is_given_up = tl_is_given_up(s->window);
@@ -227,7 +229,9 @@ TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const 
             fetch_rows(vertices, n_bytes, snapped->triangles + 3 * (i + 4 * TL_LANES));
         if (TL_LANES > 1 && g == TL_FIXED && part->ids && i + 9 * TL_LANES <= part->end)
             fetch_listed(vertices, n_bytes, snapped->triangles, part->ids + i);
-        draw_batch(s, g, sink, slice_corners(snapped, part, i, corners), id, live);
+        slice_corners(snapped, part, i + TL_LANES, corners[!turn]);
+        draw_batch(s, g, sink, corners[turn], id, live);
+        turn = !turn;
         if (g == TL_FLOAT && __builtin_expect(s->n_slivers > 0, 0))
             draw_slivers(s);
     }

@@ -111,32 +111,6 @@ static void shade(const tl_shaded_scene *scene, const tl_window *window, const i
     }
 }
 
-/* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
-static void set_inverse_w(const tl_source *source, const float *rows, int64_t first, int64_t end, float *restrict out)
-{
-    int64_t i = first;
-    for (; TL_LANES > 1 && source->matrix && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
-        vf inv_w;
-        if (source->scalar == TL_F32) {
-            vf p[4];
-            clip_lanes_f32((const float *)source->data + 3 * i, (const float *)source->matrix, 3, p);
-            inv_w = vf_div(vf_set1(1.0f), p[3]);
-        } else {
-            vd p[4];
-            clip_lanes_f64((const double *)source->data + 3 * i, (const double *)source->matrix, 3, p);
-            inv_w = vf_from_vd(vd_div(vd_set1(1.0), p[3]));
-        }
-        vf_store_fourths(rows + 4 * i, inv_w, out + 4 * i);
-    }
-    for (; i < end; i++) {
-        double p[4];
-        clip_position(source, i, p);
-        for (int k = 0; k < 3; k++)
-            out[4 * i + k] = rows[4 * i + k];
-        out[4 * i + 3] = source->scalar == TL_F32 ? 1.0f / (float)p[3] : (float)(1.0 / p[3]);
-    }
-}
-
 /* The unit normals of n pixels of a span from `column` on, with their runs set: a plane an axis. */
 TL_INLINE void find_unit_normals(const shade_runs *s, int n, int64_t column, float (*planes)[TL_SPAN_ROOM], int first)
 {

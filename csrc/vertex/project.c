@@ -80,13 +80,6 @@ static inline void store_projected(const double *p, const tl_view *view, int64_t
     store_vertex(rint(at[0] * unit), rint(at[1] * unit), at[2], i, out, wide, counts);
 }
 
-/* Where vertices go: records, with a table of wide ones or NULL; or, not snapped, points (n, TL_PLACED). */
-typedef struct {
-    tl_vertex *records;
-    tl_wide *wide;
-    double *points;
-} projected_vertices;
-
 static inline void set_placed(double *point, double x, double y, double z, int32_t x_fx, int32_t y_fx)
 {
     const int32_t place[2] = {x_fx, y_fx};
@@ -102,7 +95,7 @@ static inline int32_t place_of(double v)
 }
 
 /* A vertex that is not drawn where it lies. */
-static inline void store_special(const projected_vertices *out, int64_t i, tl_special what)
+static inline void store_special(const tl_projected *out, int64_t i, tl_special what)
 {
     double *point = out->points + TL_PLACED * i;
     if (!out->points)
@@ -112,7 +105,7 @@ static inline void store_special(const projected_vertices *out, int64_t i, tl_sp
 }
 
 /* One vertex, whatever it is. */
-static void project_one(const tl_source *source, int64_t i, const tl_view *view, const projected_vertices *out,
+static void project_one(const tl_source *source, int64_t i, const tl_view *view, const tl_projected *out,
                         tl_vertex_counts *counts)
 {
     double p[4];
@@ -160,6 +153,32 @@ TL_INLINE void clip_lanes_f64(const double *data, const double *m, int stride, v
     }
 }
 
+/* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
+static void set_inverse_w(const tl_source *source, const float *rows, int64_t first, int64_t end, float *restrict out)
+{
+    int64_t i = first;
+    for (; TL_LANES > 1 && source->matrix && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
+        vf inv_w;
+        if (source->scalar == TL_F32) {
+            vf p[4];
+            clip_lanes_f32((const float *)source->data + 3 * i, (const float *)source->matrix, 3, p);
+            inv_w = vf_div(vf_set1(1.0f), p[3]);
+        } else {
+            vd p[4];
+            clip_lanes_f64((const double *)source->data + 3 * i, (const double *)source->matrix, 3, p);
+            inv_w = vf_from_vd(vd_div(vd_set1(1.0), p[3]));
+        }
+        vf_store_fourths(rows + 4 * i, inv_w, out + 4 * i);
+    }
+    for (; i < end; i++) {
+        double p[4];
+        clip_position(source, i, p);
+        for (int k = 0; k < 3; k++)
+            out[4 * i + k] = rows[4 * i + k];
+        out[4 * i + 3] = source->scalar == TL_F32 ? 1.0f / (float)p[3] : (float)(1.0 / p[3]);
+    }
+}
+
 /* Lanes inside the planes of w, near and far; a sum and its rounding have the same sign, so these are the tests of
  * plane_distance.  Whatever lands within 2^30 sub-pixels is inside the guard band. */
 TL_INLINE vm inside_lanes(const vd *p, const tl_view *view)
@@ -199,8 +218,8 @@ TL_INLINE vm store_points(double *out, vd x, vd y, vd z)
 
 /* Names that begin with `scalar` are constants: a copy for each keeps the matrix in registers. */
 TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-                                const projected_vertices *out, tl_vertex_counts *counts, tl_scalar scalar,
-                                int has_matrix, int is_affine, int is_snapped)
+                                const tl_projected *out, tl_vertex_counts *counts, tl_scalar scalar, int has_matrix,
+                                int is_affine, int is_snapped)
 {
     const double unit = is_snapped ? (double)(1 << view->subpixel_bits) : 1.0;
     const vd one = vd_set1(1.0), half = vd_set1(0.5), largest = vd_set1(FLT_MAX);
@@ -226,6 +245,11 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
             clip_lanes_f64((const double *)source->data + i * stride, has_matrix ? m64 : NULL, stride, p);
             good = inside_lanes(p, view);
         }
+        if (out->rows) /* vd_quotients has the inverse of float64, too */
+            vf_store_fourths(out->rows + 4 * i,
+                             scalar == TL_F32 ? vf_div(vf_set1(1.0f), vf_from_vd(p[3]))
+                                              : vf_from_vd(vd_div(vd_set1(1.0), p[3])),
+                             out->seen_rows + 4 * i);
         if (is_affine)
             ndc[0] = p[0], ndc[1] = p[1], ndc[2] = p[2];
         else
@@ -248,7 +272,7 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
 }
 
 TL_INLINE tl_vertex_counts project_all(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-                                       const projected_vertices *out, int is_snapped)
+                                       const tl_projected *out, int is_snapped)
 {
     tl_vertex_counts counts = {0, 0, 0};
     int64_t i = first;
@@ -260,21 +284,23 @@ TL_INLINE tl_vertex_counts project_all(const tl_source *source, int64_t first, i
         i = source->is_affine ? project_lanes(source, first, end, view, out, &counts, TL_F64, 1, 1, is_snapped)
             : source->matrix  ? project_lanes(source, first, end, view, out, &counts, TL_F64, 1, 0, is_snapped)
                               : project_lanes(source, first, end, view, out, &counts, TL_F64, 0, 0, is_snapped);
+    if (out->rows)
+        set_inverse_w(source, out->rows, i, end, out->seen_rows);
     for (; i < end; i++)
         project_one(source, i, view, out, &counts);
     return counts;
 }
 
+static tl_vertex_counts project_to(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                   const tl_projected *out)
+{
+    return out->points ? project_all(source, first, end, view, out, 0) : project_all(source, first, end, view, out, 1);
+}
+
 static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
                                 tl_vertex *out, tl_wide *wide)
 {
-    return project_all(source, first, end, view, &(projected_vertices){out, wide, NULL}, 1);
-}
-
-static tl_vertex_counts project_points(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-                                       double *points)
-{
-    return project_all(source, first, end, view, &(projected_vertices){NULL, NULL, points}, 0);
+    return project_to(source, first, end, view, &(tl_projected){.records = out, .wide = wide});
 }
 
 #endif

@@ -35,6 +35,14 @@ cdef object as_float32(const double[:, ::1] matrix):
     return rounded.base
 
 
+cdef inline tl_projected points_to(double *points) noexcept nogil:
+    """Where points go that are not snapped."""
+    cdef tl_projected out
+    memset(&out, 0, sizeof(out))
+    out.points = points
+    return out
+
+
 cdef class Source:
     """The caller's (V, C) vertices, contiguous float32, float64 or int64, and the matrix that takes them to clip space."""
 
@@ -95,9 +103,10 @@ cdef class Source:
 
     def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points) -> tuple[int, int]:
         """Project vertices [first, end) to points (V, PLACED); returns the numbers of bad and of clipped ones, x NaN."""
+        cdef tl_projected out = points_to(&points[0, 0])
         cdef tl_vertex_counts counts
         with nogil:
-            counts = K.project_points(&self.source, first, end, &viewport.view, &points[0, 0])
+            counts = K.project_to(&self.source, first, end, &viewport.view, &out)
         return counts.n_bad, counts.n_clipped
 
     def project_blocks(self, const uint8_t[::1] is_used, Viewport viewport,

@@ -97,8 +97,10 @@ def joined(SnappedMesh like, room: Array, const int32_t[:, ::1] triangles) -> Sn
 cdef inline tl_vertex_counts project_whole(const tl_source *source, Viewport viewport, uint8_t *place,
                                            bint is_exact) noexcept nogil:
     """Project all vertices of a mesh into points or records."""
+    cdef tl_projected out
     if is_exact:
-        return K.project_points(source, 0, source.n, &viewport.view, <double *>place)
+        out = points_to(<double *>place)
+        return K.project_to(source, 0, source.n, &viewport.view, &out)
     return K.project(source, 0, source.n, &viewport.view, <tl_vertex *>place, NULL)
 
 

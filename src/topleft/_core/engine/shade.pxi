@@ -1,9 +1,5 @@
 # Shades pixels and tests their alpha: textures, materials and lights, and the passes that use them.
 
-cdef enum:
-    PROJECTED_BLOCK = 1 << 10  # vertices that are read twice while they are in the first cache
-
-
 cdef class Mipmap:
     """A picture of linear light and its halves: uint16 texels as `tl_texture` has them, a row (offset, width, height) a level."""
 
@@ -333,7 +329,7 @@ cdef int set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1]
     """
     cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
     if isinstance(mesh, WaitingMesh):
-        (<WaitingMesh>mesh).rows, (<WaitingMesh>mesh).seen_rows = &rows[0, 0], &out[0, 0]
+        (<WaitingMesh>mesh).projected.rows, (<WaitingMesh>mesh).projected.seen_rows = &rows[0, 0], &out[0, 0]
         mesh.arrays = mesh.arrays, rows, out
         return 0
     if mesh.is_used is None:
@@ -355,24 +351,25 @@ cdef int set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1]
     return 0
 
 
+cdef enum:
+    PROJECTED_BLOCK = 1 << 12  # vertices that are projected before a look whether one of them is clipped
+
+
 cdef class WaitingMesh(SnappedMesh):
     """A mesh with room for its snapped vertices, which `ShadedScene.draw` fills."""
 
-    cdef const float *rows  # those of `set_inverse_w`, and where they go; NULL: there are none
-    cdef float *seen_rows
+    cdef tl_projected projected
 
     cdef bint project(self) noexcept nogil:
-        """Project the vertices, block by block with their 1/w; tells whether all of them are drawn where they lie."""
+        """Project the vertices with their 1/w; tells whether all of them are drawn where they lie."""
         cdef const tl_source *source = self.snapped.mesh.source
         cdef tl_vertex_counts counts
-        cdef int64_t i, end, n = source.n
-        for i from 0 <= i < n by PROJECTED_BLOCK:
-            end = min(i + <int64_t>PROJECTED_BLOCK, n)
-            counts = K.project(source, i, end, self.clip_view(), <tl_vertex *>self.snapped.mesh.vertices, NULL)
+        cdef int64_t i
+        self.projected.records = <tl_vertex *>self.snapped.mesh.vertices
+        for i from 0 <= i < source.n by PROJECTED_BLOCK:
+            counts = K.project_to(source, i, min(i + PROJECTED_BLOCK, source.n), self.clip_view(), &self.projected)
             if counts.n_bad or counts.n_wide or counts.n_clipped:
                 return False
-            if self.rows != NULL:
-                K.set_inverse_w(source, self.rows, i, end, self.seen_rows)
         return True
 
 

@@ -134,7 +134,8 @@ class AttributePictures:
         `seen` where `pixels` are gradients; it is kept where they are a picture.
         """
         n, width, n_triangles = self.attr.shape[2], self.grid.width, len(self.grid.tri)
-        numbers = {band: i for i, band in enumerate(self.grid.bands.all)}
+        bands, views = self.grid.bands, self.grid.views(self.pos)
+        numbers = {band: i for i, band in enumerate(bands.all)}
 
         def make(room: Room) -> list[Any]:
             beyond = room.n_px + 4 * width
@@ -153,7 +154,7 @@ class AttributePictures:
             i, (points, rows, faces, room, *scratch) = band.picture, made
             own, n_faces = seen[numbers[band]] if seen else (room, 0)
             of_pixels = pixels(i)
-            found, n_faces = self.grid.view(of(self.pos, i)).picture(
+            found, n_faces = views[i].picture(
                 self.ids[i], of(self.attr, i), self.outline.of_picture(i), (int(self.rule), weight), of_pixels, own,
                 n_faces, tuple(scratch), (faces, points, rows), band.first, band.end,
             )  # fmt: skip
@@ -161,4 +162,4 @@ class AttributePictures:
             is_picture = of_pixels[0] is not None and n > 0
             return found, own.copy(n_rows, n_faces) if is_picture else own, n_faces
 
-        return self.grid.bands.add_up_all(make, work, outs)
+        return bands.add_up_all(make, work, outs)

@@ -77,6 +77,10 @@ class PixelGrid:
         scale, shift = ((0.5, 0.5), (0.0, 0.0)) if self.in_pixels else ((1 / self.width, 1 / self.height), (-1.0, -1.0))
         return engine.GradientView(pos, self.tri, size, scale, shift, np.inf if self.in_pixels else 1.0)
 
+    def views(self, pos: Array) -> list[engine.GradientView]:
+        """Return the views of all pictures that have pixels, of vertices (B or 1, V, 4)."""
+        return [self.view(of(pos, i)) for i in range(self.n_pictures if self.width and self.height else 0)]
+
     def shape(self, *columns: int) -> tuple[int, ...]:
         """Return the shape of a tensor of pixels."""
         return (self.n_pictures, self.height, self.width, *columns)
@@ -107,11 +111,12 @@ def points(
     flipped. `rast_db` (B, H, W, 4) is du/dX, du/dY, dv/dX, dv/dY, or has no columns.
     """
     rast, rast_db = empty(grid.shape(4), pos.dtype), empty(grid.shape(4 if with_db else 0), pos.dtype)
+    views = grid.views(pos)
 
     def work(band: Band) -> None:
         i, (own, first) = band.picture, ids[band.picture]
         slopes = rast_db[i] if with_db else None
-        grid.view(of(pos, i)).points(own, is_flipped, first, rast[i], slopes, band.first, band.end)
+        views[i].points(own, is_flipped, first, rast[i], slopes, band.first, band.end)
 
     grid.bands.run(work)
     return rast, rast_db
@@ -119,7 +124,7 @@ def points(
 
 def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
     """Return the gradient of `pos`."""
-    out = np.zeros(pos.shape, pos.dtype)
+    out, views = np.zeros(pos.shape, pos.dtype), grid.views(pos)
 
     def make(room: Room) -> list[engine.GradientSums]:
         return [room.sums("rows", pos.shape[1], 4, 3), room.sums("faces", len(grid.tri), engine.SUMS_OF_POINTS, 1)]
@@ -127,7 +132,7 @@ def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Ar
     def work(band: Band, sums: list[engine.GradientSums]) -> int:
         i = band.picture
         slopes = None if g_db is None else g_db[i]
-        return grid.view(of(pos, i)).points_vjp(rast[i], g_rast[i], slopes, sums[1], sums[0], band.first, band.end)
+        return views[i].points_vjp(rast[i], g_rast[i], slopes, sums[1], sums[0], band.first, band.end)
 
     grid.refuse(max(grid.bands.add_up_all(make, work, [out]), default=-1))
     return out
@@ -186,6 +191,7 @@ def colors_vjp(
     """
     check_counted("attr", attr.shape[1:])
     g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
+    views = grid.views(pos)
 
     def make(room: Room) -> list[engine.GradientSums]:
         n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, attr.shape[2] - 1) // 3)
@@ -197,8 +203,7 @@ def colors_vjp(
 
     def work(band: Band, sums: list[engine.GradientSums]) -> int:
         i, (points, rows, faces) = band.picture, sums
-        view = grid.view(of(pos, i))
-        return view.colors_vjp(of(attr, i), corners, rast[i], g_out[i], (faces, points, rows), band.first, band.end)
+        return views[i].colors_vjp(of(attr, i), corners, rast[i], g_out[i], (faces, points, rows), band.first, band.end)
 
     grid.refuse(max(grid.bands.add_up_all(make, work, [g_pos, g_attr]), default=-1))
     return g_pos, g_attr
@@ -329,12 +334,12 @@ def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outlin
 
 def smooth(grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, rast: Array, color: Array) -> Array:
     """Return colours (B, H, W, C) with smooth silhouettes."""
-    out = empty(color.shape, color.dtype)
+    out, views = empty(color.shape, color.dtype), grid.views(pos)
 
     def work(band: Band) -> None:
         i, scratch = band.picture, empty((3, grid.width + engine.IDS_ROOM), np.int32)
         arrays = rast[i], color[i], out[i]
-        grid.view(of(pos, i)).edges(outline.of_picture(i), scratch, int(rule), arrays, None, band.first, band.end)
+        views[i].edges(outline.of_picture(i), scratch, int(rule), arrays, None, band.first, band.end)
 
     grid.bands.run(work)
     return out
@@ -345,11 +350,12 @@ def smooth_vjp(
 ) -> tuple[Array, Array]:
     """Return the gradients of the colours and of `pos`."""
     g_color, g_pos = empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)
+    views = grid.views(pos)
 
     def work(band: Band, sums: engine.GradientSums) -> None:
         i, scratch = band.picture, empty((3, grid.width + engine.IDS_ROOM), np.int32)
         arrays = rast[i], color[i], g_out[i], g_color[i]
-        grid.view(of(pos, i)).edges(outline.of_picture(i), scratch, int(rule), arrays, sums, band.first, band.end)
+        views[i].edges(outline.of_picture(i), scratch, int(rule), arrays, sums, band.first, band.end)
 
     grid.bands.add_up(work, g_pos, 6)
     return g_color, g_pos

@@ -70,6 +70,11 @@ def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
     return material.opacity == 1 and not (texture is not None and texture.has_alpha)
 
 
+def mask_of(mesh: Mesh, material: Material | None) -> Mask | None:
+    """The same, found once."""
+    return kept_look(mesh.known, blended_triangles, material, lambda: blended_triangles(mesh, material))
+
+
 def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | None:
     """The blended triangles of each instance; None where there are none, or the shading ignores them."""
     if options.mode not in BLENDING:
@@ -77,7 +82,7 @@ def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | 
     material = options.material
 
     def make() -> list[Mask | None]:
-        return [blended_triangles(one.mesh, one.material if material is None else material) for one in scene]
+        return [mask_of(one.mesh, one.material if material is None else material) for one in scene]
 
     masks = kept_look(scene.known, blended_masks, material, make)
     return None if all(mask is None for mask in masks) else masks

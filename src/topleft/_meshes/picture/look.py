@@ -134,9 +134,10 @@ def shading_mesh_of(mesh: Mesh, stretch: F64 | None) -> ShadingMesh:
     key = b"" if stretch is None else stretch.tobytes()
     found = known.get(key)
     if found is None:
-        if len(known) * len(mesh.vertices) > MOST_STRETCHED:
-            known.clear()
-        found = known[key] = ShadingMesh(mesh, stretch)
+        found = ShadingMesh(mesh, stretch)
+        if stretch is not None and len(known) * len(mesh.vertices) > MOST_STRETCHED:
+            known = mesh.known[ShadingMesh] = {b"": known[b""]} if b"" in known else {}
+        known[key] = found
     return found
 
 
