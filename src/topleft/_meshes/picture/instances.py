@@ -124,7 +124,8 @@ class PlacedScene:
 
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes views of instances itself."""
-        return vars(self) | {"_last": None, "_kept": {}, "_n_kept": 0, "_sides_of_looks": {}}
+        own = {name: value for name, value in vars(self).items() if name != "joined"}
+        return own | {"_last": None, "_kept": {}, "_n_kept": 0, "_sides_of_looks": {}}
 
     __setstate__ = set_aligned
 
