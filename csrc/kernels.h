@@ -136,9 +136,10 @@ typedef struct tl_kernels {
     void (*count_runs)(const tl_run *runs, const int32_t *object, int64_t n, const tl_rles *rles);
     void (*write_counts)(const tl_rles *rles, int64_t *text_starts, uint8_t *text);
 
-    /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as
-     * `draw` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
-    int64_t (*draw_area)(const tl_snapped *snapped, const tl_window *window, const tl_area *target);
+    /* The exact area that the triangles of a slice, from its first on, cover of each pixel, their sum; the window has
+     * fewer than 2^31 cells.  Returns as `draw` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
+    int64_t (*draw_area)(const tl_snapped *snapped, const tl_window *window, const tl_slice *slice,
+                         const tl_area *target);
 
     /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
     int64_t (*blend)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas);

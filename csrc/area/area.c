@@ -53,6 +53,7 @@ typedef struct {
     area_plane plane;
     const tl_snapped *snapped;
     const tl_window *window;
+    const tl_slice *slice;
     int64_t bad_row;
     int32_t max_extent;
     int32_t n[TL_EDGE_KINDS];
@@ -193,7 +194,7 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
         vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     single = vm_and(live, vm_or(single, vi_eq(x_min, vi_set1(TL_SPECIAL))));
     for (unsigned lanes = vm_bits(single); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
-        push_alone(s, i + __builtin_ctz(lanes));
+        push_alone(s, slice_id(s->slice, i + __builtin_ctz(lanes)));
     const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
     /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing
      * there */
@@ -239,26 +240,27 @@ static void place_plane(const tl_window *window, const tl_area *area, area_plane
     p->seen = v4_zero();
 }
 
-static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, const tl_area *target)
+static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, const tl_slice *slice,
+                         const tl_area *target)
 {
+    const int64_t n = slice->end, n_pixels = window->width * window->height;
     area_state s;
     uint64_t met[TL_MOST_MET / 64];
     place_plane(window, target, &s.plane);
-    s.plane.is_sparse = snapped->n_triangles < window->width * window->height / TL_SPARSE_PX;
+    s.plane.is_sparse = n < n_pixels / TL_SPARSE_PX;
     const int64_t n_met = (int64_t)s.plane.stride * s.plane.n_rows / TL_MET_CELLS;
-    const int is_met_seldom = snapped->n_triangles < window->width * window->height / (2 * TL_SPARSE_PX);
+    const int is_met_seldom = n < n_pixels / (2 * TL_SPARSE_PX);
     if (is_met_seldom && !target->is_wide && n_met <= TL_MOST_MET) {
         memset(met, 0, (size_t)(n_met + 63) / 64 * sizeof *met);
         s.plane.met = met;
     }
-    s.snapped = snapped, s.window = window, s.bad_row = -1;
+    s.snapped = snapped, s.window = window, s.slice = slice, s.bad_row = -1;
     s.max_extent = max_edge_extent(window->subpixel_bits);
     memset(s.n, 0, sizeof s.n);
-    const tl_slice all = {.end = snapped->n_triangles};
     int32_t corners[3 * TL_LANES];
-    for (int64_t i = 0; i < snapped->n_triangles && s.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
+    for (int64_t i = 0; i < n && s.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
-        push_batch(&s, i, slice_corners(snapped, &all, i, corners), vm_first(snapped->n_triangles - i));
+        push_batch(&s, i, slice_corners(snapped, slice, i, corners), vm_first(n - i));
     }
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);

@@ -233,6 +233,9 @@ TL_INLINE int make_room(walk_state *s, int n)
 
 /* ---- triangles of a slice -------------------------------------------------------------------------------- */
 
+/* The triangle at place i of a slice. */
+TL_INLINE int64_t slice_id(const tl_slice *slice, int64_t i) { return slice->ids ? slice->ids[i] : i; }
+
 /* Copies the corners of the triangles [i, i + TL_LANES) of a slice, unchecked; behind the end zeros.  Later
  * writes of another thread to the indices are not seen. */
 TL_INLINE const int32_t *slice_corners(const tl_snapped *snapped, const tl_slice *slice, int64_t i, int32_t *own)
@@ -248,7 +251,7 @@ TL_INLINE const int32_t *slice_corners(const tl_snapped *snapped, const tl_slice
         return own;
     }
     for (int k = 0; k < TL_LANES; k++) {
-        const int64_t id = i + k >= slice->end ? -1 : slice->ids ? slice->ids[i + k] : i + k;
+        const int64_t id = i + k >= slice->end ? -1 : slice_id(slice, i + k);
         if (id >= 0)
             memcpy(own + 3 * k, snapped->triangles + 3 * id, 3 * sizeof *own);
         else

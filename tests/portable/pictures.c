@@ -130,12 +130,12 @@ static void draw_values(const tl_snapped *scene, const tl_window *window, const 
     tell(name, "barycentric", floats, 12 * N_PX);
 
     tl_area area = {.pixels = floats, .stride_px = WIDTH, .cells = cells};
-    int64_t status = k->draw_area(scene, window, &area);
+    int64_t status = k->draw_area(scene, window, &whole, &area);
     if (status == TL_AREA_OVERFLOW) {
         const int64_t n = tl_area_stride(WIDTH) * HEIGHT;
         for (int64_t i = 0; i < n; i++)
             cells[i] = TL_CELL_CLEAR;
-        area.cells = wide_cells, area.is_wide = 1, status = k->draw_area(scene, window, &area);
+        area.cells = wide_cells, area.is_wide = 1, status = k->draw_area(scene, window, &whole, &area);
     }
     if (status < 0)
         tell(name, "area", floats, 4 * N_PX);

@@ -349,7 +349,7 @@ def areas_of_large_shapes():
 @pytest.mark.parametrize("verb", [tl.coverage, tl.overdraw])
 def test_large_shapes_have_the_same_areas_in_bands_of_any_height(isa, threads, verb):
     def draw_in(n_bytes):
-        with choices.forced(area_bytes=n_bytes):
+        with choices.forced(area_bytes=n_bytes, area_triangle=0.0, near_pixels=0):
             return verb(LARGE, LARGE_TRIANGLES, (411, 97), sampling="area", threads=threads)
 
     with on(isa):
@@ -361,12 +361,24 @@ def test_large_shapes_have_the_same_areas_in_bands_of_any_height(isa, threads, v
     assert error < 2**-24 * (0.501 * 9 + 3)  # three edges of each triangle, and the sum
 
 
-def test_many_triangles_are_summed_in_one_band():
+def test_bands_of_areas_stay_in_the_cache_or_are_as_few_as_threads():
     height, width = 2160, 3840
-    assert sampling.area_band(1, height, width, 1) < 40
-    assert sampling.area_band(100_000, height, width, 1) == height
-    assert sampling.area_band(100_000, height, width, 2) == height // 2
-    assert sampling.area_cells(100_000, height, width, 2) == height * engine.area_stride(width)
+    assert sampling.area_band(height, width, 1, in_bands=True) == 64
+    assert sampling.area_band(height, width, 1, in_bands=False) == height
+    assert sampling.area_band(height, width, 2, in_bands=False) == height // 2
+    assert sampling.area_cells(height, width, 2, in_bands=False) == height * engine.area_stride(width)
+    assert sampling.area_cells(height, width, 2, in_bands=True) == 128 * engine.area_stride(width)
+
+
+def test_areas_of_tall_triangles_and_not_of_many_low_ones_are_summed_in_bands():
+    def is_sorted(n, px):
+        vertices, triangles, _ = scenes.random_triangles(n, px, 1920, 1080)
+        return tl.plan(vertices[:, :2], triangles, (1920, 1080), outputs="overdraw", sampling="area").explain()
+
+    said = "one band after the other"
+    assert said in is_sorted(1000, 300)
+    assert said in is_sorted(4000, 40)
+    assert said not in is_sorted(40_000, 5)
 
 
 def test_a_picture_beyond_the_bound_of_cells_is_summed_in_several_bands(monkeypatch):

@@ -9,6 +9,7 @@ import pytest
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
+from topleft._core import engine
 from topleft._core.raster import choices
 
 SIZE = (333, 301)
@@ -93,6 +94,20 @@ def test_samples_in_memory_of_a_band_equal_those_in_place(isa, columns):
         assert banded_depth.tobytes() == depth.tobytes()
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize("options", [
+    {}, {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"cull": "back"}, {"origin": (40, -30)}, {"threads": 3},
+])  # fmt: skip
+def test_areas_in_bands_equal_the_whole(force, isa, options):
+    vertices, triangles = strewn(6)
+    vertices[7] *= 1e7  # one triangle that lanes cannot take
+    force(area_triangle=0.0, area_bytes=4 * engine.area_stride(SIZE[0]) * 8)
+    with on(isa):
+        whole, banded = as_drawn(lambda: tl.overdraw(vertices[:, :2], triangles, SIZE, sampling="area", **options))
+    assert whole.max() > 2
+    assert banded.tobytes() == whole.tobytes()
+
+
 @pytest.mark.parametrize("options", [
     {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"subpixel_bits": "exact"}, {"method": "scanline"},
     {"origin": (40, -30)}, {"sampling": "msaa4"}, {"viewport": (500, 400)},
@@ -111,7 +126,7 @@ def test_rasterize_in_bands_with_options_equals_the_whole(options):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_triangles_that_planes_cut(threads):
+def test_triangles_that_planes_cut(force, threads):
     rng = np.random.default_rng(4)
     vertices = rng.normal(size=(300, 3)) * [3, 3, 6]
     triangles = np.arange(300).reshape(-1, 3)
@@ -125,6 +140,13 @@ def test_triangles_that_planes_cut(threads):
     assert (ids >= 0).any()
     assert (banded_ids == ids).all()
     assert (banded_depth == depth).all()
+
+    def areas():
+        return tl.overdraw(vertices, triangles, SIZE, transform=camera, threads=threads, sampling="area")
+
+    force(area_triangle=0.0, area_bytes=4 * engine.area_stride(SIZE[0]) * 8)
+    whole, banded = as_drawn(areas)
+    assert banded.tobytes() == whole.tobytes()
 
 
 def test_which_are_drawn_so():

@@ -279,11 +279,13 @@ cdef class SnappedMesh:
         raise_if_given_up()
 
     def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide,
-                  bint is_clamped) -> int:
+                  bint is_clamped, Bins bins=None) -> int:
         """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
 
-        `cells`: those of these rows, clear. Returns as `draw` does, or AREA_OVERFLOW when the cells must be wide.
+        `cells`: those of these rows, clear. `bins`: have the triangles of these rows, which are a band; None: all are
+        looked at. Returns as `draw` does, or AREA_OVERFLOW when the cells must be wide.
         """
+        cdef tl_slice slice = no_slice()
         cdef tl_area target
         cdef tl_window window = self.window(first_row, n_rows, pixels.shape[1])
         cdef int64_t status
@@ -291,8 +293,11 @@ cdef class SnappedMesh:
             return -1
         target.pixels, target.stride_px, target.cells = &pixels[first_row, 0], pixels.shape[1], &cells[0]
         target.is_wide, target.is_clamped = is_wide, is_clamped
+        slice.end = self.snapped.n_triangles
+        if bins is not None:
+            bins.take(&slice, first_row >> bins.band_bits)
         with nogil:
-            status = K.draw_area(&self.snapped, &window, &target)
+            status = K.draw_area(&self.snapped, &window, &slice, &target)
         raise_if_given_up()
         return status
 
@@ -433,6 +438,10 @@ cdef class Bins:
         with nogil:
             K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
 
+    cdef void take(self, tl_slice *slice, int64_t band) noexcept:
+        """Make the triangles of a band those of a slice."""
+        slice.ids, slice.end = &self.listed[0] + self.starts[band], self.starts[band + 1] - self.starts[band]
+
     cdef const int32_t *backwards(self, int64_t band) noexcept nogil:
         """Return the triangles of a band after they have been turned round: from the last to the first."""
         cdef int32_t *ids = &self.listed[0] + self.starts[band]
@@ -463,8 +472,7 @@ def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t
     slice.is_first = slice.is_last = True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
-        slice.ids = &bins.listed[0] + bins.starts[band]
-        slice.end = bins.starts[band + 1] - bins.starts[band]
+        bins.take(&slice, band)
         for mesh, target in pairs:
             rows = near = target.rows(first_row)
             window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
@@ -549,8 +557,7 @@ def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1
         first_row = band << bins.band_bits
         rows = other = first.rows(first_row)
         window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, first.height - first_row), first.width)
-        slice.ids = &bins.listed[0] + bins.starts[band]
-        slice.end = bins.starts[band + 1] - bins.starts[band]
+        bins.take(&slice, band)
         found.first_ids = <int32_t *>rows.pixels
         found.row0, found.n_rows = first_row, window.height
         found.col0, found.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]

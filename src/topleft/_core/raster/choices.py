@@ -427,9 +427,14 @@ def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
     costs, n_pixels, n = cost_table(), view.size[0] * view.size[1], snapped.n_triangles
     has_depth = sink in (Sink.NEAREST, Sink.FARTHEST, Sink.PAINT)
     is_stored = has_depth or sink in (Sink.COUNT, Sink.LABEL)
-    if not is_stored or n_pixels <= costs.near_pixels or view.sampling is not Sampling.CENTER or not can_slice(view):
+    is_area = view.sampling is Sampling.AREA and sink is Sink.COUNT
+    if not is_stored or n_pixels <= costs.near_pixels or not (is_area or view.sampling is Sampling.CENTER):
+        return False
+    if n == 0 or not can_slice(view):
         return False
     n_seen, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
+    if is_area:
+        return costs.area_pixel * n_pixels + costs.area_row * n_rows > costs.area_triangle * n
     n_covered = n_layers * n_pixels
     cleared_ns = costs.cleared_pixel * n_pixels if has_depth else 0.0
     met_ns = n_covered * costs.saved_store

@@ -137,8 +137,9 @@ def draw_area(
 ) -> NDArray[np.float32]:
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
-        n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
-        if sum_areas(memory, snapped.mesh, canvas, n_threads, is_clamped=is_clamped):
+        drawing = choices.drawing(view, snapped, Sink.COUNT)
+        half_px = max(1, 1 << view.grid_bits >> 1) if drawing.in_bands else None
+        if sum_areas(memory, snapped.mesh, canvas, drawing.n_threads, is_clamped=is_clamped, half_px=half_px):
             snapped.refuse()
     view.mark("draw")
     return result

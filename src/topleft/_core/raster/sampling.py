@@ -253,51 +253,59 @@ def bits_of_bands(shape: tuple[int, int], n_pixels: int, n_threads: int) -> int:
 
 
 def sum_areas(
-    memory: Memory, mesh: engine.SnappedMesh, pixels: NDArray[np.float32], n_threads: int, *, is_clamped: bool
+    memory: Memory,
+    mesh: engine.SnappedMesh,
+    pixels: NDArray[np.float32],
+    n_threads: int,
+    *,
+    is_clamped: bool,
+    half_px: int | None = None,
 ) -> bool:
     """Write the area that triangles cover of each pixel; returns whether a triangle has an index outside the vertices.
 
-    Sums are taken in 32 bits. Rows in which these might not do are drawn again in 64 bits, with the same result
+    With `half_px`, half a pixel in sub-pixels or more, triangles are sorted into bands of rows, whose cells stay in the
+    cache. Sums are taken in 32 bits. Rows in which these might not do are drawn again in 64 bits, with the same result
     wherever both are right.
     """
     height, width = pixels.shape
     if not pixels.size:
         return False
-    stride = engine.area_stride(width)
-    n_parts = max(1, min(n_threads, height))
-    rows_at_once = area_band(mesh.n_triangles, height, width, n_parts)
-    cells = memory.constant("cells", area_cells(mesh.n_triangles, height, width, n_threads), engine.CELL_CLEAR)
+    stride, bins = engine.area_stride(width), None
+    n_rows = area_band(height, width, n_threads, in_bands=half_px is not None)
+    if half_px is not None:
+        own = SamplePass(memory, mesh, np.array([[half_px, half_px]], np.int32), n_threads)
+        bins = own.sort_bands((height, width), n_rows * width)
+        if bins.bad_row >= 0:
+            return True
+    n_bands = -(-height // n_rows)
+    n_parts = max(1, min(n_threads, n_bands))
+    cells = memory.constant("cells", n_parts * n_rows * stride, engine.CELL_CLEAR)
     unused = list(cells.reshape(n_parts, -1))
 
-    def draw_band(own: NDArray[np.uint8], first: int, end: int) -> int:
-        status = mesh.draw_area(pixels, own, first, end - first, False, is_clamped)
+    def draw_band(cells: NDArray[np.uint8], first: int, end: int) -> int:
+        status = mesh.draw_area(pixels, cells, first, end - first, False, is_clamped, bins)
         if status != engine.AREA_OVERFLOW:
             return status
         wide = engine.as_bytes(np.zeros((end - first) * stride, np.int64))
-        return mesh.draw_area(pixels, wide, first, end - first, True, is_clamped)
+        return mesh.draw_area(pixels, wide, first, end - first, True, is_clamped, bins)
 
-    def draw_rows(first: int, end: int) -> int:
-        own = engine.as_bytes(unused.pop())
-        tops = range(first, end, rows_at_once)
-        return max(draw_band(own, top, min(top + rows_at_once, end)) for top in tops)
+    def draw_bands(first: int, end: int) -> int:
+        cells = engine.as_bytes(unused.pop())
+        return max(draw_band(cells, k * n_rows, min((k + 1) * n_rows, height)) for k in range(first, end))
 
-    return max(run_parts(draw_rows, height, n_parts)) >= 0
-
-
-def area_band(n_triangles: int, height: int, width: int, n_parts: int) -> int:
-    """Return in how many rows at once each part sums areas: as many as cells are held of, or as stay in the cache.
-
-    Every band goes through all triangles, which pays for few of them: cells that leave the cache are read and written
-    for each pixel.
-    """
-    stride, largest = engine.area_stride(width), -(-height // n_parts)
-    costs = cost_table()
-    near = max(1, int(costs.area_bytes) // (4 * stride))
-    is_near = n_triangles * -(-height // near) * costs.area_triangle < height * width * costs.area_pixel
-    return min(largest, near if is_near else max(1, MAX_CELLS // (n_parts * stride)))
+    return max(run_parts(draw_bands, n_bands, n_parts)) >= 0
 
 
-def area_cells(n_triangles: int, height: int, width: int, n_threads: int) -> int:
-    """Return how many cells `sum_areas` needs."""
+def area_band(height: int, width: int, n_threads: int, *, in_bands: bool) -> int:
+    """Return in how many rows at once areas are summed: as many as cells stay in the cache of, or are held of."""
+    stride = engine.area_stride(width)
+    if in_bands:
+        return 1 << bits_of_bands((height, stride), int(cost_table().area_bytes) // 4, n_threads)
     n_parts = max(1, min(n_threads, height))
-    return n_parts * area_band(n_triangles, height, width, n_parts) * engine.area_stride(width)
+    return min(-(-height // n_parts), max(1, MAX_CELLS // (n_parts * stride)))
+
+
+def area_cells(height: int, width: int, n_threads: int, *, in_bands: bool) -> int:
+    """Return how many cells `sum_areas` needs."""
+    n_rows = area_band(height, width, n_threads, in_bands=in_bands)
+    return min(n_threads, -(-height // n_rows)) * n_rows * engine.area_stride(width)

@@ -124,7 +124,8 @@ class PlacedScene:
 
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes views of instances itself."""
-        return vars(self) | {"_last": None, "_kept": {}, "_n_kept": 0, "_sides_of_looks": {}}
+        own = {name: value for name, value in vars(self).items() if name != "joined"}
+        return own | {"_last": None, "_kept": {}, "_n_kept": 0, "_sides_of_looks": {}}
 
     __setstate__ = set_aligned
 
@@ -205,7 +206,7 @@ class PlacedScene:
     def joined(self) -> list[engine.SnappedMesh]:
         """All instances as a few meshes, one for each run that culls alike; none of large scenes or clipped ones."""
         scene, culls = self.scene, self._sides[0]
-        starts = np.flatnonzero(np.diff(culls, prepend=-1)).tolist()
+        starts = [0, *(np.flatnonzero(culls[1:] != culls[:-1]) + 1).tolist()]
         is_small = scene.first_vertices[-1] <= VERTICES_AT_ONCE and 0 < scene.n_triangles <= TRIANGLES_AT_ONCE
         if not is_small or len(starts) > MOST_JOINED:
             return []

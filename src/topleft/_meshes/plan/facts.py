@@ -303,7 +303,8 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["covered"] = 8 * height * engine.Target.covered_shape(height, width, n_samples)[1]
     if view.sampling is Sampling.AREA:
         strips = facts.drawing.n_threads * engine.blend_cells(width)
-        of_sums = area_cells(n, height, width, facts.drawing.n_threads) if n_pixels else 0
+        in_bands, n_threads = facts.drawing.in_bands, facts.drawing.n_threads
+        of_sums = area_cells(height, width, n_threads, in_bands=in_bands) if n_pixels else 0
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
     elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_large_shapes):
         scratch["labels"] = 4 * n_pixels
@@ -319,7 +320,8 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
         scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
     elif facts.in_bands:
-        scratch |= band_bytes(n, (height, width), sum(results.values()), facts.drawing.n_threads)
+        n_bytes = 0 if view.sampling is Sampling.AREA else sum(results.values())
+        scratch |= band_bytes(n, (height, width), n_bytes, facts.drawing.n_threads)
     elif facts.is_sliced:
         scratch["outside"] = 4 * (n + 16 * facts.drawing.n_threads)
     if found is not None and found.meshlet_bytes:

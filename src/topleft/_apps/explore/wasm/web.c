@@ -138,11 +138,12 @@ WEB_EXPORT(web_area) int web_area(float *pixels, int is_clamped)
         return WEB_FULL;
     for (size_t i = 0; i < n; i++)
         ((int32_t *)cells)[i] = TL_CELL_CLEAR;
+    const tl_slice all = {.end = scene.snapped.n_triangles};
     tl_area area = {.pixels = pixels, .stride_px = scene.window.width, .cells = cells, .is_clamped = is_clamped};
-    if (K.draw_area(&scene.snapped, &scene.window, &area) == TL_AREA_OVERFLOW) {
+    if (K.draw_area(&scene.snapped, &scene.window, &all, &area) == TL_AREA_OVERFLOW) {
         memset(cells, 0, 8 * n);
         area.is_wide = 1;
-        K.draw_area(&scene.snapped, &scene.window, &area);
+        K.draw_area(&scene.snapped, &scene.window, &all, &area);
     }
     used = before;
     return 0;
