@@ -38,7 +38,10 @@ from topleft._core.raster.costs import cost_table
 from topleft._meshes.picture import instances, rounds
 
 WHOLE = {"pays_to_cluster": False}
-FORCED = {"pays_to_cluster": True, "pays_to_draw_clusters": True, "pays_to_draw_instances": True}
+FORCED = {
+    "pays_to_cluster": True, "pays_to_cluster_shaded": True, "pays_to_draw_clusters": True,
+    "pays_to_draw_instances": True,
+}  # fmt: skip
 NEVER_GROWN = {"pays_to_grow": False}
 
 Row = dict[str, Any]
