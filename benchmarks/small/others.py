@@ -169,15 +169,11 @@ def objects_beside_bop() -> Scenes:
 
 
 def gradients_beside_deodr() -> Scenes:
-    """Forward and backward of colours and silhouettes, the loss left out, beside DEODR."""
+    """Forward and backward of colours and silhouettes, the loss left out but of `photometric_loss`, beside DEODR."""
+    ways = ("silhouette", "area", "straight-through", "render", "photometric_loss")
     makers: dict[str, Callable[..., Callable[[], object]]] = {
-        f"topleft.torch, {edges}": partial(step_of_topleft, edges=edges)
-        for edges in ("silhouette", "area", "straight-through")
-    } | {
-        "topleft.torch, a picture in one, area": step_of_render,
-        "topleft.torch, a loss in one, area": step_of_loss,
-        "DEODR": step_of_deodr,
-    }
+        f"topleft.torch, {way}": partial(step_of_topleft, way=way) for way in ways
+    } | {"DEODR": step_of_deodr}
     for n_triangles, size in ((10_000, (512, 512)), (70_000, (512, 512)), (100_000, HD)):
         clip, triangles = wavy_ball(n_triangles, *size)
         steps = {name: partial(make, clip, triangles, size) for name, make in makers.items()}
@@ -292,58 +288,8 @@ def wavy_ball(n_triangles: int, width: int, height: int) -> tuple[Any, Any]:
     return clip.astype(np.float32), triangles
 
 
-def step_of_topleft(clip: Any, triangles: Any, size: tuple[int, int], edges: str) -> Callable[[], None]:
-    """Forward and backward of `topleft.torch`."""
-    import torch
-
-    import topleft.torch as dr
-
-    context, tri, pos, colors, across = in_one(clip, triangles)
-    g = torch.rand(1, size[1], size[0], 3)
-
-    def step() -> None:
-        pos.grad = colors.grad = None
-        rast, _ = dr.rasterize(context, pos, tri, size[::-1])
-        out, _ = dr.interpolate(colors, rast, tri)
-        dr.antialias(out, rast, pos, tri, topology_hash=across, edges=edges).backward(g)
-
-    return step
-
-
-def step_of_render(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:
-    """The same of `topleft.torch` in one."""
-    import torch
-
-    import topleft.torch as dr
-
-    context, tri, pos, colors, across = in_one(clip, triangles)
-    g = torch.rand(1, size[1], size[0], 3)
-
-    def step() -> None:
-        pos.grad = colors.grad = None
-        dr.render(context, pos, tri, colors, size[::-1], across).backward(g)
-
-    return step
-
-
-def step_of_loss(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:
-    """Return a call of a loss with its gradients, in one."""
-    import torch
-
-    import topleft.torch as dr
-
-    context, tri, pos, colors, across = in_one(clip, triangles)
-    target = torch.rand(1, size[1], size[0], 3)
-
-    def step() -> None:
-        pos.grad = colors.grad = None
-        dr.photometric_loss(context, pos, tri, colors, target, across).backward()
-
-    return step
-
-
-def in_one(clip: Any, triangles: Any) -> tuple[Any, ...]:
-    """What calls of `topleft.torch` take that draw in one: context, triangles, vertices, colours, edges."""
+def step_of_topleft(clip: Any, triangles: Any, size: tuple[int, int], way: str) -> Callable[[], None]:
+    """Forward and backward of `topleft.torch`: one function after the other with a rule of edges, or a call in one."""
     import torch
 
     import topleft.torch as dr
@@ -351,7 +297,23 @@ def in_one(clip: Any, triangles: Any) -> tuple[Any, ...]:
     torch.set_num_threads(1)
     context, tri = dr.RasterizeContext(threads=1, output_db=False), torch.from_numpy(triangles)
     pos, colors = torch.from_numpy(clip)[None].requires_grad_(), torch.rand(1, len(clip), 3, requires_grad=True)
-    return context, tri, pos, colors, dr.antialias_construct_topology_hash(tri)
+    across, g = dr.antialias_construct_topology_hash(tri), torch.rand(1, size[1], size[0], 3)
+
+    def one_by_one() -> None:
+        rast, _ = dr.rasterize(context, pos, tri, size[::-1])
+        out, _ = dr.interpolate(colors, rast, tri)
+        dr.antialias(out, rast, pos, tri, topology_hash=across, edges=way).backward(g)
+
+    in_one = {
+        "render": lambda: dr.render(context, pos, tri, colors, size[::-1], across).backward(g),
+        "photometric_loss": lambda: dr.photometric_loss(context, pos, tri, colors, g, across).backward(),
+    }
+
+    def step() -> None:
+        pos.grad = colors.grad = None
+        in_one.get(way, one_by_one)()
+
+    return step
 
 
 def step_of_deodr(clip: Any, triangles: Any, size: tuple[int, int]) -> Callable[[], None]:
