@@ -11,6 +11,7 @@ from engine_cases import ON_EACH_ISA, on
 import topleft as tl
 from topleft._core import engine
 from topleft._core.raster import choices
+from topleft._core.raster.sampling import SamplePass
 
 SIZE = (333, 301)
 TESTS = [None, "less", "greater"]
@@ -251,3 +252,13 @@ def test_samples_from_the_last_triangle_to_the_first(isa, threads, sampling_):
             tl.fill(vertices, triangles, np.repeat(colors, 3, 0), SIZE, per="vertex", out=smooth, **options)
         assert (flat == smooth).all()
         assert (flat != ground[..., :channels]).any()
+
+
+@pytest.mark.parametrize(("side", "threads", "is_sorted"), [(256, 1, False), (257, 1, True), (256, 2, True)])
+def test_picture_of_one_band_is_drawn_whole_by_one_thread(side, threads, is_sorted, monkeypatch):
+    sorting, seen = SamplePass.sort_bands, []
+    monkeypatch.setattr(SamplePass, "sort_bands", lambda *a, **k: seen.append(a) or sorting(*a, **k))
+    vertices = [[1, 2, 0.5], [side - 3, 9, 0.2], [40, side - 2, 0.9]]
+    frags = tl.rasterize(vertices, [[0, 1, 2]], side, sampling="msaa2", threads=threads)
+    assert frags.samples_triangle.any()
+    assert bool(seen) == is_sorted

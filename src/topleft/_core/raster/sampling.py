@@ -74,21 +74,27 @@ def draw_planes(
     n_samples, height, width = pixels.shape
     depths = [None] * n_samples if depth is None else list(depth)
     targets = [engine.Target(sink, plane, z, None) for plane, z in zip(pixels, depths, strict=True)]
-    if not is_near:
-        bad_rows = [
-            max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), height, own.n_threads))  # type: ignore[misc]
-            for s, t in zip(own.meshes, targets, strict=True)
-        ]
-        return max(bad_rows) >= 0
-    return draw_sorted(own, targets, (height, width))
+    return (draw_sorted if is_near else draw_each)(own, targets, (height, width))
+
+
+def draw_each(own: SamplePass, targets: list[engine.Target], shape: tuple[int, int]) -> bool:
+    """Draw each sample into its target, a whole picture each; returns as `draw_planes` does."""
+    bad_rows = [
+        max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), shape[0], own.n_threads))  # type: ignore[misc]
+        for s, t in zip(own.meshes, targets, strict=True)
+    ]
+    return max(bad_rows) >= 0
 
 
 def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int, int]) -> bool:
     """Draw each sample into its target, band after band of rows; returns as `draw_planes` does. The mesh is near.
 
-    Where all targets have so many bytes that they do not stay in a cache, a band is drawn in memory that does.
+    Where all targets have so many bytes that they do not stay in a cache, a band is drawn in memory that does. A
+    picture of one band is drawn whole.
     """
     costs = cost_table()
+    if own.n_threads == 1 and 8 * shape[0] * shape[1] <= costs.plane_bytes:
+        return draw_each(own, targets, shape)
     is_far = sum(target.n_bytes for target in targets) > costs.far_bytes
     bins = own.sort_bands(shape, int(costs.plane_bytes) // 8, with_columns=is_far)
     if bins.bad_row >= 0:
