@@ -515,7 +515,7 @@ def can_split(view: View, n_triangles: int) -> bool:
 
 
 def pays_to_split(view: View, n_triangles: int) -> bool:
-    """Tell whether a picture has so many samples that keeping few of them saves more than sorting the triangles takes."""
+    """Tell whether keeping few of the samples saves more than sorting the triangles takes."""
     least, of_triangle = cost_table().unsplit
     return view.size[0] * view.size[1] * view.sampling.n_samples > least + of_triangle * n_triangles
 
