@@ -82,7 +82,7 @@ TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_
 TL_INLINE void sum_up_pixels(const run_plane *plane, int from, const float *g_out, int n_pixels, int n,
                              int64_t n_columns, int has_room, vq4 sums[2])
 {
-    const vq4 zero = vq4_all(vq_set1(0.0f));
+    const vq4 zero = vq4_set1(0.0f);
     run_columns columns = columns_from(from), summed = columns_from(0);
     sums[0] = sums[1] = zero;
     for (int i = 0; i < TL_SUMMED && i < n_pixels; i += 4) {

@@ -24,8 +24,8 @@
 #include "lanes/quads.h"
 
 /* Planes of a face: by column, by row, and at its first pixel; four numbers each.  Where the last is above 0 the sum of
- * the weights is below 1.  Then that pixel's column and row; and of each three attributes their planes, those of the last
- * corner, and sums as many as planes. */
+ * the weights is below 1.  Then that pixel's column and row; and of each three attributes their planes, those of the
+ * last corner, and sums as many as planes. */
 enum { FACE_U, FACE_V, FACE_ZW, FACE_REST, FACE_TOTAL = FACE_REST, FACE_PLANE = 12, FACE_COLUMN = 12, FACE_ROW };
 enum { FACE_QUADS = 4 * 4, THREE_LAST = FACE_PLANE, THREE_SUMS = FACE_QUADS };
 
@@ -345,13 +345,13 @@ TL_INLINE void draw_three(const double *face, int64_t first, int n, int64_t n_co
 
 TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
 {
-    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], n = p->view->width * n_columns;
+    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width, n = width * n_columns;
     const int64_t n_of_face = p->l->faces->n_columns;
-    const int32_t *restrict begins = p->l->begins, *restrict faces = p->faces;
-    const double *restrict numbers = p->l->faces->sums;
-    float *restrict colors = p->colors + (row - p->base) * n;
+    const int32_t *begins = p->l->begins, *faces = p->faces;
+    const double *numbers = p->l->faces->sums;
+    float *colors = p->colors + (row - p->base) * n;
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
-        const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : p->view->width) - column;
+        const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
         float *to = colors + n_columns * column;
         if (faces[r] < 0) {
             memset(to, 0, (size_t)(n_columns * n_pixels) * sizeof *to);
@@ -454,12 +454,13 @@ TL_ONCE void pull_clamped_run(const picture_pass *p, int64_t r, int64_t row, int
 /* Adds the gradients of a row to the sums of its faces. */
 TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
 {
-    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], n_of_face = p->l->faces->n_columns;
-    const int32_t *restrict begins = p->l->begins, *restrict faces = p->faces;
-    const float *restrict g_color = p->g_color + (row - p->base) * p->view->width * n_columns;
-    double *restrict numbers = p->l->faces->sums;
+    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width;
+    const int64_t n_of_face = p->l->faces->n_columns;
+    const int32_t *begins = p->l->begins, *faces = p->faces;
+    const float *g_color = p->g_color + (row - p->base) * width * n_columns;
+    double *numbers = p->l->faces->sums;
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
-        const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : p->view->width) - column;
+        const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
         if (faces[r] < 0)
             continue;
         if (faces[r] & 1) {

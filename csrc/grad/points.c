@@ -461,7 +461,7 @@ TL_INLINE void pull_run_of_points(const tl_grad_view *view, const grad_span *s, 
                                   double *sums)
 {
     const run_plane plane = plane_of_run(s, r);
-    const vq4 zero = vq4_all(vq_set1(0.0f));
+    const vq4 zero = vq4_set1(0.0f);
     const int n = s->begins[r + 1] - s->begins[r];
     for (int first = 0; first < n; first += TL_SUMMED) {
         vq4 sum = zero, sum_x = zero;

@@ -265,12 +265,14 @@ typedef struct {
 
 TL_INLINE run_columns columns_from(int x)
 {
-    const vq first = vq_set1((float)x);
-    return (run_columns){vq4_add(vq4_pixels(), vq4_all(first)), (vq){0.0f, 1.0f, 2.0f, 3.0f} + first};
+    const run_columns columns = {vq4_pixels(), {0.0f, 1.0f, 2.0f, 3.0f}};
+    if (x == 0) /* constants, where x is one */
+        return columns;
+    return (run_columns){vq4_add(columns.quads, vq4_set1((float)x)), columns.each + vq_set1((float)x)};
 }
 TL_INLINE void next_columns(run_columns *columns)
 {
-    columns->quads = vq4_add(columns->quads, vq4_all(vq_set1(4.0f)));
+    columns->quads = vq4_add(columns->quads, vq4_set1(4.0f));
     columns->each += vq_set1(4.0f);
 }
 TL_INLINE vq4 plane_at_pixels(const run_plane *p, const run_columns *columns)

@@ -7,7 +7,7 @@
  *   vq_load_some(p, n)          the first n of four numbers, zeros beyond
  *   vqd_load vqd_store vqd_set1 vqd_add vqd_sub vqd_mul vqd_from_vq vq_from_vqd    of float64, as their names say
  *   vqd_above_zero(a, b)        bit k: number k of both is above 0
- *   vq4_all(a)                  a quad, four times
+ *   vq4_set1(a) vq4_all(a)      a number everywhere; a quad, four times
  *   vq4_add vq4_sub vq4_mul vq4_div    as their names say
  *   TL_VQ4_PERMUTE(a, i, j, k, l)      the lanes i, j, k, l of each quad
  *   TL_VQ4_BLEND(a, b, bits)    lane k of each quad from b where bit k is set
@@ -85,6 +85,7 @@ TL_INLINE unsigned vqd_above_zero(vqd a, vqd b)
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__AVX512VL__)
 typedef __m512 vq4;
+TL_INLINE vq4 vq4_set1(float a) { return _mm512_set1_ps(a); }
 TL_INLINE vq4 vq4_all(vq a) { return _mm512_broadcast_f32x4((__m128)a); }
 TL_INLINE vq4 vq4_add(vq4 a, vq4 b) { return _mm512_add_ps(a, b); }
 TL_INLINE vq4 vq4_sub(vq4 a, vq4 b) { return _mm512_sub_ps(a, b); }
@@ -136,6 +137,7 @@ typedef struct {
     __m256 of[2];
 } vq4;
 TL_INLINE __m256 two_quads(__m128 a, __m128 b) { return _mm256_insertf128_ps(_mm256_castps128_ps256(a), b, 1); }
+TL_INLINE vq4 vq4_set1(float a) { return (vq4){{_mm256_set1_ps(a), _mm256_set1_ps(a)}}; }
 TL_INLINE vq4 vq4_all(vq a) { return (vq4){{two_quads((__m128)a, (__m128)a), two_quads((__m128)a, (__m128)a)}}; }
 #define TL_VQ4_EACH(a, b, of_two) ((vq4){{of_two((a).of[0], (b).of[0]), of_two((a).of[1], (b).of[1])}})
 TL_INLINE vq4 vq4_add(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_add_ps); }
@@ -179,7 +181,7 @@ TL_INLINE vq4 vq4_load(const float *p, int64_t n, int columns)
                : k < n                  ? vq_load_some(p + columns * k, columns)
                                         : vq_set1(0.0f);
     vq4 all = {{two_quads((__m128)a[0], (__m128)a[1]), two_quads((__m128)a[2], (__m128)a[3])}};
-    return columns == 3 ? TL_VQ4_BLEND(all, vq4_all(vq_set1(0.0f)), 8) : all;
+    return columns == 3 ? TL_VQ4_BLEND(all, vq4_set1(0.0f), 8) : all;
 }
 TL_INLINE vq vq4_at(vq4 a, int k)
 {
@@ -197,6 +199,7 @@ typedef struct {
     vq of[4];
 } vq4;
 TL_INLINE vq4 vq4_all(vq a) { return (vq4){{a, a, a, a}}; }
+TL_INLINE vq4 vq4_set1(float a) { return vq4_all(vq_set1(a)); }
 #define TL_VQ4_EACH(name, a, b, done) \
     TL_INLINE vq4 name(vq4 a, vq4 b)  \
     {                                 \
@@ -226,7 +229,7 @@ TL_INLINE vq4 vq4_first(vq4 a, int64_t n)
 TL_INLINE vq vq4_fold(vq4 a) { return (a.of[0] + a.of[2]) + (a.of[1] + a.of[3]); }
 TL_INLINE vq4 vq4_load(const float *p, int64_t n, int columns)
 {
-    vq4 a = vq4_all(vq_set1(0));
+    vq4 a = vq4_set1(0.0f);
     for (int k = 0; k < 4 && k < n; k++)
         a.of[k] = columns == 3 && k < n - 1 ? TL_VQ_SHUFFLE(vq_load(p + 3 * k), vq_set1(0), 0, 1, 2, 4)
                                             : vq_load_some(p + columns * k, columns);
