@@ -510,7 +510,14 @@ def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: 
 
 def can_split(view: View, n_triangles: int) -> bool:
     """Tell whether pixels that show one triangle may keep its id and depth once, not by sample."""
-    return view.is_split and view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_slice(view)
+    is_possible = view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_slice(view)
+    return view.is_split and is_possible and pays_to_split(view, n_triangles)
+
+
+def pays_to_split(view: View, n_triangles: int) -> bool:
+    """Tell whether keeping few of the samples saves more than sorting the triangles takes."""
+    least, of_triangle = cost_table().unsplit
+    return view.size[0] * view.size[1] * view.sampling.n_samples > least + of_triangle * n_triangles
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
