@@ -58,28 +58,15 @@ static picture_pass open_pass(const tl_grad_view *view, tl_grad_picture *l)
     return p;
 }
 
-/* The ids of a row: -1 for none, less for what is no triangle and in a vector beyond. */
-TL_INLINE void copy_ids(const picture_pass *p, int64_t row, int32_t *ids)
-{
-    const int32_t *from = p->l->ids + p->l->step * row;
-    const vi end = vi_set1(clamped_to_int(p->view->n_triangles)), none = vi_set1(-1), beyond = vi_set1(TL_NO_ID);
-    const int64_t n_whole = p->view->width / TL_LANES * TL_LANES, n_left = p->view->width - n_whole;
-    for (int64_t x = 0; x < n_whole; x += TL_LANES) {
-        const vi id = vi_max(vi_load(from + x), none);
-        vi_store(ids + x, vi_select(vi_gt(end, id), id, beyond));
-    }
-    const vi id = vi_max(vi_load_masked(vm_first(n_left), from + n_whole), none);
-    vi_store(ids + n_whole, vi_select(vm_and(vm_first(n_left), vi_gt(end, id)), id, beyond));
-    vi_store(ids + p->view->width, beyond);
-}
-
 /* The face of a triangle that a pixel shows; -1 if its corners do not exist. */
 TL_INLINE int32_t find_face(picture_pass *p, int32_t id, int32_t column, int64_t row)
 {
     const tl_grad_view *view = p->view;
     const int64_t n_rows = p->l->n_attr < view->n_vertices ? p->l->n_attr : view->n_vertices;
-    int32_t face = id < 0 ? -1 : p->l->faces->slot_of[id];
-    if (face >= 0 || id < 0 || !has_corners(view, n_rows, id))
+    if (id < 0 || id >= view->n_triangles)
+        return -1;
+    int32_t face = p->l->faces->slot_of[id];
+    if (face >= 0 || !has_corners(view, n_rows, id))
         return face;
     face = p->l->faces->slot_of[id] = (int32_t)p->l->faces->n++;
     p->l->faces->rows[face] = id;
@@ -89,24 +76,33 @@ TL_INLINE int32_t find_face(picture_pass *p, int32_t id, int32_t column, int64_t
     return face;
 }
 
+/* Lists where the runs of a row begin; returns how many there are.  Numbers that are no triangle's are runs, too. */
+TL_INLINE int64_t list_row_runs(const picture_pass *p, const int32_t *ids, int32_t *begins)
+{
+    const int64_t width = p->view->width;
+    const vi none = vi_set1(-1);
+    vi before = vi_set1(INT32_MIN);
+    int64_t n = 0;
+    for (int64_t x = 0; x < width; x += TL_LANES) {
+        const vm m = vm_first(width - x);
+        const vi id = vi_max(x + TL_LANES <= width ? vi_load(ids + x) : vi_load_masked(m, ids + x), none);
+        const vm starts = vm_and_not(m, vi_eq(id, vi_shift_in(id, before)));
+        vi_compress(begins + n, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
+        n += __builtin_popcount(vm_bits(starts));
+        before = id;
+    }
+    return n;
+}
+
 /* Lists runs, row by row, and faces in the order of their first pixels. */
 static void list_faces(picture_pass *p)
 {
-    int32_t *ids = p->l->edges.ids;
     int64_t n_runs = 0;
     for (int64_t row = p->all.first_row; row < p->all.end_row; row++) {
+        const int32_t *ids = p->l->ids + p->l->step * row;
         const int64_t first = n_runs;
-        vi before = vi_set1(INT32_MIN);
         p->l->row_runs[row - p->all.first_row] = n_runs;
-        copy_ids(p, row, ids);
-        for (int64_t x = 0; x < p->view->width; x += TL_LANES) {
-            const vi id = vi_load(ids + x);
-            const vm starts = vm_and_not(vm_all(), vi_eq(id, vi_shift_in(id, before)));
-            vi_compress(p->l->begins + n_runs, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
-            n_runs += __builtin_popcount(vm_bits(starts));
-            before = id;
-        }
-        n_runs -= n_runs > first && p->l->begins[n_runs - 1] == p->view->width;
+        n_runs += list_row_runs(p, ids, p->l->begins + n_runs);
         for (int64_t r = first; r < n_runs; r++)
             p->faces[r] = 2 * find_face(p, ids[p->l->begins[r]], p->l->begins[r], row);
     }
@@ -216,35 +212,41 @@ TL_INLINE double zw_at(const picture_pass *p, int32_t id, int64_t column, int64_
     return plane[8] + plane[0] * (double)(column - p->column[face]) + plane[4] * (double)(row - p->row[face]);
 }
 
-/* Finds the pairs of a row of ids with others; returns how many there are then. */
-static int64_t meet_pairs(const picture_pass *p, const meeting *m, int64_t n, int64_t n_pairs)
+/* Whether the second pixel of a pair is the nearer one. */
+TL_INLINE int is_nearer_at(const picture_pass *p, const tl_pair_list *list, int64_t i)
 {
-    int32_t *columns = p->l->edges.ids + 2 * (p->view->width + TL_IDS_ROOM);
-    const int64_t n_listed = list_pairs(m->edges, m->ids, m->others, n, columns);
-    for (int64_t i = 0; i < n_listed; i++) {
-        const int64_t x = columns[i];
-        const int32_t id = m->ids[x], other = m->others[x];
-        const int is_flipped = id < 0 || (other >= 0 && (float)zw_at(p, other, x + !m->axis, m->row + m->axis) <
-                                                            (float)zw_at(p, id, x, m->row));
-        n_pairs += meet_pair(m, x, is_flipped, p->pairs + n_pairs);
-    }
-    return n_pairs;
+    const int in_column = list->where[i] & TL_IN_COLUMN;
+    const int64_t x = list->column[i], row = list->where[i] >> TL_ROW_SHIFT;
+    return list->near[i] < 0 || (list->far[i] >= 0 && (float)zw_at(p, list->far[i], x + !in_column, row + in_column) <
+                                                          (float)zw_at(p, list->near[i], x, row));
 }
 
+/* Finds the pairs of all rows: those with the row below, then those within a row. */
 static void list_met_pairs(const picture_pass *p)
 {
-    const int64_t width = p->view->width, lowest = p->all.first_row;
-    int64_t n = 0;
-    for (int64_t row = lowest; row < p->all.end_row; row++) {
-        int32_t *ids = p->l->edges.ids + row % 2 * (width + TL_IDS_ROOM);
-        const int32_t *below = p->l->edges.ids + (row + 1) % 2 * (width + TL_IDS_ROOM);
-        copy_ids(p, row, ids);
-        p->l->row_pairs[row - lowest] = n;
-        if (row > lowest)
-            n = meet_pairs(p, &(meeting){&p->all, &p->l->edges, 0, row - 1, 1, below, ids}, width, n);
-        n = meet_pairs(p, &(meeting){&p->all, &p->l->edges, 0, row, 0, ids, ids + 1}, width - 1, n);
+    const int64_t lowest = p->all.first_row, top = p->all.end_row;
+    pair_scan scan = scan_of(&p->all, &p->l->edges, lowest, top);
+    tl_pair_list list;
+    int32_t which[TL_PAIRS_ROOM];
+    int64_t n = 0, row = lowest;
+    scan.shown = p->l->ids, scan.step = p->l->step, scan.begins = p->l->begins, scan.row_runs = p->l->row_runs;
+    while (next_pairs(&scan, &list, 0)) {
+        for (int64_t i = 0; i < list.n; i++)
+            if (is_nearer_at(p, &list, i))
+                turn_pair(&list, i);
+        const int64_t n_met = list_met(p->view, &p->l->edges, &list, which);
+        for (int64_t i = 0; i < n_met; i += TL_LANES) {
+            const int64_t end = n + meet_some(p->view, &p->l->edges, &list, which + i, n_met - i, p->pairs + n);
+            for (; n < end; n++) {
+                const tl_pair *pair = &p->pairs[n].pair;
+                const int64_t own = (int64_t)pair->middle[1] + (pair->axis && pair->flip > 0.0);
+                for (; row <= own; row++)
+                    p->l->row_pairs[row - lowest] = n;
+            }
+        }
     }
-    p->l->row_pairs[p->all.end_row - lowest] = n;
+    for (; row <= top; row++)
+        p->l->row_pairs[row - lowest] = n;
 }
 
 /* Blends the pairs of a row, or leads them back. */
