@@ -116,7 +116,7 @@ static void pull_straight(const tl_grad_view *view, const tl_grad_edges *e, cons
     }
 }
 
-/* Ids of a row of pixels: -1 for none, less for a number that is no triangle's, and in a vector beyond the row. */
+/* Ids of a row of pixels: -1 for none, less for a number that is no triangle's. */
 TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *ids, int is_f64)
 {
     const int64_t first = row * view->width;
@@ -132,7 +132,6 @@ TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_
         const int32_t id = id_of_label(get_label(e->rast, first + x, is_f64), is_f64);
         ids[x] = id < view->n_triangles ? id : TL_NO_ID;
     }
-    vi_store(ids + view->width, vi_set1(TL_NO_ID));
 }
 
 /* Whether the surface plainly runs on from one triangle to another, or neither has an edge that counts. */
@@ -152,66 +151,100 @@ TL_INLINE vm runs_on(const tl_grad_edges *e, vm m, vi id, vi other, vi outlines)
     return found;
 }
 
-/* Lists the columns where two rows of n ids have a pair to look at; returns how many. */
-TL_INLINE int64_t list_pairs(const tl_grad_edges *e, const int32_t *ids, const int32_t *others, int64_t n,
-                             int32_t *columns)
+/* Where pairs are looked for: between rows, from the lowest to `top`, and within those of the band, row by row. */
+typedef struct {
+    const tl_grad_view *view; /* the band */
+    const tl_grad_edges *edges;
+    int64_t lowest, top;
+    const int32_t *shown, *begins; /* of a picture, unless NULL: the ids of row 0, and where runs begin */
+    int64_t step;
+    const int64_t *row_runs;
+    int64_t turn;                          /* 2 * row: between a row and the one below; 2 * row + 1: within it */
+    const int32_t *ids, *others, *columns; /* of the pixels that meet; where they may differ */
+    int64_t n_columns, n_taken;            /* of those; how many of them have been looked at */
+} pair_scan;
+
+TL_INLINE pair_scan scan_of(const tl_grad_view *view, const tl_grad_edges *e, int64_t lowest, int64_t top)
 {
-    const vi beyond = vi_set1(TL_NO_ID), none = vi_set1(-1);
-    int64_t n_listed = 0, n_found = 0;
-    for (int64_t x = 0; x < n; x += TL_LANES) {
-        const vi id = vi_load(ids + x), other = vi_load(others + x);
-        const vm m = vm_and_not(vm_and(vi_gt(id, beyond), vi_gt(other, beyond)), vi_eq(id, other));
+    return (pair_scan){.view = view, .edges = e, .lowest = lowest, .top = top, .turn = 2 * lowest - 1};
+}
+
+/* Lists the columns where two rows of n ids differ; returns how many. */
+TL_INLINE int64_t list_changes(const int32_t *ids, const int32_t *others, int64_t n, int32_t *columns)
+{
+    int64_t n_listed = 0, x = 0;
+    for (; x + TL_LANES <= n; x += TL_LANES) {
+        const vm m = vm_and_not(vm_all(), vi_eq(vi_load(ids + x), vi_load(others + x)));
         vi_compress(columns + n_listed, m, vi_add(vi_iota(), vi_set1((int32_t)x)));
         n_listed += __builtin_popcount(vm_bits(m));
     }
-    if (e->rule == TL_PAIR_STRAIGHT)
-        return n_listed;
-    for (int64_t i = 0; i < n_listed; i += TL_LANES) { /* gathers have full vectors */
-        vm m = vm_first(n_listed - i);
-        const vi x = vi_load(columns + i), id = vi_gather(m, ids, x), other = vi_gather(m, others, x);
+    for (; x < n; x++) {
+        columns[n_listed] = (int32_t)x;
+        n_listed += ids[x] != others[x];
+    }
+    return n_listed;
+}
+
+/* Goes on to the next two rows that meet, or to the next one whose columns do; 0 at the end. */
+TL_INLINE int next_turn(pair_scan *s, int is_f64)
+{
+    const int64_t width = s->view->width, room = width + TL_IDS_ROOM, turn = ++s->turn, row = turn / 2;
+    const int is_within = turn % 2;
+    int32_t *scratch = s->edges->ids, *own = scratch + row % 2 * room, *columns = scratch + 2 * room;
+    if (row >= s->top)
+        return 0;
+    s->n_columns = s->n_taken = 0;
+    if (!is_within && !s->shown)
+        load_ids(s->view, s->edges, row, own, is_f64);
+    if (is_within ? row < s->view->first_row || row >= s->view->end_row : row == s->lowest)
+        return 1;
+    if (is_within && s->begins) {
+        const int64_t *runs = s->row_runs + row - s->lowest;
+        s->columns = s->begins + runs[0] + 1, s->n_columns = runs[1] - runs[0] - 1;
+        s->ids = s->shown + s->step * row - 1, s->others = s->ids + 1;
+        return 1;
+    }
+    s->others = s->shown ? s->shown + s->step * row : own;
+    s->ids = is_within ? s->others++ : s->shown ? s->others - s->step : scratch + (row + 1) % 2 * room;
+    s->n_columns = list_changes(s->ids, s->others, width - is_within, columns);
+    s->columns = columns;
+    return 1;
+}
+
+/* Adds those of the next columns whose pairs are to be looked at. */
+TL_INLINE void list_some(pair_scan *s, tl_pair_list *list)
+{
+    const tl_grad_edges *e = s->edges;
+    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(s->view->n_triangles));
+    const vm are_left = vm_first(s->n_columns - s->n_taken);
+    const vi x = vi_load(s->columns + s->n_taken);
+    const vi id = vi_max(vi_gather(are_left, s->ids, x), none), other = vi_max(vi_gather(are_left, s->others, x), none);
+    vm m = vm_and(are_left, vm_and(vi_gt(end, id), vi_gt(end, other)));
+    m = vm_and_not(m, vi_eq(id, other));
+    if (e->rule != TL_PAIR_STRAIGHT) {
         const vi outlines = vi_or(vi_gather(vm_and(m, vi_gt(id, none)), e->outline, id),
                                   vi_gather(vm_and(m, vi_gt(other, none)), e->outline, other));
         m = vm_and(m, vi_gt(outlines, none)); /* both have corners */
         m = vm_and_not(m, runs_on(e, m, id, other, outlines));
-        vi_compress(columns + n_found, m, x);
-        n_found += __builtin_popcount(vm_bits(m));
     }
-    return n_found;
+    const int in_column = s->turn % 2 == 0;
+    const int64_t row = s->turn / 2 - in_column;
+    vi_compress(list->near + list->n, m, id), vi_compress(list->far + list->n, m, other);
+    vi_compress(list->column + list->n, m, vi_sub(x, vi_set1(s->begins && !in_column)));
+    vi_compress(list->where + list->n, m, vi_set1((int32_t)(row << TL_ROW_SHIFT) + in_column * TL_IN_COLUMN));
+    list->n += __builtin_popcount(vm_bits(m)), s->n_taken += TL_LANES;
 }
 
-/* Two rows of pixels that meet, or one whose columns do: first the lower row, or the left columns. */
-typedef struct {
-    const tl_grad_view *view;
-    const tl_grad_edges *edges;
-    tl_grad_sums *sums;
-    int64_t row;
-    int axis; /* 0: columns meet */
-    const int32_t *ids, *others;
-} meeting;
-
-/* A pair and its edge. */
-typedef struct {
-    tl_pair pair;
-    tl_pair_edge edge;
-} tl_met_pair;
-
-/* Finds what meets in a column, the second pixel being the nearer one if it is flipped; 0 if nothing comes of it. */
-TL_INLINE int meet_pair(const meeting *m, int64_t x, int is_flipped, tl_met_pair *p)
+/* Lists the next pairs to be looked at, the first pixel of each as the near one; 0 if there are none left. */
+TL_INLINE int next_pairs(pair_scan *s, tl_pair_list *list, int is_f64)
 {
-    const tl_grad_edges *e = m->edges;
-    const int64_t first = m->row * m->view->width + x, second = first + (m->axis ? m->view->width : 1);
-    const int32_t id = m->ids[x], other = m->others[x];
-    p->pair = (tl_pair){is_flipped ? second : first,
-                        is_flipped ? first : second,
-                        is_flipped ? other : id,
-                        is_flipped ? id : other,
-                        m->axis,
-                        is_flipped ? -1.0 : 1.0,
-                        {(double)x + 0.5, (double)m->row + 0.5}};
-    p->pair.middle[m->axis] += is_flipped;
-    return e->rule == TL_PAIR_STRAIGHT ? 1
-           : e->rule == TL_PAIR_AREA   ? find_area_edge(m->view, e, &p->pair, &p->edge)
-                                       : find_silhouette(m->view, e, &p->pair, &p->edge);
+    list->n = 0;
+    while (list->n < TL_PAIRS_AT_ONCE)
+        if (s->n_taken < s->n_columns)
+            list_some(s, list);
+        else if (!next_turn(s, is_f64))
+            break;
+    return list->n > 0;
 }
 
 /* Blends the pixels of a pair in the band; backward adds the gradients of their colours and of its edge. */
@@ -234,34 +267,34 @@ TL_INLINE void blend_pair(const tl_grad_view *view, const tl_grad_edges *e, cons
         take_color(e, pair->far, pair->near, p->edge.far, is_f64);
 }
 
-/* The pairs of n columns. */
-TL_INLINE void meet_row(const meeting *m, int64_t n, int is_f64)
+/* Whether the second pixel of a pair is the nearer one. */
+TL_INLINE int is_nearer(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair_list *list, int64_t i,
+                        int is_f64)
 {
-    int32_t *columns = m->edges->ids + 2 * (m->view->width + TL_IDS_ROOM);
-    const int64_t n_pairs = list_pairs(m->edges, m->ids, m->others, n, columns);
-    for (int64_t i = 0; i < n_pairs; i++) {
-        const int64_t first = m->row * m->view->width + columns[i], second = first + (m->axis ? m->view->width : 1);
-        const int is_flipped = m->ids[columns[i]] < 0 ||
-                               (m->others[columns[i]] >= 0 && get_real(m->edges->rast, 4 * second + 2, is_f64) <
-                                                                  get_real(m->edges->rast, 4 * first + 2, is_f64));
-        tl_met_pair pair;
-        if (meet_pair(m, columns[i], is_flipped, &pair))
-            blend_pair(m->view, m->edges, &pair, m->sums, is_f64);
-    }
+    const int64_t first = (list->where[i] >> TL_ROW_SHIFT) * view->width + list->column[i];
+    const int64_t second = first + (list->where[i] & TL_IN_COLUMN ? view->width : 1);
+    return list->near[i] < 0 ||
+           (list->far[i] >= 0 && get_real(e->rast, 4 * second + 2, is_f64) < get_real(e->rast, 4 * first + 2, is_f64));
 }
 
 TL_INLINE void edges_of_band(const tl_grad_view *view, const tl_grad_edges *e, tl_grad_sums *sums, int is_f64)
 {
-    const int64_t width = view->width, room = width + TL_IDS_ROOM;
     const int64_t top = view->end_row < view->height ? view->end_row + 1 : view->height;
     const int64_t bottom = view->first_row > 0 ? view->first_row - 1 : 0;
-    for (int64_t row = bottom; row < top; row++) {
-        int32_t *ids = e->ids + row % 2 * room;
-        load_ids(view, e, row, ids, is_f64);
-        if (row > bottom)
-            meet_row(&(meeting){view, e, sums, row - 1, 1, e->ids + (row + 1) % 2 * room, ids}, width, is_f64);
-        if (row >= view->first_row && row < view->end_row)
-            meet_row(&(meeting){view, e, sums, row, 0, ids, ids + 1}, width - 1, is_f64);
+    pair_scan scan = scan_of(view, e, bottom, top);
+    tl_pair_list list;
+    tl_met_pair pairs[TL_MAX_LANES];
+    int32_t which[TL_PAIRS_ROOM];
+    while (next_pairs(&scan, &list, is_f64)) {
+        for (int64_t i = 0; i < list.n; i++)
+            if (is_nearer(view, e, &list, i, is_f64))
+                turn_pair(&list, i);
+        const int64_t n = list_met(view, e, &list, which);
+        for (int64_t i = 0; i < n; i += TL_LANES) {
+            const int64_t n_met = meet_some(view, e, &list, which + i, n - i, pairs);
+            for (int64_t k = 0; k < n_met; k++)
+                blend_pair(view, e, pairs + k, sums, is_f64);
+        }
     }
 }
 

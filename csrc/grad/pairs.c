@@ -12,16 +12,18 @@
 #ifndef TL_GRAD_PAIRS_C
 #define TL_GRAD_PAIRS_C
 
-#include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "topleft.h"
-#include "lanes/inline.h"
 #include "grad/pixels.h"
+#include "lanes/lanes.h"
 
 #define TL_CROSSING_SLACK 0.0625 /* px by which the snap may move an edge past a middle that it separates */
 #define TL_HANDOVER 0.6          /* width of the hand-over about 45 degrees, in the cosine of twice the angle */
 #define TL_WALK_STEPS 256        /* of a walk */
+#define TL_PAIRS_AT_ONCE 512     /* pairs that are walked at once */
+#define TL_PAIRS_ROOM (TL_PAIRS_AT_ONCE + 2 * TL_MAX_LANES)
 
 /* Two neighbours. */
 typedef struct {
@@ -31,7 +33,7 @@ typedef struct {
     double flip, middle[2]; /* flip: 1, or -1 where the far one comes first */
 } tl_pair;
 
-/* The edge that separates them. */
+/* The edge between them. */
 typedef struct {
     int32_t vertices[2];
     double t, slope, rise, ends[2]; /* where it crosses the line of middles; d along / d beside; ends: weights of t */
@@ -39,146 +41,335 @@ typedef struct {
     double near_by[2], far_by[2];   /* what they change by with t and with the slope */
 } tl_pair_edge;
 
-/* The corners of a triangle about a pair. */
-TL_INLINE void place_corners(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, int32_t id,
-                             double *along, double *beside)
+/* A pair and its edge. */
+typedef struct {
+    tl_pair pair;
+    tl_pair_edge edge;
+} tl_met_pair;
+
+/* Pairs of neighbours, some at once. */
+typedef struct {
+    int64_t n;
+    int32_t near[TL_PAIRS_ROOM], far[TL_PAIRS_ROOM];     /* triangles; the last may be -1 */
+    int32_t column[TL_PAIRS_ROOM], where[TL_PAIRS_ROOM]; /* of the near pixel; where: its row and TL_IN_COLUMN, ... */
+    int32_t end[TL_PAIRS_ROOM];                          /* the triangle that has the edge between them, -1 for none */
+} tl_pair_list;
+
+enum { TL_IN_COLUMN = 1, TL_IS_BEYOND = 2, TL_ROW_SHIFT = 2 };
+
+/* Walks of a list's pairs: which triangles they have reached, pixels as of the list, which pairs they are. */
+typedef struct {
+    const tl_grad_view *view;
+    const tl_grad_edges *edges;
+    tl_pair_list *list;
+    int64_t n, n_failed;
+    int32_t id[TL_PAIRS_ROOM], far[TL_PAIRS_ROOM], column[TL_PAIRS_ROOM], where[TL_PAIRS_ROOM], pair[TL_PAIRS_ROOM];
+    int32_t failed[TL_PAIRS_ROOM]; /* pairs whose walks lead nowhere */
+} pair_walks;
+
+/* Some of them. */
+typedef struct {
+    vi id, far, column, where, pair;
+} walker_lanes;
+
+TL_INLINE vm bits_set(vi a, int bits) { return vm_and_not(vm_all(), vi_eq(vi_and(a, vi_set1(bits)), vi_set1(0))); }
+TL_INLINE vm vd_exceeds(vd a, vd b) { return vm_and_not(vd_ge(a, b), vd_ge(b, a)); }
+
+/* The corners of triangles about the near pixels of pairs. */
+typedef struct {
+    vd along[3], beside[3];
+} placed_lanes;
+
+/* Those of TL_LANES `ids`, whose vertices exist. */
+TL_INLINE void place_corners(const tl_grad_view *view, const tl_grad_edges *e, const int32_t *ids, vi column, vi where,
+                             placed_lanes *p)
 {
+    int32_t corners[3 * TL_MAX_LANES];
+    const vm in_column = bits_set(where, TL_IN_COLUMN);
+    const vd half = vd_set1(0.5), x = vd_add(vd_from_vi(column), half);
+    const vd y = vd_add(vd_from_vi(vi_shift_right(where, TL_ROW_SHIFT)), half);
+    const vd flip = vd_select(bits_set(where, TL_IS_BEYOND), vd_set1(-1.0), vd_set1(1.0));
+    for (int lane = 0; lane < TL_LANES; lane++)
+        memcpy(corners + 3 * lane, view->tri + 3 * (int64_t)ids[lane], 3 * sizeof *corners);
     for (int k = 0; k < 3; k++) {
-        const double *px = e->places + 2 * (int64_t)view->tri[3 * (int64_t)id + k];
-        along[k] = pair->flip * (px[pair->axis] - pair->middle[pair->axis]);
-        beside[k] = px[1 - pair->axis] - pair->middle[1 - pair->axis];
+        vd px[2];
+        vd_load_pairs(e->places, 2, corners + k, &px[0], &px[1]);
+        px[0] = vd_sub(px[0], x), px[1] = vd_sub(px[1], y);
+        p->along[k] = vd_mul(flip, vd_select(in_column, px[1], px[0]));
+        p->beside[k] = vd_select(in_column, px[0], px[1]);
     }
 }
 
-/* The edge among `allowed` that crosses the line of middles farthest along; -1 for none. */
-TL_INLINE int exit_edge(const double *along, const double *beside, int allowed, tl_pair_edge *edge)
+/* Edges: the corner opposite to each, and of its ends how far beside they are; the rest as of tl_pair_edge. */
+typedef struct {
+    vi corner;
+    vd t, slope, rise, beside[2];
+} exit_lanes;
+
+/* The edges that cross the lines of middles farthest along, among all or those in `allowed`; which lanes have one. */
+TL_INLINE vm exit_edges(const placed_lanes *p, const vm *allowed, exit_lanes *edge)
 {
-    int found = -1;
-    edge->t = -9.0;
+    const vd zero = vd_set1(0.0);
+    *edge = (exit_lanes){vi_set1(0), vd_set1(-9.0), zero, zero, {zero, zero}};
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
-        if (!(allowed >> k & 1) || (beside[i] <= 0.0) == (beside[j] <= 0.0))
-            continue;
-        const double rise = beside[j] - beside[i], slope = (along[j] - along[i]) / rise;
-        const double t = along[i] - beside[i] * slope;
-        if (!(t > edge->t))
-            continue;
-        found = k;
-        edge->t = t, edge->slope = slope, edge->rise = rise;
-        edge->ends[0] = beside[j] / rise, edge->ends[1] = -beside[i] / rise;
+        const vm before = vd_ge(zero, p->beside[i]), after = vd_ge(zero, p->beside[j]);
+        const vd rise = vd_sub(p->beside[j], p->beside[i]), slope = vd_div(vd_sub(p->along[j], p->along[i]), rise);
+        const vd t = vd_sub(p->along[i], vd_mul(p->beside[i], slope));
+        vm m = vm_and(vm_and_not(vm_or(before, after), vm_and(before, after)), vd_exceeds(t, edge->t));
+        if (allowed)
+            m = vm_and(m, allowed[k]);
+        edge->corner = vi_select(m, vi_set1(k), edge->corner), edge->t = vd_select(m, t, edge->t);
+        edge->slope = vd_select(m, slope, edge->slope), edge->rise = vd_select(m, rise, edge->rise);
+        edge->beside[0] = vd_select(m, p->beside[i], edge->beside[0]);
+        edge->beside[1] = vd_select(m, p->beside[j], edge->beside[1]);
     }
-    return edge->t > -TL_CROSSING_SLACK && edge->t < 1.0 + TL_CROSSING_SLACK ? found : -1;
+    return vm_and(vd_exceeds(edge->t, vd_set1(-TL_CROSSING_SLACK)),
+                  vd_exceeds(vd_set1(1.0 + TL_CROSSING_SLACK), edge->t));
 }
 
-/* The edges of a triangle that are steep enough for a pair in a row, or flat enough for one in a column. */
-TL_INLINE int steep_edges(const double *along, const double *beside, int axis)
+/* A third of numbers that are not below 0. */
+TL_INLINE vi third_of(vi a) { return vi_round(vd_mul(vd_from_vi(vi_sub(a, vi_set1(1))), vd_set1(1.0 / 3.0))); }
+
+/* A step of walks from i on, to the next triangle or to the end; those that go on.  Nowhere lead those where the snap
+ * moved an edge past a middle, and those that reach behind the eye. */
+TL_INLINE vm step_walks(pair_walks *w, int64_t i, int is_last, walker_lanes *at)
 {
-    int found = 0;
+    placed_lanes placed;
+    exit_lanes edge;
+    vm m = vm_first(w->n - i);
+    place_corners(w->view, w->edges, w->id + i, at->column, at->where, &placed);
+    const vi outline = vi_gather(m, w->edges->outline, at->id);
+    const vm has_edge = vm_and(exit_edges(&placed, 0, &edge), bits_set(outline, TL_IS_AHEAD));
+    const vm fails = vm_and_not(m, has_edge);
+    vi_compress(w->failed + w->n_failed, fails, at->pair);
+    w->n_failed += __builtin_popcount(vm_bits(fails));
+    m = vm_and(m, has_edge);
+    const vi other = vi_gather(m, w->edges->across, vi_add(vi_add(at->id, vi_add(at->id, at->id)), edge.corner));
+    vm ends = vi_gt(vi_set1(0), other);
+    for (int k = 0; k < 3; k++)
+        ends = vm_or(ends, vm_and(bits_set(outline, 1 << k), vi_eq(edge.corner, vi_set1(k))));
+    ends = is_last ? m : vm_and(m, ends);
+    for (unsigned bits = vm_bits(ends); bits; bits &= bits - 1) {
+        const int64_t k = i + __builtin_ctz(bits);
+        w->list->end[w->pair[k]] = w->id[k];
+    }
+    at->id = third_of(other);
+    return vm_and_not(vm_and_not(m, ends), vi_eq(at->id, at->far));
+}
+
+/* All walks, step by step, from the near triangles to where the surface ends or folds, or to the far ones. */
+static void walk_pairs(pair_walks *w)
+{
+    w->n_failed = 0;
+    for (int step = 0; step <= TL_WALK_STEPS && w->n; step++) {
+        int64_t n_left = 0;
+        vi_store(w->id + w->n, vi_set1(w->id[0])); /* a vector has triangles everywhere */
+        for (int64_t i = 0; i < w->n; i += TL_LANES) {
+            walker_lanes at = {vi_load(w->id + i), vi_load(w->far + i), vi_load(w->column + i), vi_load(w->where + i),
+                               vi_load(w->pair + i)};
+            const vm m = step_walks(w, i, step == TL_WALK_STEPS, &at);
+            vi_compress(w->id + n_left, m, at.id), vi_compress(w->far + n_left, m, at.far);
+            vi_compress(w->column + n_left, m, at.column), vi_compress(w->where + n_left, m, at.where);
+            vi_compress(w->pair + n_left, m, at.pair);
+            n_left += __builtin_popcount(vm_bits(m));
+        }
+        w->n = n_left;
+    }
+}
+
+/* The other one of a pair becomes the near one. */
+TL_INLINE void turn_pair(tl_pair_list *list, int64_t i)
+{
+    const int32_t near = list->near[i], step = list->where[i] & TL_IS_BEYOND ? -1 : 1;
+    list->near[i] = list->far[i], list->far[i] = near;
+    if (list->where[i] & TL_IN_COLUMN)
+        list->where[i] += step * (1 << TL_ROW_SHIFT);
+    else
+        list->column[i] += step;
+    list->where[i] ^= TL_IS_BEYOND;
+}
+
+/* Finds where the surface ends or folds between pairs: from the near triangles, else from the far ones. */
+static void end_walks(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list)
+{
+    pair_walks w;
+    const size_t size = (size_t)list->n * sizeof(int32_t);
+    w.view = view, w.edges = e, w.list = list, w.n = list->n;
+    memcpy(w.id, list->near, size), memcpy(w.far, list->far, size);
+    memcpy(w.column, list->column, size), memcpy(w.where, list->where, size);
+    for (int64_t i = 0; i < list->n; i++)
+        w.pair[i] = (int32_t)i, list->end[i] = -1;
+    walk_pairs(&w);
+    w.n = 0;
+    for (int64_t k = 0; k < w.n_failed; k++) {
+        const int32_t i = w.failed[k];
+        if (list->far[i] < 0)
+            continue;
+        turn_pair(list, i);
+        w.id[w.n] = list->near[i], w.far[w.n] = list->far[i];
+        w.column[w.n] = list->column[i], w.where[w.n] = list->where[i], w.pair[w.n++] = i;
+    }
+    walk_pairs(&w);
+}
+
+/* Pairs of which something may come, what they have; the shares as of tl_pair_edge. */
+typedef struct {
+    int32_t ids[TL_MAX_LANES]; /* of the triangles that have their edges */
+    vi where;
+    vm m; /* those of which something comes */
+    placed_lanes placed;
+    exit_lanes edge;
+    vd near, far, near_by[2], far_by[2];
+} pair_lanes;
+
+TL_INLINE vd vd_clamped(vd a, vd low, vd high)
+{
+    return vd_select(vd_exceeds(low, a), low, vd_select(vd_exceeds(a, high), high, a));
+}
+
+/* By silhouettes, of the near triangles: those steep enough for a pair in a row, or flat enough for one in a column. */
+TL_INLINE void share_silhouettes(const tl_grad_edges *e, pair_lanes *p)
+{
+    const vi outline = vi_gather(p->m, e->outline, vi_load(p->ids));
+    const vm in_column = bits_set(p->where, TL_IN_COLUMN);
+    const vd zero = vd_set1(0.0), one = vd_set1(1.0), minus = vd_set1(-1.0), *along = p->placed.along;
+    vm allowed[3];
     for (int k = 0; k < 3; k++) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const double rise = fabs(beside[j] - beside[i]), run = fabs(along[j] - along[i]);
-        found |= (axis ? rise > run : rise >= run) << k;
+        const vd rise = vd_abs(vd_sub(p->placed.beside[j], p->placed.beside[i])),
+                 run = vd_abs(vd_sub(along[j], along[i]));
+        const vm is_steep = vm_and_not(vd_ge(rise, run), vm_and(in_column, vd_ge(run, rise)));
+        allowed[k] = vm_and(is_steep, bits_set(outline, 1 << k));
     }
-    return found;
+    p->m = vm_and(p->m, vm_and(bits_set(outline, TL_IS_AHEAD), exit_edges(&p->placed, allowed, &p->edge)));
+    const vm is_between = vm_and(vd_ge(p->edge.t, zero), vd_ge(one, p->edge.t));
+    const vd shift = vd_sub(vd_clamped(p->edge.t, zero, one), vd_set1(0.5));
+    const vm is_far = vd_exceeds(shift, zero), is_near = vd_exceeds(zero, shift);
+    p->near = vd_select(is_far, zero, vd_mul(minus, shift)), p->far = vd_select(is_far, shift, zero);
+    p->near_by[0] = vd_select(vm_and(is_between, is_near), minus, zero);
+    p->far_by[0] = vd_select(vm_and(is_between, is_far), one, zero);
+    p->near_by[1] = p->far_by[1] = zero;
 }
 
-TL_INLINE void set_vertices(const tl_grad_view *view, int32_t id, int k, tl_pair_edge *edge)
-{
-    edge->vertices[0] = view->tri[3 * (int64_t)id + (k + 1) % 3];
-    edge->vertices[1] = view->tri[3 * (int64_t)id + (k + 2) % 3];
-}
-
-static int find_silhouette(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, tl_pair_edge *edge)
-{
-    double along[3], beside[3];
-    const int allowed = e->outline[pair->id] & TL_SILHOUETTES;
-    if (!allowed || !(e->outline[pair->id] & TL_IS_AHEAD))
-        return 0;
-    place_corners(view, e, pair, pair->id, along, beside);
-    const int k = exit_edge(along, beside, allowed & steep_edges(along, beside, pair->axis), edge);
-    if (k < 0)
-        return 0;
-    set_vertices(view, pair->id, k, edge);
-    const int is_between = edge->t >= 0.0 && edge->t <= 1.0;
-    const double shift = clamped(edge->t, 0.0, 1.0) - 0.5;
-    edge->near = shift > 0.0 ? 0.0 : -shift, edge->far = shift > 0.0 ? shift : 0.0;
-    edge->near_by[0] = is_between && shift < 0.0 ? -1.0 : 0.0, edge->far_by[0] = is_between && shift > 0.0 ? 1.0 : 0.0;
-    edge->near_by[1] = edge->far_by[1] = 0.0;
-    return 1;
-}
-
-/* The share of a square of side 1 that lies before a line, which crosses its middle line at u and has a slope of 2 h
+/* The share of squares of side 1 that lies before lines, which cross their middle lines at u and have slopes of 2 h
  * there; what it changes by with u and with h. */
-TL_INLINE double area_before(double u, double h, double *by_u, double *by_h)
+TL_INLINE vd area_before(vd u, vd h, vd *by_u, vd *by_h)
 {
-    *by_u = *by_h = 0.0;
-    if (u <= -h || u >= 1.0 + h)
-        return u > 0.5;
-    h = h < 1e-9 ? 1e-9 : h;
-    const double p = h - u > 0.0 ? h - u : 0.0, q = u + h > 1.0 ? u + h - 1.0 : 0.0;
-    *by_u = 1.0 - (p + q) / (2.0 * h);
-    *by_h = (p * (h + u) - q * (h - u + 1.0)) / (4.0 * h * h);
-    return u + (p * p - q * q) / (4.0 * h);
+    const vd zero = vd_set1(0.0), one = vd_set1(1.0), two = vd_set1(2.0), four = vd_set1(4.0);
+    const vm is_whole = vm_or(vd_ge(vd_mul(vd_set1(-1.0), h), u), vd_ge(u, vd_add(one, h)));
+    h = vd_max(vd_set1(1e-9), h);
+    const vd p = vd_max(vd_sub(h, u), zero), up = vd_add(u, h);
+    const vd q = vd_select(vd_exceeds(up, one), vd_sub(up, one), zero);
+    const vd over = vd_sub(vd_mul(p, vd_add(h, u)), vd_mul(q, vd_add(vd_sub(h, u), one)));
+    *by_u = vd_select(is_whole, zero, vd_sub(one, vd_div(vd_add(p, q), vd_mul(two, h))));
+    *by_h = vd_select(is_whole, zero, vd_div(over, vd_mul(vd_mul(four, h), h)));
+    const vd part = vd_add(u, vd_div(vd_sub(vd_mul(p, p), vd_mul(q, q)), vd_mul(four, h)));
+    return vd_select(is_whole, vd_select(vd_exceeds(u, vd_set1(0.5)), one, zero), part);
 }
 
-/* How much of an edge is left to this axis, the rest being the other one's: rows and columns of pixels. */
-TL_INLINE double share_of_axis(double slope, double low, double high, int axis)
+/* How much of edges is left to this axis, the rest being the other one's: rows and columns of pixels. */
+TL_INLINE vd share_of_axis(const exit_lanes *edge, vm in_column)
 {
-    const double open = 1.0 - (high < 0.5 ? high : 0.5) + (low > -0.5 ? low : -0.5), width = TL_HANDOVER * open;
-    if (width <= 1e-9)
-        return axis ? fabs(slope) < 1.0 : fabs(slope) <= 1.0;
-    return clamped(0.5 + (1.0 - slope * slope) / (1.0 + slope * slope) / (2.0 * width), 0.0, 1.0);
+    const vd zero = vd_set1(0.0), one = vd_set1(1.0), half = vd_set1(0.5), size = vd_abs(edge->slope);
+    const vd low = vd_max(vd_min(edge->beside[0], edge->beside[1]), vd_set1(-0.5));
+    const vd high = vd_min(vd_max(edge->beside[0], edge->beside[1]), half);
+    const vd width = vd_mul(vd_set1(TL_HANDOVER), vd_add(vd_sub(one, high), low));
+    const vm is_steep = vm_and_not(vd_ge(one, size), vm_and(in_column, vd_ge(size, one)));
+    const vd squared = vd_mul(edge->slope, edge->slope);
+    const vd cosine = vd_div(vd_sub(one, squared), vd_add(one, squared));
+    const vd part = vd_add(half, vd_div(cosine, vd_mul(vd_set1(2.0), width)));
+    return vd_select(vd_ge(vd_set1(1e-9), width), vd_select(is_steep, one, zero), vd_clamped(part, zero, one));
 }
 
-/* The walk; 1: an edge was found, 0: the surface goes on to the far triangle, -1: neither. */
-static int walk_edge(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, tl_pair_edge *edge,
-                     double *beside)
+/* By the area beyond the edges where walks end. */
+TL_INLINE void share_area(pair_lanes *p)
 {
-    double along[3];
-    int32_t id = pair->id;
-    for (int step = 0; step <= TL_WALK_STEPS; step++) {
-        if (!(e->outline[id] & TL_IS_AHEAD))
-            return -1;
-        place_corners(view, e, pair, id, along, beside);
-        const int k = exit_edge(along, beside, 7, edge);
-        if (k < 0)
-            return -1;
-        const int32_t other = e->across[3 * (int64_t)id + k];
-        set_vertices(view, id, k, edge);
-        const double low = beside[(k + 1) % 3], high = beside[(k + 2) % 3];
-        beside[0] = low < high ? low : high, beside[1] = low < high ? high : low;
-        if (other < 0 || e->outline[id] >> k & 1 || step == TL_WALK_STEPS)
-            return 1;
-        if (other / 3 == pair->far_id)
-            return 0;
-        id = other / 3;
+    const vd zero = vd_set1(0.0), half = vd_set1(0.5);
+    exit_edges(&p->placed, 0, &p->edge);
+    const vd slope = p->edge.slope, u = vd_clamped(p->edge.t, zero, vd_set1(1.0)), h = vd_mul(vd_abs(slope), half);
+    const vd sign = vd_select(vd_exceeds(zero, slope), vd_set1(-0.5), vd_select(vd_exceeds(slope, zero), half, zero));
+    const vd part = share_of_axis(&p->edge, bits_set(p->where, TL_IN_COLUMN)), less = vd_mul(vd_set1(-1.0), part);
+    vd by_u, by_h;
+    p->m = vm_and_not(p->m, vm_and(vd_ge(part, zero), vd_ge(zero, part)));
+    p->near = vd_mul(part, vd_sub(vd_set1(1.0), area_before(vd_add(u, half), h, &by_u, &by_h)));
+    p->near_by[0] = vd_mul(less, by_u), p->near_by[1] = vd_mul(vd_mul(less, by_h), sign);
+    p->far = vd_mul(part, area_before(vd_sub(u, half), h, &by_u, &by_h));
+    p->far_by[0] = vd_mul(part, by_u), p->far_by[1] = vd_mul(vd_mul(part, by_h), sign);
+}
+
+/* Pair i of a list, without its edge. */
+TL_INLINE tl_pair pair_of(const tl_grad_view *view, const tl_pair_list *list, int64_t i)
+{
+    const int axis = list->where[i] & TL_IN_COLUMN, flip = list->where[i] & TL_IS_BEYOND ? -1 : 1;
+    const int64_t row = list->where[i] >> TL_ROW_SHIFT, near = row * view->width + list->column[i];
+    const int64_t far = near + flip * (axis ? view->width : 1);
+    return (tl_pair){near, far, list->near[i], list->far[i], axis, flip, {list->column[i] + 0.5, (double)row + 0.5}};
+}
+
+/* Takes pairs out of their lanes; returns how many they are. */
+static int64_t store_pairs(const tl_grad_view *view, const tl_pair_list *list, const int32_t *which,
+                           const pair_lanes *p, tl_met_pair *out)
+{
+    const vd rise = p->edge.rise, from = vd_div(p->edge.beside[1], rise);
+    const vd to = vd_div(vd_mul(vd_set1(-1.0), p->edge.beside[0]), rise);
+    const vd numbers[] = {p->edge.t, p->edge.slope, rise,          from,         to,          p->near,
+                          p->far,    p->near_by[0], p->near_by[1], p->far_by[0], p->far_by[1]};
+    double at[11][TL_MAX_LANES];
+    int32_t corners[TL_MAX_LANES];
+    int64_t n = 0;
+    for (int k = 0; k < 11; k++)
+        vd_store(at[k], numbers[k]);
+    vi_spill(corners, p->edge.corner);
+    for (unsigned bits = vm_bits(p->m); bits; bits &= bits - 1, n++) {
+        const int i = __builtin_ctz(bits), k = corners[i];
+        const int32_t *tri = view->tri + 3 * (int64_t)p->ids[i];
+        tl_pair_edge *edge = &out[n].edge;
+        out[n].pair = pair_of(view, list, which[i]);
+        edge->vertices[0] = tri[(k + 1) % 3], edge->vertices[1] = tri[(k + 2) % 3];
+        edge->t = at[0][i], edge->slope = at[1][i], edge->rise = at[2][i];
+        edge->ends[0] = at[3][i], edge->ends[1] = at[4][i], edge->near = at[5][i], edge->far = at[6][i];
+        edge->near_by[0] = at[7][i], edge->near_by[1] = at[8][i];
+        edge->far_by[0] = at[9][i], edge->far_by[1] = at[10][i];
     }
-    return -1;
+    return n;
 }
 
-static int find_area_edge(const tl_grad_view *view, const tl_grad_edges *e, tl_pair *pair, tl_pair_edge *edge)
+/* Finds the edges of n pairs of a list, of TL_LANES at most; returns of how many something comes. */
+TL_INLINE int64_t meet_some(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair_list *list,
+                            const int32_t *which, int64_t n, tl_met_pair *out)
 {
-    double beside[3];
-    int found = walk_edge(view, e, pair, edge, beside);
-    if (found < 0 && pair->far_id >= 0) { /* from the far one */
-        const int64_t near = pair->near;
-        const int32_t id = pair->id;
-        pair->middle[pair->axis] += pair->flip, pair->flip = -pair->flip;
-        pair->near = pair->far, pair->far = near, pair->id = pair->far_id, pair->far_id = id;
-        found = walk_edge(view, e, pair, edge, beside);
+    pair_lanes p;
+    const int is_area = e->rule == TL_PAIR_AREA;
+    n = n < TL_LANES ? n : TL_LANES;
+    if (e->rule == TL_PAIR_STRAIGHT) {
+        for (int64_t i = 0; i < n; i++)
+            out[i].pair = pair_of(view, list, which[i]);
+        return n;
     }
-    if (found <= 0)
-        return 0;
-    const double part = share_of_axis(edge->slope, beside[0], beside[1], pair->axis), u = clamped(edge->t, 0.0, 1.0);
-    if (part == 0.0)
-        return 0;
-    const double h = fabs(edge->slope) / 2.0, sign = edge->slope < 0.0 ? -0.5 : edge->slope > 0.0 ? 0.5 : 0.0;
-    double by_u, by_h;
-    edge->near = part * (1.0 - area_before(u + 0.5, h, &by_u, &by_h));
-    edge->near_by[0] = -part * by_u, edge->near_by[1] = -part * by_h * sign;
-    edge->far = part * area_before(u - 0.5, h, &by_u, &by_h);
-    edge->far_by[0] = part * by_u, edge->far_by[1] = part * by_h * sign;
-    return 1;
+    p.m = vm_first(n);
+    const vi pair = vi_select(p.m, vi_load(which), vi_set1(which[0])); /* every lane has a triangle */
+    p.where = vi_gather(vm_all(), list->where, pair);
+    vi_spill(p.ids, vi_gather(vm_all(), is_area ? list->end : list->near, pair));
+    place_corners(view, e, p.ids, vi_gather(vm_all(), list->column, pair), p.where, &p.placed);
+    if (is_area)
+        share_area(&p);
+    else
+        share_silhouettes(e, &p);
+    return store_pairs(view, list, which, &p, out);
+}
+
+/* Lists the pairs of a list of which something may come, after their walks; returns how many. */
+static int64_t list_met(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list, int32_t *which)
+{
+    int64_t n = 0;
+    if (e->rule == TL_PAIR_AREA)
+        end_walks(view, e, list);
+    for (int64_t i = 0; i < list->n; i++) {
+        which[n] = (int32_t)i;
+        n += e->rule != TL_PAIR_AREA || list->end[i] >= 0;
+    }
+    return n;
 }
 
 /* Adds a gradient of a vertex's pixel coordinates to its sums of x, y, z, w. */

@@ -188,6 +188,9 @@ def test_pose_that_is_taken_at_a_glance_is_one():
             assert np.isfinite(pose).all()
             assert pose[3].tolist() == [0, 0, 0, 1]
             assert np.linalg.matrix_rank(pose[:3, :3]) == 3
+            assert engine.are_mirrored(pose[None]).tolist() == [engine.determinant(pose[:3, :3]) < 0]
+        else:
+            assert engine.are_mirrored(np.stack([np.eye(4), pose])) is None
     assert 50 < n_taken < 350
     assert engine.is_pose(np.eye(4))
     assert not engine.is_pose(np.diag([1.0, 1.0, 0.0, 1.0]))

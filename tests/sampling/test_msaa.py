@@ -12,6 +12,7 @@ from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_cen
 
 import topleft as tl
 from topleft._core.base.memory import FRESH
+from topleft._core.raster import choices
 from topleft._core.raster.rasterize import draw_fragments
 from topleft._core.raster.sampling import POSITIONS
 from topleft._core.raster.view import View
@@ -211,7 +212,8 @@ def test_index_outside_the_vertices_is_an_error():
 def split_ids(vertices, triangles, size, memory=FRESH, depth_test="less", background_depth=None, out=None, **options):
     """The visibility buffer as pictures have it drawn."""
     view = View.parse(size, options).but(is_split=True)
-    return draw_fragments(memory, vertices, triangles, view, depth_test, background_depth, out)
+    with choices.forced(pays_to_split=True):
+        return draw_fragments(memory, vertices, triangles, view, depth_test, background_depth, out)
 
 
 def kept(frags):

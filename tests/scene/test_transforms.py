@@ -1,5 +1,8 @@
 """`Scene.with_transforms`: the same instances elsewhere."""
 
+import dataclasses
+import pickle
+
 import numpy as np
 import pytest
 from comparing import assert_same
@@ -19,6 +22,18 @@ def test_scene_with_other_transforms_is_drawn_as_a_new_one_is():
     fresh = tl.Scene([tl.Instance(ball, places[0], color="red"), tl.Instance(ball, places[1])])
     assert_same(tl.render(moved, camera, SIZE), tl.render(fresh, camera, SIZE))
     assert moved[0].mesh is ball
+
+
+def test_moved_scene_has_the_instances_of_its_own_place_when_they_are_asked_for():
+    cube, ball = tl.Mesh(*tl.scenes.cube()), tl.Mesh(*tl.scenes.icosphere(0))
+    places = np.stack([np.eye(4)] * 2)
+    places[1, :3, 3] = 1, 2, 3
+    first = tl.Scene([tl.Instance(cube, name="left"), tl.Instance(ball, color="red")])
+    moved = first.with_transforms(places * [[[2], [2], [2], [1]]]).with_transforms(places)
+    assert repr(moved) == repr(first) == "Scene(2 instances of 2 meshes, 32 triangles)"
+    for found in (moved, pickle.loads(pickle.dumps(moved)), dataclasses.replace(moved)):
+        assert (len(found), found[0].name, found[1].material.color) == (2, "left", (255, 0, 0))
+        assert [one.transform.tolist() for one in found] == places.tolist()
 
 
 @pytest.mark.parametrize(
@@ -42,6 +57,7 @@ def test_moved_instances_know_whether_they_are_mirrored():
     turns = np.random.default_rng(0).normal(size=(20, 3, 3))
     places = np.tile(np.eye(4), (20, 1, 1))
     places[:, :3, :3] = turns
+    places[19, :3, :3] = np.diag([1e-9, -1, 1])  # regular, but not at a glance
     moved = tl.Scene([cube] * 20).with_transforms(places)
     assert [one.is_mirrored for one in moved] == [tl.Instance(cube, place).is_mirrored for place in places]
     assert 0 < sum(one.is_mirrored for one in moved) < 20

@@ -33,7 +33,7 @@ def test_alpha_is_the_share_of_samples_with_a_triangle(n):
 @pytest.mark.parametrize("shading", ["smooth", "flat", "normals"])
 @pytest.mark.parametrize("size", [SIZE, (1100, 40)])
 def test_picture_is_the_same_from_planes_of_samples(force, isa, shading, size):
-    force(pays_to_cluster=False)  # planes of samples
+    force(pays_to_cluster=False, pays_to_split=True)  # planes of samples
     square = tl.Camera.orthographic(tl.Camera.framing(KNOT).view, near=0.1, far=30, height=3)
     look = {"shading": shading, "fog": tl.Fog(2.0, 9.0), "background": (10, 200, 30, 100)}
     lights = [tl.Light((1, 2, 3), kind="point")]
@@ -46,6 +46,13 @@ def test_picture_is_the_same_from_planes_of_samples(force, isa, shading, size):
             assert frags.samples_depth.shape[-1] == n
             assert frags._split is None
             assert_same(tl.shade(frags, KNOT, camera, lights=lights, **look), from_lists)
+
+
+def test_samples_of_a_small_picture_are_kept_one_by_one():
+    cube = Shot.of(tl.Mesh(*tl.scenes.cube()), None, (150, 150))
+    assert rasterize_shot(cube, sampling="msaa4")._split is None
+    assert rasterize_shot(cube, sampling="msaa8")._split is not None
+    assert rasterize_shot(Shot.of(KNOT, None, (150, 150)), sampling="msaa8")._split is None
 
 
 @pytest.mark.parametrize("look", [{}, {"shading": "ids"}, {"cutoff": 0.5}, {"edges": True}, {"cull": "back"}])

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 import weakref
 from collections.abc import Sequence
 from typing import Any
@@ -17,7 +16,7 @@ from topleft import rasterize as draw
 from topleft._core.gradients import tensors
 from topleft._core.gradients.pictures import AttributePictures, Seen
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid
-from topleft._torch.operators import each, joined, like, numpy_of, once, operator, threads_of, triangles_of
+from topleft._torch.operators import joined, like, numpy_of, once, operator, threads_of, triangles_of
 
 #: The sizes of pictures and what they show, by the address of the ids, for as long as these live.
 kept: dict[int, tuple[list[Any], list[tuple[Seen, int]]]] = {}
@@ -42,21 +41,21 @@ def kept_seen(pictures: AttributePictures) -> list[tuple[Seen, int]] | None:
     return seen if sizes == sizes_of(pictures) else None
 
 
-def draw_edges(pos: Tensor, tri: Tensor, across: Tensor, height: int, width: int, threads: int) -> tuple[Any, Any]:
-    """Return the ids of pictures, row 0 on top, and their outlines."""
-    n = threads_of(threads, height * width)
-    drawn = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, None)]
-    grid = PixelGrid(triangles_of(tri, pos.shape[1]), len(pos), height, width, n)
-    return joined(drawn, (height, width)), tensors.outline_of(grid, numpy_of(pos), numpy_of(across.to(torch.int32)))
-
-
-def pictures_of(
-    pos: Tensor, tri: Tensor, attr: Tensor, ids: Any, outline: tensors.Outline, rule: int, threads: int
-) -> AttributePictures:
-    """Return what the engine draws of a mesh, and leads back."""
+def grid_of_mesh(pos: Tensor, tri: Tensor, attr: Tensor, size: tuple[int, int], threads: int) -> PixelGrid:
+    """Return the pictures (B, H, W) of a mesh, whose triangles have rows in `pos` and `attr`."""
     triangles = triangles_of(tri, min(pos.shape[1], attr.shape[1]))
-    grid = PixelGrid(triangles, len(ids), ids.shape[1], ids.shape[2], threads_of(threads, math.prod(ids.shape)))
-    return AttributePictures(grid, EdgeRule(rule), outline, numpy_of(pos), ids, numpy_of(attr))
+    return PixelGrid(triangles, len(pos), *size, threads_of(threads, len(pos) * size[0] * size[1]))
+
+
+def draw_pictures(
+    pos: Tensor, tri: Tensor, attr: Tensor, across: Tensor, size: tuple[int, int], rule: int, threads: int
+) -> AttributePictures:
+    """Draw which triangles show, row 0 on top, and find their outlines; `size` is height and width."""
+    grid, vertices = grid_of_mesh(pos, tri, attr, size, threads), numpy_of(pos)
+    n = threads_of(threads, size[0] * size[1])
+    ids = joined([draw(one, grid.tri, size[::-1], threads=n).triangle for one in vertices], size)
+    outline = tensors.outline_of(grid, vertices, numpy_of(across.to(torch.int32)))
+    return AttributePictures(grid, EdgeRule(rule), outline, vertices, ids, numpy_of(attr))
 
 
 @operator(
@@ -72,8 +71,8 @@ def squares(
     pos: Tensor, tri: Tensor, attr: Tensor, target: Tensor, across: Tensor, rule: int, threads: int
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return the mean squared difference from pictures, and the gradients of `pos` and `attr`."""
-    ids, edges = draw_edges(pos, tri, across, target.shape[1], target.shape[2], threads)
-    loss, *gradients = pictures_of(pos, tri, attr, ids, edges, rule, threads).squares(numpy_of(target))
+    pictures = draw_pictures(pos, tri, attr, across, (target.shape[1], target.shape[2]), rule, threads)
+    loss, *gradients = pictures.squares(numpy_of(target))
     g_pos, g_attr = map(torch.from_numpy, gradients)
     return torch.tensor(loss, dtype=pos.dtype), g_pos, g_attr
 
@@ -90,13 +89,13 @@ def squares(
 )
 def draw_attributes(
     pos: Tensor, tri: Tensor, attr: Tensor, across: Tensor, height: int, width: int, rule: int, threads: int
-) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+) -> tuple[Tensor, ...]:
     """Return pictures of attributes with smooth silhouettes; their ids, and what `outline` returns."""
-    ids, edges = draw_edges(pos, tri, across, height, width, threads)
-    pictures = pictures_of(pos, tri, attr, ids, edges, rule, threads)
+    pictures = draw_pictures(pos, tri, attr, across, (height, width), rule, threads)
     drawn, seen = pictures.picture()
     keep_seen(pictures, seen)
-    return torch.from_numpy(drawn), torch.from_numpy(ids), torch.from_numpy(edges.places), torch.from_numpy(edges.edges)
+    outline = pictures.outline
+    return tuple(map(torch.from_numpy, (drawn, pictures.ids, outline.places, outline.edges)))
 
 
 @operator(
@@ -116,7 +115,8 @@ def draw_attributes_vjp(
 ) -> tuple[Tensor, Tensor]:
     """Return the gradients of `pos` and `attr`."""
     edges = tensors.Outline(*map(numpy_of, outline))
-    pictures = pictures_of(pos, tri, attr, numpy_of(ids), edges, rule, threads)
+    grid = grid_of_mesh(pos, tri, attr, (ids.shape[1], ids.shape[2]), threads)
+    pictures = AttributePictures(grid, EdgeRule(rule), edges, numpy_of(pos), numpy_of(ids), numpy_of(attr))
     g_pos, g_attr = pictures.vjp(numpy_of(g_out), kept_seen(pictures))
     return torch.from_numpy(g_pos), torch.from_numpy(g_attr)
 

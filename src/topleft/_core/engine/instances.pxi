@@ -1,107 +1,153 @@
 # Instances of meshes behind the vertex stage: many in one call.
 
 
-def project_instances(meshes: Sequence[tuple[Array, I32]], const double[:, :, ::1] matrices, const int32_t[::1] culls,
-                      const int64_t[::1] numbers, Viewport viewport, how: tuple[int, int, int, int, int, int],
-                      room: Array, const int64_t[::1] firsts, int64_t first,
-                      int64_t end) -> list[SnappedMesh | None]:
-    """Project instances [first, end) of meshes, ready to be drawn; None where one needs a closer look.
+cdef class MeshList:
+    """Vertices (V, 3), float32 or float64, and checked triangles of a scene's instances, to be placed again and again."""
 
-    That is one with a vertex that is bad, wide or clipped, without triangles, or with a matrix beyond float32.
+    cdef object arrays
+    cdef uint8_t[::1] source_room, mesh_room
+    cdef tl_source *sources
+    cdef tl_snapped *meshes
 
-    `meshes`: vertices (V, 3) float32 or float64 and checked triangles of each. `matrices`: clip from object of each.
-    `culls`, `numbers`: the `tl_cull` of each, and the id of its triangle 0. `how`: that of a view. `room`: records
-    of all vertices, uint8, or points (V, PLACED) float64, which are not snapped; from vertex firsts[i] on for instance i.
+    def __init__(self, meshes: Sequence[tuple[Array, I32]]):
+        cdef int64_t i, n = len(meshes)
+        cdef const int32_t[:, ::1] triangles
+        cdef const uint8_t[::1] raw
+        cdef tl_source *source
+        self.arrays = meshes
+        self.source_room = np.zeros(max(1, n) * sizeof(tl_source), np.uint8)
+        self.mesh_room = np.zeros(max(1, n) * sizeof(tl_snapped), np.uint8)
+        self.sources, self.meshes = <tl_source *>&self.source_room[0], <tl_snapped *>&self.mesh_room[0]
+        for i in range(n):
+            vertices, triangles = meshes[i]
+            raw, source = as_bytes(vertices), self.sources + i
+            source.data, source.n, source.n_components = data(raw), vertices.shape[0], 3
+            source.scalar = TL_F32 if vertices.dtype == np.float32 else TL_F64
+            self.meshes[i].mesh.n_vertices, self.meshes[i].n_triangles = source.n, triangles.shape[0]
+            self.meshes[i].triangles = &triangles[0, 0] if triangles.shape[0] else NULL
+
+
+cdef class PlacedMeshes:
+    """Instances of a list of meshes from `first` on, as many as there are matrices: `project` makes them ready to be drawn.
+
+    `matrices`: clip from object of each. `culls`, `numbers`: the `tl_cull` of each, and the id of its triangle 0.
+    `is_apart`: 1 where one is left out. `how`: that of a view. `room`: records of all vertices, uint8, or points
+    (V, PLACED) float64, which are not snapped; from vertex firsts[i] on for instance i.
     """
-    cdef int64_t i, n = end - first
-    cdef bint is_exact = room.dtype == np.float64, is_held
-    cdef uint8_t[::1] raw = as_bytes(room)
-    cdef uint8_t[::1] source_room = np.empty(max(1, n) * sizeof(tl_source), np.uint8)
-    cdef float[:, ::1] rounded = np.empty((max(1, n), 16), np.float32)
-    cdef tl_source *source = <tl_source *>&source_room[0]
-    cdef tl_vertex_counts counts
-    cdef const float[:, ::1] narrow
-    cdef const double[:, ::1] wide
-    cdef const int32_t[:, ::1] triangles
-    cdef object mesh = None, kept = (meshes, matrices, rounded, source_room, room)
-    cdef SnappedMesh made
-    cdef list found = []
-    cdef tl_source of_mesh
-    cdef uint8_t *place
-    memset(&of_mesh, 0, sizeof(of_mesh))
-    of_mesh.n_components = 3
-    is_held = firsts[end] - firsts[first] < HELD_VERTICES
-    for i in range(first, end):
-        if meshes[i] is not mesh:
-            mesh = meshes[i]
-            vertices, triangles = mesh
-            of_mesh.n = vertices.shape[0]
-            of_mesh.data = NULL
-            if of_mesh.n and vertices.dtype == np.float32:
-                narrow, of_mesh.scalar = vertices, TL_F32
-                of_mesh.data = &narrow[0, 0]
-            elif of_mesh.n:
-                wide, of_mesh.scalar = vertices, TL_F64
-                of_mesh.data = &wide[0, 0]
-        source[0] = of_mesh
-        source.is_affine = set_matrix(source, &matrices[i, 0, 0], &rounded[i - first, 0])
-        if of_mesh.data == NULL or not triangles.shape[0] or source.matrix == NULL:
-            found.append(None)
-            continue
-        place = &raw[firsts[i] * (TL_PLACED * sizeof(double) if is_exact else sizeof(tl_vertex))]
-        if is_held:
-            counts = project_whole(source, viewport, place, is_exact)
+
+    cdef object arrays, room
+    cdef Viewport viewport
+    cdef uint8_t[::1] raw, source_room, mesh_room, is_apart
+    cdef const double[:, :, ::1] matrices
+    cdef float[:, ::1] rounded
+    cdef const int64_t[::1] firsts
+    cdef tl_source *sources
+    cdef tl_snapped *meshes
+    cdef bint is_exact
+    cdef int64_t x_px, y_px
+    cdef int subpixel_bits, test
+
+    def __init__(self, MeshList meshes, int64_t first, const double[:, :, ::1] matrices, const int32_t[::1] culls,
+                 const int64_t[::1] numbers, const uint8_t[::1] is_apart, Viewport viewport,
+                 how: tuple[int, int, int, int, int, int], room: Array, const int64_t[::1] firsts):
+        cdef int64_t i, n = matrices.shape[0]
+        cdef int method
+        self.viewport, self.room, self.is_exact, self.raw = viewport, room, room.dtype == np.float64, as_bytes(room)
+        self.matrices, self.firsts, self.rounded = matrices, firsts, np.empty((max(1, n), 16), np.float32)
+        self.is_apart = np.array(is_apart)
+        self.source_room = np.empty(max(1, n) * sizeof(tl_source), np.uint8)
+        self.mesh_room = np.empty(max(1, n) * sizeof(tl_snapped), np.uint8)
+        self.sources, self.meshes = <tl_source *>&self.source_room[0], <tl_snapped *>&self.mesh_room[0]
+        memcpy(self.sources, meshes.sources + first, n * sizeof(tl_source))
+        memcpy(self.meshes, meshes.meshes + first, n * sizeof(tl_snapped))
+        self.arrays = meshes, matrices, self.rounded, self.source_room, room
+        self.x_px, self.y_px, self.subpixel_bits, _, method, self.test = how
+        for i in range(n):
+            self.sources[i].is_affine = set_matrix(&self.sources[i], &matrices[i, 0, 0], &self.rounded[i, 0])
+            self.meshes[i].mesh.source, self.meshes[i].method = &self.sources[i], <tl_method>method
+            self.meshes[i].cull, self.meshes[i].first_id = <tl_cull>culls[i], <int32_t>numbers[i]
+            if not self.is_exact:
+                self.meshes[i].mesh.vertices = <const tl_vertex *>self.place(i)
+
+    cdef uint8_t *place(self, int64_t i) noexcept nogil:
+        """Where the vertices of an instance begin."""
+        cdef int64_t n_bytes = TL_PLACED * sizeof(double) if self.is_exact else sizeof(tl_vertex)
+        return &self.raw[0] + self.firsts[i] * n_bytes
+
+    def project(self, int64_t first, int64_t end):
+        """Project instances [first, end) and leave out those that need a closer look.
+
+        That is one with a vertex that is bad, wide or clipped, without triangles, or with a matrix beyond float32.
+        """
+        if self.firsts[end] - self.firsts[first] < HELD_VERTICES:
+            self.project_all(first, end)
         else:
             with nogil:
-                counts = project_whole(source, viewport, place, is_exact)
-        if counts.n_bad or counts.n_wide or counts.n_clipped:
-            found.append(None)
-            continue
-        made = SnappedMesh.__new__(SnappedMesh)
-        memset(&made.snapped, 0, sizeof(made.snapped))
-        made.arrays, made.viewport, made.is_used = kept, viewport, None
-        made.snapped.mesh.source, made.snapped.mesh.n_vertices = source, of_mesh.n
+                self.project_all(first, end)
+
+    cdef void project_all(self, int64_t first, int64_t end) noexcept nogil:
+        cdef int64_t i
+        cdef tl_projected out
+        cdef tl_vertex_counts counts
+        for i in range(first, end):
+            if self.is_apart[i] or not self.sources[i].n or not self.meshes[i].n_triangles or not self.sources[i].matrix:
+                self.is_apart[i] = True
+                continue
+            memset(&out, 0, sizeof(out))
+            if self.is_exact:
+                out = points_to(<double *>self.place(i))
+            else:
+                out.records = <tl_vertex *>self.place(i)
+            counts = K.project_to(&self.sources[i], 0, self.sources[i].n, &self.viewport.view, &out)
+            self.is_apart[i] = counts.n_bad + counts.n_wide + counts.n_clipped > 0
+
+    def count_left_out(self) -> int:
+        """Return how many triangles the instances have that were left out."""
+        cdef int64_t i, n = 0
+        for i in range(self.is_apart.shape[0]):
+            n += self.meshes[i].n_triangles if self.is_apart[i] else 0
+        return n
+
+    def mesh(self, int64_t i) -> SnappedMesh | None:
+        """Return an instance ready to be drawn; None if it was left out."""
+        if self.is_apart[i]:
+            return None
+        cdef SnappedMesh made = self.like(i)
+        if self.is_exact:
+            self.set_points(made, <double *>self.place(i), made.snapped.mesh.n_vertices)
+        return made
+
+    def joined(self, int64_t first, const int32_t[:, ::1] triangles) -> SnappedMesh:
+        """Return some of the instances as one mesh, for drawing alone, culled and numbered as instance `first` is.
+
+        `triangles`: of theirs, by vertices of the whole room.
+        """
+        cdef SnappedMesh made = self.like(first)
+        cdef int64_t n_vertices = self.firsts[self.is_apart.shape[0]]
+        made.arrays = self.room, triangles
+        made.snapped.mesh.source, made.snapped.mesh.n_vertices = NULL, n_vertices
         made.snapped.triangles, made.snapped.n_triangles = &triangles[0, 0], triangles.shape[0]
-        made.x_px, made.y_px, made.subpixel_bits, _, made.snapped.method, made.test = how
-        made.snapped.cull, made.snapped.first_id = <tl_cull>culls[i], <int32_t>numbers[i]
-        if is_exact:
-            made.exact = whole_points(<double *>place, of_mesh.n, triangles, kept)
-            made.snapped.mesh.exact = &made.exact.points
+        if self.is_exact:
+            self.set_points(made, <double *>&self.raw[0], n_vertices)
         else:
-            made.snapped.mesh.vertices = <tl_vertex *>place
-        source += 1
-        found.append(made)
-    return found
+            made.snapped.mesh.vertices = <const tl_vertex *>&self.raw[0]
+        return made
 
+    cdef SnappedMesh like(self, int64_t i):
+        cdef SnappedMesh made = SnappedMesh.__new__(SnappedMesh)
+        made.snapped, made.arrays, made.viewport, made.is_used = self.meshes[i], self.arrays, self.viewport, None
+        made.x_px, made.y_px, made.subpixel_bits, made.test = self.x_px, self.y_px, self.subpixel_bits, <tl_test>self.test
+        return made
 
-def joined(SnappedMesh like, room: Array, const int32_t[:, ::1] triangles) -> SnappedMesh:
-    """Return some of the instances that `project_instances` placed in a room as one mesh, for drawing alone.
-
-    `like`: one of them, which tells the rest. `triangles`: of theirs, by vertices of the whole room.
-    """
-    cdef uint8_t[::1] raw = as_bytes(room)
-    cdef SnappedMesh made = like.copy()
-    made.arrays = room, triangles
-    made.snapped.mesh.source, made.snapped.first_id = NULL, 0
-    made.snapped.triangles, made.snapped.n_triangles = &triangles[0, 0], triangles.shape[0]
-    if like.exact is not None:
-        made.snapped.mesh.n_vertices = raw.shape[0] // <int64_t>(TL_PLACED * sizeof(double))
-        made.exact = whole_points(<double *>&raw[0], made.snapped.mesh.n_vertices, triangles, made.arrays)
-        made.snapped.mesh.exact = &made.exact.points
-    else:
-        made.snapped.mesh.n_vertices = raw.shape[0] // <int64_t>sizeof(tl_vertex)
-        made.snapped.mesh.vertices = <tl_vertex *>&raw[0]
-    return made
-
-
-cdef inline tl_vertex_counts project_whole(const tl_source *source, Viewport viewport, uint8_t *place,
-                                           bint is_exact) noexcept nogil:
-    """Project all vertices of a mesh into points or records."""
-    cdef tl_projected out
-    if is_exact:
-        out = points_to(<double *>place)
-        return K.project_to(source, 0, source.n, &viewport.view, &out)
-    return K.project(source, 0, source.n, &viewport.view, <tl_vertex *>place, NULL)
+    cdef void set_points(self, SnappedMesh mesh, const double *points, int64_t n):
+        """Give a mesh n points (PLACED,) that are not snapped, of triangles that no plane cuts."""
+        cdef UnsnappedPoints made = UnsnappedPoints.__new__(UnsnappedPoints)
+        memset(&made.counted, 0, sizeof(made.counted))
+        memset(&made.points, 0, sizeof(made.points))
+        made.arrays, made.n_vertices, made.points.band = mesh.arrays, n, 1.0
+        made.points.points, made.points.n_points, made.points.stride = points, n, TL_PLACED
+        made.points.triangles, made.points.n_triangles = mesh.snapped.triangles, mesh.snapped.n_triangles
+        mesh.exact, mesh.snapped.mesh.exact = made, &made.points
 
 
 cdef bint set_matrix(tl_source *source, const double *matrix, float *rounded) noexcept:
@@ -115,14 +161,3 @@ cdef bint set_matrix(tl_source *source, const double *matrix, float *rounded) no
             if isinf(rounded[k]):
                 source.matrix = NULL
     return matrix[12] == 0 and matrix[13] == 0 and matrix[14] == 0 and matrix[15] == 1
-
-
-cdef UnsnappedPoints whole_points(const double *points, int64_t n, const int32_t[:, ::1] triangles, object arrays):
-    """Points (n, PLACED) in `arrays` that are not snapped, of triangles that no plane cuts."""
-    cdef UnsnappedPoints made = UnsnappedPoints.__new__(UnsnappedPoints)
-    memset(&made.counted, 0, sizeof(made.counted))
-    memset(&made.points, 0, sizeof(made.points))
-    made.arrays, made.n_vertices, made.points.band = arrays, n, 1.0
-    made.points.points, made.points.n_points, made.points.stride = points, n, TL_PLACED
-    made.points.triangles, made.points.n_triangles = &triangles[0, 0], triangles.shape[0]
-    return made

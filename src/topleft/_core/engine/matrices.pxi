@@ -111,22 +111,43 @@ def determinant(a: ArrayLike) -> float:
     return determinant_of(m)
 
 
-def is_pose(a: Array) -> bool:
-    """Return whether a float64 matrix, (4, 4), is finite, has the last row of a pose, and is certain to be regular.
+cdef int handedness(const double[:, :] m) noexcept:
+    """1 of a matrix (4, 4) that is surely a pose, -1 of one that mirrors; 0 where the caller looks closer.
 
-    The least singular value of three rows is at least 2 |det| / |m|^2, in Frobenius' norm; where that is
-    below 1e-9 |m|, the caller looks closer.
+    A pose is finite, ends in 0 0 0 1 and is regular: the least singular value of three rows is at least 2 |det| / |m|^2,
+    in Frobenius' norm, and 1e-9 |m| is enough.
     """
-    cdef const double[:, :] m = a
     cdef Py_ssize_t i, j
-    cdef double squares = 0.0, shift = 0.0
+    cdef double squares = 0.0, shift = 0.0, volume
     if m[3, 0] != 0.0 or m[3, 1] != 0.0 or m[3, 2] != 0.0 or m[3, 3] != 1.0:
-        return False
+        return 0
     for i in range(3):
         shift = shift + m[i, 3] - m[i, 3]  # NaN where it is not finite
         for j in range(3):
             squares = squares + m[i, j] * m[i, j]
-    return shift == 0.0 and 2.0 * fabs(determinant_of(m)) > 1e-9 * squares * sqrt(squares)
+    volume = determinant_of(m)
+    if not (shift == 0.0 and 2.0 * fabs(volume) > 1e-9 * squares * sqrt(squares)):
+        return 0
+    return -1 if volume < 0.0 else 1
+
+
+def is_pose(a: Array) -> bool:
+    """Return whether a float64 matrix, (4, 4), is surely a pose: finite, regular, with the last row 0 0 0 1."""
+    return handedness(a) != 0
+
+
+def are_mirrored(const double[:, :, :] poses) -> U8 | None:
+    """Return 1 for each of poses (N, 4, 4) that mirrors; None unless all are surely poses."""
+    cdef Py_ssize_t k
+    cdef int hand
+    found = np.empty(poses.shape[0], np.uint8)
+    cdef uint8_t[::1] out = found
+    for k in range(poses.shape[0]):
+        hand = handedness(poses[k])
+        if not hand:
+            return None
+        out[k] = hand < 0
+    return found
 
 
 cdef struct Rays:

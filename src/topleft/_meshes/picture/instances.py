@@ -119,13 +119,14 @@ class PlacedScene:
         self._may_cluster = may_cluster
         self._kept: dict[int, engine.SnappedMesh] = {}
         self._n_kept = 0  # vertices of these
+        self._all: engine.PlacedMeshes | None = None  # of a small scene, once they have been joined
         self._sides_of_looks: dict[tuple[int, int], tuple[int, NDArray[np.uint8] | None]] = {}
         self._last: tuple[int, View] | None = None  # the last instance that was needed: often thrice in turn
 
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes views of instances itself."""
         own = {name: value for name, value in vars(self).items() if name != "joined"}
-        return own | {"_last": None, "_kept": {}, "_n_kept": 0, "_sides_of_looks": {}}
+        return own | {"_last": None, "_kept": {}, "_n_kept": 0, "_all": None, "_sides_of_looks": {}}
 
     __setstate__ = set_aligned
 
@@ -170,11 +171,14 @@ class PlacedScene:
     def snap(self, i: int) -> engine.SnappedMesh:
         """Return an instance, snapped; in shared buffers it draws its own range of ids. Small scenes are kept."""
         kept = self._kept.get(i)
+        if kept is None and self._all is not None:
+            kept = self._kept[i] = self._all.mesh(i) or self._snap_alone(i)
         return self._snap(i, i + 1)[0] if kept is None else kept
 
     def _snap(self, first: int, end: int) -> list[engine.SnappedMesh]:
         """Return instances [first, end) in the same way: in one call, except those that are snapped alone."""
-        found, _ = self._project(first, end)
+        placed = self._project(first, end)
+        found = [None if placed is None else placed.mesh(k) for k in range(end - first)]
         snapped = [self._snap_alone(first + k) if mesh is None else mesh for k, mesh in enumerate(found)]
         if self._n_kept < VERTICES_AT_ONCE:
             firsts = self.scene.first_vertices
@@ -182,25 +186,24 @@ class PlacedScene:
             self._n_kept += int(firsts[end] - firsts[first])
         return snapped
 
-    def _project(self, first: int, end: int) -> tuple[list[engine.SnappedMesh | None], NDArray[Any] | None]:
-        """Return instances [first, end), with vertices in one room, and that; None for those to be snapped alone."""
+    def _project(self, first: int, end: int) -> engine.PlacedMeshes | None:
+        """Return instances [first, end), but for those to be snapped alone; None: that is all of them."""
         view, n = self._view, end - first
         firsts = self.scene.first_vertices[first : end + 1] - self.scene.first_vertices[first]
         n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
         is_sliced = n_threads <= n  # fewer instances than threads: each is the work of all of them
         if not (is_sliced and view.plan is None and view.grid_bits == view.subpixel_bits) or 0 in view.size:
-            return [None] * n, None
+            return None
         points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
         shape = int(firsts[-1]) * engine.VERTEX_BYTES
         room = FRESH.empty("records", (shape,), np.uint8) if points is None else points
-        meshes = [(one.mesh.vertices, one.mesh.triangles) for one in self.scene.instances[first:end]]
-        (culls, has_some_sides), numbers = self._sides, self._numbers[first:end]
-        given = meshes, self._clip_from_objects[first:end], culls[first:end], numbers, view.engine_viewport(), view.how
-        parts = run_parts(lambda k, end: engine.project_instances(*given, room, firsts, k, end), n, n_threads)
-        found = [mesh for part in parts for mesh in part]
-        for k in np.flatnonzero(has_some_sides[first:end]).tolist():
-            found[k] = None
-        return found, room
+        own, (culls, has_some_sides) = slice(first, end), self._sides
+        placed = engine.PlacedMeshes(
+            self.scene.mesh_list, first, self._clip_from_objects[own], culls[own], self._numbers[own],
+            has_some_sides[own].view(np.uint8), view.engine_viewport(), view.how, room, firsts,
+        )  # fmt: skip
+        run_parts(placed.project, n, n_threads)
+        return placed
 
     @cached_property
     def joined(self) -> list[engine.SnappedMesh]:
@@ -210,19 +213,12 @@ class PlacedScene:
         is_small = scene.first_vertices[-1] <= VERTICES_AT_ONCE and 0 < scene.n_triangles <= TRIANGLES_AT_ONCE
         if not is_small or len(starts) > MOST_JOINED:
             return []
-        found, room = self._project(0, len(scene))
-        drawn = {i: mesh for i, mesh in enumerate(found) if mesh is not None}
-        if room is None or sum(mesh.n_triangles for mesh in drawn.values()) < scene.n_triangles:
+        self._all = placed = self._project(0, len(scene))
+        if placed is None or placed.count_left_out():
             return []
-        self._kept.update(drawn)
-        self._n_kept = int(scene.first_vertices[-1])
-        meshes = []
-        for first, end in pairwise([*starts, len(scene)]):
-            triangles = scene.joined_triangles[slice(*scene.first_ids[[first, end]].tolist())]
-            if len(triangles):
-                like = next(drawn[i] for i in range(first, end) if i in drawn)
-                meshes.append(engine.joined(like, room, triangles).numbered_from(int(self._numbers[first])))
-        return meshes
+        triangles, ends = scene.joined_triangles, pairwise(scene.first_ids[[*starts, len(scene)]].tolist())
+        runs = zip(starts, ends, strict=True)
+        return [placed.joined(i, triangles[first:end]) for i, (first, end) in runs if first < end]
 
     def _snap_alone(self, i: int) -> engine.SnappedMesh:
         mesh = self.scene[i].mesh
@@ -272,7 +268,8 @@ class PlacedScene:
 
     def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
         """Return an instance snapped; only the part with some triangles, if its mesh is drawn in clusters."""
-        if i not in self._kept and self.scene[i].mesh.has_clusters and self._can_cluster(Sink.NEAREST):
+        is_snapped = self._all is not None or i in self._kept
+        if not is_snapped and self.scene[i].mesh.has_clusters and self._can_cluster(Sink.NEAREST):
             return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i)
 
@@ -376,8 +373,8 @@ class PlacedScene:
         while first < len(self.scene):
             end = int(np.searchsorted(firsts, firsts[first] + VERTICES_AT_ONCE))
             end = min(max(end, first + 1), len(self.scene))
-            is_kept = len(self._kept) == len(self.scene)
-            yield [self._kept[i] for i in range(first, end)] if is_kept else self._snap(first, end)
+            is_kept = self._all is not None or len(self._kept) == len(self.scene)
+            yield [self.snap(i) for i in range(first, end)] if is_kept else self._snap(first, end)
             first = end
 
     def meshes(self) -> Iterator[list[engine.SnappedMesh]]:

@@ -40,8 +40,12 @@ def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], 
     """Tell whether drawing a scene's meshes in clusters pays, and note that they are drawn."""
     scene = placed.scene
     n, n_instances = scene.n_triangles, len(scene)
-    wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
-    if not all(wanted) or not scene.backoff.is_over():
+    if not choices.pays_to_cluster(n, 1):
+        return False
+    if not scene.known.get("are drawn often"):
+        wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
+        scene.known["are drawn often"] = all(wanted)
+    if not (scene.known["are drawn often"] and scene.backoff.is_over()):
         return False
     survey = survey_instances(placed)
     layers = partial(count_layers, scene, clip_from_world)

@@ -171,6 +171,12 @@ class Scene:
         if not self.instances:
             raise ValueError("a scene needs at least one instance, got none")
 
+    @cached_property  # type: ignore[no-redef]
+    def instances(self) -> tuple[Instance, ...]:
+        """The instances; those of a scene that `with_transforms` has made are made when they are needed."""
+        parts = zip(vars(self)["_like"].instances, self.transforms, self.are_mirrored.tolist(), strict=True)
+        return tuple(one.at(matrix, is_mirrored=is_mirrored) for one, matrix, is_mirrored in parts)
+
     def __getstate__(self) -> dict[str, object]:
         """The state for another process, which finds out the rest itself."""
         return {"instances": self.instances}
@@ -186,7 +192,7 @@ class Scene:
         return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>"
 
     def __len__(self) -> int:
-        return len(self.instances)
+        return len(self.first_ids) - 1
 
     def __iter__(self) -> Iterator[Instance]:
         return iter(self.instances)
@@ -195,7 +201,7 @@ class Scene:
         return self.instances[i]
 
     def __repr__(self) -> str:
-        n, n_meshes = len(self), len({id(instance.mesh) for instance in self})
+        n, n_meshes = len(self), len(self.meshes)
         many, kinds = "s" * (n > 1), "es" * (n_meshes > 1)
         return f"Scene({n} instance{many} of {n_meshes} mesh{kinds}, {self.n_triangles} triangles)"
 
@@ -216,6 +222,15 @@ class Scene:
             found = np.concatenate([instance.mesh.triangles for instance in self.instances])
             found += np.repeat(self.first_vertices[:-1].astype(np.int32), np.diff(self.first_ids))[:, None]
             self.known["joined triangles"] = found
+        return found
+
+    @property
+    def mesh_list(self) -> engine.MeshList:
+        """The meshes of the instances, in their order."""
+        found = self.known.get("mesh list")
+        if found is None:
+            meshes = [(instance.mesh.vertices, instance.mesh.triangles) for instance in self.instances]
+            found = self.known["mesh list"] = engine.MeshList(meshes)
         return found
 
     @cached_property
@@ -330,23 +345,20 @@ class Scene:
         placed = as_real("transforms", transforms).copy()
         if placed.shape != (len(self), 4, 4):
             raise ValueError(f"transforms must have shape ({len(self)}, 4, 4), got {placed.shape}")
-        if not np.isfinite(placed).all():
-            raise ValueError("transforms must hold finite numbers")
-        if not (placed[:, 3] == [0, 0, 0, 1]).all():
-            raise ValueError("the last row of each of transforms must be [0, 0, 0, 1]")
         placed.flags.writeable = False
-        (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(placed[:, :3, :3], 0, 2)
-        volumes = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)  # as engine.determinant has them
-        largest = np.abs(placed[:, :3, :3]).max(axis=(1, 2), initial=0)
-        for k in np.flatnonzero(np.abs(volumes) <= 1e-12 * largest**3):  # the others are regular, far beyond rounding
-            check_regular(f"transforms[{k}]", placed[k])
+        mirrored = engine.are_mirrored(placed)
+        if mirrored is None:  # unless all are regular, far beyond rounding
+            if not np.isfinite(placed).all():
+                raise ValueError("transforms must hold finite numbers")
+            if not (placed[:, 3] == [0, 0, 0, 1]).all():
+                raise ValueError("the last row of each of transforms must be [0, 0, 0, 1]")
+            for k, matrix in enumerate(placed):
+                check_regular(f"transforms[{k}]", matrix)
+            mirrored = np.array([engine.determinant(matrix[:3, :3]) < 0 for matrix in placed], np.uint8)
         scene = object.__new__(Scene)
-        are_mirrored = volumes < 0
-        parts = zip(self.instances, placed, are_mirrored.tolist(), strict=True)
-        instances = tuple(one.at(matrix, is_mirrored=is_mirrored) for one, matrix, is_mirrored in parts)
-        vars(scene).update(instances=instances, transforms=placed)
+        like = vars(self).get("_like", self)
         kept = {"first_ids": self.first_ids, "meshes": self.meshes, "boxes": self.boxes, "backoff": self.backoff}
-        vars(scene).update(kept, known=self.known, are_mirrored=are_mirrored)
+        vars(scene).update(kept, _like=like, known=self.known, transforms=placed, are_mirrored=mirrored.view(np.bool_))
         return scene
 
     def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
