@@ -258,5 +258,26 @@ def test_parts_that_cannot_be_collapsed_stay_and_fit(monkeypatch):
     levels = tl.simplify(mesh, smallest=20)
     sizes = np.diff(levels.parts.starts[1])
     assert sizes.max() > 2 * sizes.min()
-    for level in levels[1:]:
-        assert border_of(level.mesh.vertices, level.mesh.triangles) == border_of(mesh.vertices, mesh.triangles)
+    for level, bounds in zip(levels[1:], levels.parts.bounds[1:], strict=True):
+        assert len(bounds) == 1 or border_of(level.mesh.vertices, level.mesh.triangles) == border_of(
+            mesh.vertices, mesh.triangles
+        )
+
+
+def test_levels_go_on_as_one_part_where_parts_cannot_be_collapsed(monkeypatch):
+    mesh = hills()
+    monkeypatch.setattr(
+        simplify, "coarser_part", lambda part, own, *_: simplify.CoarserPart(part, *border_and_rows(part, own))
+    )
+    levels = tl.simplify(mesh, smallest=20)
+    assert [len(bounds) for bounds in levels.parts.bounds][:3] == [64, 1, 1]
+    assert len(levels[2].mesh.triangles) < len(mesh.triangles) / 8
+    found = tl.choose_detail(mesh, ALONG, SIZE, tolerance=0.5)
+    assert found.n_parts in (0, 64)
+    far = tl.Camera.look_at((0.5, 0.5, 60), (0.5, 0.5, 0), fov_y_deg=40)
+    assert tl.choose_detail(mesh, far, SIZE, tolerance=0.5).level >= 2
+
+
+def border_and_rows(part, own):
+    border = simplify.border_points(part.triangles)
+    return border, own[border]

@@ -36,6 +36,9 @@ MOST_TO_COMPARE = 300_000
 #: this power times its bound: it has lost a part. Bounds go with the area of triangles on smooth surfaces, with n.
 MOST_POWER = 2.0
 
+#: Larger levels are the last ones if their parts cannot be collapsed: the package takes 300 bytes a triangle.
+MOST_WHOLE = 2_000_000
+
 #: The attributes of vertices, by their names in a mesh.
 ATTRIBUTES = ("normals", "colors", "uv", "uv1")
 
@@ -131,13 +134,20 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> tuple[list[Level]
         corners, rows = corners._replace(triangles=corners.triangles[order]), rows[order]
     layers = [Layer(mesh, corners, starts, np.zeros(len(starts) - 1), [])]
     anchor = layers[0]
-    while coarser := coarser_layer(layers[-1], ratio, smallest, mesh):
-        bounds, known = measured(anchor, coarser, center)
-        bound, n_before, n = float(bounds.max()), len(layers[-1].corners.triangles), len(coarser.corners.triangles)
-        if found and bound > (n_before / n) ** MOST_POWER * found[-1].bound:
-            break
+    base: Layer | None = layers[0]
+    while base is not None:
+        coarser = coarser_layer(base, ratio, smallest, mesh)
+        if coarser is not None:
+            bounds, known = measured(anchor, coarser, center)
+            bound, n_before, n = float(bounds.max()), len(base.corners.triangles), len(coarser.corners.triangles)
+            if found and bound > (n_before / n) ** MOST_POWER * found[-1].bound:
+                coarser = None
+        if coarser is None:  # one part may have spoiled it
+            base = base.as_one()
+            continue
         found.append(Level(coarser.mesh, bound, known))
         layers.append(coarser._replace(bounds=bounds))
+        base = layers[-1]
         if len(anchor.corners.triangles) > MOST_TO_COMPARE:
             anchor = layers[-1]
     is_parted = n_joins > 0 and len(found) > 0
@@ -158,6 +168,13 @@ class Layer(NamedTuple):
     def n_parts(self) -> int:
         """How many parts it has."""
         return len(self.starts) - 1
+
+    def as_one(self) -> Layer | None:
+        """The same level as one part; None if it is, or is too large to be collapsed at once."""
+        n = len(self.corners.triangles)
+        if self.n_parts == 1 or n > MOST_WHOLE:
+            return None
+        return self._replace(starts=np.array([0, n]), bounds=self.bounds.max(keepdims=True))
 
     def part(self, i: int, n: int) -> tuple[Corners, I32]:
         """Part i of n, which are as many as its own or fewer, and the rows of its points."""
