@@ -287,8 +287,8 @@ TL_INLINE void edges_of_band(const tl_grad_view *view, const tl_grad_edges *e, t
     int32_t which[TL_PAIRS_ROOM];
     while (next_pairs(&scan, &list, is_f64)) {
         for (int64_t i = 0; i < list.n; i++)
-            if (is_nearer(view, e, &list, i, is_f64))
-                turn_pair(&list, i);
+            list.turned[i] = -is_nearer(view, e, &list, i, is_f64);
+        turn_pairs(&list);
         const int64_t n = list_met(view, e, &list, which);
         for (int64_t i = 0; i < n; i += TL_LANES) {
             const int64_t n_met = meet_some(view, e, &list, which + i, n - i, pairs);
