@@ -95,7 +95,7 @@ typedef struct {
 
 /* A picture of attributes of float32 with smooth silhouettes: drawn, led back, or both beside another one.  Its band
  * has up to two rows more on either side, of n_px pixels; a face is a triangle that they show. */
-enum { TL_ROWS_KEPT = 12, TL_PAIR_BYTES = 152, TL_SUMS_OF_FACE = 24, TL_FACE_ROWS = 6 };
+enum { TL_ROWS_KEPT = 12, TL_PAIR_BYTES = 152, TL_HEAD_OF_FACE = 16, TL_SUMS_OF_FACE = 28, TL_FACE_ROWS = 6 };
 typedef struct {
     const int32_t *ids; /* of row 0; -1: none */
     int64_t step;       /* from row to row */
@@ -115,9 +115,9 @@ typedef struct {
     void *pairs;  /* (2 n_px, TL_PAIR_BYTES) */
     float *steps; /* (2 n_px, n_columns): of pairs */
     /* Scratch. */
-    float *window;                     /* 3 times TL_ROWS_KEPT rows of n_columns numbers a pixel, + TL_IDS_ROOM */
-    float *rast;                       /* a row of four numbers a pixel */
-    tl_grad_sums *faces;               /* by triangle, 12 columns and TL_SUMS_OF_FACE for each three attributes */
+    float *window;       /* 3 times TL_ROWS_KEPT rows of n_columns numbers a pixel, + TL_IDS_ROOM */
+    float *rast;         /* a row of four numbers a pixel */
+    tl_grad_sums *faces; /* by triangle, TL_HEAD_OF_FACE columns and TL_SUMS_OF_FACE for each three attributes */
     tl_grad_sums *of_points, *of_attr; /* not scratch; NULL where the picture is drawn alone */
 } tl_grad_picture;
 

@@ -82,14 +82,16 @@ TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_
 TL_INLINE void sum_up_pixels(const run_plane *plane, int from, const float *g_out, int n_pixels, int n,
                              int64_t n_columns, int has_room, vq4 sums[2])
 {
-    const vq4 zero = vq4_all(vq_set1(0.0f));
+    const vq4 zero = vq4_set1(0.0f);
+    run_columns columns = columns_from(from), summed = columns_from(0);
     sums[0] = sums[1] = zero;
     for (int i = 0; i < TL_SUMMED && i < n_pixels; i += 4) {
-        const vq4 at = plane_at_pixels(plane, from + i), inverse = vq4_inverse_of_last(at);
+        const vq4 at = plane_at_pixels(plane, &columns), inverse = inverse_at_pixels(plane, &columns);
         const vq4 g = vq4_mul(load_gradients(g_out + n_columns * i, n_pixels - i, n, n_columns, has_room), inverse);
         const vq4 of_total = vq4_sub(zero, vq4_sum(vq4_mul(g, vq4_mul(at, inverse))));
         const vq4 h = vq4_first(TL_VQ4_BLEND(g, of_total, 8), n_pixels - i);
-        sums[0] = vq4_add(sums[0], h), sums[1] = vq4_add(sums[1], vq4_mul(h, columns_from(i)));
+        sums[0] = vq4_add(sums[0], h), sums[1] = vq4_add(sums[1], vq4_mul(h, summed.quads));
+        next_columns(&columns), next_columns(&summed);
     }
 }
 
@@ -180,19 +182,20 @@ typedef struct {
     const double
         *sums; /* of the first one: x and y, and from `moments` on, `stride` further for each three attributes */
     int64_t n_columns, moments, stride;
-    int n, is_in_pixels; /* in pixels, and units of the total where they begin */
+    int n, is_in_pixels;        /* in pixels, and units of the total where they begin */
+    int32_t from[TL_MAX_LANES]; /* 0, 1, 2 and so on; the first one's beyond n */
     int32_t corners[3][TL_MAX_LANES], rows[3][TL_MAX_LANES];
-    vd q[3][3], units[3];
+    vd v[3][3], q[3][3], units[3];
 } closing_lanes;
 
 TL_INLINE void load_closing(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, closing_lanes *l,
-                            vd *x0, vd *y0, vd *w)
+                            vd *x0, vd *y0)
 {
     const int32_t *const corners[3] = {l->corners[0], l->corners[1], l->corners[2]};
     double about[2][TL_MAX_LANES];
     vd z[3];
     for (int i = 0; i < TL_LANES; i++) {
-        const int from = i < l->n ? i : 0;
+        const int from = l->from[i] = i < l->n ? i : 0;
         for (int k = 0; k < 3; k++) {
             l->corners[k][i] = view->tri[3 * (int64_t)ids[from] + k];
             l->rows[k][i] = p->corners[3 * (int64_t)ids[from] + k];
@@ -200,11 +203,30 @@ TL_INLINE void load_closing(const tl_grad_view *view, const tl_grad_colors *p, c
         about[0][i] = l->sums[from * l->n_columns], about[1][i] = l->sums[from * l->n_columns + 1];
     }
     *x0 = vd_load(about[0]), *y0 = vd_load(about[1]);
-    load_triangles(view, corners, *x0, *y0, l->q, z, w);
+    load_triangles(view, corners, *x0, *y0, l->v, l->q, z);
     const vd total = sum_of_three(l->q[0][2], l->q[1][2], l->q[2][2]), one = vd_set1(1.0);
     const vd unit = l->is_in_pixels ? vd_div(one, one_for_zero(total)) : one;
     for (int c = 0; c < 3; c++)
         l->units[c] = l->is_in_pixels && c < 2 ? vd_mul(vd_set1(2.0 * view->scale[c]), unit) : unit;
+}
+
+/* Adds four columns of n lanes to the rows of their corners, one triangle after the other, from column `first` on. */
+TL_INLINE void add_rows(int n, double *const rows[3][TL_MAX_LANES], int64_t first, vd columns[3][4])
+{
+    double some[3][4 * TL_MAX_LANES];
+    for (int k = 0; k < 3; k++)
+        vd_store_quads(some[k], 4, columns[k]);
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++) {
+            double *to = rows[k][i] + first;
+            vqd_store(to, vqd_add(vqd_load(to), vqd_load(some[k] + 4 * i)));
+        }
+}
+TL_INLINE void find_rows(tl_grad_sums *sums, int n, const int32_t rows[3][TL_MAX_LANES], double *to[3][TL_MAX_LANES])
+{
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++)
+            to[k][i] = sums_of(sums, rows[k][i]);
 }
 
 /* Adds the gradients of the attributes of corners; returns those of q_k, added. */
@@ -212,73 +234,55 @@ TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l,
 {
     const int64_t n = p->values.n_columns;
     double *to[3][TL_MAX_LANES];
-    for (int i = 0; i < l->n; i++)
-        for (int k = 0; k < 3; k++)
-            to[k][i] = sums_of(p->attr, l->rows[k][i]);
+    find_rows(p->attr, l->n, l->rows, to);
     for (int64_t first = 0; first < n; first += 3) {
-        double some[12][TL_MAX_LANES] = {{0}}, found[3][TL_MAX_LANES];
-        vd m[12];
-        for (int i = 0; i < l->n; i++)
-            for (int j = 0; j < 12; j++)
-                some[j][i] = l->sums[i * l->n_columns + l->moments + first / 3 * l->stride + j];
+        const double *moments = l->sums + l->moments + first / 3 * l->stride;
+        vd m[12], at[3][3], found[3][4];
+        for (int j = 0; j < 12; j += 4)
+            vd_load_records(moments + j, (int)l->n_columns, l->from, m + j);
         for (int j = 0; j < 12; j++)
-            m[j] = vd_mul(vd_load(some[j]), l->units[j / 4]);
-        for (int64_t c = first; c < n && c < first + 3; c++) {
-            vd at[3];
-            for (int k = 0; k < 3; k++) {
-                const vi row = vi_mul(vi_load(l->rows[k]), vi_set1((int32_t)n));
-                at[k] = vd_from_vf(vf_of_bits(vi_gather(vm_first(l->n), (const int32_t *)p->values.attr + c, row)));
-                vd_store(found[k], sum_of_three(vd_mul(l->q[k][0], m[c - first]), vd_mul(l->q[k][1], m[4 + c - first]),
-                                                vd_mul(l->q[k][2], m[8 + c - first])));
-            }
-            for (int i = 0; i < l->n; i++)
-                for (int k = 0; k < 3; k++)
-                    to[k][i][c] += found[k][i];
-            const vd by_u = vd_sub(at[0], at[2]), by_v = vd_sub(at[1], at[2]);
-            for (int j = 0; j < 3; j++) {
-                by_q[0][j] = vd_add(by_q[0][j], vd_mul(by_u, m[4 * j + c - first]));
-                by_q[1][j] = vd_add(by_q[1][j], vd_mul(by_v, m[4 * j + c - first]));
-                for (int k = 0; k < 3 && c == first; k++)
+            m[j] = vd_mul(m[j], l->units[j / 4]);
+        for (int k = 0; k < 3; k++) {
+            load_attributes(p->values.attr, n, first, l->rows[k], at[k]);
+            for (int c = 0; c < 3; c++)
+                found[k][c] =
+                    sum_of_three(vd_mul(l->q[k][0], m[c]), vd_mul(l->q[k][1], m[4 + c]), vd_mul(l->q[k][2], m[8 + c]));
+            found[k][3] = vd_set1(0.0);
+        }
+        add_rows(l->n, to, first, found);
+        for (int j = 0; j < 3; j++)
+            for (int c = 0; c < 3; c++) {
+                by_q[0][j] = vd_add(by_q[0][j], vd_mul(vd_sub(at[0][c], at[2][c]), m[4 * j + c]));
+                by_q[1][j] = vd_add(by_q[1][j], vd_mul(vd_sub(at[1][c], at[2][c]), m[4 * j + c]));
+                for (int k = 0; k < 3 && c == 0; k++)
                     by_q[k][j] = vd_add(by_q[k][j], m[4 * j + 3]);
             }
-        }
     }
 }
 
 /* Gradients of the corners of triangles and of their attributes from their sums, as pull_corners gives them. */
 static void close_triangles(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, closing_lanes *l)
 {
-    vd x0, y0, w[3], by_q[3][3], g[3][3];
-    double found[3][4][TL_MAX_LANES];
-    load_closing(view, p, ids, l, &x0, &y0, w);
+    vd x0, y0, by_q[3][3], g[3][4];
+    double *to[3][TL_MAX_LANES];
+    load_closing(view, p, ids, l, &x0, &y0);
     for (int k = 0; k < 9; k++)
         by_q[k / 3][k % 3] = g[k / 3][k % 3] = vd_set1(0.0);
     close_attributes(p, l, by_q);
-    vd v[3][3];
-    for (int k = 0; k < 3; k++) {
-        vi bits[4];
-        vi_load_records(view->pos, 16, l->corners[k], bits);
-        v[k][0] = vd_sub(vd_from_vf(vf_of_bits(bits[0])), vd_mul(x0, w[k]));
-        v[k][1] = vd_sub(vd_from_vf(vf_of_bits(bits[1])), vd_mul(y0, w[k]));
-        v[k][2] = w[k];
-    }
     for (int k = 0; k < 3; k++) { /* q_k = v_i x v_j */
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         for (int a = 0; a < 3; a++) {
             const int b = (a + 1) % 3, c = (a + 2) % 3;
-            g[i][a] = vd_add(g[i][a], vd_sub(vd_mul(v[j][b], by_q[k][c]), vd_mul(v[j][c], by_q[k][b])));
-            g[j][a] = vd_add(g[j][a], vd_sub(vd_mul(v[i][c], by_q[k][b]), vd_mul(v[i][b], by_q[k][c])));
+            g[i][a] = vd_add(g[i][a], vd_sub(vd_mul(l->v[j][b], by_q[k][c]), vd_mul(l->v[j][c], by_q[k][b])));
+            g[j][a] = vd_add(g[j][a], vd_sub(vd_mul(l->v[i][c], by_q[k][b]), vd_mul(l->v[i][b], by_q[k][c])));
         }
     }
-    for (int k = 0; k < 3; k++) {
-        vd_store(found[k][0], g[k][0]), vd_store(found[k][1], g[k][1]);
-        vd_store(found[k][3], vd_sub(g[k][2], vd_add(vd_mul(x0, g[k][0]), vd_mul(y0, g[k][1]))));
+    for (int k = 0; k < 3; k++) { /* none of z */
+        g[k][3] = vd_sub(g[k][2], vd_add(vd_mul(x0, g[k][0]), vd_mul(y0, g[k][1])));
+        g[k][2] = vd_set1(0.0);
     }
-    for (int i = 0; i < l->n; i++)
-        for (int k = 0; k < 3; k++) {
-            double *to = sums_of(p->vertices, l->corners[k][i]);
-            to[0] += found[k][0][i], to[1] += found[k][1][i], to[3] += found[k][3][i];
-        }
+    find_rows(p->vertices, l->n, l->corners, to);
+    add_rows(l->n, to, 0, g);
 }
 
 /* Ends a band: from sums of triangles to those of their corners. */

@@ -24,8 +24,10 @@
 #include "lanes/quads.h"
 
 /* Planes of a face: by column, by row, and at its first pixel; four numbers each.  Where the last is above 0 the sum of
- * the weights is below 1. */
-enum { FACE_U, FACE_V, FACE_ZW, FACE_REST, FACE_TOTAL = FACE_REST, FACE_PLANE = 12 };
+ * the weights is below 1.  Then that pixel's column and row; and of each three attributes their planes, those of the
+ * last corner, and sums as many as planes. */
+enum { FACE_U, FACE_V, FACE_ZW, FACE_REST, FACE_TOTAL = FACE_REST, FACE_PLANE = 12, FACE_COLUMN = 12, FACE_ROW };
+enum { FACE_QUADS = 4 * 4, THREE_LAST = FACE_PLANE, THREE_SUMS = FACE_QUADS };
 
 /* A band, with the rows on either side of it that it takes part in: runs of pixels of equal id, faces, pairs. */
 typedef struct {
@@ -126,11 +128,12 @@ TL_INLINE void set_face_planes(const picture_pass *p, int64_t first, vd planes[F
     const tl_grad_view *view = p->view;
     const int32_t *const corners[3] = {p->corners[0] + first, p->corners[1] + first, p->corners[2] + first};
     const vd steps[3] = {vd_set1(2.0 * view->scale[0]), vd_set1(2.0 * view->scale[1]), vd_set1(1.0)};
-    vd q[3][3], z[3], w[3];
+    vd v[3][3], q[3][3], z[3];
     load_triangles(view, corners, middles_at(view, 0, vi_load(p->column + first)),
-                   middles_at(view, 1, vi_load(p->row + first)), q, z, w);
+                   middles_at(view, 1, vi_load(p->row + first)), v, q, z);
     const vd inverse = vd_div(vd_set1(1.0), one_for_zero(sum_of_three(q[0][2], q[1][2], q[2][2])));
-    const vd under = one_for_zero(sum_of_three(vd_mul(w[0], q[0][2]), vd_mul(w[1], q[1][2]), vd_mul(w[2], q[2][2])));
+    const vd under =
+        one_for_zero(sum_of_three(vd_mul(v[0][2], q[0][2]), vd_mul(v[1][2], q[1][2]), vd_mul(v[2][2], q[2][2])));
     for (int c = 0; c < 3; c++) {
         const vd unit = vd_mul(inverse, steps[c]);
         const vd over = sum_of_three(vd_mul(z[0], q[0][c]), vd_mul(z[1], q[1][c]), vd_mul(z[2], q[2][c]));
@@ -140,67 +143,68 @@ TL_INLINE void set_face_planes(const picture_pass *p, int64_t first, vd planes[F
     }
 }
 
-/* Stores planes of lanes, and zeros for as many sums of attributes. */
-TL_INLINE void store_planes(const picture_pass *p, int64_t first, int64_t at, const vd planes[FACE_PLANE])
+/* The numbers of a face, and those of three attributes from `first` on. */
+TL_INLINE double *face_at(const picture_pass *p, int64_t face)
 {
-    const tl_grad_sums *faces = p->l->faces;
-    double some[FACE_PLANE][TL_MAX_LANES];
-    for (int k = 0; k < FACE_PLANE; k++)
-        vd_store(some[k], planes[k]);
-    for (int64_t i = 0; i < TL_LANES && first + i < faces->n; i++)
-        for (int k = 0; k < FACE_PLANE; k++) {
-            double *to = faces->sums + (first + i) * faces->n_columns + at + k;
-            to[0] = some[k][i];
-            if (at > 0)
-                to[FACE_PLANE] = 0.0;
-        }
+    return p->l->faces->sums + face * p->l->faces->n_columns;
+}
+TL_INLINE int64_t place_of_three(int64_t first) { return TL_HEAD_OF_FACE + first / 3 * TL_SUMS_OF_FACE; }
+
+/* Stores quads of lanes. */
+TL_INLINE void store_quads(const picture_pass *p, int64_t first, int64_t at, const vd quads[FACE_QUADS])
+{
+    const int64_t n_of_face = p->l->faces->n_columns, n = p->l->faces->n - first;
+    double some[FACE_QUADS * TL_MAX_LANES], *to = face_at(p, first) + at;
+    const int is_whole = n >= TL_LANES;
+    for (int k = 0; k < FACE_QUADS; k += 4)
+        vd_store_quads((is_whole ? to : some) + k, is_whole ? n_of_face : FACE_QUADS, quads + k);
+    for (int64_t i = 0; !is_whole && i < n; i++)
+        memcpy(to + i * n_of_face, some + i * FACE_QUADS, FACE_QUADS * sizeof *some);
 }
 
-/* Planes of each three attributes are those less that of the last corner. */
-TL_INLINE void set_attr_planes(const picture_pass *p, int64_t first, int64_t column, vd planes[FACE_PLANE])
+/* Planes of each three attributes are those less that of the last corner, which follows. */
+TL_INLINE void set_attr_planes(const picture_pass *p, int64_t first, int64_t column, vd planes[FACE_QUADS])
 {
-    const int64_t n_columns = p->l->n_columns;
-    const vm m = vm_first(p->l->faces->n - first);
-    vd attr[3][FACE_PLANE];
+    vd attr[3][FACE_PLANE], at[3][3];
+    for (int k = 0; k < 3; k++)
+        load_attributes(p->l->attr, p->l->n_columns, column, p->corners[k] + first, at[k]);
     for (int c = 0; c < 3; c++) {
-        vd at[3];
-        for (int k = 0; k < 3; k++) {
-            const vi row = vi_mul(vi_load(p->corners[k] + first), vi_set1((int32_t)n_columns));
-            at[k] = vd_from_vf(vf_of_bits(
-                vi_gather(column + c < n_columns ? m : vm_first(0), (const int32_t *)p->l->attr + column + c, row)));
-        }
-        const vd by_u = vd_sub(at[0], at[2]), by_v = vd_sub(at[1], at[2]);
+        const vd by_u = vd_sub(at[0][c], at[2][c]), by_v = vd_sub(at[1][c], at[2][c]);
         for (int j = 0; j < 3; j++)
             attr[c][j] = vd_add(vd_mul(by_u, planes[4 * j + FACE_U]), vd_mul(by_v, planes[4 * j + FACE_V]));
     }
     for (int c = 0; c < 3; c++)
         for (int j = 0; j < 3; j++)
             planes[4 * j + c] = attr[c][j];
+    for (int c = 0; c < 3; c++)
+        planes[THREE_LAST + c] = at[2][c];
 }
 
 static void set_up_faces(const picture_pass *p)
 {
-    for (int64_t first = 0; first < p->l->faces->n; first += TL_LANES) {
-        vd of_points[FACE_PLANE], planes[FACE_PLANE];
+    const int64_t n_faces = p->l->faces->n;
+    for (int64_t first = 0; first < n_faces; first += TL_LANES) {
+        vd of_points[FACE_PLANE], planes[FACE_QUADS];
         set_face_planes(p, first, of_points);
-        memcpy(planes, of_points, sizeof planes);
+        memcpy(planes, of_points, sizeof of_points);
         for (int j = 0; j < FACE_PLANE; j += 4)
             planes[j + FACE_REST] = vd_sub(vd_mul(of_points[j + FACE_TOTAL], vd_set1(TL_ALMOST_ONE)),
                                            vd_add(of_points[j + FACE_U], of_points[j + FACE_V]));
-        store_planes(p, first, 0, planes);
+        planes[FACE_COLUMN] = vd_from_vi(vi_load(p->column + first));
+        planes[FACE_ROW] = vd_from_vi(vi_load(p->row + first));
+        planes[FACE_ROW + 1] = planes[FACE_ROW + 2] = vd_set1(0.0);
+        store_quads(p, first, 0, planes);
         for (int64_t c = 0; c < p->l->n_columns; c += 3) {
-            memcpy(planes, of_points, sizeof planes);
+            memcpy(planes, of_points, sizeof of_points);
             set_attr_planes(p, first, c, planes);
-            store_planes(p, first, FACE_PLANE + 8 * c, planes);
+            store_quads(p, first, place_of_three(c), planes);
+            for (int64_t i = first; i < first + TL_LANES && i < n_faces; i++)
+                for (int k = 0; k < FACE_PLANE; k += 4)
+                    vqd_store(face_at(p, i) + place_of_three(c) + THREE_SUMS + k, vqd_set1(0.0));
         }
     }
 }
 
-/* The planes and sums of a face: of points, then of each three attributes those and sums of as many. */
-TL_INLINE double *face_at(const picture_pass *p, int64_t face)
-{
-    return p->l->faces->sums + face * p->l->faces->n_columns;
-}
 TL_INLINE double zw_at(const picture_pass *p, int32_t id, int64_t column, int64_t row)
 {
     const int32_t face = p->l->faces->slot_of[id];
@@ -267,20 +271,22 @@ static void blend_row(const picture_pass *p, const tl_grad_view *view, int64_t r
 }
 
 /* A plane of a face from a pixel on, x and y off its first one. */
-TL_INLINE run_plane plane_of_face(const double *plane, int64_t x, int64_t y)
+TL_INLINE vqd plane_at_place(const double *plane, double x, double y)
 {
-    const four by_x = TL_FOUR(plane), begin = TL_FOUR(plane + 8) + by_x * (double)x + TL_FOUR(plane + 4) * (double)y;
-    return (run_plane){vq4_all(__builtin_convertvector(begin, vq)), vq4_all(__builtin_convertvector(by_x, vq))};
+    const vqd in_row = vqd_add(vqd_load(plane + 8), vqd_mul(vqd_load(plane), vqd_set1(x)));
+    return vqd_add(in_row, vqd_mul(vqd_load(plane + 4), vqd_set1(y)));
+}
+TL_INLINE run_plane plane_of_face(const double *plane, double x, double y)
+{
+    return run_plane_of(vq_from_vqd(plane_at_place(plane, x, y)), vq_from_vqd(vqd_load(plane)));
 }
 
 /* Whether the pixels of a run, x and y off the first one of the face, lie well within their triangle. */
-TL_INLINE int is_within(const double *face, int64_t x, int64_t y, int64_t n)
+TL_INLINE int is_within(const double *face, double x, double y, int64_t n)
 {
-    const four at = TL_FOUR(face + 8) + TL_FOUR(face) * (double)x + TL_FOUR(face + 4) * (double)y;
-    const four last = at + TL_FOUR(face) * (double)(n - 1);
+    const vqd at = plane_at_place(face, x, y), last = vqd_add(at, vqd_mul(vqd_load(face), vqd_set1((double)(n - 1))));
     const unsigned wanted = 1u << FACE_U | 1u << FACE_V | 1u << FACE_REST;
-    return (vq_above_zero(__builtin_convertvector(at, vq)) & vq_above_zero(__builtin_convertvector(last, vq)) &
-            wanted) == wanted;
+    return (vqd_above_zero(at, last) & wanted) == wanted;
 }
 
 /* `rast` of a run that is clamped somewhere, of which row 0 of the picture would stand there. */
@@ -294,42 +300,42 @@ static const float *points_of_clamped(const picture_pass *p, const pixel_run *ru
     return out[0];
 }
 
-/* Run r of a row, the face's. */
-TL_INLINE pixel_run run_of_face(const picture_pass *p, int64_t r, int64_t end, int64_t row)
+/* Run r of a row, n pixels of a face, as that of a band. */
+TL_INLINE pixel_run run_of_face(const picture_pass *p, int64_t r, int64_t row, int64_t n)
 {
-    const int32_t face = p->faces[r] >> 1;
     const int64_t column = p->l->begins[r];
-    return (pixel_run){.id = face < 0 ? -1 : p->l->faces->rows[face],
+    return (pixel_run){.id = p->l->faces->rows[p->faces[r] >> 1],
                        .row = row,
                        .column = column,
                        .at = row * p->view->width + column,
-                       .n = (r + 1 < end ? p->l->begins[r + 1] : p->view->width) - column};
+                       .n = n};
 }
 
-static void draw_clamped(const picture_pass *p, const pixel_run *run, float *colors)
+TL_ONCE void draw_clamped(const picture_pass *p, int64_t r, int64_t row, int64_t n_pixels, float *colors)
 {
     const int64_t n = p->l->n_columns;
+    const pixel_run run = run_of_face(p, r, row, n_pixels);
     int64_t rows[3];
     const tl_grad_values v = {.attr = p->l->attr,
-                              .rast = points_of_clamped(p, run),
-                              .out = (void *)((uintptr_t)colors - 4 * (uintptr_t)(n * run->row * p->view->width))};
-    attr_rows(p->view, run->id, n, rows);
+                              .rast = points_of_clamped(p, &run),
+                              .out = (void *)((uintptr_t)colors - 4 * (uintptr_t)(n * row * p->view->width))};
+    attr_rows(p->view, run.id, n, rows);
     for (int64_t c = 0; c < n; c += TL_FEW_COLUMNS)
-        values_of_run(&v, run, rows, c, n - c < TL_FEW_COLUMNS ? (int)(n - c) : TL_FEW_COLUMNS, n, 0);
+        values_of_run(&v, &run, rows, c, n - c < TL_FEW_COLUMNS ? (int)(n - c) : TL_FEW_COLUMNS, n, 0);
 }
 
 /* n of n_columns attributes from `first` on at the pixels of a run; x and y off the first pixel of the face. */
-TL_INLINE void draw_three(const picture_pass *p, int32_t face, int64_t first, int n, int64_t n_columns, int64_t x,
-                          int64_t y, int64_t n_pixels, float *colors)
+TL_INLINE void draw_three(const double *face, int64_t first, int n, int64_t n_columns, double x, double y,
+                          int64_t n_pixels, float *colors)
 {
-    const float *attr = (const float *)p->l->attr + n_columns * p->corners[2][face] + first;
-    const double *planes = face_at(p, face) + FACE_PLANE + 8 * first;
-    const vq4 last = vq4_all(vq_load_some(attr, n));
+    const double *three = face + place_of_three(first);
+    const vq4 last = vq4_all(vq_from_vqd(vqd_load(three + THREE_LAST)));
     for (int64_t begin = 0; begin < n_pixels; begin += TL_SUMMED) {
-        const run_plane plane = plane_of_face(planes, x + begin, y);
-        for (int i = 0; i < TL_SUMMED && begin + i < n_pixels; i += 4) {
-            const vq4 at = plane_at_pixels(&plane, i);
-            const vq4 color = vq4_add(vq4_mul(at, vq4_inverse_of_last(at)), last);
+        const run_plane plane = plane_of_face(three, x + (double)begin, y);
+        run_columns columns = columns_from(0);
+        for (int i = 0; i < TL_SUMMED && begin + i < n_pixels; i += 4, next_columns(&columns)) {
+            const vq4 at = plane_at_pixels(&plane, &columns);
+            const vq4 color = vq4_add(vq4_mul(at, inverse_at_pixels(&plane, &columns)), last);
             const int64_t n_left = n_pixels - begin - i;
             float some[16], *to = colors + n_columns * (begin + i) + first;
             vq4_store(n == n_columns ? to : some, color, 4, n); /* pixels to the right are drawn later */
@@ -341,24 +347,27 @@ TL_INLINE void draw_three(const picture_pass *p, int32_t face, int64_t first, in
 
 TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
 {
-    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], n = p->view->width * n_columns;
+    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width, n = width * n_columns;
+    const int64_t n_of_face = p->l->faces->n_columns;
+    const int32_t *begins = p->l->begins, *faces = p->faces;
+    const double *numbers = p->l->faces->sums;
     float *colors = p->colors + (row - p->base) * n;
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
-        const pixel_run run = run_of_face(p, r, end, row);
-        float *to = colors + n_columns * run.column;
-        const int32_t face = p->faces[r] >> 1;
-        if (run.id < 0) {
-            memset(to, 0, (size_t)(n_columns * run.n) * sizeof *to);
+        const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
+        float *to = colors + n_columns * column;
+        if (faces[r] < 0) {
+            memset(to, 0, (size_t)(n_columns * n_pixels) * sizeof *to);
             continue;
         }
-        const int64_t x = run.column - p->column[face], y = row - p->row[face];
-        if (!is_within(face_at(p, face), x, y, run.n)) {
+        const double *face = numbers + (faces[r] >> 1) * n_of_face;
+        const double x = (double)column - face[FACE_COLUMN], y = (double)row - face[FACE_ROW];
+        if (!is_within(face, x, y, n_pixels)) {
             p->faces[r] |= 1;
-            draw_clamped(p, &run, colors);
+            draw_clamped(p, r, row, n_pixels, colors);
             continue;
         }
         for (int64_t c = 0; c < n_columns; c += 3)
-            draw_three(p, face, c, n_columns - c < 3 ? (int)(n_columns - c) : 3, n_columns, x, y, run.n, to);
+            draw_three(face, c, n_columns - c < 3 ? (int)(n_columns - c) : 3, n_columns, x, y, n_pixels, to);
     }
     if (!p->l->out)
         memcpy(p->g_out + (row - p->base) * n, colors, (size_t)n * sizeof *colors);
@@ -366,44 +375,50 @@ TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
         memcpy(p->l->out + row * n, colors, (size_t)n * sizeof *colors);
 }
 
-/* Writes the gradient of sixteen numbers over them, and again; adds the squares of their differences. */
+/* Numbers that are compared at a time, and those of which as many squares are summed up in float32. */
+enum { COMPARED = 32, SQUARED = 256 };
+
+/* Writes the gradient of some numbers over them, and again; adds the squares of their differences. */
 TL_INLINE void compare_some(float *out, float *again, const float *target, vf scale, vf *squares)
 {
-    for (int k = 0; k < 16; k += TL_LANES) {
+    for (int k = 0; k < COMPARED; k += TL_LANES) {
         const vf step = vf_sub(vf_load(out + k), vf_load(target + k)), g = vf_mul(step, scale);
         vf_store(out + k, g), vf_store(again + k, g);
         squares[k / TL_LANES] = vf_add(squares[k / TL_LANES], vf_mul(step, step));
     }
 }
 
-/* The same of a row; returns the sum of squares, of which each eight are summed up in float32. */
+/* The same of a row; returns the sum of squares. */
 static double compare_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
     float *restrict out = p->g_out + (row - p->base) * n, *restrict again = p->g_color + (row - p->base) * n;
     const float *restrict target = p->l->target + row * n;
     const vf scale = vf_set1((float)p->l->scale);
-    double sum = 0.0;
-    for (int64_t first = 0; first < n; first += 128) {
-        vf squares[16 / TL_LANES];
-        float some[16], last[3][16] = {{0}};
+    vqd sum = vqd_set1(0.0);
+    double sums[4];
+    for (int64_t first = 0; first < n; first += SQUARED) {
+        const int64_t end = n - first < SQUARED ? n : first + SQUARED;
+        vf squares[COMPARED / TL_LANES];
+        float some[COMPARED], last[3][COMPARED] = {{0}};
         int64_t i = first;
-        for (int k = 0; k < 16 / TL_LANES; k++)
+        for (int k = 0; k < COMPARED / TL_LANES; k++)
             squares[k] = vf_set1(0.0f);
-        for (; i + 16 <= n && i < first + 128; i += 16)
+        for (; i + COMPARED <= end; i += COMPARED)
             compare_some(out + i, again + i, target + i, scale, squares);
-        if (i < n && i < first + 128) {
-            const size_t size = (size_t)(n - i) * sizeof(float);
+        if (i < end) {
+            const size_t size = (size_t)(end - i) * sizeof(float);
             memcpy(last[0], out + i, size), memcpy(last[2], target + i, size);
             compare_some(last[0], last[1], last[2], scale, squares);
             memcpy(out + i, last[0], size), memcpy(again + i, last[1], size);
         }
-        for (int k = 0; k < 16 / TL_LANES; k++)
+        for (int k = 0; k < COMPARED / TL_LANES; k++)
             vf_store(some + k * TL_LANES, squares[k]);
-        for (int k = 0; k < 8; k++)
-            sum += (double)(some[k] + some[k + 8]);
+        for (int k = 0; k < COMPARED; k += 8)
+            sum = vqd_add(sum, vqd_from_vq(vq_load(some + k) + vq_load(some + k + 4)));
     }
-    return sum;
+    vqd_store(sums, sum);
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
 /* Takes a row of gradients: those beside the other picture, or as given. */
@@ -430,35 +445,43 @@ static tl_grad_colors colors_of(const picture_pass *p)
                             .attr = l->of_attr};
 }
 
+TL_ONCE void pull_clamped_run(const picture_pass *p, int64_t r, int64_t row, int64_t n_pixels)
+{
+    const pixel_run run = run_of_face(p, r, row, n_pixels);
+    tl_grad_colors colors = colors_of(p);
+    colors.values.rast = points_of_clamped(p, &run);
+    pull_clamped(p->view, &colors, &run);
+}
+
 /* Adds the gradients of a row to the sums of its faces. */
 TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
 {
-    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row];
-    const float *g_color = p->g_color + (row - p->base) * p->view->width * n_columns;
+    const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width;
+    const int64_t n_of_face = p->l->faces->n_columns;
+    const int32_t *begins = p->l->begins, *faces = p->faces;
+    const float *g_color = p->g_color + (row - p->base) * width * n_columns;
+    double *numbers = p->l->faces->sums;
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
-        const pixel_run run = run_of_face(p, r, end, row);
-        const int32_t face = p->faces[r] >> 1;
-        if (run.id < 0)
+        const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
+        if (faces[r] < 0)
             continue;
-        if (p->faces[r] & 1) {
-            tl_grad_colors colors = colors_of(p);
-            colors.values.rast = points_of_clamped(p, &run);
-            pull_clamped(p->view, &colors, &run);
+        if (faces[r] & 1) {
+            pull_clamped_run(p, r, row, n_pixels);
             continue;
         }
-        const int64_t x = run.column - p->column[face], y = row - p->row[face];
+        double *face = numbers + (faces[r] >> 1) * n_of_face;
+        const double y = (double)row - face[FACE_ROW];
         for (int64_t c = 0; c < n_columns; c += 3) {
-            double *planes = face_at(p, face) + FACE_PLANE + 8 * c, *moments = planes + FACE_PLANE;
-            for (int64_t first = 0; first < run.n; first += TL_SUMMED) {
-                const run_plane plane = plane_of_face(planes, x + first, y);
-                const float *g = g_color + n_columns * (run.column + first) + c;
+            double *three = face + place_of_three(c);
+            for (int64_t first = 0; first < n_pixels; first += TL_SUMMED) {
+                const double x = (double)(column + first) - face[FACE_COLUMN];
+                const run_plane plane = plane_of_face(three, x, y);
+                const float *g = g_color + n_columns * (column + first) + c;
                 vq4 sums[2];
-                sum_up_pixels(&plane, 0, g, (int)(run.n - first), n_columns - c < 3 ? (int)(n_columns - c) : 3,
+                sum_up_pixels(&plane, 0, g, (int)(n_pixels - first), n_columns - c < 3 ? (int)(n_columns - c) : 3,
                               n_columns, 1, sums);
-                const four whole = __builtin_convertvector(vq4_fold(sums[0]), four);
-                TL_FOUR(moments) += __builtin_convertvector(vq4_fold(sums[1]), four) + whole * (double)(x + first);
-                TL_FOUR(moments + 4) += whole * (double)y;
-                TL_FOUR(moments + 8) += whole;
+                add_three_moments(three + THREE_SUMS, vqd_from_vq(vq4_fold(sums[0])), vqd_from_vq(vq4_fold(sums[1])), x,
+                                  y);
             }
         }
     }
@@ -472,7 +495,7 @@ static void close_faces(const picture_pass *p)
         face_at(p, i)[0] = middle_at(p->view, 0, p->column[i]);
         face_at(p, i)[1] = middle_at(p->view, 1, p->row[i]);
     }
-    close_colors(p->view, &colors, 2 * FACE_PLANE, 2 * FACE_PLANE, 1);
+    close_colors(p->view, &colors, place_of_three(0) + THREE_SUMS, TL_SUMS_OF_FACE, 1);
 }
 
 /* Rows drawn, their gradients taken and led back, one after the other. */

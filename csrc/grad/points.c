@@ -129,23 +129,32 @@ TL_INLINE vd middles_at(const tl_grad_view *view, int axis, vi i)
     return vd_add(vd_mul(middle, vd_set1(view->scale[axis])), vd_set1(view->shift[axis]));
 }
 
-/* q_k of TL_LANES triangles about x0, y0, as load_seen_triangle has them; z and w. */
-TL_INLINE void load_triangles(const tl_grad_view *view, const int32_t *const corners[3], vd x0, vd y0, vd q[3][3],
-                              vd *z, vd *w)
+/* n <= 3 attributes of float32 of rows, from `first` on, as columns; zeros beyond. */
+TL_INLINE void load_attributes(const float *attr, int64_t n_columns, int64_t first, const int32_t *rows, vd *columns)
 {
-    vd x[3], y[3];
+    const vi at = vi_mul(vi_load(rows), vi_set1((int32_t)n_columns));
+    for (int c = 0; c < 3; c++)
+        columns[c] = first + c < n_columns
+                         ? vd_from_vf(vf_of_bits(vi_gather(vm_all(), (const int32_t *)attr + first + c, at)))
+                         : vd_set1(0.0);
+}
+
+/* Corners v_k = x', y', w of TL_LANES triangles about x0, y0, and q_k, as load_seen_triangle has them; z. */
+TL_INLINE void load_triangles(const tl_grad_view *view, const int32_t *const corners[3], vd x0, vd y0, vd v[3][3],
+                              vd q[3][3], vd *z)
+{
     for (int k = 0; k < 3; k++) {
         vi bits[4];
         vi_load_records(view->pos, 16, corners[k], bits);
-        z[k] = vd_from_vf(vf_of_bits(bits[2])), w[k] = vd_from_vf(vf_of_bits(bits[3]));
-        x[k] = vd_sub(vd_from_vf(vf_of_bits(bits[0])), vd_mul(x0, w[k]));
-        y[k] = vd_sub(vd_from_vf(vf_of_bits(bits[1])), vd_mul(y0, w[k]));
+        z[k] = vd_from_vf(vf_of_bits(bits[2])), v[k][2] = vd_from_vf(vf_of_bits(bits[3]));
+        v[k][0] = vd_sub(vd_from_vf(vf_of_bits(bits[0])), vd_mul(x0, v[k][2]));
+        v[k][1] = vd_sub(vd_from_vf(vf_of_bits(bits[1])), vd_mul(y0, v[k][2]));
     }
     for (int k = 0; k < 3; k++) {
-        const int i = (k + 1) % 3, j = (k + 2) % 3;
-        q[k][0] = vd_sub(vd_mul(y[i], w[j]), vd_mul(w[i], y[j]));
-        q[k][1] = vd_sub(vd_mul(w[i], x[j]), vd_mul(x[i], w[j]));
-        q[k][2] = vd_sub(vd_mul(x[i], y[j]), vd_mul(y[i], x[j]));
+        const vd *a = v[(k + 1) % 3], *b = v[(k + 2) % 3];
+        q[k][0] = vd_sub(vd_mul(a[1], b[2]), vd_mul(a[2], b[1]));
+        q[k][1] = vd_sub(vd_mul(a[2], b[0]), vd_mul(a[0], b[2]));
+        q[k][2] = vd_sub(vd_mul(a[0], b[1]), vd_mul(a[1], b[0]));
     }
 }
 
@@ -168,7 +177,7 @@ TL_INLINE void set_point_numbers(const tl_grad_view *view, grad_span *s, double 
     const vd step[2] = {vd_set1(2.0 * view->scale[0]), vd_set1(2.0 * view->scale[1])};
     for (int r = 0; r < s->n_runs; r += TL_LANES) {
         const vm m = vm_and(vm_first(s->n_runs - r), vi_gt(vi_load(s->ids + r), vi_set1(-1)));
-        vd q[3][3], z[3], w[3], sum[3], products[3];
+        vd v[3][3], q[3][3], z[3], sum[3], products[3];
         if (!vm_any(m)) {
             for (int k = 0; k <= POINT_ZW_X; k++)
                 vf_store(s->numbers[k] + r, vf_set1(0.0f));
@@ -176,7 +185,7 @@ TL_INLINE void set_point_numbers(const tl_grad_view *view, grad_span *s, double 
         }
         const int32_t *const corners[3] = {s->corners[0] + r, s->corners[1] + r, s->corners[2] + r};
         const vd x0 = middles_at(view, 0, vi_add(vi_load(s->begins + r), vi_set1((int32_t)s->first)));
-        load_triangles(view, corners, x0, vd_set1(middle_at(view, 1, s->row)), q, z, w);
+        load_triangles(view, corners, x0, vd_set1(middle_at(view, 1, s->row)), v, q, z);
         for (int c = 0; c < 3; c++)
             sum[c] = sum_of_three(q[0][c], q[1][c], q[2][c]);
         const vd inverse = vd_div(vd_set1(1.0), one_for_zero(sum[2]));
@@ -189,7 +198,7 @@ TL_INLINE void set_point_numbers(const tl_grad_view *view, grad_span *s, double 
             set_number(s, r, POINT_TOTAL_X + k, m, vd_mul(vd_mul(sum[k], step[k]), inverse));
         }
         for (int k = 0; k < 3; k++)
-            products[k] = vd_mul(w[k], q[k][2]);
+            products[k] = vd_mul(v[k][2], q[k][2]);
         const vd under = one_for_zero(sum_of_three(products[0], products[1], products[2]));
         for (int c = 0; c < 3; c += 2) {
             for (int k = 0; k < 3; k++)
@@ -407,6 +416,14 @@ TL_INLINE double *begun_sums(const tl_grad_view *view, tl_grad_sums *faces, cons
     return sums;
 }
 
+/* Adds sums about x, y: times their own X, times Y, and as they are. */
+TL_INLINE void add_three_moments(double *moments, vqd whole, vqd by_x, double x, double y)
+{
+    vqd_store(moments, vqd_add(vqd_load(moments), vqd_add(by_x, vqd_mul(whole, vqd_set1(x)))));
+    vqd_store(moments + 4, vqd_add(vqd_load(moments + 4), vqd_mul(whole, vqd_set1(y))));
+    vqd_store(moments + 8, vqd_add(vqd_load(moments + 8), whole));
+}
+
 /* Adds what some pixels of a run have summed up, as it is and times their number, in units of what the total is at the
  * run's first pixel; `last`: what the fourth number counts by. */
 TL_INLINE void add_moments(const tl_grad_view *view, const grad_span *s, int r, int first, double last,
@@ -415,12 +432,9 @@ TL_INLINE void add_moments(const tl_grad_view *view, const grad_span *s, int r, 
     const double inverse = s->inverses[r], step = 2.0 * view->scale[0];
     const double x = middle_at(view, 0, s->first + s->begins[r] + first) - begins[0];
     const double y = middle_at(view, 1, s->row) - begins[1];
-    const four unit = {inverse, inverse, inverse, last};
-    const four whole = __builtin_convertvector(vq4_fold(sum), four) * unit;
-    const four by_x = __builtin_convertvector(vq4_fold(sum_x), four) * unit;
-    TL_FOUR(moments) += by_x * step + whole * x;
-    TL_FOUR(moments + 4) += whole * y;
-    TL_FOUR(moments + 8) += whole;
+    const vqd unit = vqd_load((const double[]){inverse, inverse, inverse, last});
+    const vqd by_x = vqd_mul(vqd_from_vq(vq4_fold(sum_x)), unit);
+    add_three_moments(moments, vqd_mul(vqd_from_vq(vq4_fold(sum)), unit), vqd_mul(by_x, vqd_set1(step)), x, y);
 }
 
 /* Sets the quads of runs: u, v, z/w and the total. */
@@ -447,18 +461,20 @@ TL_INLINE void pull_run_of_points(const tl_grad_view *view, const grad_span *s, 
                                   double *sums)
 {
     const run_plane plane = plane_of_run(s, r);
-    const vq4 zero = vq4_all(vq_set1(0.0f));
+    const vq4 zero = vq4_set1(0.0f);
     const int n = s->begins[r + 1] - s->begins[r];
     for (int first = 0; first < n; first += TL_SUMMED) {
         vq4 sum = zero, sum_x = zero;
+        run_columns columns = columns_from(first), summed = columns_from(0);
         for (int i = 0; i < TL_SUMMED && first + i < n; i += 4) {
-            const vq4 at = plane_at_pixels(&plane, first + i), inverse = vq4_inverse_of_last(at);
+            const vq4 at = plane_at_pixels(&plane, &columns), inverse = inverse_at_pixels(&plane, &columns);
             const vq4 g = vq4_load(g_rast + 4 * (first + i), n - first - i, 4);
             const vq4 product = vq4_mul(g, vq4_mul(at, inverse));
             const vq4 total = vq4_add(TL_VQ4_PERMUTE(product, 0, 0, 0, 0), TL_VQ4_PERMUTE(product, 1, 1, 1, 1));
             const vq4 of_a = vq4_mul(vq4_sub(TL_VQ4_BLEND(g, zero, 12), total), inverse);
             const vq4 h = vq4_first(TL_VQ4_BLEND(of_a, TL_VQ4_PERMUTE(g, 2, 2, 2, 2), 8), n - first - i);
-            sum = vq4_add(sum, h), sum_x = vq4_add(sum_x, vq4_mul(h, columns_from(i)));
+            sum = vq4_add(sum, h), sum_x = vq4_add(sum_x, vq4_mul(h, summed.quads));
+            next_columns(&columns), next_columns(&summed);
         }
         add_moments(view, s, r, first, 1.0, sums, sums + FACE_X, sum, sum_x);
     }

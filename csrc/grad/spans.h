@@ -241,25 +241,48 @@ TL_INLINE void set_quads(grad_span *s, int plane, int r, const vf *columns)
     vi_store_quads((int32_t *)s->planes[plane] + 4 * r, bits);
 }
 
-/* Four pixels of a plane, x pixels after the first one of its run. */
+/* A plane along a run, from its first pixel on; its last number alone, four times. */
 typedef struct {
     vq4 begin, step;
+    vq last, last_step;
 } run_plane;
 
+TL_INLINE run_plane run_plane_of(vq begin, vq step)
+{
+    return (run_plane){vq4_all(begin), vq4_all(step), vq_set1(begin[3]), vq_set1(step[3])};
+}
 TL_INLINE run_plane plane_of_run(const grad_span *s, int r)
 {
     const int at = quad_of_run(r);
-    return (run_plane){vq4_all(vq_load(s->planes[0] + at)), vq4_all(vq_load(s->planes[1] + at))};
-}
-TL_INLINE vq4 columns_from(int x) { return vq4_add(vq4_pixels(), vq4_all(vq_set1((float)x))); }
-TL_INLINE vq4 plane_at_pixels(const run_plane *p, int x)
-{
-    return vq4_add(p->begin, vq4_mul(p->step, columns_from(x)));
+    return run_plane_of(vq_load(s->planes[0] + at), vq_load(s->planes[1] + at));
 }
 
-/* Four float64 that belong together: nothing takes or returns them, since not every instruction set has them. */
-typedef double four __attribute__((vector_size(32)));
-typedef double four_there __attribute__((vector_size(32), aligned(8), may_alias));
-#define TL_FOUR(p) (*(four_there *)(p))
+/* How far four pixels lie from the first one of their run: in all lanes of their quads, and once. */
+typedef struct {
+    vq4 quads;
+    vq each;
+} run_columns;
+
+TL_INLINE run_columns columns_from(int x)
+{
+    const run_columns columns = {vq4_pixels(), {0.0f, 1.0f, 2.0f, 3.0f}};
+    if (x == 0) /* constants, where x is one */
+        return columns;
+    return (run_columns){vq4_add(columns.quads, vq4_set1((float)x)), columns.each + vq_set1((float)x)};
+}
+TL_INLINE void next_columns(run_columns *columns)
+{
+    columns->quads = vq4_add(columns->quads, vq4_set1(4.0f));
+    columns->each += vq_set1(4.0f);
+}
+TL_INLINE vq4 plane_at_pixels(const run_plane *p, const run_columns *columns)
+{
+    return vq4_add(p->begin, vq4_mul(p->step, columns->quads));
+}
+/* 1 / the last number at each pixel: a division of four numbers, not of sixteen. */
+TL_INLINE vq4 inverse_at_pixels(const run_plane *p, const run_columns *columns)
+{
+    return vq4_spread(vq_set1(1.0f) / (p->last + p->last_step * columns->each));
+}
 
 #endif

@@ -102,17 +102,17 @@ TL_INLINE void scatter_shares(const pulled_lanes *p, const texel_shares *quad, i
         for (int64_t c = 0; c < n; c += 4) {
             const int64_t at = n * lane + c;
             const int is_last = at + 4 > n * p->n_left, n_some = n - c < 4 ? (int)(n - c) : 4;
-            four g;
-            if (is_f64)
-                for (int i = 0; i < 4; i++)
-                    g[i] = i < n_some ? ((const double *)p->g)[at + i] : 0.0;
-            else
-                g = __builtin_convertvector(
-                    is_last ? vq_load_some((const float *)p->g + at, n_some) : vq_load((const float *)p->g + at), four);
+            double some[4] = {0};
+            for (int i = 0; is_f64 && i < n_some; i++)
+                some[i] = ((const double *)p->g)[at + i];
+            const vqd g = is_f64    ? vqd_load(some)
+                          : is_last ? vqd_from_vq(vq_load_some((const float *)p->g + at, n_some))
+                                    : vqd_from_vq(vq_load((const float *)p->g + at));
             for (int k = 0; k < quad->n; k++) {
-                const double s = shares[k][lane];
-                if (s != 0.0)
-                    TL_FOUR(sums_of(sums, p->t->first_texels[level] + rows[k][lane]) + c) += s * g;
+                if (shares[k][lane] == 0.0)
+                    continue;
+                double *to = sums_of(sums, p->t->first_texels[level] + rows[k][lane]) + c;
+                vqd_store(to, vqd_add(vqd_load(to), vqd_mul(vqd_set1(shares[k][lane]), g)));
             }
         }
     }

@@ -256,7 +256,7 @@ TL_INLINE void pull_quads(const tl_grad_values *v, const pixel_run *run, const g
     const vq last = vq_load_some(attr + n * (int64_t)s->corners[2][r], n);
     const vq4 of_u = vq4_all(vq_load_some(attr + n * (int64_t)s->corners[0][r], n) - last);
     const vq4 of_v = vq4_all(vq_load_some(attr + n * (int64_t)s->corners[1][r], n) - last);
-    const vq4 zero = vq4_all(vq_set1(0.0f));
+    const vq4 zero = vq4_set1(0.0f);
     for (int64_t first = 0; first < run->n; first += TL_SUMMED) {
         vq4 by_u = zero, by_v = zero, whole = zero;
         for (int64_t i = first; i < first + TL_SUMMED && i < run->n; i += 4) {

@@ -28,6 +28,7 @@
  *   vi_spill(p, a)          a store of lanes that are then read one by one
  *   vd_power(a, sum, mask)  the number with bits of `sum` less the bits of a in `mask`
  *   vd_load_records(base, stride, i, c)    four doubles at base + 8 * stride * i[k], as columns
+ *   vd_store_quads(p, stride, c)    four columns of doubles as rows of four, at p + stride * k
  *   vd_load_pairs(base, stride, first, x, y)    two doubles at base + 8 * stride * first[3 * k], as columns
  *   vd_load_triples(base, first, x, y, z)    three doubles at base + 24 * first[3 * k], as columns
  *   vd_load_places(base, first, x, y, z, a, b)    three doubles and two int32 at base + 32 * first[3 * k], as columns

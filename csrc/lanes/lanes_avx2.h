@@ -393,19 +393,23 @@ TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, v
     *a = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0x88)), 0xd8);
     *b = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0xdd)), 0xd8);
 }
-TL_INLINE void store_four_places(double *p, __m256d x, __m256d y, __m256d z, __m128i a, __m128i b)
+TL_INLINE void vd_store_quads(double *p, int64_t stride, const vd *c)
 {
-    const __m256i ab = _mm256_or_si256(_mm256_cvtepu32_epi64(a), _mm256_slli_epi64(_mm256_cvtepu32_epi64(b), 32));
-    const __m256d c[4] = {x, y, z, _mm256_castsi256_pd(ab)};
-    __m256d row[4];
-    transpose_four(c, row);
-    for (int k = 0; k < 4; k++)
-        _mm256_storeu_pd(p + 4 * k, row[k]);
+    for (int part = 0; part < 2; part++) {
+        __m256d half[4], row[4];
+        for (int k = 0; k < 4; k++)
+            half[k] = part ? c[k].hi : c[k].lo;
+        transpose_four(half, row);
+        for (int k = 0; k < 4; k++)
+            _mm256_storeu_pd(p + (4 * part + k) * stride, row[k]);
+    }
 }
 TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
 {
-    store_four_places(p, x.lo, y.lo, z.lo, _mm256_castsi256_si128(a), _mm256_castsi256_si128(b));
-    store_four_places(p + 16, x.hi, y.hi, z.hi, _mm256_extracti128_si256(a, 1), _mm256_extracti128_si256(b, 1));
+    const __m256i even = _mm256_unpacklo_epi32(a, b), odd = _mm256_unpackhi_epi32(a, b);
+    const vd ab = {_mm256_castsi256_pd(_mm256_permute2x128_si256(even, odd, 0x20)),
+                   _mm256_castsi256_pd(_mm256_permute2x128_si256(even, odd, 0x31))};
+    vd_store_quads(p, 4, (const vd[]){x, y, z, ab});
 }
 TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
 #include "lanes/lanes_x86.h"

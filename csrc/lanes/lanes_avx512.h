@@ -425,28 +425,34 @@ TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, v
     *a = _mm512_permutex2var_epi32(low, even, high);
     *b = _mm512_permutex2var_epi32(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high);
 }
-TL_INLINE void store_eight_places(double *p, __m512d x, __m512d y, __m512d z, __m512i ab)
+TL_INLINE void vd_store_quads(double *p, int64_t stride, const vd *c)
 {
-    const __m512d w = _mm512_castsi512_pd(ab);
     const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
     const __m512i high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
-    const __m512d xy[2] = {_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y)}; /* rows 0 2 4 6, and 1 3 5 7 */
-    const __m512d zw[2] = {_mm512_unpacklo_pd(z, w), _mm512_unpackhi_pd(z, w)};
-    for (int k = 0; k < 2; k++) {
-        const __m512d front = _mm512_permutex2var_pd(xy[k], low, zw[k]);
-        const __m512d back = _mm512_permutex2var_pd(xy[k], high, zw[k]);
-        _mm256_storeu_pd(p + 4 * k, _mm512_castpd512_pd256(front));
-        _mm256_storeu_pd(p + 4 * k + 8, _mm512_extractf64x4_pd(front, 1));
-        _mm256_storeu_pd(p + 4 * k + 16, _mm512_castpd512_pd256(back));
-        _mm256_storeu_pd(p + 4 * k + 24, _mm512_extractf64x4_pd(back, 1));
+    for (int part = 0; part < 2; part++, p += 8 * stride) {
+        __m512d a[4];
+        for (int k = 0; k < 4; k++)
+            a[k] = part ? c[k].hi : c[k].lo;
+        const __m512d left[2] = {_mm512_unpacklo_pd(a[0], a[1]),
+                                 _mm512_unpackhi_pd(a[0], a[1])}; /* of even, odd rows */
+        const __m512d right[2] = {_mm512_unpacklo_pd(a[2], a[3]), _mm512_unpackhi_pd(a[2], a[3])};
+        for (int k = 0; k < 2; k++) {
+            const __m512d front = _mm512_permutex2var_pd(left[k], low, right[k]);
+            const __m512d back = _mm512_permutex2var_pd(left[k], high, right[k]);
+            _mm256_storeu_pd(p + k * stride, _mm512_castpd512_pd256(front));
+            _mm256_storeu_pd(p + (k + 2) * stride, _mm512_extractf64x4_pd(front, 1));
+            _mm256_storeu_pd(p + (k + 4) * stride, _mm512_castpd512_pd256(back));
+            _mm256_storeu_pd(p + (k + 6) * stride, _mm512_extractf64x4_pd(back, 1));
+        }
     }
 }
 TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
 {
     const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
     const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
-    store_eight_places(p, x.lo, y.lo, z.lo, _mm512_permutex2var_epi32(a, low, b));
-    store_eight_places(p + 32, x.hi, y.hi, z.hi, _mm512_permutex2var_epi32(a, high, b));
+    const vd ab = {_mm512_castsi512_pd(_mm512_permutex2var_epi32(a, low, b)),
+                   _mm512_castsi512_pd(_mm512_permutex2var_epi32(a, high, b))};
+    vd_store_quads(p, 4, (const vd[]){x, y, z, ab});
 }
 
 /* Pairs at base + 8 * stride * first[3 * lane]. */

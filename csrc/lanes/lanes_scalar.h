@@ -358,6 +358,11 @@ TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, v
     *x = row[0], *y = row[1], *z = row[2];
     memcpy(a, row + 3, sizeof *a), memcpy(b, (const char *)(row + 3) + sizeof *a, sizeof *b);
 }
+TL_INLINE void vd_store_quads(double *p, int64_t stride, const vd *c)
+{
+    (void)stride;
+    memcpy(p, c, 32);
+}
 TL_INLINE void vd_store_places(double *row, vd x, vd y, vd z, vi a, vi b)
 {
     row[0] = x, row[1] = y, row[2] = z;

@@ -690,13 +690,18 @@ TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, v
     *a = TL_SHUFFLE((vi)c[3].lo, (vi)c[3].hi, 0, 2, 4, 6);
     *b = TL_SHUFFLE((vi)c[3].lo, (vi)c[3].hi, 1, 3, 5, 7);
 }
+TL_INLINE void vd_store_quads(double *p, int64_t stride, const vd *c)
+{
+    for (int k = 0; k < 4; k += 2) {
+        v2d_store(p + k, low_two(c[k].lo, c[k + 1].lo)), v2d_store(p + stride + k, high_two(c[k].lo, c[k + 1].lo));
+        v2d_store(p + 2 * stride + k, low_two(c[k].hi, c[k + 1].hi));
+        v2d_store(p + 3 * stride + k, high_two(c[k].hi, c[k + 1].hi));
+    }
+}
 TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
 {
-    const v2d low = (v2d)TL_SHUFFLE(a, b, 0, 4, 1, 5), high = (v2d)TL_SHUFFLE(a, b, 2, 6, 3, 7);
-    v2d_store(p, low_two(x.lo, y.lo)), v2d_store(p + 2, low_two(z.lo, low));
-    v2d_store(p + 4, high_two(x.lo, y.lo)), v2d_store(p + 6, high_two(z.lo, low));
-    v2d_store(p + 8, low_two(x.hi, y.hi)), v2d_store(p + 10, low_two(z.hi, high));
-    v2d_store(p + 12, high_two(x.hi, y.hi)), v2d_store(p + 14, high_two(z.hi, high));
+    const vd ab = {(v2d)TL_SHUFFLE(a, b, 0, 4, 1, 5), (v2d)TL_SHUFFLE(a, b, 2, 6, 3, 7)};
+    vd_store_quads(p, 4, (const vd[]){x, y, z, ab});
 }
 
 #endif

@@ -1,15 +1,18 @@
-/* Quads: four float32 that belong together, those of a pixel or of a corner; and four quads, of four pixels.
+/* Quads: four float32 that belong together, those of a pixel or of a corner; four quads, of four pixels; and four
+ * float64.
  *
  * The same bits on every instruction set: nothing is fused, and each sum has one order.
  *
  *   vq_set1 vq_load vq_store    as their names say; + - * / are those of the compiler
  *   vq_load_some(p, n)          the first n of four numbers, zeros beyond
- *   vq_above_zero(a)            bit k: number k is above 0
- *   vq4_all(a)                  a quad, four times
+ *   vqd_load vqd_store vqd_set1 vqd_add vqd_sub vqd_mul vqd_from_vq vq_from_vqd    of float64, as their names say
+ *   vqd_above_zero(a, b)        bit k: number k of both is above 0
+ *   vq4_set1(a) vq4_all(a)      a number everywhere; a quad, four times
  *   vq4_add vq4_sub vq4_mul vq4_div    as their names say
  *   TL_VQ4_PERMUTE(a, i, j, k, l)      the lanes i, j, k, l of each quad
  *   TL_VQ4_BLEND(a, b, bits)    lane k of each quad from b where bit k is set
  *   vq4_pixels()                0, 1, 2, 3: each in all lanes of its quad
+ *   vq4_spread(a)               the same of the numbers of a quad
  *   vq4_first(a, n)             the first n quads, zeros beyond
  *   vq4_fold(a)                 the sum of the four: the first and the third, the second and the fourth, both
  *   vq4_load(p, n, columns)     n rows of so many numbers, at most four, zeros beyond; and vq4_store.  n = TL_VQ4_ROOM
@@ -36,17 +39,53 @@ TL_INLINE vq vq_load_some(const float *p, int n)
 }
 
 #ifdef __AVX2__
-TL_INLINE unsigned vq_above_zero(vq a) { return (unsigned)_mm_movemask_ps(_mm_cmpgt_ps((__m128)a, _mm_setzero_ps())); }
-#else
-TL_INLINE unsigned vq_above_zero(vq a)
+typedef __m256d vqd;
+TL_INLINE vqd vqd_set1(double a) { return _mm256_set1_pd(a); }
+TL_INLINE vqd vqd_load(const double *p) { return _mm256_loadu_pd(p); }
+TL_INLINE void vqd_store(double *p, vqd a) { _mm256_storeu_pd(p, a); }
+TL_INLINE vqd vqd_add(vqd a, vqd b) { return _mm256_add_pd(a, b); }
+TL_INLINE vqd vqd_sub(vqd a, vqd b) { return _mm256_sub_pd(a, b); }
+TL_INLINE vqd vqd_mul(vqd a, vqd b) { return _mm256_mul_pd(a, b); }
+TL_INLINE vqd vqd_from_vq(vq a) { return _mm256_cvtps_pd((__m128)a); }
+TL_INLINE vq vq_from_vqd(vqd a) { return (vq)_mm256_cvtpd_ps(a); }
+TL_INLINE unsigned vqd_above_zero(vqd a, vqd b)
 {
-    return (unsigned)(a[0] > 0.0f) | (unsigned)(a[1] > 0.0f) << 1 | (unsigned)(a[2] > 0.0f) << 2 |
-           (unsigned)(a[3] > 0.0f) << 3;
+    const __m256d zero = _mm256_setzero_pd();
+    return (unsigned)_mm256_movemask_pd(
+        _mm256_and_pd(_mm256_cmp_pd(a, zero, _CMP_GT_OQ), _mm256_cmp_pd(b, zero, _CMP_GT_OQ)));
+}
+#else
+typedef double vq_halves __attribute__((vector_size(16)));
+typedef double vq_halves_there __attribute__((vector_size(16), aligned(8), may_alias));
+typedef struct {
+    vq_halves of[2];
+} vqd;
+TL_INLINE vqd vqd_set1(double a) { return (vqd){{{a, a}, {a, a}}}; }
+TL_INLINE vqd vqd_load(const double *p)
+{
+    return (vqd){{*(const vq_halves_there *)p, *(const vq_halves_there *)(p + 2)}};
+}
+TL_INLINE void vqd_store(double *p, vqd a) { *(vq_halves_there *)p = a.of[0], *(vq_halves_there *)(p + 2) = a.of[1]; }
+TL_INLINE vqd vqd_add(vqd a, vqd b) { return (vqd){{a.of[0] + b.of[0], a.of[1] + b.of[1]}}; }
+TL_INLINE vqd vqd_sub(vqd a, vqd b) { return (vqd){{a.of[0] - b.of[0], a.of[1] - b.of[1]}}; }
+TL_INLINE vqd vqd_mul(vqd a, vqd b) { return (vqd){{a.of[0] * b.of[0], a.of[1] * b.of[1]}}; }
+TL_INLINE vqd vqd_from_vq(vq a) { return (vqd){{{(double)a[0], (double)a[1]}, {(double)a[2], (double)a[3]}}}; }
+TL_INLINE vq vq_from_vqd(vqd a)
+{
+    return (vq){(float)a.of[0][0], (float)a.of[0][1], (float)a.of[1][0], (float)a.of[1][1]};
+}
+TL_INLINE unsigned vqd_above_zero(vqd a, vqd b)
+{
+    unsigned bits = 0;
+    for (int k = 0; k < 4; k++)
+        bits |= (unsigned)(a.of[k / 2][k % 2] > 0.0 && b.of[k / 2][k % 2] > 0.0) << k;
+    return bits;
 }
 #endif
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__AVX512VL__)
 typedef __m512 vq4;
+TL_INLINE vq4 vq4_set1(float a) { return _mm512_set1_ps(a); }
 TL_INLINE vq4 vq4_all(vq a) { return _mm512_broadcast_f32x4((__m128)a); }
 TL_INLINE vq4 vq4_add(vq4 a, vq4 b) { return _mm512_add_ps(a, b); }
 TL_INLINE vq4 vq4_sub(vq4 a, vq4 b) { return _mm512_sub_ps(a, b); }
@@ -55,9 +94,14 @@ TL_INLINE vq4 vq4_div(vq4 a, vq4 b) { return _mm512_div_ps(a, b); }
 #define TL_VQ4_PERMUTE(a, i, j, k, l) _mm512_permute_ps(a, (i) | (j) << 2 | (k) << 4 | (l) << 6)
 #define TL_VQ4_BLEND(a, b, bits) _mm512_mask_blend_ps((__mmask16)((bits) * 0x1111), a, b)
 TL_INLINE vq4 vq4_pixels(void) { return _mm512_setr_ps(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3); }
+TL_INLINE vq4 vq4_spread(vq a)
+{
+    const __m512i number = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+    return _mm512_permutexvar_ps(number, _mm512_castps128_ps512((__m128)a));
+}
 TL_INLINE __mmask16 vq4_mask(int64_t n, int columns)
 {
-    return n < 4 ? (__mmask16)((1u << (unsigned)(columns * (int)n)) - 1) : (__mmask16)((1u << 4 * columns) - 1);
+    return (__mmask16)_bzhi_u32((1u << 4 * columns) - 1, (unsigned)columns * (n < 4 ? (unsigned)n : 4));
 }
 TL_INLINE vq4 vq4_first(vq4 a, int64_t n) { return _mm512_maskz_mov_ps(vq4_mask(n, 4), a); }
 TL_INLINE vq vq4_fold(vq4 a)
@@ -93,6 +137,7 @@ typedef struct {
     __m256 of[2];
 } vq4;
 TL_INLINE __m256 two_quads(__m128 a, __m128 b) { return _mm256_insertf128_ps(_mm256_castps128_ps256(a), b, 1); }
+TL_INLINE vq4 vq4_set1(float a) { return (vq4){{_mm256_set1_ps(a), _mm256_set1_ps(a)}}; }
 TL_INLINE vq4 vq4_all(vq a) { return (vq4){{two_quads((__m128)a, (__m128)a), two_quads((__m128)a, (__m128)a)}}; }
 #define TL_VQ4_EACH(a, b, of_two) ((vq4){{of_two((a).of[0], (b).of[0]), of_two((a).of[1], (b).of[1])}})
 TL_INLINE vq4 vq4_add(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_add_ps); }
@@ -108,6 +153,12 @@ TL_INLINE vq4 vq4_div(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_div_ps); }
 TL_INLINE vq4 vq4_pixels(void)
 {
     return (vq4){{_mm256_setr_ps(0, 0, 0, 0, 1, 1, 1, 1), _mm256_setr_ps(2, 2, 2, 2, 3, 3, 3, 3)}};
+}
+TL_INLINE vq4 vq4_spread(vq a)
+{
+    const __m256 both = two_quads((__m128)a, (__m128)a);
+    return (vq4){{_mm256_permutevar_ps(both, _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1)),
+                  _mm256_permutevar_ps(both, _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3))}};
 }
 TL_INLINE vq4 vq4_first(vq4 a, int64_t n)
 {
@@ -130,7 +181,7 @@ TL_INLINE vq4 vq4_load(const float *p, int64_t n, int columns)
                : k < n                  ? vq_load_some(p + columns * k, columns)
                                         : vq_set1(0.0f);
     vq4 all = {{two_quads((__m128)a[0], (__m128)a[1]), two_quads((__m128)a[2], (__m128)a[3])}};
-    return columns == 3 ? TL_VQ4_BLEND(all, vq4_all(vq_set1(0.0f)), 8) : all;
+    return columns == 3 ? TL_VQ4_BLEND(all, vq4_set1(0.0f), 8) : all;
 }
 TL_INLINE vq vq4_at(vq4 a, int k)
 {
@@ -148,6 +199,7 @@ typedef struct {
     vq of[4];
 } vq4;
 TL_INLINE vq4 vq4_all(vq a) { return (vq4){{a, a, a, a}}; }
+TL_INLINE vq4 vq4_set1(float a) { return vq4_all(vq_set1(a)); }
 #define TL_VQ4_EACH(name, a, b, done) \
     TL_INLINE vq4 name(vq4 a, vq4 b)  \
     {                                 \
@@ -167,6 +219,7 @@ TL_VQ4_EACH(vq4_div, a, b, a.of[k] / b.of[k])
 #define TL_VQ4_BLEND(a, b, bits) \
     TL_VQ4_SHUFFLE(a, b, (bits) & 1 ? 4 : 0, (bits) & 2 ? 5 : 1, (bits) & 4 ? 6 : 2, (bits) & 8 ? 7 : 3)
 TL_INLINE vq4 vq4_pixels(void) { return (vq4){{vq_set1(0), vq_set1(1), vq_set1(2), vq_set1(3)}}; }
+TL_INLINE vq4 vq4_spread(vq a) { return (vq4){{vq_set1(a[0]), vq_set1(a[1]), vq_set1(a[2]), vq_set1(a[3])}}; }
 TL_INLINE vq4 vq4_first(vq4 a, int64_t n)
 {
     for (int k = 0; k < 4; k++)
@@ -176,7 +229,7 @@ TL_INLINE vq4 vq4_first(vq4 a, int64_t n)
 TL_INLINE vq vq4_fold(vq4 a) { return (a.of[0] + a.of[2]) + (a.of[1] + a.of[3]); }
 TL_INLINE vq4 vq4_load(const float *p, int64_t n, int columns)
 {
-    vq4 a = vq4_all(vq_set1(0));
+    vq4 a = vq4_set1(0.0f);
     for (int k = 0; k < 4 && k < n; k++)
         a.of[k] = columns == 3 && k < n - 1 ? TL_VQ_SHUFFLE(vq_load(p + 3 * k), vq_set1(0), 0, 1, 2, 4)
                                             : vq_load_some(p + columns * k, columns);
@@ -206,7 +259,4 @@ TL_INLINE vq4 vq4_sum(vq4 a)
     a = vq4_add(a, TL_VQ4_PERMUTE(a, 2, 3, 0, 1));
     return vq4_add(a, TL_VQ4_PERMUTE(a, 1, 0, 3, 2));
 }
-/* 1 / the last number of each quad, in all its lanes. */
-TL_INLINE vq4 vq4_inverse_of_last(vq4 a) { return vq4_div(vq4_all(vq_set1(1)), TL_VQ4_PERMUTE(a, 3, 3, 3, 3)); }
-
 #endif

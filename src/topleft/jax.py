@@ -19,6 +19,7 @@ import numpy as np
 from topleft import rasterize as draw
 from topleft._core.base.arrays import as_checked_triangles, as_pair
 from topleft._core.gradients import tensors
+from topleft._core.gradients.pictures import AttributePictures
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond, halved_axes
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption
@@ -29,7 +30,7 @@ try:
 except ImportError:
     raise MissingPackageError("topleft.jax needs JAX: pip install jax") from None
 
-__all__ = ["antialias", "interpolate", "rasterize", "texture"]
+__all__ = ["antialias", "interpolate", "rasterize", "render", "texture"]
 
 Array = Any
 
@@ -97,9 +98,13 @@ def rasterize(pos: Array, tri: Array, resolution: Sequence[int]) -> tuple[Array,
         For a wrong dtype or shape.
     """
     check("pos", pos, "(B, V, 4)", pos.ndim == 3 and pos.shape[2] == 4)
-    height, width = as_pair("resolution", resolution)
-    found: tuple[Array, Array] = points((height, width), pos, tri)
+    found: tuple[Array, Array] = points(as_pair("resolution", resolution), pos, tri)
     return found
+
+
+def ids_of(size: tuple[int, int], pos: Any, tri: Any) -> list[Any]:
+    """Return the ids of pictures, row 0 on top."""
+    return [draw(one, tri, size[::-1]).triangle for one in pos]
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -108,7 +113,7 @@ def points(size: tuple[int, int], pos: Array, tri: Array) -> Any:
 
     def run(pos: Any, tri: Any) -> Any:
         grid = PixelGrid(as_checked_triangles(tri, pos.shape[1]), len(pos), *size)
-        ids = [(draw(one, tri, size[::-1]).triangle, 0) for one in pos]
+        ids = [(one, 0) for one in ids_of(size, pos, tri)]
         return tensors.points(grid, pos, ids, is_flipped=True, with_db=True)
 
     return call(run, (shape_of(pos.dtype, len(pos), *size, 4),) * 2, pos, tri)
@@ -155,13 +160,18 @@ def interpolate(attr: Array, rast: Array, tri: Array, rast_db: Array | None = No
         For a wrong dtype or shape.
     """
     check("rast", rast, "(B, H, W, 4)", rast.ndim == 4 and rast.shape[3] == 4)
-    rows = attr if attr.ndim == 3 else attr[None]
-    fits = attr.ndim in (2, 3) and len(rows) in (1, len(rast))
-    check("attr", attr, f"(V, K), (1, V, K) or ({len(rast)}, V, K)", fits)
+    rows = table_of(attr, len(rast))
     dtype = jnp.result_type(rows, rast)
     slopes = jnp.zeros((*rast.shape[:3], 0), dtype) if rast_db is None else rast_db.astype(dtype)
     found: tuple[Array, Array] = values(rows.astype(dtype), rast.astype(dtype), tri, slopes)
     return found
+
+
+def table_of(attr: Array, n: int) -> Array:
+    """Return attributes of n pictures as (1 or n, V, K)."""
+    rows = attr if attr.ndim == 3 else attr[None]
+    check("attr", attr, f"(V, K), (1, V, K) or ({n}, V, K)", attr.ndim in (2, 3) and len(rows) in (1, n))
+    return rows
 
 
 @partial(jax.custom_vjp)
@@ -352,10 +362,8 @@ def antialias(color: Array, rast: Array, pos: Array, tri: Array, *, edges: Edges
     check("rast", rast, f"{(*color.shape[:3], 4)}", rast.shape == (*color.shape[:3], 4))
     fits = pos.ndim == 3 and pos.shape[2] == 4 and len(pos) in (1, len(color))
     check("pos", pos, f"(1, V, 4) or ({len(color)}, V, 4)", fits)
-    if edges not in get_args(EdgesOption):
-        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
     dtype = jnp.result_type(color, rast, pos)
-    return smooth(edges, color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)
+    return smooth(rule_of(edges), color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)
 
 
 def outline_of(grid: PixelGrid, pos: Any) -> tensors.Outline:
@@ -365,35 +373,117 @@ def outline_of(grid: PixelGrid, pos: Any) -> tensors.Outline:
 
 def rule_of(edges: str) -> EdgeRule:
     """Return the rule of a word."""
+    if edges not in get_args(EdgesOption):
+        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
     return EdgeRule[edges.replace("-", "_").upper()]
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
-def smooth(edges: str, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
+def smooth(rule: EdgeRule, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
     """Return the picture with smooth silhouettes."""
 
     def run(color: Any, rast: Any, pos: Any, tri: Any) -> Any:
         grid = grid_of(tri, rast, pos.shape[1])
-        return tensors.smooth(grid, rule_of(edges), outline_of(grid, pos), pos, rast, color)
+        return tensors.smooth(grid, rule, outline_of(grid, pos), pos, rast, color)
 
     return call(run, like(color), color, rast, pos, tri)
 
 
-def smooth_forward(edges: str, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
+def smooth_forward(rule: EdgeRule, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
     """Return the same, and what backward takes."""
-    return smooth(edges, color, rast, pos, tri), (color, rast, pos, tri)
+    return smooth(rule, color, rast, pos, tri), (color, rast, pos, tri)
 
 
-def smooth_backward(edges: str, kept: Any, g: Array) -> Any:
+def smooth_backward(rule: EdgeRule, kept: Any, g: Array) -> Any:
     """Return the gradients of what `smooth` takes."""
     color, rast, pos, tri = kept
 
     def run(color: Any, rast: Any, pos: Any, tri: Any, g: Any) -> Any:
         grid = grid_of(tri, rast, pos.shape[1])
-        return tensors.smooth_vjp(grid, rule_of(edges), outline_of(grid, pos), pos, rast, color, g)
+        return tensors.smooth_vjp(grid, rule, outline_of(grid, pos), pos, rast, color, g)
 
     g_color, g_pos = call(run, like(color, pos), *kept, g)
     return g_color, jnp.zeros_like(rast), g_pos, no_gradient(tri)
 
 
 smooth.defvjp(smooth_forward, smooth_backward)
+
+
+def render(pos: Array, tri: Array, attr: Array, resolution: Sequence[int], *, edges: EdgesOption = "area") -> Array:
+    """Return pictures of a mesh for a loss of your own: `rasterize`, `interpolate` and `antialias` in one.
+
+    Parameters
+    ----------
+    pos : array of float32 or float64, shape (B, V, 4)
+        As in `rasterize`.
+    tri : array of int32, shape (T, 3)
+        Indices of rows of `pos` and of `attr`.
+    attr : array of float32 or float64, shape (V, K), (1, V, K) or (B, V, K)
+        Colours, or other numbers, of the vertices; a column of ones for the silhouette.
+    resolution : (int, int)
+        Height and width.
+    edges : {"area", "silhouette", "straight-through"}
+        As in `antialias`.
+
+    Returns
+    -------
+    array, shape (B, H, W, K)
+        Row 0 is the bottom row; 0 where nothing is. Gradients reach `pos` and `attr`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a wrong dtype or shape, or an unknown rule.
+
+    Examples
+    --------
+    >>> pos = jnp.array([[[-1.0, -2, 0, 1], [0.25, -2, 0, 1], [0.25, 4, 0, 1], [-1, 4, 0, 1]]])
+    >>> tri = jnp.array([[0, 1, 2], [0, 2, 3]])
+    >>> render(pos, tri, jnp.ones((4, 1)), (1, 4)).ravel()
+    Array([1. , 1. , 0.5, 0. ], dtype=float32)
+    """
+    check("pos", pos, "(B, V, 4)", pos.ndim == 3 and pos.shape[2] == 4)
+    rows, size = table_of(attr, len(pos)), as_pair("resolution", resolution)
+    dtype = jnp.result_type(pos, rows)
+    return drawn((size, rule_of(edges)), pos.astype(dtype), tri, rows.astype(dtype))
+
+
+#: Height and width, and the rule of edges.
+Drawing = tuple[tuple[int, int], EdgeRule]
+
+
+def pictures_of(drawing: Drawing, pos: Any, tri: Any, attr: Any, ids: Any) -> AttributePictures:
+    """Return what the engine draws of a mesh, and leads back."""
+    grid = grid_of(tri, ids, min(pos.shape[1], attr.shape[1]))
+    return AttributePictures(grid, drawing[1], outline_of(grid, pos), pos, ids, attr)
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def drawn(drawing: Drawing, pos: Array, tri: Array, attr: Array) -> Any:
+    """Return pictures of attributes with smooth silhouettes."""
+    return drawn_forward(drawing, pos, tri, attr)[0]
+
+
+def drawn_forward(drawing: Drawing, pos: Array, tri: Array, attr: Array) -> Any:
+    """Return the same, and what backward takes: the ids of pixels among it."""
+    of_pixels = len(pos), *drawing[0]
+
+    def run(pos: Any, tri: Any, attr: Any) -> Any:
+        ids = np.concatenate(
+            [np.empty((0, *drawing[0]), np.int32), *(one[None] for one in ids_of(drawing[0], pos, tri))]
+        )
+        return pictures_of(drawing, pos, tri, attr, ids).picture()[0], ids
+
+    shapes = shape_of(pos.dtype, *of_pixels, attr.shape[2]), shape_of(np.int32, *of_pixels)
+    out, ids = call(run, shapes, pos, tri, attr)
+    return out, (pos, tri, attr, ids)
+
+
+def drawn_backward(drawing: Drawing, kept: Any, g: Array) -> Any:
+    """Return the gradients of what `drawn` takes."""
+    pos, tri, attr, _ = kept
+    g_pos, g_attr = call(lambda *given: pictures_of(drawing, *given[:4]).vjp(given[4]), like(pos, attr), *kept, g)
+    return g_pos, no_gradient(tri), g_attr
+
+
+drawn.defvjp(drawn_forward, drawn_backward)

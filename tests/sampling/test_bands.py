@@ -234,8 +234,10 @@ def test_large_triangles_by_area(isa, shape, blend):
 @ON_EACH_ISA
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("sampling_", ["msaa2", "msaa4", "msaa16"])
-def test_samples_from_the_last_triangle_to_the_first(isa, threads, sampling_):
+@pytest.mark.parametrize("is_sorted", [True, False])
+def test_samples_from_the_last_triangle_to_the_first(force, isa, threads, sampling_, is_sorted):
     """Flat colours, large triangles over small ones and under them, have the bits of colours of vertices."""
+    force(pays_to_sort_labels=is_sorted)
     large, _ = strewn(7, 60, 200.0)
     small, _ = strewn(8, 400, 12.0)
     parts = [large[:90], small[:600], large[90:], small[600:], large[:30] + 3]
@@ -252,6 +254,18 @@ def test_samples_from_the_last_triangle_to_the_first(isa, threads, sampling_):
             tl.fill(vertices, triangles, np.repeat(colors, 3, 0), SIZE, per="vertex", out=smooth, **options)
         assert (flat == smooth).all()
         assert (flat != ground[..., :channels]).any()
+
+
+@pytest.mark.parametrize(
+    ("side", "size_px", "threads", "is_sorted"),
+    [(64, 9, 1, False), (64, 9, 2, True), (300, 200, 1, True), (900, 9, 1, True)],
+)
+def test_flat_colours_of_samples_are_sorted_where_that_pays(side, size_px, threads, is_sorted, monkeypatch):
+    sorting, seen = SamplePass.sort_bands, []
+    monkeypatch.setattr(SamplePass, "sort_bands", lambda *a, **k: seen.append(a) or sorting(*a, **k))
+    vertices, triangles, colors = tl.scenes.random_triangles(50, size_px, side, side)
+    assert tl.fill(vertices, triangles, colors, side, sampling="msaa4", threads=threads).any()
+    assert bool(seen) == is_sorted
 
 
 @pytest.mark.parametrize(("side", "threads", "is_sorted"), [(256, 1, False), (257, 1, True), (256, 2, True)])

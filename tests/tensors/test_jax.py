@@ -37,9 +37,12 @@ def picture(pos, colours, tex, tri):
     return dr.antialias(out, rast, pos, tri, edges="area")
 
 
-def number(*given):
-    out = picture(*given)
+def weighted(out):
     return (out * jnp.sin(jnp.arange(out.size, dtype=out.dtype)).reshape(out.shape)).sum()
+
+
+def number(*given):
+    return weighted(picture(*given))
 
 
 def test_jit_gives_the_same_picture():
@@ -97,6 +100,44 @@ def test_vmap_is_one_sample_after_the_other():
         np.testing.assert_array_equal(found[k], jax.grad(number)(pos[k : k + 1], colours, TEX, tri))
 
 
+def in_parts(pos, tri, colours, edges):
+    rast, _ = dr.rasterize(pos, tri, SIZE)
+    return dr.antialias(dr.interpolate(colours, rast, tri)[0], rast, pos, tri, edges=edges)
+
+
+@pytest.mark.parametrize("edges", ["area", "silhouette", "straight-through"])
+def test_render_and_its_gradients_are_those_of_the_functions_one_after_the_other(edges):
+    pos, tri, colours = sphere()
+    np.testing.assert_allclose(
+        dr.render(pos, tri, colours, SIZE, edges=edges), in_parts(pos, tri, colours, edges), atol=1e-6
+    )
+    found = jax.grad(lambda p, c: weighted(dr.render(p, tri, c, SIZE, edges=edges)), (0, 1))(pos, colours)
+    expected = jax.grad(lambda p, c: weighted(in_parts(p, tri, c, edges)), (0, 1))(pos, colours)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6 * np.abs(other).max())
+
+
+def test_render_has_the_bits_of_torch_in_jit_and_vmap():
+    torch = pytest.importorskip("torch")
+    from topleft import torch as of_torch
+
+    pos, tri, colours = sphere(3)
+    weights = jnp.asarray(np.random.default_rng(3).random((3, *SIZE, 3), np.float32))
+    given = [torch.tensor(np.asarray(one), requires_grad=True) for one in (pos, colours)]
+    expected = of_torch.render(of_torch.RasterizeContext(), given[0], torch.tensor(np.asarray(tri)), given[1], SIZE)
+    expected.backward(torch.tensor(np.asarray(weights)))
+    out, pull = jax.vjp(jax.jit(lambda p, c: dr.render(p, tri, c, SIZE)), pos, colours)
+    for one, other in zip((out, *pull(weights)), (expected, *(one.grad for one in given)), strict=True):
+        np.testing.assert_array_equal(one, other.detach().numpy())
+    by_sample = jax.vmap(lambda p, w: jax.vjp(lambda q: dr.render(q[None], tri, colours, SIZE)[0], p)[1](w)[0])
+    np.testing.assert_array_equal(by_sample(pos, weights), given[0].grad.numpy())
+
+
+def test_render_of_no_picture_has_none():
+    pos, tri, colours = sphere()
+    assert dr.render(pos[:0], tri, colours, SIZE).shape == (0, *SIZE, 3)
+
+
 def test_attributes_without_derivatives_have_no_columns():
     pos, tri, colours = sphere(1)
     rast, _ = dr.rasterize(pos, tri, SIZE)
@@ -139,6 +180,13 @@ def test_attributes_without_derivatives_have_no_columns():
             ValueError,
             "halve down to level 2, got (6, 8); max_mip_le",
         ),
+        (lambda pos, tri, c: dr.render(pos[0], tri, c, SIZE), ValueError, "pos must have shape (B, V, 4), got"),
+        (
+            lambda pos, tri, c: dr.render(pos, tri, c[None, None], SIZE),
+            ValueError,
+            "attr must have shape (V, K), (1, V, K) or (1, V, K), got",
+        ),
+        (lambda pos, tri, c: dr.render(pos, tri, c, SIZE, edges="a"), ValueError, "edges must be 'silhouette', 'area'"),
         (lambda pos, tri, c: dr.antialias(c, pos, pos, tri), ValueError, "color must have shape (B, H, W, C), got"),
     ],
 )

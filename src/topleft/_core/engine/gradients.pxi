@@ -4,6 +4,7 @@ MOST_LEVELS = TL_MOST_LEVELS
 SUMS_OF_POINTS = TL_SUMS_OF_POINTS
 SUMS_OF_THREE = TL_SUMS_OF_THREE
 IDS_ROOM = TL_IDS_ROOM
+HEAD_OF_FACE = TL_HEAD_OF_FACE
 SUMS_OF_FACE = TL_SUMS_OF_FACE
 ROWS_KEPT = TL_ROWS_KEPT
 PAIR_BYTES = TL_PAIR_BYTES
@@ -197,8 +198,8 @@ cdef class GradientView:
 
         `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, `codes` the rule and the weight of squares.
         `pixels`, one of them: the picture; its gradients; another one, whose squared differences count. `seen` and the
-        rest of `scratch` are those of ``tl_grad_picture``. `sums`: by triangle, 12 columns and SUMS_OF_FACE for each
-        three attributes; by vertex; by row of `attr`. Returns the sum of squares, and how many faces are seen.
+        rest of `scratch` are those of ``tl_grad_picture``. `sums`: by triangle, HEAD_OF_FACE columns and SUMS_OF_FACE
+        for each three attributes; by vertex; by row of `attr`. Returns the sum of squares, and how many faces are seen.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_picture l

@@ -23,6 +23,7 @@ from topleft._core.gradients.tensors import (
     of,
     points,
     points_vjp,
+    row_columns,
     smooth,
     smooth_vjp,
     values,
@@ -142,8 +143,8 @@ class AttributePictures:
             around = Room(room.number, beyond)
             return [
                 around.sums("points", self.pos.shape[1], 4, 9),
-                around.sums("rows", self.attr.shape[1], n, 3),
-                around.sums("faces", n_triangles, 12 + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
+                around.sums("rows", self.attr.shape[1], row_columns(n), 3),
+                around.sums("faces", n_triangles, engine.HEAD_OF_FACE + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
                 None if seen else Seen.room(beyond // max(1, width), beyond, n_triangles, n),
                 empty((3, width + engine.IDS_ROOM), np.int32),
                 empty((3 * (engine.ROWS_KEPT * width * n + engine.IDS_ROOM),), np.float32),

@@ -182,6 +182,11 @@ def values_vjp(
     return g_attr, g_rast, g_db
 
 
+def row_columns(n: int) -> int:
+    """Return how many columns sums of `n` attributes have: the kernels add four, of which three are attributes."""
+    return 3 * -(-n // 3) + 1
+
+
 def colors_vjp(
     grid: PixelGrid, pos: Array, attr: Array, corners: NDArray[np.int32], rast: Array, g_out: Array
 ) -> tuple[Array, Array]:
@@ -197,7 +202,7 @@ def colors_vjp(
         n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, attr.shape[2] - 1) // 3)
         return [
             room.sums("points", pos.shape[1], 4, 3),
-            room.sums("rows", attr.shape[1], attr.shape[2], 3),
+            room.sums("rows", attr.shape[1], row_columns(attr.shape[2]), 3),
             room.sums("faces", len(grid.tri), n_columns, 1),
         ]
 

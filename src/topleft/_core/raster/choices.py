@@ -449,6 +449,18 @@ def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
     return cleared_ns + scatter * met_ns > sorted_ns + scatter * n_seen * costs.far_triangle
 
 
+def pays_to_sort_labels(view: View, snapped: Snapped, n_threads: int) -> bool:
+    """Tell whether flat colours by several samples are drawn in bands, from the last triangle to the first.
+
+    Threads share the setup, a large picture is resolved in the cache, and large triangles leave out what others cover.
+    """
+    costs, n_pixels = cost_table(), view.size[0] * view.size[1]
+    if n_threads > 1 or 4 * n_pixels * view.sampling.n_samples > costs.label_planes:
+        return True
+    n_seen, n_layers, _ = snapped.mesh.guess_seen(*view.size)
+    return n_layers * n_pixels >= costs.label_pixels * n_seen
+
+
 def pays_to_bound(view: View, snapped: Snapped, sink: Sink) -> bool:
     """Tell whether to keep, beside depths, a bound of those of each 64 columns of a row: where spans are long."""
     costs, (width, height) = cost_table(), view.size

@@ -131,6 +131,10 @@ class Costs:
         "render by msaa4 and 8 of 12 to 100,000 triangles, 64x64 to 1280x720: 0.7 to 1.0 of the time below, 1.1 above",
     )
     label_bytes: float = row(512 << 10, "bytes", "labels of all samples in a band", STUDY)
+    label_planes: float = row(
+        8 << 20, "bytes", "labels of all samples of a picture, past the cache", "fill by msaa4 and 8, 3 to 300 px"
+    )
+    label_pixels: float = row(1600.0, "pixels", "triangles, on the mean, that hide others row by row", "the same")
     area_bytes: float = row(1 << 20, "bytes", "cells of areas in a band", f"areas of 8 to 300 px, {RAPIDS}")
     area_triangle: float = row(36.0, "ns", "a triangle sorted into bands of areas", "the same")
     area_row: float = row(2.0, "ns", "saved: a row of a triangle in the nearer cache", "the same")

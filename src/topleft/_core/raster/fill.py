@@ -262,14 +262,16 @@ def paint_samples(p: Painting) -> None:
     """Draw coloured triangles, each pixel the mean of its samples."""
     drawing = choices.drawing(p.view, p.snapped, Sink.LABEL)
     samples = p.samples(drawing.n_threads)
-    if p.is_flat and choices.can_slice(p.view):
+    if p.is_flat and choices.can_slice(p.view) and choices.pays_to_sort_labels(p.view, p.snapped, drawing.n_threads):
         if draw_means(samples, engine.Palette(p.colors, p.transfer), p.pixels, p.ground):
             p.snapped.refuse()
         p.view.mark("draw")
         return
+    if p.ground is not None:
+        p = p.with_ground_laid()
     shape = len(samples.positions), *p.pixels.shape[:2]
     labels: NDArray[np.int32] = p.memory.empty("sample labels", shape, np.int32)
-    draw_all_samples(samples, p.snapped, p.view, drawing.sink, labels, None)
+    draw_all_samples(samples, p.snapped, p.view, drawing.sink, labels, None, in_bands=not p.is_flat)
     if p.is_flat:
         resolve_flat(p, labels, drawing.n_threads)
     else:

@@ -218,11 +218,14 @@ def draw_all_samples(
     sink: Sink,
     pixels: NDArray[np.int32],
     depth: NDArray[np.float32] | None,
+    *,
+    in_bands: bool = True,
 ) -> None:
-    """Clear (S, H, W) planes and draw the view of each sample."""
+    """Clear (S, H, W) planes and draw the view of each sample; `in_bands`: of all samples, where that can be."""
     if 0 in view.size:
         return
-    if draw_planes(own, sink, pixels, depth, is_near=snapped.n_triangles > 0 and choices.can_slice(view)):
+    is_near = in_bands and snapped.n_triangles > 0 and choices.can_slice(view)
+    if draw_planes(own, sink, pixels, depth, is_near=is_near):
         snapped.refuse()
     view.mark("draw")
 
