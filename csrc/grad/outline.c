@@ -83,7 +83,7 @@ TL_INLINE void face_triangles(const tl_grad_view *view, int32_t *outline, int is
     }
 }
 
-/* Whether triangles that are wound differently, or more than two of an edge, fold there: at corners of `id`, `other`. */
+/* Whether the surface folds at an edge of triangles that are wound differently, or of more than two. */
 TL_INLINE int is_twisted_fold(const tl_grad_view *view, const int32_t *outline, int32_t id, int k, int32_t other)
 {
     const int32_t own = outline[id] & TL_SIDES, across = outline[other / 3] & TL_SIDES;
