@@ -432,6 +432,7 @@ static double compare_row(const picture_pass *p, int64_t row)
     const int64_t n = p->view->width * p->l->n_columns;
     float *restrict out = p->rows + (row - p->base) * n;
     const float *restrict target = p->l->target + row * n;
+    const int64_t ahead = row + 1 < p->view->height ? n : 0;
     const vf scale = vf_set1((float)p->l->scale);
     vqd sum = vqd_set1(0.0);
     double sums[4];
@@ -442,8 +443,10 @@ static double compare_row(const picture_pass *p, int64_t row)
         int64_t i = first;
         for (int k = 0; k < COMPARED / TL_LANES; k++)
             squares[k] = vf_set1(0.0f);
-        for (; i + COMPARED <= end; i += COMPARED)
+        for (; i + COMPARED <= end; i += COMPARED) {
             compare_some(out + i, target + i, scale, squares);
+            __builtin_prefetch(target + i + ahead), __builtin_prefetch(target + i + ahead + 16);
+        }
         if (i < end) {
             const size_t size = (size_t)(end - i) * sizeof(float);
             memcpy(last[0], out + i, size), memcpy(last[1], target + i, size);
@@ -530,15 +533,11 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
 static void close_faces(const picture_pass *p)
 {
     const tl_grad_colors colors = colors_of(p);
-    for (int64_t i = 0; i < p->l->faces->n; i++) {
-        face_at(p, i)[0] = middle_at(p->view, 0, p->column[i]);
-        face_at(p, i)[1] = middle_at(p->view, 1, p->row[i]);
-    }
-    close_colors(p->view, &colors, place_of_three(0) + THREE_SUMS, TL_SUMS_OF_FACE, 1);
+    close_colors(p->view, &colors, place_of_three(0) + THREE_SUMS, TL_SUMS_OF_FACE, p->column, p->row);
 }
 
-/* Rows drawn, finished, led back, one after the other; each in its place, so a row waits until the next one's pairs have
- * been found before those of its own change it. */
+/* Rows drawn, finished, led back, one after the other, each in its place: what its pairs move waits until those of the
+ * next row have been found. */
 TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
 {
     const tl_grad_view *view = p->view;
