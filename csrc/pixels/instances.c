@@ -14,15 +14,13 @@
 #include "lanes/lanes.h"
 #include "pixels/runs.c"
 
-/* The last of n instances with a first id not above `id`; n where no instance has it. */
-static int64_t instance_of(const int64_t *first_ids, int64_t n, int64_t id)
+/* The last of n instances with a first id not above `id`, or the first of all; first ids by themselves, or NULL. */
+TL_INLINE int64_t last_begun(const int64_t *first_ids, const tl_shaded *instances, int64_t n, int64_t id)
 {
     int64_t low = 0, high = n;
-    if (id >= first_ids[n])
-        return n;
     while (high - low > 1) {
         const int64_t middle = low + (high - low) / 2;
-        if (first_ids[middle] <= id)
+        if ((first_ids ? first_ids[middle] : instances[middle].first_id) <= id)
             low = middle;
         else
             high = middle;
@@ -46,7 +44,7 @@ static void find_instances(const int32_t *ids, int64_t n_rows, int64_t width, co
                 continue;
             }
             if (ids[col] < first || ids[col] >= end) {
-                found = instance_of(first_ids, n, ids[col]);
+                found = ids[col] < first_ids[n] ? last_begun(first_ids, NULL, n, ids[col]) : n;
                 first = first_ids[found], end = found < n ? first_ids[found + 1] : (int64_t)1 << 31;
             }
             while (col < width && ids[col] >= first && ids[col] < end)
@@ -77,20 +75,6 @@ typedef struct {
 static void start_list(span_list *list, const tl_shaded_scene *scene)
 {
     list->scene = scene, list->last = scene->instances, list->set = NULL;
-}
-
-/* The last of the instances with a first id not above `id`, or the first of all. */
-static const tl_shaded *find_instance(const tl_shaded_scene *scene, int32_t id)
-{
-    int64_t low = 0, high = scene->n;
-    while (high - low > 1) {
-        const int64_t middle = low + (high - low) / 2;
-        if (scene->instances[middle].first_id <= id)
-            low = middle;
-        else
-            high = middle;
-    }
-    return &scene->instances[low];
 }
 
 /* The first of the ids from x on that is not one of [low, high]; n if there is none. */
@@ -135,7 +119,7 @@ TL_ONCE void list_instances(span_list *list, const int32_t *ids, int n)
             continue;
         }
         if (id < own->first_id || id - own->first_id >= own->snapped->n_triangles)
-            list->last = own = find_instance(list->scene, id);
+            list->last = own = list->scene->instances + last_begun(NULL, list->scene->instances, list->scene->n, id);
         const int32_t end = own->first_id + (int32_t)own->snapped->n_triangles - 1;
         const int first = x;
         if (id < own->first_id || id > end) { /* of none */

@@ -129,9 +129,19 @@ def colours():
     return of_scenes(lambda v, s: choices.is_direct(s, v, np.dtype(np.uint8), is_flat=True), {})
 
 
+def labels():
+    options = {"sampling": "msaa2"}, {"sampling": "msaa8"}
+    return of_scenes(lambda v, s: choices.pays_to_sort_labels(v, s, 1), *options)
+
+
+def split():
+    options = {"sampling": "msaa2"}, {"sampling": "msaa8"}
+    return [choices.pays_to_split(view, n) for view in views(*options) for n in COUNTS]
+
+
 GRIDS = (
     arrays_by_threads, draws_by_threads, shares, clusters, meshlets, sampled, instances, flat, sorting, bounds,
-    blending, colours,
+    blending, colours, labels, split,
 )  # fmt: skip
 
 #: Of each grid: cases, how many are not the commonest, and the beginning of a hash of all.
@@ -139,15 +149,17 @@ DECIDED = {
     "arrays_by_threads": (96, 32, "278bfa1eff08511b"),
     "draws_by_threads": (193536, 105366, "db0a20145174c260"),
     "shares": (192, 48, "deedb067a68f7d6a"),
-    "clusters": (11760, 4461, "503a6b0a084dae9f"),
+    "clusters": (11760, 4571, "b44150dd6574cc8c"),
     "meshlets": (114912, 35990, "9d17c939f804ff9d"),
     "sampled": (65664, 20955, "057125f20bfde487"),
-    "instances": (24624, 9395, "f71629e0c5b6b304"),
+    "instances": (24624, 9329, "5647fd5ae1372f66"),
     "flat": (10752, 5238, "cae0f22b1ce82c8d"),
     "sorting": (64512, 7382, "3ed8e8a7b0759050"),
     "bounds": (10752, 3570, "1d9105453eb874e7"),
     "blending": (86016, 71517, "00580d5c656b8030"),
     "colours": (10752, 4560, "783c5bea1de99436"),
+    "labels": (21504, 8832, "e91fcc0b80ed6bba"),
+    "split": (672, 289, "13a948a471d0955a"),
 }  # fmt: skip
 
 

@@ -79,7 +79,8 @@ def test_vertices_beyond_near_and_far_are_counted(clip_depth):
     assert ClusteredMesh(clusters, view).find_beyond() == (0.5 if clip_depth == "minus_one_to_one" else 4 / 6)
 
 
-def test_mesh_of_several_samples_is_drawn_from_clusters_where_they_pay():
+def test_mesh_of_several_samples_is_drawn_from_clusters_where_they_pay(force):
+    force(pays_to_split=True)
     mesh = tl.Mesh(*FINE)
     mesh.note_drawn()
     for cull, in_planes in (("none", True), ("back", False)):
