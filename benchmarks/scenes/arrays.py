@@ -56,6 +56,20 @@ def grid_triangles(n_rows: int, n_columns: int) -> NDArray[np.int32]:
     return np.stack([a, c, b, b, c, d], axis=-1).reshape(-1, 3)
 
 
+def terrain_arrays(n: int, height: float = 0.12) -> Arrays:
+    """Return a terrain over [-1, 1] x [-1, 1], y up, rough at every scale: heights of a spectrum f ** -2.2."""
+    side = max(2, round((n / 2) ** 0.5) + 1)
+    k = 1 << (side - 1).bit_length()
+    squares = np.fft.fftfreq(k)[:, None] ** 2 + np.fft.rfftfreq(k) ** 2
+    squares[0, 0] = np.inf
+    phases = np.random.default_rng(1).random(squares.shape)
+    heights = np.fft.irfft2(squares**-1.1 * np.exp(2j * np.pi * phases), (k, k))[:side, :side]
+    heights *= height / np.ptp(heights)
+    x, z = np.meshgrid(*[np.linspace(-1, 1, side)] * 2)
+    points = np.stack([x, heights - heights.min(), z], axis=-1).reshape(-1, 3)
+    return points.astype(np.float32), grid_triangles(side, side)
+
+
 def write_ply(path: Path, vertices: NDArray[Any], triangles: NDArray[Any], **attributes: NDArray[Any]) -> None:
     """Write a binary PLY file of float32 vertices; attributes: columns of float32 or bytes by their names."""
     columns = dict(zip("xyz", vertices.T.astype("<f4"), strict=True)) | attributes

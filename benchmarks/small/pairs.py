@@ -22,7 +22,7 @@ from benchmarks.harness.records import Record, Save
 from benchmarks.harness.turns import take_turns, turn_of
 from benchmarks.report.study import Study
 from benchmarks.report.tables import facts_text, table
-from benchmarks.scenes.arrays import blob_arrays, strewn_arrays
+from benchmarks.scenes.arrays import blob_arrays, strewn_arrays, terrain_arrays
 from benchmarks.scenes.families import NO_SNAP
 from benchmarks.small.others import (
     HD,
@@ -154,6 +154,34 @@ def levels_beside_whole() -> Scenes:
                 }  # fmt: skip
 
 
+TERRAINS = (1_000_000, 4_000_000, 10_000_000)
+"""Triangles."""
+
+
+def parts_beside_whole() -> Scenes:
+    """Views of terrains that begin at the camera, within half a pixel beside without; levels are made before."""
+    import topleft as tl
+
+    for n in TERRAINS:
+        mesh = tl.Mesh(*terrain_arrays(n))
+        top = float(mesh.vertices[:, 1].max())
+        looks = {
+            "from its edge": ((0, 0.16, 1.1), (0, 0, 0), 0.01),
+            "over the ground": ((0.02, top + 0.02, 0.9), (0, 0.3 * top, -0.5), 0.005),
+            "from its middle": ((0.02, top + 0.01, 0), (0.3, 0.3 * top, -1), 0.002),
+        }
+        for look, (eye, target, near) in looks.items():
+            camera = tl.Camera.look_at(eye, target, fov_y_deg=50, near=near, far=100)
+            found = tl.choose_detail(mesh, camera, HD, tolerance=0.5)
+            for verb in (tl.rasterize_mesh, tl.render):
+                draw = partial(verb, mesh, camera, HD, threads=1, rasterizer=tl.Rasterizer(HD, threads=1))
+                for _ in range(17):  # after which meshlets are there
+                    draw()
+                yield f"terrain of {n:,}, {look}, {verb.__name__}", {
+                    "whole": draw, f"{found.n_drawn:,} in {found.n_parts} parts": partial(draw, tolerance=0.5),
+                }  # fmt: skip
+
+
 FRAME_PX = 1024
 SOUP = {"200,000 of 1.5 px": (200_000, 1.5), "100,000 of 4 px": (100_000, 4.0), "50,000 of 12 px": (50_000, 12.0),
         "5,000 of 60 px": (5_000, 60.0)}  # fmt: skip
@@ -245,6 +273,7 @@ PAIRS = {
     "fresh": Pairs(fresh_beside_kept, "time verbs that return arrays of their own beside `Rasterizer`", 30),
     "layers": Pairs(layers_beside_picture, "time each layer of a view beside its picture", 40),
     "tolerance": Pairs(levels_beside_whole, "time views with `tolerance=` beside the same without", 31),
+    "terrain": Pairs(parts_beside_whole, "time views of terrains with `tolerance=` beside the same without", 15),
     "no-snap": Pairs(unsnapped_beside_snapped, "time vertices that are not snapped beside snapped ones", 10),
     "rle": Pairs(run_lengths_beside_coco, "time run lengths beside pycocotools", 15),
     "objects": Pairs(objects_beside_bop, "time full and visible masks of objects beside the loop of BOP's tools", 7),

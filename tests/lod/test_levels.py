@@ -9,8 +9,7 @@ import pytest
 from surface_samples import corners_of, sampled_distance
 
 import topleft as tl
-from topleft._meshes.lod import collapse as collapsing
-from topleft._meshes.lod.collapse import border_points, collapse, flatness, gather, wanted_of
+from topleft._meshes.lod.collapse import border_points, collapse, gather, wanted_of
 from topleft._meshes.lod.levels import kept_levels
 from topleft._meshes.lod.simplify import levels_of
 
@@ -304,57 +303,6 @@ def test_gather_leaves_borders_alone():
     assert np.array_equal(found.points[found.into[on_border]], points[on_border])
     assert len(found.triangles) < len(triangles)
     assert (found.into >= 0).sum() >= len(found.points)
-
-
-def test_gather_leaves_bent_cells_alone():
-    """A roof: cells along its ridge hold triangles of both sides."""
-    points, triangles = grid(16, lambda x, y: np.minimum(x, 1 - x) + 0 * y)
-    found = gather(points, triangles, 64, least_flat=0.99)
-    is_ridge = points[:, 0] == 0.5
-    assert np.array_equal(found.points[found.into[is_ridge]], points[is_ridge])
-    assert len(gather(points, triangles, 64).points) < len(found.points) < len(points)
-
-
-def test_flatness_is_one_for_a_plane_and_the_cosine_for_a_roof():
-    points, triangles = grid(4, lambda x, y: np.minimum(x, 1 - x) + 0 * y)
-    one_side = triangles[points[triangles, 0].max(axis=1) <= 0.5]
-    group = np.zeros(len(points), np.int64)
-    assert flatness(points, one_side, group, 1) == pytest.approx([1])  # sums of squares, rounded
-    assert flatness(points, triangles, group, 1) == pytest.approx([np.sqrt(0.5)])
-
-
-def test_collapse_of_large_mesh_tells_where_points_went(monkeypatch):
-    monkeypatch.setattr(collapsing, "MOST_TO_COLLAPSE", 1000)
-    monkeypatch.setattr(collapsing, "GATHERED_FOR", 1)
-    points, triangles = grid(40, lambda x, y: 0.05 * np.sin(3 * x) * np.cos(2 * y))
-    gathered = gather(points, triangles, 300, least_flat=collapsing.FLAT)
-    assert 300 < len(gathered.triangles) < len(triangles)
-    found = collapse(points, triangles, 300)
-    assert 0 < len(found.triangles) <= 1.25 * 300
-    corners = found.into[triangles]
-    a, b, c = corners.T
-    left = corners[(corners >= 0).all(axis=1) & (a != b) & (b != c) & (c != a)]
-    assert np.array_equal(np.unique(left, axis=0), np.unique(found.triangles, axis=0))
-
-
-@pytest.mark.parametrize("with_uv", [False, True])
-def test_simplify_large_mesh_is_within_its_bounds(monkeypatch, with_uv):
-    monkeypatch.setattr(collapsing, "MOST_TO_COLLAPSE", 1000)
-    monkeypatch.setattr(collapsing, "GATHERED_FOR", 1)
-    monkeypatch.setattr(collapsing, "FLAT", 0.9)  # coarse as it is, no cell is flatter
-    sizes = []
-
-    def watched(points, triangles, n_wanted, **options):
-        found = gather(points, triangles, n_wanted, **options)
-        sizes.append(len(found.triangles))
-        return found
-
-    monkeypatch.setattr(collapsing, "gather", watched)
-    mesh = torus()
-    mesh = tl.Mesh(mesh.vertices, mesh.triangles, uv=mesh.vertices[:, :2] if with_uv else None)
-    level = tl.simplify(mesh)[1]
-    assert 576 < sizes[0] < 2304
-    assert sampled_distance(corners_of(mesh), corners_of(level.mesh), 2) <= level.bound < 0.2
 
 
 def test_wanted_of_leaves_borders_out_of_the_ratio():

@@ -49,13 +49,13 @@ GRACE_S = 5.0
 class HeldScene:
     """A mesh or scene in the memory of a worker, with its coarser levels."""
 
-    def __init__(self, scene: Any, coarser: list[tuple[Mesh, tuple[Level, ...]]]) -> None:
+    def __init__(self, scene: Any, coarser: list[tuple[Mesh, tuple[Level, ...], Any]]) -> None:
         self.scene, self.coarser = scene, coarser
 
     def __call__(self) -> Any:
         """Return it."""
-        for mesh, levels in self.coarser:
-            keep_levels(mesh, Levels(mesh, levels))
+        for mesh, *levels in self.coarser:
+            keep_levels(mesh, Levels(mesh, *levels))
         return self.scene
 
 

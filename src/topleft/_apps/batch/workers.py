@@ -219,8 +219,8 @@ class SpooledMesh:
 
         with open(self.path, "rb") as file:
             scene, coarser = pickle.load(file)
-        for mesh, levels in coarser:
-            keep_levels(mesh, Levels(mesh, levels))
+        for mesh, *levels in coarser:
+            keep_levels(mesh, Levels(mesh, *levels))
         return scene
 
 
@@ -289,13 +289,13 @@ class Spool:
             shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...]]]:
-    """The meshes of a scene, each with its coarser levels; none where they cannot be made: the job then raises."""
+def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...], Any]]:
+    """The meshes of a scene, each with its coarser levels and parts; none if they cannot be made: the job raises."""
     if not isinstance(scene, Mesh | Scene):
         return []
     meshes = [scene] if isinstance(scene, Mesh) else [instance.mesh for instance in scene]
     try:
-        return [(mesh, levels_of(mesh)[1:]) for mesh in dict.fromkeys(meshes)]
+        return [(mesh, levels_of(mesh)[1:], levels_of(mesh).parts) for mesh in dict.fromkeys(meshes)]
     except MissingPackageError:
         return []
 

@@ -355,7 +355,7 @@ def answer_draw(session: Session, request: Request) -> Reply:
     }  # fmt: skip
     if view.tolerance:
         found = choose_detail(shown.mesh, camera, view.size, tolerance=view.tolerance, cull=view.cull)  # type: ignore[arg-type]
-        header |= {"level": found.level, "level_triangles": len(found.mesh.triangles), "why": found.why}
+        header |= {"level": found.level, "level_triangles": found.n_drawn, "why": found.why}
     return Reply(header, {"pixels": content})
 
 

@@ -58,6 +58,11 @@ cdef double pixels_a_unit(const double *m, double width, double height, const do
         low[k], high[k] = extents[k], extents[3 + k]
         for i in range(1, n):
             low[k], high[k] = lesser(low[k], extents[EXTENT * i + k]), larger(high[k], extents[EXTENT * i + 3 + k])
+    for i in range(5):  # beyond a side of the window, or behind the eye: nothing shows
+        for k in range(4):
+            row[k] = -of_w[k] if i == 4 else (-1.0 if i % 2 else 1.0) * (window[i] * of_w[k] - m[4 * (i // 2) + k])
+        if least_in_box(row, low, high) > 0.0:
+            return 0.0
     nearest = least_on(of_w, low, high, extents, n)
     if not nearest > 0.0:
         return NAN
@@ -129,3 +134,38 @@ def coarsest_levels(const double[:, :, ::1] matrices, size: tuple[int, int], con
                 if not isnan(scale) and bounds[k] * scale <= tolerance:
                     levels[i], scales[i] = k, scale
                     break
+
+
+cdef int64_t choose_under(const double *m, double width, double height, const double *window, const double *extents,
+                          const double *bounds, const int64_t *counts, int64_t level, int64_t first, int64_t part,
+                          double tolerance, int32_t *chosen, int64_t n, double *off) noexcept nogil:
+    """Add the parts that stand for a part to n chosen ones; returns how many there are. `first`: the first row of its level."""
+    cdef int64_t row = first + part, n_children, k
+    cdef double scale = 0.0
+    if level > 0:
+        scale = pixels_a_unit(m, width, height, window, extents + EXTENT * row, 1)
+    if level == 0 or bounds[row] * scale <= tolerance:  # not where nothing is known of it
+        chosen[n] = <int32_t>row
+        off[0] = larger(off[0], bounds[row] * scale)
+        return n + 1
+    n_children = counts[level - 1] // counts[level]
+    for k in range(n_children * part, n_children * (part + 1)):
+        n = choose_under(m, width, height, window, extents, bounds, counts, level - 1, first - counts[level - 1], k,
+                         tolerance, chosen, n, off)
+    return n
+
+
+def choose_parts(const double[:, ::1] matrix, size: tuple[int, int], const double[::1] window,
+                 const double[:, ::1] extents, const double[::1] bounds, const int64_t[::1] counts, double tolerance,
+                 int32_t[::1] chosen) -> tuple[int, float]:
+    """Write the rows of the coarsest parts that are sure to be within a tolerance, or else those of the mesh itself.
+
+    `extents` (N, 10), `bounds`: of the parts, those of the mesh itself first, then level by level; `counts`: how many
+    parts a level has. Returns how many are chosen, and the most pixels that they are off.
+    """
+    cdef double width = size[0], height = size[1], off = 0.0
+    cdef int64_t top = counts.shape[0] - 1, first = bounds.shape[0] - counts[counts.shape[0] - 1], part, n = 0
+    for part in range(counts[top]):
+        n = choose_under(&matrix[0, 0], width, height, &window[0], &extents[0, 0], &bounds[0], &counts[0], top, first,
+                         part, tolerance, &chosen[0], n, &off)
+    return n, off

@@ -82,6 +82,8 @@ class ClusteredMesh:
     def route(self, sink: Sink) -> ClusterRoute:
         """Return how a picture of the mesh is drawn, and count that picture."""
         clusters = self.clusters
+        if clusters.n_drawn is not None:
+            return ClusterRoute.CLUSTERS
         survey = self.survey(SURVEYED_OF_SAMPLES if self._view.sampling.n_samples > 1 else SURVEYED)
         found = choices.cluster_route(self._view, sink, clusters, survey, self.find_beyond)
         clusters.backoff.note(pays=found is not ClusterRoute.WHOLE)
@@ -94,7 +96,8 @@ class ClusteredMesh:
 
         `sample`: where in a pixel it is sampled, in sub-pixels from the centre.
         """
-        height, n_threads = self._view.size[1], count_threads(self._view.threads, self.clusters.n_triangles)
+        n_triangles = self.clusters.n_drawn or self.clusters.n_triangles
+        height, n_threads = self._view.size[1], count_threads(self._view.threads, n_triangles)
         if route is ClusterRoute.MESHLETS:
             return self.draw_meshlets(memory, target, min(n_threads, height), sample)
         memories, tops = (
@@ -105,7 +108,7 @@ class ClusteredMesh:
 
     def note_hidden(self, target: engine.Target) -> None:
         """Note the share of the mesh that a target hides; it decides how the next picture is drawn."""
-        can_draw_meshlets = choices.can_draw_meshlets(
+        can_draw_meshlets = self.clusters.n_drawn is None and choices.can_draw_meshlets(
             self._view, Sink(target.sink), is_float32=self.clusters.is_float32
         )
         if can_draw_meshlets and self.clusters.is_look_due():
@@ -173,7 +176,8 @@ class ClusteredMesh:
         """Return the mesh with the vertices of some triangles snapped, maybe more; -1 is no triangle."""
         points, own, view = self.clusters.points, self.clusters.triangles, self._view
         mesh = None
-        if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
+        is_all_drawn = self.clusters.n_drawn is None
+        if is_all_drawn and choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
             mesh = self.try_part(None, FRESH)
         if mesh is None:
             mesh = self.try_part(triangles, FRESH)

@@ -6,7 +6,7 @@ In: the vertices and triangles of a mesh in object space. Out: copies of them in
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,10 @@ from topleft._core import engine
 from topleft._core.base.memory import allocate
 from topleft._core.base.threads import count_threads, run_parts
 
-#: `tl_cluster` of csrc/clusters.h, as far as Python reads it.
-RECORD = np.dtype({"names": ["first_triangle", "n_triangles"], "formats": [np.int64, np.int32], "offsets": [96, 112],
-                   "itemsize": engine.CLUSTER_BYTES})  # fmt: skip
+#: `tl_cluster` of csrc/clusters.h.
+RECORD = np.dtype([("low", np.float64, 3), ("high", np.float64, 3), ("axis", np.float64, 3), ("cone_cos", np.float64),
+                   ("min_area", np.float64), ("min_height", np.float64), ("first_triangle", np.int64),
+                   ("first_vertex", np.int64), ("n_triangles", np.int32), ("n_vertices", np.int32)])  # fmt: skip
 
 #: How much is hidden is found out once in so many pictures: cameras move little between pictures, and 45 microseconds
 #: are 2.5 % of 70,000 triangles in 512x512.
@@ -62,37 +63,52 @@ class Clusters:
         The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
     n_bytes : int
         How much memory the copy takes.
+    n_drawn : int, optional
+        Of clusters that are a part of those of the mesh: how many triangles they have. Nothing else draws that part.
     """
+
+    n_drawn: int | None
 
     def __init__(self, points: NDArray[Any], triangles: NDArray[np.int32], threads: int | None = None) -> None:
         """Sort and measure (V, 3) contiguous points and (T, 3) checked triangles that nobody writes to."""
+        found = sort_clusters(points, triangles)
+        own_points = np.zeros((len(found.vertices) + engine.CLUSTER_TAIL, 3), points.dtype)
+        np.take(points, found.vertices, axis=0, out=own_points[: len(found.vertices)])
+        boxes = measure_clusters(own_points, found.corners, found.records, threads)
+        self._keep(points, triangles, own_points, found.records, boxes, found.corners, found.order)
+
+    @classmethod
+    def of_parts(
+        cls,
+        own_points: NDArray[Any],
+        triangles: NDArray[np.int32],
+        records: NDArray[np.uint8],
+        boxes: NDArray[np.float64],
+        corners: NDArray[np.uint8],
+        order: NDArray[np.int32],
+        n_drawn: int,
+    ) -> Clusters:
+        """Return some measured clusters, with `n_drawn` triangles, of a mesh whose points lie cluster by cluster."""
+        found = cls.__new__(cls)
+        found._keep(own_points[: -engine.CLUSTER_TAIL], triangles, own_points, records, boxes, corners, order)
+        found.n_drawn = n_drawn
+        return found
+
+    def _keep(
+        self,
+        points: NDArray[Any],
+        triangles: NDArray[np.int32],
+        own_points: NDArray[Any],
+        records: NDArray[np.uint8],
+        boxes: NDArray[np.float64],
+        corners: NDArray[np.uint8],
+        order: NDArray[np.int32],
+    ) -> None:
         self.points, self.triangles, self.backoff = points, triangles, Backoff()
         self.n_pictures, self.hidden, self.hidden_at = 0, 0.0, -PICTURES_A_LOOK
-        n_triangles = len(triangles)
-        order: NDArray[np.int32] = np.empty(n_triangles, np.int32)
-        keys: NDArray[np.uint32] = np.empty(n_triangles, np.uint32)
-        room: NDArray[np.uint64] = np.empty((2, n_triangles), np.uint64)
-        engine.order_triangles(engine.Source(points), triangles, box_of(points), keys, room, order)
-        clusters: NDArray[np.uint8] = np.empty(max(1, n_triangles) * engine.CLUSTER_BYTES, np.uint8)
-        vertices: NDArray[np.int32] = np.empty(3 * n_triangles, np.int32)
-        own_corners: NDArray[np.uint8] = np.empty((n_triangles, 3), np.uint8)
-        seen: NDArray[np.int32] = np.full(len(points), -1, np.int32)
-        n, n_vertices = engine.cut_clusters(triangles, order, seen, clusters, vertices, own_corners)
-        records = clusters[: n * engine.CLUSTER_BYTES].copy()
-        self.own_points = np.zeros((n_vertices + engine.CLUSTER_TAIL, 3), points.dtype)
-        np.take(points, vertices[:n_vertices], axis=0, out=self.own_points[:n_vertices])
-        group_boxes: NDArray[np.float64] = np.empty((-(-n // engine.CLUSTER_GROUP), 6))
-        source = engine.Source(self.own_points)
-
-        def measure(first: int, end: int) -> None:
-            first, end = first * engine.CLUSTER_GROUP, min(end * engine.CLUSTER_GROUP, n)
-            engine.measure_clusters(source, own_corners, records, group_boxes, first, end)
-
-        run_parts(measure, len(group_boxes), count_threads(threads, n_triangles))
-        self.engine = engine.Clustered(records, group_boxes, own_corners, order)
-        self._records, self.order = records, order
-        arrays = self.own_points, records, group_boxes, own_corners, order
-        self.n_bytes = sum(array.nbytes for array in arrays)
+        self.own_points, self._records, self.order = own_points, records, order
+        self.engine, self.n_drawn = engine.Clustered(records, boxes, corners, order), None
+        self.n_bytes = sum(array.nbytes for array in (own_points, records, boxes, corners, order))
 
     @cached_property
     def is_float32(self) -> bool:
@@ -131,6 +147,50 @@ class Clusters:
         sizes = self._records.view(RECORD)["n_triangles"]
         found[self.order] = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
         return found
+
+
+class SortedClusters(NamedTuple):
+    """Triangles in clusters that are not measured yet."""
+
+    records: NDArray[np.uint8]
+    """`tl_cluster` of ``csrc/clusters.h``, one after the other."""
+    vertices: NDArray[np.int32]
+    """(N,) the vertices of the mesh cluster by cluster, those on borders several times."""
+    corners: NDArray[np.uint8]
+    """(T, 3) the corners of the triangles among the vertices of their cluster."""
+    order: NDArray[np.int32]
+    """(T,) which triangle of the mesh each is."""
+
+
+def sort_clusters(points: NDArray[Any], triangles: NDArray[np.int32]) -> SortedClusters:
+    """Return the triangles of a mesh sorted into clusters."""
+    n = len(triangles)
+    order: NDArray[np.int32] = np.empty(n, np.int32)
+    keys: NDArray[np.uint32] = np.empty(n, np.uint32)
+    room: NDArray[np.uint64] = np.empty((2, n), np.uint64)
+    engine.order_triangles(engine.Source(points), triangles, box_of(points), keys, room, order)
+    clusters: NDArray[np.uint8] = np.empty(max(1, n) * engine.CLUSTER_BYTES, np.uint8)
+    vertices: NDArray[np.int32] = np.empty(3 * n, np.int32)
+    corners: NDArray[np.uint8] = np.empty((n, 3), np.uint8)
+    seen: NDArray[np.int32] = np.full(len(points), -1, np.int32)
+    n_clusters, n_vertices = engine.cut_clusters(triangles, order, seen, clusters, vertices, corners)
+    return SortedClusters(clusters[: n_clusters * engine.CLUSTER_BYTES].copy(), vertices[:n_vertices], corners, order)
+
+
+def measure_clusters(
+    own_points: NDArray[Any], corners: NDArray[np.uint8], records: NDArray[np.uint8], threads: int | None = None
+) -> NDArray[np.float64]:
+    """Measure clusters, and return the boxes of each `CLUSTER_GROUP` of them, (N, 6)."""
+    n = len(records) // engine.CLUSTER_BYTES
+    boxes: NDArray[np.float64] = np.empty((-(-n // engine.CLUSTER_GROUP), 6))
+    source = engine.Source(own_points)
+
+    def measure(first: int, end: int) -> None:
+        first, end = first * engine.CLUSTER_GROUP, min(end * engine.CLUSTER_GROUP, n)
+        engine.measure_clusters(source, corners, records, boxes, first, end)
+
+    run_parts(measure, len(boxes), count_threads(threads, len(corners)))
+    return boxes
 
 
 class Meshlets:

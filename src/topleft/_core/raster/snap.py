@@ -134,7 +134,7 @@ def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, 
     if view.plan is not None:
         is_checked, indices = True, view.plan.triangles_of(triangles, len(points))
     elif view.static is not None:
-        is_checked, indices = True, view.static.triangles
+        is_checked, indices = True, view.static.drawn_triangles
     else:
         native = as_triangles(triangles)
         is_checked = native.dtype == np.int64

@@ -50,8 +50,8 @@ class Static(Protocol):
     """A mesh that does not change: it has checked its triangles, and may be drawn in clusters."""
 
     @property
-    def triangles(self) -> NDArray[np.int32]:
-        """Its triangles (T, 3)."""
+    def drawn_triangles(self) -> NDArray[np.int32]:
+        """Its triangles (T, 3), as they are drawn without clusters."""
 
     def find_clusters(self) -> Clusters | None:
         """Return its clusters, if it is drawn often enough to have them, and count this draw."""

@@ -20,29 +20,11 @@ from topleft.errors import MissingPackageError
 #: Scales to be tried: the diameter of a mesh, per triangle that is wanted.
 FINENESS = (10.0, 1.0)
 
-#: Larger meshes have the coarser scale alone, which takes half the time.
-MOST_TO_COLLAPSE_FINELY = 2_000_000
-
-#: Still larger ones are gathered first, for the package takes 300 bytes and 3.3 us a triangle: into cells for one
-#: in so many of the triangles that are wanted ...
-MOST_TO_COLLAPSE, GATHERED_FOR = 4_000_000, 4
-
-#: ... where the sum of the vectors of area in a cell is at least this share of the area: where normals are off by
-#: 0.045 or less. Without that the star at the poles of the blob is lost, and the bound is 10 times larger.
-FLAT = 0.999
-
-#: Triangles by which the area of all is judged.
-MOST_TO_WEIGH = 1 << 18
-
 #: A result with more than so many times the triangles that were wanted has another try.
 TOO_MANY = 1.25
 
 #: A result with more than this share of the triangles is a failure: nearly nothing can be collapsed.
 STUCK = 0.8
-
-#: The finest level has about so many triangles at most. A blob of 300,000 is within half a pixel where it fills a frame
-#: of 7,000 pixels; finer levels would take most of the time and of the memory.
-MOST_OF_LEVEL = 1_000_000
 
 #: The package keeps its mesh in a global variable.
 _lock = threading.Lock()
@@ -74,11 +56,11 @@ def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
     """The number of triangles of the next level; 0: there is none.
 
     Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
-    nothing but its borders. (Very large meshes are looked at when they have become smaller.)
+    nothing but its borders.
     """
-    n_fixed = len(border_points(triangles)) if len(triangles) <= MOST_TO_COLLAPSE else 0
+    n_fixed = len(border_points(triangles))
     n_free = int((len(triangles) - n_fixed) * ratio)
-    n_wanted = min(n_fixed + n_free, max(MOST_OF_LEVEL, n_fixed))
+    n_wanted = n_fixed + n_free
     return n_wanted if smallest <= n_free and n_wanted <= STUCK * len(triangles) else 0
 
 
@@ -104,16 +86,7 @@ def collapse(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool = T
     The package moves open borders as if there were no surface outside: on the bunny, which is open below, bounds
     are 4 to 6 times smaller where borders stay.
     """
-    if len(triangles) > MOST_TO_COLLAPSE:
-        gathered = gather(points, triangles, n_wanted // GATHERED_FOR, least_flat=FLAT)
-        if len(gathered.triangles) > n_wanted:
-            return joined(gathered, collapse_edges(*gathered[:2], n_wanted, with_pairs=with_pairs))
-    return collapse_edges(points, triangles, n_wanted, with_pairs=with_pairs)
-
-
-def collapse_edges(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool) -> Collapsed:
-    """The same, with a grid only where edges cannot be collapsed."""
-    for fineness in FINENESS if len(triangles) <= MOST_TO_COLLAPSE_FINELY else FINENESS[1:]:
+    for fineness in FINENESS:
         found = collapse_at(points, triangles, n_wanted, fineness, with_pairs=with_pairs)
         if len(found.triangles) <= TOO_MANY * n_wanted:
             return found
@@ -131,10 +104,8 @@ def joined(first: Collapsed, second: Collapsed) -> Collapsed:
     return second._replace(into=np.where(first.into < 0, np.int32(-1), second.into[first.into]).astype(np.int32))
 
 
-def gather(points: F64, triangles: I32, n_wanted: int, *, least_flat: float = 0.0) -> Collapsed:
+def gather(points: F64, triangles: I32, n_wanted: int) -> Collapsed:
     """The mesh with points that share a cell of a grid made one of them; open borders stay as they are.
-
-    So do cells with a surface less flat than `least_flat`: 0 for a closed surface, 1 for a plane.
 
     The package does not touch needles, which the poles of a globe are made of. Cells are a third of a side of the
     triangles that are wanted, so no shape is lost that those could show.
@@ -143,8 +114,7 @@ def gather(points: F64, triangles: I32, n_wanted: int, *, least_flat: float = 0.
     ----------
     J. Rossignac, P. Borrel, "Multi-resolution 3D Approximations for Rendering Complex Scenes", 1993.
     """
-    some = triangles[:: max(1, len(triangles) // MOST_TO_WEIGH)]
-    a, b, c = points[some.T]
+    a, b, c = points[triangles.T]
     area = float(np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).mean()) / 2 * len(triangles)
     side = np.sqrt(4 / np.sqrt(3) * area / max(n_wanted, 1)) / 3
     low = points.min(axis=0)
@@ -156,9 +126,6 @@ def gather(points: F64, triangles: I32, n_wanted: int, *, least_flat: float = 0.
     key[on_border] = -1 - on_border
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     into = first[group].astype(np.int32)
-    if least_flat > 0:
-        is_bent = flatness(points, triangles, group, len(first))[group] < least_flat
-        into[is_bent] = np.flatnonzero(is_bent)
     corners, row = left_of(triangles, into)
     return Collapsed(points[row >= 0], corners, row[into])
 
@@ -174,24 +141,13 @@ def left_of(triangles: I32, into: I32) -> tuple[I32, I32]:
     return row[corners], row
 
 
-def flatness(points: F64, triangles: I32, group: npt.NDArray[np.int64], n_groups: int) -> F64:
-    """The sum of the vectors of area of the triangles with corners in a group of points, as a share of their area."""
-    sums = np.zeros((4, n_groups))
-    for start in range(0, len(triangles), MOST_TO_WEIGH):
-        some = triangles[start : start + MOST_TO_WEIGH]
-        a, b, c = points[some.T]
-        across = np.cross(b - a, c - a)
-        length = np.sqrt(np.einsum("ij,ij->i", across, across))
-        for own in group[some.T]:
-            low, high = int(own.min()), int(own.max()) + 1
-            for k, weights in enumerate((*across.T, length)):
-                sums[k, low:high] += np.bincount(own - low, weights, high - low)
-    flat: F64 = np.divide(np.sqrt((sums[:3] ** 2).sum(axis=0)), sums[3], out=np.ones(n_groups), where=sums[3] > 0)
-    return flat
-
-
 def border_points(triangles: I32) -> npt.NDArray[np.int64]:
     """The points of sides that one triangle has."""
+    return np.unique(open_sides(triangles))
+
+
+def open_sides(triangles: I32) -> npt.NDArray[np.int64]:
+    """The sides (N, 2) that one triangle has, the lower of their points first."""
     n = len(triangles)
     key = np.empty(3 * n, np.int64)
     for k in range(3):
@@ -200,8 +156,8 @@ def border_points(triangles: I32) -> npt.NDArray[np.int64]:
     key.sort()
     is_new = np.ones(3 * n + 1, np.bool_)
     np.not_equal(key[1:], key[:-1], out=is_new[1:-1])
-    open_sides = key[is_new[:-1] & is_new[1:]]
-    return np.unique(np.concatenate([open_sides >> 32, open_sides & 0xFFFFFFFF]))
+    own = key[is_new[:-1] & is_new[1:]]
+    return np.stack([own >> 32, own & 0xFFFFFFFF], axis=1)
 
 
 def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, with_pairs: bool) -> Collapsed:

@@ -27,12 +27,16 @@ from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_number, as_size, shown
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.lod.levels import Level, Levels
+from topleft._meshes.lod.parts import LEAST_PARTED, CutMesh
 from topleft._meshes.lod.simplify import levels_of
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.scene.adapt import as_mesh
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption
+
+#: Parts are drawn where they have at most this share of the triangles of the level that would do for all of them.
+MOST_CUT = 0.5
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class Detail:
     Attributes
     ----------
     level : int
-        0: the mesh itself.
+        0: the mesh itself. Of a mesh that is put together from parts the coarsest level among them.
     mesh : Mesh
         The mesh that is drawn: the `.triangle` of its visibility buffer are rows of its triangles.
     bound : float
@@ -55,6 +59,11 @@ class Detail:
         Triangles of the mesh itself.
     why : str
     rejected : tuple of str
+    n_drawn : int
+        Triangles that are drawn. Those of a mesh that is put together from parts are all that parts have, and those of
+        other parts have one corner three times.
+    n_parts : int
+        Of how many parts, each of a level of its own, the mesh is put together; 0: it is one level.
 
     Examples
     --------
@@ -73,6 +82,8 @@ class Detail:
     n_triangles: int
     why: str
     rejected: tuple[str, ...] = ()
+    n_drawn: int = 0
+    n_parts: int = 0
 
 
 def choose_detail(
@@ -119,6 +130,10 @@ def choose_detail(
     round; the snap to sub-pixels moves either by 1/512 pixel at most along each axis. The order in which surfaces hide
     each other, and their light, may differ by more.
 
+    Of a mesh of 500,000 triangles or more each part has a level of its own where that leaves at most half of the
+    triangles. `rasterize_mesh` and `render` draw these parts where the mesh stands alone, without edges and without
+    anything that shows through; otherwise one level is drawn, which all of the mesh allows.
+
     It is the mesh itself where no bound holds: with a lens; where the mesh may reach the near or the far plane or the
     eye; where a side is culled, since turns of triangles are not bounded; where materials cut holes.
 
@@ -135,7 +150,7 @@ def choose_detail(
     n = len(mesh.triangles)
 
     def whole(why: str, others: tuple[str, ...] = ()) -> Detail:
-        return Detail(0, mesh, 0.0, 0.0, tolerance, n, why, others)
+        return Detail(0, mesh, 0.0, 0.0, tolerance, n, why, others, n)
 
     if reason := why_whole(mesh, camera, tolerance, cull, material):
         return whole(reason)
@@ -154,13 +169,22 @@ def choose_detail(
 
     matrix = screen.clip_from_world if place is None else engine.product(screen.clip_from_world, place)
     (i,), (scale,) = (found.tolist() for found in screen.coarsest(matrix[None], levels, tolerance))
+    if (cut := screen.cut(matrix, levels, i, tolerance)) is not None:
+        used = np.unique(cut.levels)
+        why = f"each part is the coarsest of levels {used[0]} to {used[-1]} that is sure to be within {tolerance:g} px"
+        return Detail(
+            int(used[-1]), cut.mesh.as_mesh(), cut.bound, cut.bound_px, tolerance, n, why,
+            (rejected(i + 1),) if i + 1 < len(levels) else (), cut.mesh.n_drawn, len(cut.levels),
+        )  # fmt: skip
     if i == 0:
         return whole(f"no coarser level is sure to be within {tolerance:g} px", (rejected(1),))
     bound_px = levels[i].bound * scale
     why = f"no point that shows is off by more than {bound_px:.3g} px, and {tolerance:g} px are allowed"
     others = [rejected(i + 1)] if i + 1 < len(levels) else []
     others.append(f"the mesh itself, {n:,} triangles: finer than the picture has to be")
-    return Detail(i, levels[i].mesh, levels[i].bound, bound_px, tolerance, n, why, tuple(others))
+    return Detail(
+        i, levels[i].mesh, levels[i].bound, bound_px, tolerance, n, why, tuple(others), len(levels[i].mesh.triangles)
+    )
 
 
 class ScreenError(NamedTuple):
@@ -182,6 +206,26 @@ class ScreenError(NamedTuple):
         given = matrices, self.viewport, self.window, levels.extents, levels.bounds, tolerance
         engine.coarsest_levels(*given, found, scales)
         return found, scales
+
+    def cut(self, matrix: F64, levels: Levels, level: int, tolerance: float) -> ChosenParts | None:
+        """The mesh put together from parts that are sure to be within a tolerance, if a level is much finer."""
+        n = len(levels[level].mesh.triangles)
+        if n < LEAST_PARTED or levels.parted is None:
+            return None
+        parted = levels.parted
+        chosen, bound_px = parted.choose(matrix, self.viewport, self.window, tolerance)
+        if parted.n_triangles(chosen) > MOST_CUT * n:
+            return None
+        return ChosenParts(parted.mesh(chosen), parted.levels(chosen), parted.bound(chosen), bound_px)
+
+
+class ChosenParts(NamedTuple):
+    """A mesh put together from parts of several levels, with their levels and its bounds."""
+
+    mesh: CutMesh
+    levels: NDArray[np.intp]
+    bound: float
+    bound_px: float
 
 
 def screen_error_of(
@@ -225,8 +269,10 @@ def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: t
     return np.array([*ends[0], -ends[1][1], -ends[1][0]])
 
 
-def detailed(scene: Scene, camera: Camera, size: tuple[int, int], tolerance: float, **options: Any) -> Scene:
-    """The scene as it is drawn within a tolerance; options as for `choose_detail`."""
+def detailed(
+    scene: Scene, camera: Camera, size: tuple[int, int], tolerance: float, *, in_parts: bool = False, **options: Any
+) -> Scene:
+    """The scene as it is drawn within a tolerance; options as for `choose_detail`, `in_parts` as for `Shot.within`."""
     if not isinstance(options.get("material"), Material | None):
         raise TypeError(f"material must be a Material, got {shown(options['material'])}")
     if check_tolerance(tolerance) == 0:
@@ -239,6 +285,9 @@ def detailed(scene: Scene, camera: Camera, size: tuple[int, int], tolerance: flo
     for one, material, at in scene.looks(options.get("material")):
         if not why_whole(one, camera, tolerance, options.get("cull"), material):
             levels = levels_of(one)
-            for i, level in zip(at.tolist(), screen.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
+            found = screen.coarsest(matrices[at], levels, tolerance)[0].tolist()
+            for i, level in zip(at.tolist(), found, strict=True):
                 meshes[i] = levels[level].mesh if level else one
+            if in_parts and (cut := screen.cut(matrices[0], levels, found[0], tolerance)) is not None:
+                meshes[0] = cut.mesh
     return scene.with_meshes(meshes)

@@ -24,6 +24,7 @@ from topleft._core.base.whole_file import write_whole
 from topleft._meshes.camera.matrices import bounding_sphere
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.limits.npy import arrays_of
+from topleft._meshes.lod.parts import PartedMesh, Parts, parts_of_arrays
 from topleft._meshes.model.mesh import Mesh
 from topleft.errors import MeshError
 
@@ -75,6 +76,8 @@ class Levels(Sequence[Level]):
     mesh : Mesh
     coarser : sequence of Level
         Each with fewer triangles than the one before.
+    parts : optional
+        The parts that `simplify` has cut a large mesh into, for views that need some finely and others coarsely.
 
     Examples
     --------
@@ -85,10 +88,16 @@ class Levels(Sequence[Level]):
     [320, 80]
     """
 
-    def __init__(self, mesh: Mesh, coarser: Sequence[Level] = ()) -> None:
+    def __init__(self, mesh: Mesh, coarser: Sequence[Level] = (), parts: Parts | None = None) -> None:
         # Not the mesh itself: it keeps its levels alive, and a circle would keep both for ever.
         self._original = Level(replace(mesh))
         self._coarser = tuple(coarser)
+        self.parts = parts
+
+    @cached_property
+    def parted(self) -> PartedMesh | None:
+        """The levels in parts, of a large mesh: made at the first use, and as large as they are."""
+        return None if self.parts is None else PartedMesh([level.mesh for level in self], self.parts)
 
     @cached_property
     def extents(self) -> F64:
@@ -133,6 +142,10 @@ class Levels(Sequence[Level]):
             "bound": np.array([level.bound for level in self[1:]], np.float64),
             "known": np.array([level.known for level in self[1:]], np.float64),
         }
+        if self.parts is not None:
+            arrays["order"] = self.parts.order
+            for i in range(len(self)):
+                arrays[f"starts_{i}"], arrays[f"bounds_{i}"] = self.parts.starts[i], self.parts.bounds[i]
         for i, level in enumerate(self[1:], 1):
             for name in ARRAYS:
                 array = getattr(level.mesh, name)
@@ -189,6 +202,7 @@ class Levels(Sequence[Level]):
                     )
                     for i, (bound, known) in enumerate(zip(bounds, knowns, strict=True), 1)
                 ]
+                parts = parts_of_arrays(array, [mesh, *(level.mesh for level in coarser)])
         except FileNotFoundError:
             raise FileNotFoundError(f"there is no file {str(path)!r}") from None
         except MeshError as error:
@@ -200,7 +214,7 @@ class Levels(Sequence[Level]):
             if isinstance(error, OSError) and error.filename is not None:  # it is the file, not its content
                 raise
             raise MeshError(f"cannot read {str(path)!r}: broken, or not levels of detail ({error})") from error
-        return keep_levels(mesh, cls(mesh, coarser))
+        return keep_levels(mesh, cls(mesh, coarser, parts))
 
 
 def as_bounds(values: npt.NDArray[Any] | None) -> list[float]:

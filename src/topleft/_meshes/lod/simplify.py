@@ -9,7 +9,9 @@ went into it. Other triangles may be nearer, across a seam or a thin wall: they 
 
 from __future__ import annotations
 
+import math
 import threading
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,9 +21,10 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
 from topleft._core.base.arrays import shown
 from topleft._core.base.color import spread_colors
-from topleft._meshes.lod.collapse import STUCK, Collapsed, collapse, collapser, wanted_of
-from topleft._meshes.lod.distance import TriangleTree, measure, welded
+from topleft._meshes.lod.collapse import STUCK, Collapsed, border_points, collapse, collapser, open_sides, wanted_of
+from topleft._meshes.lod.distance import TriangleTree, measure
 from topleft._meshes.lod.levels import Level, Levels, keep_levels, kept_levels
+from topleft._meshes.lod.parts import JOINED, LEAST_PARTED, OF_PART, Parts, sort_in_parts
 from topleft._meshes.model.mesh import FloatArray, Mesh, coincident
 from topleft._meshes.model.normals import unit_or_zero
 
@@ -87,6 +90,9 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     the seams where attributes jump or materials meet: nothing bleeds across and nothing cracks, but no level is coarser
     than its borders and seams. A mesh without normals has levels without, which crease at the same angle.
 
+    Levels of a mesh of 500,000 triangles or more are made of parts, whose sides stay in their level, too. Where such a
+    mesh is drawn alone, each part has the coarsest level that the view allows.
+
     Examples
     --------
     >>> import topleft as tl
@@ -103,8 +109,7 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
         raise ValueError(f"smallest must be at least 4, got {smallest!r}")
     collapser()
     with _lock:
-        coarser = coarser_levels(mesh, ratio, smallest)
-        return keep_levels(mesh, Levels(mesh, coarser))
+        return keep_levels(mesh, Levels(mesh, *coarser_levels(mesh, ratio, smallest)))
 
 
 def levels_of(mesh: Mesh) -> Levels:
@@ -113,36 +118,166 @@ def levels_of(mesh: Mesh) -> Levels:
         return kept_levels(mesh) or simplify(mesh)
 
 
-def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
-    """The levels below the mesh, as long as each is of use."""
+def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> tuple[list[Level], Parts | None]:
+    """The levels below the mesh, as long as each is of use; the parts of a large mesh and of these levels."""
     found: list[Level] = []
-    corners = corners_of(mesh)
+    corners, rows = corners_of(mesh)
     center = corners.points.min(axis=0) / 2 + corners.points.max(axis=0) / 2 if len(corners.points) else np.zeros(3)
-    has_more = bool(corners.attributes) or corners.material is not None
-    anchor: TriangleTree | None = None
-    bound_of_anchor = 0.0
-    while n_wanted := wanted_of(corners.triangles, ratio, smallest):
-        n_before = len(corners.triangles)
-        collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=has_more)
-        if not 0 < len(collapsed.triangles) <= STUCK * n_before:
+    n = len(corners.triangles)
+    n_joins = round(math.log(n / OF_PART, JOINED)) if n >= LEAST_PARTED else 0
+    starts = np.array([0, n])
+    if n_joins:
+        order, starts = sort_in_parts(corners.points, corners.triangles, n_joins)
+        corners, rows = corners._replace(triangles=corners.triangles[order]), rows[order]
+    layers = [Layer(mesh, corners, starts, np.zeros(len(starts) - 1), [])]
+    anchor = layers[0]
+    while coarser := coarser_layer(layers[-1], ratio, smallest, mesh):
+        bounds, known = measured(anchor, coarser, center)
+        bound, n_before, n = float(bounds.max()), len(layers[-1].corners.triangles), len(coarser.corners.triangles)
+        if found and bound > (n_before / n) ** MOST_POWER * found[-1].bound:
             break
-        if anchor is None:  # without attributes the corners are welded already
-            anchor = (
-                TriangleTree.of_mesh(mesh.vertices, mesh.triangles, center)
-                if has_more
-                else TriangleTree(corners.points - center, corners.triangles)
-            )
-        corners = stored(next_corners(corners, collapsed), mesh)
-        level = level_mesh(corners, mesh)
-        surface = TriangleTree.of_mesh(level.vertices, level.triangles, center)
-        apart = measure(anchor, surface)
-        bound = bound_of_anchor + apart.bound
-        if found and bound > (n_before / len(corners.triangles)) ** MOST_POWER * found[-1].bound:
-            break
-        found.append(Level(level, bound, max(apart.known - bound_of_anchor, 0.0)))
-        if len(anchor.triangles) > MOST_TO_COMPARE:
-            anchor, bound_of_anchor = surface, bound
-    return found
+        found.append(Level(coarser.mesh, bound, known))
+        layers.append(coarser._replace(bounds=bounds))
+        if len(anchor.corners.triangles) > MOST_TO_COMPARE:
+            anchor = layers[-1]
+    is_parted = n_joins > 0 and len(found) > 0
+    columns = tuple(one.starts for one in layers), tuple(one.bounds for one in layers)
+    return found, Parts(rows, *columns) if is_parted else None
+
+
+class Layer(NamedTuple):
+    """A level with its parts: their first triangles, with the end, and their distances from the mesh."""
+
+    mesh: Mesh
+    corners: Corners
+    starts: npt.NDArray[np.int64]
+    bounds: F64
+    whole: list[TriangleTree]  # of all parts, once it is there
+
+    @property
+    def n_parts(self) -> int:
+        """How many parts it has."""
+        return len(self.starts) - 1
+
+    def part(self, i: int, n: int) -> tuple[Corners, I32]:
+        """Part i of n, which are as many as its own or fewer, and the rows of its points."""
+        step = self.n_parts // n
+        triangles = self.corners.triangles[self.starts[step * i] : self.starts[step * (i + 1)]]
+        own, compact = np.unique(triangles, return_inverse=True)
+        attributes = {name: array[own] for name, array in self.corners.attributes.items()}
+        material = None if self.corners.material is None else self.corners.material[own]
+        return self.corners._replace(
+            points=self.corners.points[own], triangles=compact.reshape(-1, 3).astype(np.int32), attributes=attributes,
+            material=material,
+        ), own  # fmt: skip
+
+    def surface(self, i: int, n: int, center: F64) -> TriangleTree:
+        """The surface of part i of n; that of all is kept."""
+        if n > 1:
+            part, _ = self.part(i, n)
+            return TriangleTree.of_mesh(part.points, part.triangles, center)
+        if not self.whole:
+            self.whole.append(TriangleTree.of_mesh(self.mesh.vertices, self.mesh.triangles, center))
+        return self.whole[0]
+
+
+def measured(anchor: Layer, coarser: Layer, center: F64) -> tuple[F64, float]:
+    """How far the parts of a level are from the mesh at most, by way of another level; and about the farthest."""
+    n = coarser.n_parts
+    own = anchor.bounds.reshape(n, -1).max(axis=1)
+    found = [measure(anchor.surface(i, n, center), coarser.surface(i, n, center)) for i in range(n)]
+    bounds = own + np.array([apart.bound for apart in found])
+    return bounds, max(0.0, *(apart.known - bound for apart, bound in zip(found, own.tolist(), strict=True)))
+
+
+def coarser_layer(layer: Layer, ratio: float, smallest: int, mesh: Mesh) -> Layer | None:
+    """The next level, its distances not known yet; None where nothing can be collapsed."""
+    n_before = len(layer.corners.triangles)
+    if layer.n_parts == 1:
+        has_more = bool(layer.corners.attributes) or layer.corners.material is not None
+        collapsed = collapse_to(layer.corners, ratio, smallest, with_pairs=has_more)
+        if collapsed is None:
+            return None
+        corners = next_corners(layer.corners, collapsed)
+        starts = np.array([0, len(corners.triangles)])
+    else:
+        n = layer.n_parts // JOINED
+        corners, starts = joined_parts(layer, [coarser_part(*layer.part(i, n), ratio, smallest) for i in range(n)])
+        if len(corners.triangles) > STUCK * n_before:
+            return None
+    corners = stored(corners, mesh)
+    return Layer(level_mesh(corners, mesh), corners, starts, np.zeros(len(starts) - 1), [])
+
+
+def collapse_to(corners: Corners, ratio: float, smallest: int, *, with_pairs: bool) -> Collapsed | None:
+    """The corners collapsed to a share of their triangles; None where that gains nothing."""
+    n_wanted = wanted_of(corners.triangles, ratio, smallest)
+    if not n_wanted:
+        return None
+    collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=with_pairs)
+    return collapsed if 0 < len(collapsed.triangles) <= STUCK * len(corners.triangles) else None
+
+
+class CoarserPart(NamedTuple):
+    """A part of the next level, and the points that it has in common with others: its rows, and those before."""
+
+    corners: Corners
+    border: npt.NDArray[np.int64]
+    border_before: npt.NDArray[np.int64]
+
+
+def coarser_part(part: Corners, own: npt.NDArray[Any], ratio: float, smallest: int) -> CoarserPart:
+    """A part of the next level with the same border, to the bit; `own`: the rows of its points in the level before.
+
+    The part itself, if nothing can be collapsed or the border does not stay.
+    """
+    border = border_points(part.triangles)
+    collapsed = collapse_to(part, ratio, smallest, with_pairs=True)
+    if collapsed is None or collapsed.into is None or not keeps_border(part.triangles, collapsed):
+        return CoarserPart(part, border, own[border])
+    corners, rows = next_corners(part, collapsed), collapsed.into[border].astype(np.int64)
+    corners.points[rows] = part.points[border]
+    for name, array in corners.attributes.items():
+        array[rows] = part.attributes[name][border]
+    return CoarserPart(corners, rows, own[border])
+
+
+def keeps_border(triangles: I32, collapsed: Collapsed) -> bool:
+    """Whether the sides that one triangle has are the same as before."""
+    assert collapsed.into is not None
+    before = np.sort(collapsed.into[open_sides(triangles)], axis=1)
+    after = open_sides(collapsed.triangles)
+    return np.array_equal(before[np.lexsort(before.T)], after[np.lexsort(after.T)])
+
+
+def joined_parts(layer: Layer, parts: list[CoarserPart]) -> tuple[Corners, npt.NDArray[np.int64]]:
+    """Parts as one level, with the points of their borders once, and where their triangles begin."""
+    row_of: I32 = np.full(len(layer.corners.points), -1, np.int32)
+    triangles, fresh, n = [], [], 0
+    for part in parts:
+        rows = row_of[part.border_before]
+        is_there = rows >= 0
+        is_new = np.ones(len(part.corners.points), np.bool_)
+        is_new[part.border[is_there]] = False
+        numbers = (n - 1 + np.cumsum(is_new)).astype(np.int32)
+        numbers[part.border[is_there]] = rows[is_there]
+        row_of[part.border_before] = numbers[part.border]
+        triangles.append(numbers[part.corners.triangles])
+        fresh.append(is_new)
+        n += int(is_new.sum())
+
+    def join(arrays: Iterable[npt.NDArray[Any]]) -> Any:
+        return np.concatenate([array[is_new] for array, is_new in zip(arrays, fresh, strict=True)])
+
+    before = layer.corners
+    material = None if before.material is None else join(part.corners.material for part in parts)  # type: ignore[misc]
+    joined = before._replace(
+        points=join(part.corners.points for part in parts),
+        triangles=np.concatenate(triangles),
+        attributes={name: join(part.corners.attributes[name] for part in parts) for name in before.attributes},
+        material=material,
+    )
+    return joined, np.cumsum([0, *map(len, triangles)], dtype=np.int64)
 
 
 def stored(corners: Corners, mesh: Mesh) -> Corners:
@@ -150,21 +285,19 @@ def stored(corners: Corners, mesh: Mesh) -> Corners:
     return corners._replace(points=corners.points.astype(mesh.vertices.dtype).astype(np.float64))
 
 
-def corners_of(mesh: Mesh) -> Corners:
-    """The corners of a mesh, without triangles that have two corners at one place."""
+def corners_of(mesh: Mesh) -> tuple[Corners, I32]:
+    """The corners of a mesh, without triangles that have two corners at one place, and the rows of those it keeps."""
     given = {name: getattr(mesh, name) for name in ATTRIBUTES}
     given = {name: array for name, array in given.items() if array is not None}
     rows = mesh.material_of_triangle
-    if not given and rows is None:
-        points, triangles = welded(mesh.vertices, mesh.triangles)
-        return Corners(points, triangles, {}, None)
     first, group = coincident(mesh.vertices, *given.values())
     corners = group[mesh.triangles]
-    _, place = coincident(mesh.vertices)
+    place = coincident(mesh.vertices)[1] if given else group
     a, b, c = place[mesh.triangles].T
     is_whole = (a != b) & (b != c) & (c != a)
-    if is_whole.any():
-        corners, rows = corners[is_whole], None if rows is None else rows[is_whole]
+    if not is_whole.any():
+        is_whole[:] = True
+    corners, rows = corners[is_whole], None if rows is None else rows[is_whole]
     if rows is None:
         key = corners.ravel()
     else:  # a vertex of two materials becomes two
@@ -178,7 +311,7 @@ def corners_of(mesh: Mesh) -> Corners:
         {name: array[source] for name, array in given.items()},
         None if rows is None else (used % len(mesh.materials)).astype(np.int32),
         mesh.color_interpolation == "linear",
-    )
+    ), np.flatnonzero(is_whole).astype(np.int32)
 
 
 def next_corners(corners: Corners, collapsed: Collapsed) -> Corners:

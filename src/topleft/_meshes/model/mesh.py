@@ -233,6 +233,11 @@ class Mesh:
         """Whether all vertices are finite."""
         return bool(np.isfinite(self.vertices).all())
 
+    @property
+    def drawn_triangles(self) -> I32:
+        """The triangles (T, 3) as pictures have them: all."""
+        return self.triangles
+
     def note_drawn(self) -> int:
         """Note that there is a picture of the mesh; returns how many there were before."""
         n_drawn: int = self.__dict__.get("_n_drawn", 0)

@@ -21,7 +21,7 @@ from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
-from topleft._meshes.picture.blended import transparent_pass
+from topleft._meshes.picture.blended import blended_masks, transparent_pass
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
 from topleft._meshes.picture.edges import draw_all_edges
 from topleft._meshes.picture.fragments import SceneFragments
@@ -135,7 +135,8 @@ def render(
         if edges:
             raise ValueError("points have no edges")
         return shade_cloud(draw_cloud(shot.cloud, shot.camera, shot.size, **view), shot.cloud, shot.camera, options)
-    shot = shot.within(tolerance, cull=cull, material=options.material)
+    in_parts = not is_whole and not edges and blended_masks(shot.scene, options) is None
+    shot = shot.within(tolerance, in_parts=in_parts, cull=cull, material=options.material)
     blended = transparent_pass(shot, options, view)
     frags = draw_visible(shot, rasterizer, options.material, **view) if blended is None else blended.draw_opaque()
     scene, camera = shot.scene, shot.camera
@@ -198,5 +199,5 @@ def rasterize_mesh(
     if shot.cloud is not None:
         return draw_cloud(shot.cloud, shot.camera, shot.size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    shot = shot.within(tolerance, cull=cull, **window)
+    shot = shot.within(tolerance, in_parts=True, cull=cull, **window)
     return rasterize_shot(shot, rasterizer, is_split=False, cull=cull, threads=threads, **view)

@@ -49,9 +49,13 @@ class Shot:
             return self.cloud
         return self.scene[0].mesh if self.is_mesh else self.scene
 
-    def within(self, tolerance: float, **options: Any) -> Shot:
-        """Return the shot of the levels of detail that a tolerance in pixels allows; options as for `choose_detail`."""
+    def within(self, tolerance: float, *, in_parts: bool = False, **options: Any) -> Shot:
+        """Return the shot of the levels of detail that a tolerance in pixels allows; options as for `choose_detail`.
+
+        `in_parts`: a large mesh alone may have parts of several levels; what is drawn is asked of the view alone then.
+        """
         if type(tolerance) is float and not tolerance:  # unless given
             return self
-        scene = detailed(self.scene, self.camera, self.size, tolerance, **options)
+        in_parts = in_parts and self.is_mesh
+        scene = detailed(self.scene, self.camera, self.size, tolerance, in_parts=in_parts, **options)
         return self if scene is self.scene else replace(self, scene=scene)

@@ -92,7 +92,7 @@ def silhouette(
         result = as_out("out", out, found.shape, found.dtype.type)
         result[...] = found
         return result
-    window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
+    window: Any = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     shot = shot.within(tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
     return cover_shot(shot, out, **options)

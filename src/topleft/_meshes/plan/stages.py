@@ -124,9 +124,13 @@ def megabytes(n: int) -> str:
 
 def plan_detail(found: Detail) -> Stage:
     """Tell which level of a mesh is drawn."""
-    count, n = len(found.mesh.triangles), found.n_triangles
+    count, n = found.n_drawn, found.n_triangles
     choice = f"the mesh itself, {plural(n, 'triangle')}"
-    if found.level:
+    if found.n_parts:
+        choice = (
+            f"{plural(found.n_parts, 'part')}: {plural(count, 'triangle')} of {n:,}, within {found.bound_px:.3g} px"
+        )
+    elif found.level:
         choice = f"level {found.level}: {plural(count, 'triangle')} of {n:,}, within {found.bound_px:.3g} px"
     return Stage("detail", choice, found.why, found.rejected)
 
