@@ -48,6 +48,17 @@ TL_INLINE int in_band(const tl_grad_view *view, int64_t pixel)
     return pixel >= view->first_row * view->width && pixel < view->end_row * view->width;
 }
 
+/* Adds what column c says of the shares of a pair; returns what its gradient moves from the far pixel to the near. */
+TL_INLINE double pull_column(const tl_grad_edges *e, const tl_pair *pair, const tl_pair_edge *edge, int64_t c,
+                             double *g_near, double *g_far, int is_f64)
+{
+    const double a = get_real(e->g_out, e->n_channels * pair->near + c, is_f64);
+    const double b = get_real(e->g_out, e->n_channels * pair->far + c, is_f64);
+    const double step = color_step(e, pair, c, is_f64);
+    *g_near += a * step, *g_far -= b * step;
+    return edge->far * b - edge->near * a;
+}
+
 /* Gradients of the two colours of a pair, and of its edge. */
 TL_INLINE void pull_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair,
                          const tl_pair_edge *edge, tl_grad_sums *sums, int is_f64)
@@ -56,10 +67,7 @@ TL_INLINE void pull_pair(const tl_grad_view *view, const tl_grad_edges *e, const
     const int64_t near = e->n_channels * pair->near, far = e->n_channels * pair->far;
     const int has_near = in_band(view, pair->near), has_far = in_band(view, pair->far);
     for (int64_t c = 0; c < e->n_channels; c++) {
-        const double a = get_real(e->g_out, near + c, is_f64), b = get_real(e->g_out, far + c, is_f64);
-        const double step = color_step(e, pair, c, is_f64);
-        const double moved = edge->far * b - edge->near * a;
-        g_near += a * step, g_far -= b * step;
+        const double moved = pull_column(e, pair, edge, c, &g_near, &g_far, is_f64);
         if (has_near)
             put_real(e->g_color, near + c, get_real(e->g_color, near + c, is_f64) + moved, is_f64);
         if (has_far)
