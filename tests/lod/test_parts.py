@@ -10,7 +10,7 @@ from surface_samples import corners_of, sampled_distance
 import topleft as tl
 from topleft._apps.batch.workers import coarser_levels_of
 from topleft._meshes.lod import detail, simplify
-from topleft._meshes.lod.collapse import open_sides
+from topleft._meshes.lod.collapse import border_points, open_sides
 from topleft._meshes.lod.distance import welded
 
 SIDE = 72
@@ -279,5 +279,5 @@ def test_levels_go_on_as_one_part_where_parts_cannot_be_collapsed(monkeypatch):
 
 
 def border_and_rows(part, own):
-    border = simplify.border_points(part.triangles)
+    border = border_points(part.triangles)
     return border, own[border]
