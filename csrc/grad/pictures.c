@@ -236,8 +236,8 @@ static void list_met_pairs(const picture_pass *p)
     scan.shown = p->l->ids, scan.step = p->l->step, scan.begins = p->l->begins, scan.row_runs = p->l->row_runs;
     while (next_pairs(&scan, &list, 0)) {
         for (int64_t i = 0; i < list.n; i++)
-            if (is_nearer_at(p, &list, i))
-                turn_pair(&list, i);
+            list.turned[i] = -is_nearer_at(p, &list, i);
+        turn_pairs(&list);
         const int64_t n_met = list_met(p->view, &p->l->edges, &list, which);
         for (int64_t i = 0; i < n_met; i += TL_LANES) {
             const int64_t end = n + meet_some(p->view, &p->l->edges, &list, which + i, n_met - i, p->pairs + n);
