@@ -115,7 +115,8 @@ typedef struct {
     void *pairs;  /* (2 n_px, TL_PAIR_BYTES) */
     float *steps; /* (2 n_px, n_columns): of pairs */
     /* Scratch. */
-    float *window;       /* 3 times TL_ROWS_KEPT rows of n_columns numbers a pixel, + TL_IDS_ROOM */
+    float *window;       /* TL_ROWS_KEPT rows of n_columns numbers a pixel, + TL_IDS_ROOM */
+    double *moves;       /* 16 rows of n_columns numbers a pixel */
     float *rast;         /* a row of four numbers a pixel */
     tl_grad_sums *faces; /* by triangle, TL_HEAD_OF_FACE columns and TL_SUMS_OF_FACE for each three attributes */
     tl_grad_sums *of_points, *of_attr; /* not scratch; NULL where the picture is drawn alone */

@@ -179,10 +179,11 @@ static int64_t pull_colors(const tl_grad_view *view, const tl_grad_colors *p)
 
 /* TL_LANES triangles to close, of which n have sums: the rows of their corners and attributes, where they begin. */
 typedef struct {
-    const double
-        *sums; /* of the first one: x and y, and from `moments` on, `stride` further for each three attributes */
+    const double *sums; /* of the first one, from `moments` on, `stride` further for each three attributes */
     int64_t n_columns, moments, stride;
-    int n, is_in_pixels;        /* in pixels, and units of the total where they begin */
+    const int32_t *column,
+        *row; /* sums count pixels from these, and by the total there; NULL: from x and y, which are */
+    int n;    /* the first two sums */
     int32_t from[TL_MAX_LANES]; /* 0, 1, 2 and so on; the first one's beyond n */
     int32_t corners[3][TL_MAX_LANES], rows[3][TL_MAX_LANES];
     vd v[3][3], q[3][3], units[3];
@@ -200,14 +201,16 @@ TL_INLINE void load_closing(const tl_grad_view *view, const tl_grad_colors *p, c
             l->corners[k][i] = view->tri[3 * (int64_t)ids[from] + k];
             l->rows[k][i] = p->corners[3 * (int64_t)ids[from] + k];
         }
-        about[0][i] = l->sums[from * l->n_columns], about[1][i] = l->sums[from * l->n_columns + 1];
+        for (int k = 0; k < 2 && !l->column; k++)
+            about[k][i] = l->sums[from * l->n_columns + k];
     }
-    *x0 = vd_load(about[0]), *y0 = vd_load(about[1]);
+    *x0 = l->column ? middles_at(view, 0, vi_load(l->column)) : vd_load(about[0]);
+    *y0 = l->column ? middles_at(view, 1, vi_load(l->row)) : vd_load(about[1]);
     load_triangles(view, corners, *x0, *y0, l->v, l->q, z);
     const vd total = sum_of_three(l->q[0][2], l->q[1][2], l->q[2][2]), one = vd_set1(1.0);
-    const vd unit = l->is_in_pixels ? vd_div(one, one_for_zero(total)) : one;
+    const vd unit = l->column ? vd_div(one, one_for_zero(total)) : one;
     for (int c = 0; c < 3; c++)
-        l->units[c] = l->is_in_pixels && c < 2 ? vd_mul(vd_set1(2.0 * view->scale[c]), unit) : unit;
+        l->units[c] = l->column && c < 2 ? vd_mul(vd_set1(2.0 * view->scale[c]), unit) : unit;
 }
 
 /* Adds four columns of n lanes to the rows of their corners, one triangle after the other, from column `first` on. */
@@ -287,7 +290,7 @@ static void close_triangles(const tl_grad_view *view, const tl_grad_colors *p, c
 
 /* Ends a band: from sums of triangles to those of their corners. */
 TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, int64_t moments, int64_t stride,
-                            int is_in_pixels)
+                            const int32_t *column, const int32_t *row)
 {
     const tl_grad_sums *faces = p->faces;
     for (int64_t i = 0; i < faces->n; i += TL_LANES) {
@@ -295,8 +298,9 @@ TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, i
                            .n_columns = faces->n_columns,
                            .moments = moments,
                            .stride = stride,
-                           .n = (int)(faces->n - i < TL_LANES ? faces->n - i : TL_LANES),
-                           .is_in_pixels = is_in_pixels};
+                           .column = column ? column + i : 0,
+                           .row = column ? row + i : 0,
+                           .n = (int)(faces->n - i < TL_LANES ? faces->n - i : TL_LANES)};
         close_triangles(view, p, faces->rows + i, &l);
     }
     forget_band(p->faces);
@@ -308,7 +312,7 @@ TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, i
 static int64_t grad_colors_vjp(const tl_grad_view *view, const tl_grad_colors *p)
 {
     const int64_t bad_id = pull_colors(view, p);
-    close_colors(view, p, FACE_X, TL_SUMS_OF_THREE, 0);
+    close_colors(view, p, FACE_X, TL_SUMS_OF_THREE, 0, 0);
     return bad_id;
 }
 

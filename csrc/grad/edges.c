@@ -48,6 +48,17 @@ TL_INLINE int in_band(const tl_grad_view *view, int64_t pixel)
     return pixel >= view->first_row * view->width && pixel < view->end_row * view->width;
 }
 
+/* Adds what column c says of the shares of a pair; returns what its gradient moves from the far pixel to the near. */
+TL_INLINE double pull_column(const tl_grad_edges *e, const tl_pair *pair, const tl_pair_edge *edge, int64_t c,
+                             double *g_near, double *g_far, int is_f64)
+{
+    const double a = get_real(e->g_out, e->n_channels * pair->near + c, is_f64);
+    const double b = get_real(e->g_out, e->n_channels * pair->far + c, is_f64);
+    const double step = color_step(e, pair, c, is_f64);
+    *g_near += a * step, *g_far -= b * step;
+    return edge->far * b - edge->near * a;
+}
+
 /* Gradients of the two colours of a pair, and of its edge. */
 TL_INLINE void pull_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair,
                          const tl_pair_edge *edge, tl_grad_sums *sums, int is_f64)
@@ -56,10 +67,7 @@ TL_INLINE void pull_pair(const tl_grad_view *view, const tl_grad_edges *e, const
     const int64_t near = e->n_channels * pair->near, far = e->n_channels * pair->far;
     const int has_near = in_band(view, pair->near), has_far = in_band(view, pair->far);
     for (int64_t c = 0; c < e->n_channels; c++) {
-        const double a = get_real(e->g_out, near + c, is_f64), b = get_real(e->g_out, far + c, is_f64);
-        const double step = color_step(e, pair, c, is_f64);
-        const double moved = edge->far * b - edge->near * a;
-        g_near += a * step, g_far -= b * step;
+        const double moved = pull_column(e, pair, edge, c, &g_near, &g_far, is_f64);
         if (has_near)
             put_real(e->g_color, near + c, get_real(e->g_color, near + c, is_f64) + moved, is_f64);
         if (has_far)
@@ -159,14 +167,14 @@ typedef struct {
     const int32_t *shown, *begins; /* of a picture, unless NULL: the ids of row 0, and where runs begin */
     int64_t step;
     const int64_t *row_runs;
-    int64_t turn;                          /* 2 * row: between a row and the one below; 2 * row + 1: within it */
+    int64_t meeting;                       /* 2 * row: between a row and the one below; 2 * row + 1: within it */
     const int32_t *ids, *others, *columns; /* of the pixels that meet; where they may differ */
     int64_t n_columns, n_taken;            /* of those; how many of them have been looked at */
 } pair_scan;
 
 TL_INLINE pair_scan scan_of(const tl_grad_view *view, const tl_grad_edges *e, int64_t lowest, int64_t top)
 {
-    return (pair_scan){.view = view, .edges = e, .lowest = lowest, .top = top, .turn = 2 * lowest - 1};
+    return (pair_scan){.view = view, .edges = e, .lowest = lowest, .top = top, .meeting = 2 * lowest - 1};
 }
 
 /* Lists the columns where two rows of n ids differ; returns how many. */
@@ -186,10 +194,10 @@ TL_INLINE int64_t list_changes(const int32_t *ids, const int32_t *others, int64_
 }
 
 /* Goes on to the next two rows that meet, or to the next one whose columns do; 0 at the end. */
-TL_INLINE int next_turn(pair_scan *s, int is_f64)
+TL_INLINE int next_meeting(pair_scan *s, int is_f64)
 {
-    const int64_t width = s->view->width, room = width + TL_IDS_ROOM, turn = ++s->turn, row = turn / 2;
-    const int is_within = turn % 2;
+    const int64_t width = s->view->width, room = width + TL_IDS_ROOM, meeting = ++s->meeting, row = meeting / 2;
+    const int is_within = meeting % 2;
     int32_t *scratch = s->edges->ids, *own = scratch + row % 2 * room, *columns = scratch + 2 * room;
     if (row >= s->top)
         return 0;
@@ -227,8 +235,8 @@ TL_INLINE void list_some(pair_scan *s, tl_pair_list *list)
         m = vm_and(m, vi_gt(outlines, none)); /* both have corners */
         m = vm_and_not(m, runs_on(e, m, id, other, outlines));
     }
-    const int in_column = s->turn % 2 == 0;
-    const int64_t row = s->turn / 2 - in_column;
+    const int in_column = s->meeting % 2 == 0;
+    const int64_t row = s->meeting / 2 - in_column;
     vi_compress(list->near + list->n, m, id), vi_compress(list->far + list->n, m, other);
     vi_compress(list->column + list->n, m, vi_sub(x, vi_set1(s->begins && !in_column)));
     vi_compress(list->where + list->n, m, vi_set1((int32_t)(row << TL_ROW_SHIFT) + in_column * TL_IN_COLUMN));
@@ -242,7 +250,7 @@ TL_INLINE int next_pairs(pair_scan *s, tl_pair_list *list, int is_f64)
     while (list->n < TL_PAIRS_AT_ONCE)
         if (s->n_taken < s->n_columns)
             list_some(s, list);
-        else if (!next_turn(s, is_f64))
+        else if (!next_meeting(s, is_f64))
             break;
     return list->n > 0;
 }
@@ -287,8 +295,8 @@ TL_INLINE void edges_of_band(const tl_grad_view *view, const tl_grad_edges *e, t
     int32_t which[TL_PAIRS_ROOM];
     while (next_pairs(&scan, &list, is_f64)) {
         for (int64_t i = 0; i < list.n; i++)
-            if (is_nearer(view, e, &list, i, is_f64))
-                turn_pair(&list, i);
+            list.turned[i] = -is_nearer(view, e, &list, i, is_f64);
+        turn_pairs(&list);
         const int64_t n = list_met(view, e, &list, which);
         for (int64_t i = 0; i < n; i += TL_LANES) {
             const int64_t n_met = meet_some(view, e, &list, which + i, n - i, pairs);

@@ -55,48 +55,77 @@ TL_INLINE vi sign_code(vd area)
 TL_INLINE void face_triangles(const tl_grad_view *view, int32_t *outline, int is_f64)
 {
     const vd zero = vd_set1(0.0);
-    int32_t rows[3][TL_MAX_LANES], sides[TL_MAX_LANES];
+    const vi n_vertices = vi_set1(clamped_to_int(view->n_vertices)), none = vi_set1(0);
+    int32_t rows[TL_MAX_LANES];
     vd p[3][4];
-    for (int64_t i = 0; i < view->n_triangles; i += TL_LANES) {
-        const int64_t n = view->n_triangles - i < TL_LANES ? view->n_triangles - i : TL_LANES;
-        for (int64_t lane = 0; lane < TL_LANES; lane++) {
-            const int64_t id = lane < n ? i + lane : i;
-            const int is_there = has_corners(view, view->n_vertices, (int32_t)id);
-            for (int k = 0; k < 3; k++)
-                rows[k][lane] = is_there ? view->tri[3 * id + k] : 0;
+    for (int64_t i = 0; i < view->n_triangles && !view->n_vertices; i++)
+        outline[i] = -1;
+    for (int64_t i = 0; i < view->n_triangles && view->n_vertices; i += TL_LANES) {
+        const vm m = vm_first(view->n_triangles - i);
+        vi corners[3], ahead = vi_set1(TL_IS_AHEAD);
+        vm is_there = m;
+        for (int k = 0; k < 3; k++) {
+            corners[k] = vi_gather(m, view->tri + 3 * i + k, vi_mul(vi_iota(), vi_set1(3)));
+            is_there = vm_and(is_there, vi_gt_unsigned(n_vertices, corners[k]));
         }
-        if (!view->n_vertices)
-            return;
-        for (int k = 0; k < 3; k++)
-            load_vertices_of(view, rows[k], p[k], is_f64);
+        for (int k = 0; k < 3; k++) {
+            vi_spill(rows, vi_select(is_there, corners[k], none));
+            load_vertices_of(view, rows, p[k], is_f64);
+            const vm is_behind = vd_ge(zero, p[k][3]); /* w > 0 */
+            ahead = vi_select(vm_and_not(vd_ge(p[k][3], zero), is_behind), ahead, none);
+        }
         const vd a = vd_sub(vd_mul(p[1][1], p[2][3]), vd_mul(p[1][3], p[2][1]));
         const vd b = vd_sub(vd_mul(p[1][3], p[2][0]), vd_mul(p[1][0], p[2][3]));
         const vd c = vd_sub(vd_mul(p[1][0], p[2][1]), vd_mul(p[1][1], p[2][0]));
         const vd area = vd_add(vd_add(vd_mul(p[0][0], a), vd_mul(p[0][1], b)), vd_mul(p[0][3], c));
-        vi side = sign_code(area), ahead = vi_set1(TL_IS_AHEAD);
-        for (int k = 0; k < 3; k++) { /* w > 0 */
-            const vm is_behind = vd_ge(zero, p[k][3]);
-            ahead = vi_select(vm_and_not(vd_ge(p[k][3], zero), is_behind), ahead, vi_set1(0));
-        }
-        side = vi_or(vi_shift_left(side, TL_SIDE_SHIFT), ahead);
-        vi_store(sides, side);
-        for (int64_t lane = 0; lane < n; lane++)
-            outline[i + lane] = has_corners(view, view->n_vertices, (int32_t)(i + lane)) ? sides[lane] : -1;
+        const vi side = vi_or(vi_shift_left(sign_code(area), TL_SIDE_SHIFT), ahead);
+        vi_store_masked(outline + i, m, vi_select(is_there, side, vi_set1(-1)));
     }
 }
 
-/* Whether nothing lies on the other side of an edge: `half` stands in `across` of triangle `id`, corner `k`. */
-TL_INLINE int is_silhouette(const tl_grad_view *view, const int32_t *outline, int32_t id, int k, int32_t half)
+/* Whether the surface folds at an edge of triangles that are wound differently, or of more than two. */
+TL_INLINE int is_twisted_fold(const tl_grad_view *view, const int32_t *outline, int32_t id, int k, int32_t other)
 {
-    const int32_t other = half < -1 ? -2 - half : half;
-    if (other < 0 || other >= 3 * view->n_triangles || outline[other / 3] < 0)
-        return 1;
     const int32_t own = outline[id] & TL_SIDES, across = outline[other / 3] & TL_SIDES;
-    if (half >= 0)
-        return (own | across) == TL_SIDES;
     const int32_t *a = view->tri + 3 * (int64_t)id, *b = view->tri + 3 * (int64_t)(other / 3);
     const int is_reversed = a[(k + 1) % 3] != b[(other % 3 + 1) % 3];
     return is_reversed ? (own | across) == TL_SIDES : own && own == across;
+}
+
+/* Triangles of half-edges, which are not below 0: a third of those. */
+TL_INLINE vi triangles_of_halves(vi a)
+{
+    return vi_round(vd_mul(vd_from_vi(vi_sub(a, vi_set1(1))), vd_set1(1.0 / 3.0)));
+}
+
+/* Adds the edges beyond which nothing lies, or the surface folds. */
+TL_INLINE void mark_silhouettes(const tl_grad_view *view, const int32_t *across, int32_t *outline)
+{
+    const vi none = vi_set1(-1), sides = vi_set1(TL_SIDES), end = vi_set1((int32_t)(3 * view->n_triangles));
+    int32_t halves[TL_MAX_LANES];
+    for (int64_t i = 0; i < view->n_triangles; i += TL_LANES) {
+        const vm m = vm_first(view->n_triangles - i);
+        const vi own = vi_load_masked(m, outline + i);
+        vi marks = own;
+        for (int k = 0; k < 3; k++) {
+            const vi half = vi_gather(m, across + 3 * i + k, vi_mul(vi_iota(), vi_set1(3)));
+            const vi other = vi_select(vi_gt(none, half), vi_sub(vi_set1(-2), half), half);
+            vm is_there = vm_and(m, vm_and(vi_gt(other, none), vi_gt(end, other)));
+            const vi beyond = vi_gather(is_there, outline, triangles_of_halves(other));
+            is_there = vm_and(is_there, vi_gt(beyond, none));
+            const vm goes_on = vm_and_not(is_there, vi_eq(vi_and(vi_or(own, beyond), sides), sides));
+            unsigned bits = vm_bits(goes_on);
+            unsigned twisted = vm_bits(vm_and(vm_and(is_there, vi_gt(own, none)), vi_gt(none, half)));
+            vi_spill(halves, other);
+            for (; twisted; twisted &= twisted - 1) {
+                const int lane = __builtin_ctz(twisted);
+                const int folds = is_twisted_fold(view, outline, (int32_t)i + lane, k, halves[lane]);
+                bits = (bits & ~(1u << lane)) | (unsigned)!folds << lane;
+            }
+            marks = vi_select(vm_from_bits(bits), marks, vi_or(marks, vi_set1(1 << k)));
+        }
+        vi_store_masked(outline + i, m, vi_select(vi_gt(own, none), marks, own));
+    }
 }
 
 /* See kernels.h. */
@@ -109,9 +138,7 @@ static void grad_outline(const tl_grad_view *view, const int32_t *across, double
         place_vertices(view, places, 0);
         face_triangles(view, outline, 0);
     }
-    for (int64_t i = 0; i < view->n_triangles; i++)
-        for (int k = 0; k < 3 && outline[i] >= 0; k++)
-            outline[i] |= is_silhouette(view, outline, (int32_t)i, k, across[3 * i + k]) << k;
+    mark_silhouettes(view, across, outline);
 }
 
 #endif

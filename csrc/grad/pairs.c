@@ -16,6 +16,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/outline.c"
 #include "grad/pixels.h"
 #include "lanes/lanes.h"
 
@@ -52,6 +53,7 @@ typedef struct {
     int64_t n;
     int32_t near[TL_PAIRS_ROOM], far[TL_PAIRS_ROOM];     /* triangles; the last may be -1 */
     int32_t column[TL_PAIRS_ROOM], where[TL_PAIRS_ROOM]; /* of the near pixel; where: its row and TL_IN_COLUMN, ... */
+    int32_t turned[TL_PAIRS_ROOM];                       /* see turn_pairs */
     int32_t end[TL_PAIRS_ROOM];                          /* the triangle that has the edge between them, -1 for none */
 } tl_pair_list;
 
@@ -128,9 +130,6 @@ TL_INLINE vm exit_edges(const placed_lanes *p, const vm *allowed, exit_lanes *ed
                   vd_exceeds(vd_set1(1.0 + TL_CROSSING_SLACK), edge->t));
 }
 
-/* A third of numbers that are not below 0. */
-TL_INLINE vi third_of(vi a) { return vi_round(vd_mul(vd_from_vi(vi_sub(a, vi_set1(1))), vd_set1(1.0 / 3.0))); }
-
 /* A step of walks from i on, to the next triangle or to the end; those that go on.  Nowhere lead those where the snap
  * moved an edge past a middle, and those that reach behind the eye. */
 TL_INLINE vm step_walks(pair_walks *w, int64_t i, int is_last, walker_lanes *at)
@@ -154,7 +153,7 @@ TL_INLINE vm step_walks(pair_walks *w, int64_t i, int is_last, walker_lanes *at)
         const int64_t k = i + __builtin_ctz(bits);
         w->list->end[w->pair[k]] = w->id[k];
     }
-    at->id = third_of(other);
+    at->id = triangles_of_halves(other);
     return vm_and_not(vm_and_not(m, ends), vi_eq(at->id, at->far));
 }
 
@@ -178,16 +177,20 @@ static void walk_pairs(pair_walks *w)
     }
 }
 
-/* The other one of a pair becomes the near one. */
-TL_INLINE void turn_pair(tl_pair_list *list, int64_t i)
+/* The far ones of pairs become the near ones, where `turned` is -1. */
+TL_INLINE void turn_pairs(tl_pair_list *list)
 {
-    const int32_t near = list->near[i], step = list->where[i] & TL_IS_BEYOND ? -1 : 1;
-    list->near[i] = list->far[i], list->far[i] = near;
-    if (list->where[i] & TL_IN_COLUMN)
-        list->where[i] += step * (1 << TL_ROW_SHIFT);
-    else
-        list->column[i] += step;
-    list->where[i] ^= TL_IS_BEYOND;
+    const vi in_column = vi_set1(TL_IN_COLUMN), is_beyond = vi_set1(TL_IS_BEYOND);
+    for (int64_t i = 0; i < list->n; i += TL_LANES) {
+        const vi near = vi_load(list->near + i), far = vi_load(list->far + i), where = vi_load(list->where + i);
+        const vi turned = vi_load(list->turned + i), one = vi_and(turned, vi_set1(1));
+        const vm m = vi_gt(vi_set1(0), turned), is_back = vi_eq(vi_and(where, is_beyond), is_beyond);
+        const vi step = vi_select(is_back, vi_sub(vi_set1(0), one), one), down = vi_and(where, in_column);
+        const vi row = vi_mul(step, down);
+        vi_store(list->near + i, vi_select(m, far, near)), vi_store(list->far + i, vi_select(m, near, far));
+        vi_store(list->column + i, vi_add(vi_load(list->column + i), vi_sub(step, row)));
+        vi_store(list->where + i, vi_xor(vi_add(where, vi_shift_left(row, TL_ROW_SHIFT)), vi_and(turned, is_beyond)));
+    }
 }
 
 /* Finds where the surface ends or folds between pairs: from the near triangles, else from the far ones. */
@@ -199,14 +202,16 @@ static void end_walks(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_
     memcpy(w.id, list->near, size), memcpy(w.far, list->far, size);
     memcpy(w.column, list->column, size), memcpy(w.where, list->where, size);
     for (int64_t i = 0; i < list->n; i++)
-        w.pair[i] = (int32_t)i, list->end[i] = -1;
+        w.pair[i] = (int32_t)i, list->end[i] = -1, list->turned[i] = 0;
     walk_pairs(&w);
+    for (int64_t k = 0; k < w.n_failed; k++)
+        list->turned[w.failed[k]] = list->far[w.failed[k]] < 0 ? 0 : -1;
+    turn_pairs(list);
     w.n = 0;
     for (int64_t k = 0; k < w.n_failed; k++) {
         const int32_t i = w.failed[k];
-        if (list->far[i] < 0)
+        if (!list->turned[i])
             continue;
-        turn_pair(list, i);
         w.id[w.n] = list->near[i], w.far[w.n] = list->far[i];
         w.column[w.n] = list->column[i], w.where[w.n] = list->where[i], w.pair[w.n++] = i;
     }

@@ -6,8 +6,8 @@
  * A triangle that is seen is a face: planes in float64, about the first pixel that shows it and in units of its total
  * there, whose quotients are the attributes at its pixels; and the sums of colors.c.  A run of pixels begins in float64
  * and goes on in float32; one with a weight that is clamped goes by itself, as in points.c.  Runs, faces and pairs of
- * pixels are found once for both ways.  A row is drawn, finished when the next one is drawn, led back when that one is
- * finished. */
+ * pixels are found once for both ways.  A row is drawn, finished when the next two are drawn, and led back when these
+ * are finished: all in one place. */
 #ifndef TL_GRAD_PICTURES_C
 #define TL_GRAD_PICTURES_C
 
@@ -27,6 +27,7 @@
  * the weights is below 1.  Then that pixel's column and row; and of each three attributes their planes, those of the
  * last corner, and sums as many as planes. */
 enum { FACE_U, FACE_V, FACE_ZW, FACE_REST, FACE_TOTAL = FACE_REST, FACE_PLANE = 12, FACE_COLUMN = 12, FACE_ROW };
+enum { ROWS_WAITING = 4 }; /* of those that are kept, before a row has been led back */
 enum { FACE_QUADS = 4 * 4, THREE_LAST = FACE_PLANE, THREE_SUMS = FACE_QUADS };
 
 /* A band, with the rows on either side of it that it takes part in: runs of pixels of equal id, faces, pairs. */
@@ -37,8 +38,10 @@ typedef struct {
     int32_t *faces;                          /* of runs: twice the face, 1 more where clamped, less than 0 for none */
     int32_t *corners[3], *column, *row, *id; /* of faces */
     tl_met_pair *pairs;
-    float *colors, *g_out, *g_color; /* TL_ROWS_KEPT rows from `base` on */
+    float *rows; /* TL_ROWS_KEPT rows from `base` on: colours, which become gradients */
     int64_t base;
+    double
+        *moves[2][2]; /* forward and back, of even and odd rows: what pairs add to the near pixel, take from the far */
 } picture_pass;
 
 _Static_assert(sizeof(tl_met_pair) == TL_PAIR_BYTES, "callers make room for pairs");
@@ -52,8 +55,9 @@ static picture_pass open_pass(const tl_grad_view *view, tl_grad_picture *l)
     int32_t **const of_faces[TL_FACE_ROWS] = {&p.corners[0], &p.corners[1], &p.corners[2], &p.column, &p.row, &p.id};
     for (int k = 0; k < TL_FACE_ROWS; k++)
         *of_faces[k] = l->of_faces + k * l->face_step;
-    const int64_t n_kept = TL_ROWS_KEPT * view->width * l->n_columns + TL_IDS_ROOM;
-    p.colors = l->window, p.g_out = p.colors + n_kept, p.g_color = p.g_out + n_kept;
+    p.rows = l->window;
+    for (int k = 0; k < 4; k++)
+        p.moves[k / 2][k % 2] = l->moves + 4 * k * view->width * l->n_columns;
     p.base = p.all.first_row;
     return p;
 }
@@ -232,8 +236,8 @@ static void list_met_pairs(const picture_pass *p)
     scan.shown = p->l->ids, scan.step = p->l->step, scan.begins = p->l->begins, scan.row_runs = p->l->row_runs;
     while (next_pairs(&scan, &list, 0)) {
         for (int64_t i = 0; i < list.n; i++)
-            if (is_nearer_at(p, &list, i))
-                turn_pair(&list, i);
+            list.turned[i] = -is_nearer_at(p, &list, i);
+        turn_pairs(&list);
         const int64_t n_met = list_met(p->view, &p->l->edges, &list, which);
         for (int64_t i = 0; i < n_met; i += TL_LANES) {
             const int64_t end = n + meet_some(p->view, &p->l->edges, &list, which + i, n_met - i, p->pairs + n);
@@ -249,24 +253,62 @@ static void list_met_pairs(const picture_pass *p)
         p->l->row_pairs[row - lowest] = n;
 }
 
-/* Blends the pairs of a row, or leads them back. */
-static void blend_row(const picture_pass *p, const tl_grad_view *view, int64_t row, int is_back)
+/* The pixels of the rows that are kept, as those of a picture. */
+TL_INLINE float *as_picture(const picture_pass *p)
 {
-    const int64_t n = p->l->n_columns, before = p->base * p->view->width * n;
-    tl_grad_edges e = p->l->edges;
-    e.color = (const void *)((uintptr_t)p->colors - 4 * (uintptr_t)before);
-    e.out = p->l->out ? (void *)p->l->out : (void *)((uintptr_t)p->g_out - 4 * (uintptr_t)before);
-    e.g_out = !is_back ? 0 : p->l->g_out ? p->l->g_out : e.out;
-    e.g_color = (void *)((uintptr_t)p->g_color - 4 * (uintptr_t)before);
-    row -= p->all.first_row;
-    for (int64_t i = p->l->row_pairs[row]; i < p->l->row_pairs[row + 1]; i++) {
+    return (float *)((uintptr_t)p->rows - 4 * (uintptr_t)(p->base * p->view->width * p->l->n_columns));
+}
+
+/* Finds the steps of colour across the pairs of a row, its own and with the row before, and what these move. */
+static void find_steps(const picture_pass *p, int64_t row)
+{
+    const int64_t n = p->l->n_columns, *pairs = p->l->row_pairs + (row - p->all.first_row);
+    const tl_grad_edges e = {.color = as_picture(p), .n_channels = n};
+    const int is_moved = p->l->edges.rule != TL_PAIR_STRAIGHT;
+    double *moves = p->moves[0][row % 2];
+    for (int64_t i = pairs[0]; i < pairs[1]; i++, moves += 2 * n)
+        for (int64_t c = 0; c < n; c++) {
+            const tl_pair_edge *edge = &p->pairs[i].edge;
+            const double step = color_step(&e, &p->pairs[i].pair, c, 0);
+            p->l->steps[n * i + c] = (float)step;
+            moves[c] = is_moved && edge->near != 0.0 ? edge->near * step : 0.0;
+            moves[n + c] = is_moved && edge->far != 0.0 ? edge->far * step : 0.0;
+        }
+}
+
+/* Finds what the gradients of a row say of its pairs: of their edges, and what these move from pixel to pixel. */
+static void pull_pairs(const picture_pass *p, int64_t row)
+{
+    const int64_t n = p->l->n_columns, *pairs = p->l->row_pairs + (row - p->all.first_row);
+    tl_grad_edges e = {.g_out = as_picture(p), .n_channels = n};
+    double *moves = p->moves[1][row % 2];
+    for (int64_t i = pairs[0]; i < pairs[1]; i++, moves += 2 * n) {
         const tl_pair *pair = &p->pairs[i].pair;
-        float *steps = p->l->steps + n * i;
-        e.steps = 0;
-        for (int64_t c = 0; c < n && !is_back; c++)
-            steps[c] = (float)color_step(&e, pair, c, 0);
-        e.steps = steps;
-        blend_pair(view, &e, p->pairs + i, p->l->of_points, 0);
+        double g_near = 0.0, g_far = 0.0;
+        e.steps = p->l->steps + n * i;
+        if (p->l->edges.rule == TL_PAIR_STRAIGHT) {
+            pull_straight(p->view, &e, pair, p->l->of_points);
+            continue;
+        }
+        for (int64_t c = 0; c < n; c++)
+            moves[c] = moves[n + c] = pull_column(&e, pair, &p->pairs[i].edge, c, &g_near, &g_far, 0);
+        if (in_band(p->view, pair->near < pair->far ? pair->near : pair->far))
+            pull_edge(p->view, pair, &p->pairs[i].edge, g_near, g_far, p->l->of_points);
+    }
+}
+
+/* Moves colours, or gradients, between the pixels of the pairs of a row. */
+static void move_between(const picture_pass *p, int64_t row, int is_back)
+{
+    const int64_t n = p->l->n_columns, *pairs = p->l->row_pairs + (row - p->all.first_row);
+    const double *moves = p->moves[is_back][row % 2];
+    float *picture = as_picture(p);
+    for (int64_t i = pairs[0]; i < pairs[1] && p->l->edges.rule != TL_PAIR_STRAIGHT; i++, moves += 2 * n) {
+        float *near = picture + n * p->pairs[i].pair.near, *far = picture + n * p->pairs[i].pair.far;
+        for (int64_t c = 0; c < n; c++) {
+            near[c] = (float)((double)near[c] + moves[c]);
+            far[c] = (float)((double)far[c] - moves[n + c]);
+        }
     }
 }
 
@@ -351,7 +393,7 @@ TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
     const int64_t n_of_face = p->l->faces->n_columns;
     const int32_t *begins = p->l->begins, *faces = p->faces;
     const double *numbers = p->l->faces->sums;
-    float *colors = p->colors + (row - p->base) * n;
+    float *colors = p->rows + (row - p->base) * n;
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
         const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
         float *to = colors + n_columns * column;
@@ -369,21 +411,17 @@ TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
         for (int64_t c = 0; c < n_columns; c += 3)
             draw_three(face, c, n_columns - c < 3 ? (int)(n_columns - c) : 3, n_columns, x, y, n_pixels, to);
     }
-    if (!p->l->out)
-        memcpy(p->g_out + (row - p->base) * n, colors, (size_t)n * sizeof *colors);
-    else if (row >= p->view->first_row && row < p->view->end_row)
-        memcpy(p->l->out + row * n, colors, (size_t)n * sizeof *colors);
 }
 
 /* Numbers that are compared at a time, and those of which as many squares are summed up in float32. */
 enum { COMPARED = 32, SQUARED = 256 };
 
-/* Writes the gradient of some numbers over them, and again; adds the squares of their differences. */
-TL_INLINE void compare_some(float *out, float *again, const float *target, vf scale, vf *squares)
+/* Writes the gradient of some numbers over them; adds the squares of their differences. */
+TL_INLINE void compare_some(float *out, const float *target, vf scale, vf *squares)
 {
     for (int k = 0; k < COMPARED; k += TL_LANES) {
-        const vf step = vf_sub(vf_load(out + k), vf_load(target + k)), g = vf_mul(step, scale);
-        vf_store(out + k, g), vf_store(again + k, g);
+        const vf step = vf_sub(vf_load(out + k), vf_load(target + k));
+        vf_store(out + k, vf_mul(step, scale));
         squares[k / TL_LANES] = vf_add(squares[k / TL_LANES], vf_mul(step, step));
     }
 }
@@ -392,25 +430,28 @@ TL_INLINE void compare_some(float *out, float *again, const float *target, vf sc
 static double compare_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
-    float *restrict out = p->g_out + (row - p->base) * n, *restrict again = p->g_color + (row - p->base) * n;
+    float *restrict out = p->rows + (row - p->base) * n;
     const float *restrict target = p->l->target + row * n;
+    const int64_t ahead = row + 1 < p->view->height ? n : 0;
     const vf scale = vf_set1((float)p->l->scale);
     vqd sum = vqd_set1(0.0);
     double sums[4];
     for (int64_t first = 0; first < n; first += SQUARED) {
         const int64_t end = n - first < SQUARED ? n : first + SQUARED;
         vf squares[COMPARED / TL_LANES];
-        float some[COMPARED], last[3][COMPARED] = {{0}};
+        float some[COMPARED], last[2][COMPARED] = {{0}};
         int64_t i = first;
         for (int k = 0; k < COMPARED / TL_LANES; k++)
             squares[k] = vf_set1(0.0f);
-        for (; i + COMPARED <= end; i += COMPARED)
-            compare_some(out + i, again + i, target + i, scale, squares);
+        for (; i + COMPARED <= end; i += COMPARED) {
+            compare_some(out + i, target + i, scale, squares);
+            __builtin_prefetch(target + i + ahead), __builtin_prefetch(target + i + ahead + 16);
+        }
         if (i < end) {
             const size_t size = (size_t)(end - i) * sizeof(float);
-            memcpy(last[0], out + i, size), memcpy(last[2], target + i, size);
-            compare_some(last[0], last[1], last[2], scale, squares);
-            memcpy(out + i, last[0], size), memcpy(again + i, last[1], size);
+            memcpy(last[0], out + i, size), memcpy(last[1], target + i, size);
+            compare_some(last[0], last[1], scale, squares);
+            memcpy(out + i, last[0], size);
         }
         for (int k = 0; k < COMPARED / TL_LANES; k++)
             vf_store(some + k * TL_LANES, squares[k]);
@@ -421,28 +462,29 @@ static double compare_row(const picture_pass *p, int64_t row)
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-/* Takes a row of gradients: those beside the other picture, or as given. */
-static double take_row(const picture_pass *p, int64_t row)
+/* Writes a finished row of the picture, compares it, or takes its gradients; returns a sum of squares. */
+static double finish_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
+    float *kept = p->rows + (row - p->base) * n;
     if (p->l->target)
         return compare_row(p, row);
-    memcpy(p->g_color + (row - p->base) * n, p->l->g_out + row * n, (size_t)n * sizeof(float));
+    if (p->l->g_out)
+        memcpy(kept, p->l->g_out + row * n, (size_t)n * sizeof *kept);
+    else if (row >= p->view->first_row && row < p->view->end_row)
+        memcpy(p->l->out + row * n, kept, (size_t)n * sizeof *kept);
     return 0.0;
 }
 
 static tl_grad_colors colors_of(const picture_pass *p)
 {
     const tl_grad_picture *l = p->l;
-    const int64_t before = p->base * p->view->width * l->n_columns;
-    return (tl_grad_colors){.values = {.attr = l->attr,
-                                       .n_attr = l->n_attr,
-                                       .n_columns = l->n_columns,
-                                       .out = (void *)((uintptr_t)p->g_color - 4 * (uintptr_t)before)},
-                            .corners = p->view->tri,
-                            .faces = l->faces,
-                            .vertices = l->of_points,
-                            .attr = l->of_attr};
+    return (tl_grad_colors){
+        .values = {.attr = l->attr, .n_attr = l->n_attr, .n_columns = l->n_columns, .out = as_picture(p)},
+        .corners = p->view->tri,
+        .faces = l->faces,
+        .vertices = l->of_points,
+        .attr = l->of_attr};
 }
 
 TL_ONCE void pull_clamped_run(const picture_pass *p, int64_t r, int64_t row, int64_t n_pixels)
@@ -459,7 +501,7 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
     const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width;
     const int64_t n_of_face = p->l->faces->n_columns;
     const int32_t *begins = p->l->begins, *faces = p->faces;
-    const float *g_color = p->g_color + (row - p->base) * width * n_columns;
+    const float *gradients = p->rows + (row - p->base) * width * n_columns;
     double *numbers = p->l->faces->sums;
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
         const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
@@ -476,7 +518,7 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
             for (int64_t first = 0; first < n_pixels; first += TL_SUMMED) {
                 const double x = (double)(column + first) - face[FACE_COLUMN];
                 const run_plane plane = plane_of_face(three, x, y);
-                const float *g = g_color + n_columns * (column + first) + c;
+                const float *g = gradients + n_columns * (column + first) + c;
                 vq4 sums[2];
                 sum_up_pixels(&plane, 0, g, (int)(n_pixels - first), n_columns - c < 3 ? (int)(n_columns - c) : 3,
                               n_columns, 1, sums);
@@ -491,41 +533,40 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
 static void close_faces(const picture_pass *p)
 {
     const tl_grad_colors colors = colors_of(p);
-    for (int64_t i = 0; i < p->l->faces->n; i++) {
-        face_at(p, i)[0] = middle_at(p->view, 0, p->column[i]);
-        face_at(p, i)[1] = middle_at(p->view, 1, p->row[i]);
-    }
-    close_colors(p->view, &colors, place_of_three(0) + THREE_SUMS, TL_SUMS_OF_FACE, 1);
+    close_colors(p->view, &colors, place_of_three(0) + THREE_SUMS, TL_SUMS_OF_FACE, p->column, p->row);
 }
 
-/* Rows drawn, their gradients taken and led back, one after the other. */
+/* Rows drawn, finished, led back, one after the other, each in its place: what its pairs move waits until those of the
+ * next row have been found. */
 TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
 {
     const tl_grad_view *view = p->view;
-    const int64_t n = view->width * n_columns;
-    const int is_back = !p->l->out;
+    const int64_t n = view->width * n_columns, first = p->all.first_row, end = p->all.end_row;
+    const int is_back = !p->l->out, has_picture = !p->l->g_out;
     const int64_t taken = view->first_row > 0 ? view->first_row - 1 : 0;
     const int64_t taken_end = view->end_row < view->height ? view->end_row + 1 : view->height;
     double sum = 0.0;
-    for (int64_t row = p->all.first_row; row < view->end_row + 2; row++) {
-        if (row - p->base == TL_ROWS_KEPT) { /* two rows stay */
-            float *const windows[3] = {p->colors, p->g_out, p->g_color};
-            for (int k = 0; k < 3; k++)
-                memcpy(windows[k], windows[k] + (TL_ROWS_KEPT - 2) * n, (size_t)(2 * n) * sizeof(float));
-            p->base = row - 2;
+    for (int64_t row = first; row < view->end_row + ROWS_WAITING; row++) {
+        if (row - p->base == TL_ROWS_KEPT) {
+            memcpy(p->rows, p->rows + (TL_ROWS_KEPT - ROWS_WAITING) * n, (size_t)(ROWS_WAITING * n) * sizeof(float));
+            p->base = row - ROWS_WAITING;
         }
-        if (row < p->all.end_row && !p->l->g_out) {
+        if (row < end && has_picture) {
             draw_row(p, row, n_columns);
-            blend_row(p, is_back ? &p->all : view, row, 0);
+            find_steps(p, row);
         }
-        if (is_back && row > taken && row <= taken_end) {
-            const double found = take_row(p, row - 1);
-            sum += row > view->first_row && row <= view->end_row ? found : 0.0;
-            if (row > view->first_row)
-                blend_row(p, view, row - 1, 1);
+        if (row > first && row <= end && has_picture)
+            move_between(p, row - 1, 0);
+        if (row - 2 >= taken && row - 2 < taken_end) {
+            const double found = finish_row(p, row - 2);
+            sum += row - 2 >= view->first_row && row - 2 < view->end_row ? found : 0.0;
+            if (is_back && row - 2 >= view->first_row)
+                pull_pairs(p, row - 2);
         }
-        if (is_back && row - 2 >= view->first_row)
-            pull_row(p, row - 2, n_columns);
+        if (is_back && row - 3 >= view->first_row && row - 3 < taken_end)
+            move_between(p, row - 3, 1);
+        if (is_back && row - ROWS_WAITING >= view->first_row)
+            pull_row(p, row - ROWS_WAITING, n_columns);
     }
     return sum;
 }

@@ -204,6 +204,20 @@ def test_antialias_of_a_long_edge_is_its_exact_area(degrees):
     np.testing.assert_allclose(by_points[:2], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize("edges", ["area", "silhouette"])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_antialias_of_more_edges_than_are_found_at_once_is_their_exact_area(isa, edges, axis):
+    lows = 3 * np.arange(500)[:, None] + [[1.25, 2.75, 2.75, 1.25]]  # a stripe over two pixels of three
+    points = np.stack(np.broadcast_arrays(lows, [-5.0, -5, 9, 9]), 2).reshape(-1, 2)[:, :: 1 - 2 * axis]
+    quads = 4 * np.arange(500)[:, None, None] + [[0, 1, 2], [0, 2, 3]]
+    with on(isa):
+        size = (4, 1501) if axis else (1501, 4)
+        frags = tl.rasterize(points, quads.reshape(-1, 3), size)
+        smooth = frags.antialias(frags.mask, edges=edges)
+    assert np.array_equal((smooth.T if axis else smooth)[:, :1500], np.tile([0, 0.75, 0.75], (4, 500)))
+
+
 def test_antialias_of_float32_in_either_byte_order_is_float32():
     frags = tl.rasterize([(1, 1), (7, 2), (2, 6)], [(0, 1, 2)], (8, 8))
     picture = np.where(frags.mask, np.float32(0.3), np.float32(0.7))

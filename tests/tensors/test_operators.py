@@ -287,6 +287,17 @@ def loss_of_parts(pos, tri, attr, target, edges="area"):
     return loss.detach(), *torch.autograd.grad(5 * loss, given)
 
 
+@ON_EACH_ISA
+def test_render_of_more_edges_than_are_found_at_once_is_their_exact_area(isa):
+    lows = 3 * torch.arange(682.0)[:, None] + torch.tensor([1.25, 2.75, 2.75, 1.25])
+    rest = torch.tensor([[-5.0, 0, 1], [-5, 0, 1], [5, 0, 1], [5, 0, 1]]).expand(682, 4, 3)
+    pos = torch.cat([(lows / 1024 - 1)[..., None], rest], 2).reshape(1, -1, 4)
+    tri = (4 * torch.arange(682)[:, None, None] + torch.tensor([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    with on(isa):
+        picture = dr.render(CTX, pos, tri, torch.ones(pos.shape[1], 1), (4, 2048))
+    assert torch.equal(picture[0, :, :2046, 0], torch.tensor([0, 0.75, 0.75]).repeat(4, 682))
+
+
 IN_ONE = pytest.mark.parametrize("in_one", [loss_in_one, loss_of_render])
 
 

@@ -192,7 +192,7 @@ cdef class GradientView:
 
     def picture(self, const int32_t[:, ::1] ids, attr: Array, mesh: tuple[Array, Array, Array],
                 codes: tuple[int, float], pixels: tuple[Array | None, Array | None, Array | None],
-                seen: tuple[Array, ...], int64_t n_faces, scratch: tuple[Array, Array, Array],
+                seen: tuple[Array, ...], int64_t n_faces, scratch: tuple[Array, Array, Array, Array],
                 sums: tuple[GradientSums, GradientSums, GradientSums], int64_t first, int64_t end) -> tuple[float, int]:
         """Write rows of a picture of `attr` (V, K) float32, or add their gradients to sums.
 
@@ -219,7 +219,8 @@ cdef class GradientView:
         l.begins, l.run_faces = <int32_t *>first_of(seen[2]), <int32_t *>first_of(seen[3])
         l.of_faces, l.face_step, l.n_faces = <int32_t *>first_of(seen[4]), seen[4].shape[1], n_faces
         l.pairs, l.steps = <void *>first_of(seen[5]), <float *>first_of(seen[6])
-        l.window, l.rast = <float *>first_of(scratch[1]), <float *>first_of(scratch[2])
+        l.window, l.moves = <float *>first_of(scratch[1]), <double *>first_of(scratch[2])
+        l.rast = <float *>first_of(scratch[3])
         l.faces, l.of_points, l.of_attr = &faces.sums, &points.sums, &values.sums
         with nogil:
             found = K.grad_picture(&view, &l)

@@ -147,7 +147,8 @@ class AttributePictures:
                 around.sums("faces", n_triangles, engine.HEAD_OF_FACE + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
                 None if seen else Seen.room(beyond // max(1, width), beyond, n_triangles, n),
                 empty((3, width + engine.IDS_ROOM), np.int32),
-                empty((3 * (engine.ROWS_KEPT * width * n + engine.IDS_ROOM),), np.float32),
+                empty((engine.ROWS_KEPT * width * n + engine.IDS_ROOM,), np.float32),
+                empty((16 * width * n,), np.float64),
                 empty((4 * width,), np.float32),
             ]
 
