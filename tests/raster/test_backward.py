@@ -226,6 +226,39 @@ def test_antialias_of_float32_in_either_byte_order_is_float32():
     assert_same(swapped, frags.antialias(picture))
 
 
+BOTH_WINDINGS = pytest.mark.parametrize("second", [[1, 0, 3], [0, 1, 3]])
+
+
+@BOTH_WINDINGS
+def test_antialias_of_a_surface_that_runs_on_is_the_picture_for_either_winding(second):
+    points = np.array([[-50.0, -31, 0], [70, 55, 0], [50, -70, 5], [-40, 90, 5]])
+    frags = tl.rasterize(points, [[0, 1, 2], second], (24, 24), subpixel_bits=16)
+    assert set(frags.triangle.ravel()) == {0, 1}
+    colours = frags.triangle + 1.0
+    assert np.array_equal(frags.antialias(colours, edges="silhouette"), colours)
+
+
+@BOTH_WINDINGS
+def test_antialias_of_a_surface_that_folds_is_that_of_its_front_for_either_winding(second):
+    points = np.array([[-50.0, -31, 0], [70, 55, 0], [50, -70, 0], [30, -40, 5]])
+    frags = tl.rasterize(points, [[0, 1, 2], second], (24, 24), subpixel_bits=16)
+    alone = tl.rasterize(points, [[0, 1, 2]], (24, 24), subpixel_bits=16)
+    assert np.array_equal(frags.mask, alone.mask)
+    expected = alone.antialias(alone.mask, edges="silhouette")
+    assert (expected != alone.mask).any()
+    assert np.array_equal(frags.antialias(frags.mask, edges="silhouette"), expected)
+
+
+def test_antialias_beside_a_nearer_triangle_that_reaches_behind_the_eye_finds_the_edge_of_the_far_one():
+    x = 4.25 / 4 - 1  # the edge of both, in a picture of 8 pixels
+    near = [[x, -4, -0.5, 1], [x, 4, -0.5, 1], [1, 0, 0.5, -1]]
+    far = [[x, -40, 0.5, 1], [x, 40, 0.5, 1], [-80, 0, 0.5, 1]]
+    frags = tl.rasterize(np.array([*near, *far]), [[0, 1, 2], [3, 4, 5]], (8, 8))
+    assert np.array_equal(frags.triangle, np.tile([1, 1, 1, 1, 0, 0, 0, 0], (8, 1)))
+    smooth = frags.antialias(frags.triangle.astype(np.float64))
+    np.testing.assert_allclose(smooth, np.tile([1, 1, 1, 1, 0.25, 0, 0, 0], (8, 1)), rtol=0, atol=1e-12)
+
+
 def test_antialias_of_a_crease_of_flat_colours_is_exact():
     points = np.array([[-50.0, -31], [70, 55], [50, -70], [-40, 90]])
     triangles = np.array([[0, 1, 2], [1, 0, 3]])

@@ -10,7 +10,8 @@ from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
 from topleft._core.raster.clusters import Backoff, Clusters
 from topleft._core.raster.view import View
 from topleft._meshes.picture import rounds
-from topleft._meshes.picture.instances import PlacedScene, rasterize_shot, scene_through
+from topleft._meshes.picture.buffers import rasterize_shot
+from topleft._meshes.picture.instances import PlacedScene, scene_through
 from topleft._meshes.picture.rounds import count_layers, survey_instances
 from topleft._meshes.picture.shot import Shot
 

@@ -11,7 +11,7 @@ import topleft as tl
 from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.peel import peel_meshes
 from topleft._meshes.picture.blended import blended_masks
-from topleft._meshes.picture.instances import draw_nearest, place
+from topleft._meshes.picture.buffers import draw_nearest, place
 from topleft._meshes.picture.shade import ShadingOptions
 from topleft._meshes.picture.shot import Shot
 

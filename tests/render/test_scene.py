@@ -14,7 +14,7 @@ from topleft._core.base.color import srgb_tables
 from topleft._core.raster import choices
 from topleft._core.raster.snap import Snapped
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.picture import instances, rounds, shade
+from topleft._meshes.picture import buffers, instances, rounds, shade
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.render import rasterize_mesh
 from topleft._meshes.picture.shot import Shot
@@ -340,7 +340,7 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
     mask = tl.silhouette(tl.Scene(standing), camera, (60, 40), **mask_options)
     force(pays_to_cluster=True, pays_to_draw_instances=True, pays_to_share_instances=True)
     monkeypatch.setattr(rounds, "ROUND", int(rng.choice([1, 4])))
-    for module in (placed, instances):
+    for module in (placed, instances, buffers):
         monkeypatch.setattr(module, "INT32_MAX", most_ids)
     with on(isa):
         found = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)
@@ -366,7 +366,7 @@ def test_bands_of_instances_share_the_rows(height, n, monkeypatch):
     at = np.tile(np.eye(4), (10, 1, 1))
     at[:, 1, 3], at[:, 2, 3] = np.repeat([-2, -2, 0, 1, 90], 2), np.tile([0, 20], 5)
     standing = [tl.Instance(BALLS[0], matrix) for matrix in at]
-    seen = instances.place(Shot.of(tl.Scene(standing), camera, (60, height)), {})[0]
+    seen = buffers.place(Shot.of(tl.Scene(standing), camera, (60, height)), {})[0]
     with choices.forced(scene_triangles=0, scene_rows=0):
         for some in (range(10), (0, 2), (8,), (1, 3, 5), (4, 4, 4)):
             tops = seen.split_rows(np.array(some), height, n)

@@ -12,7 +12,7 @@ from engine_cases import ON_EACH_ISA, on
 import topleft as tl
 from topleft._core.base.color import id_colors, srgb_tables
 from topleft._core.raster.cluster_draw import ClusteredMesh
-from topleft._meshes.picture.instances import rasterize_shot
+from topleft._meshes.picture.buffers import rasterize_shot
 from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
 from topleft._meshes.picture.shot import Shot
 from topleft.methods.reference.sampling import mean

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -267,20 +266,10 @@ def look_up_vjp(
     return [tensor_of(one, uv) for one in (*(g_levels if of_levels else [None] * len(levels)), *where)]
 
 
-#: Triangles, and what lies across their edges, of the last calls.
-known: deque[tuple[NDArray[np.int32], NDArray[np.int32]]] = deque(maxlen=4)
-
-
 @operator("(Tensor tri) -> Tensor", lambda tri: tri.new_empty(tri.shape, dtype=torch.int32))
 def halves_across(tri: Tensor) -> Tensor:
     """Return the triangle across each edge."""
-    own = numpy_of(tri.to(torch.int32))
-    for triangles, across in list(known):
-        if triangles.shape == own.shape and np.array_equal(triangles, own):
-            return torch.from_numpy(across.copy())
-    found = tensors.halves_across(own)
-    known.append((own.copy(), found))
-    return torch.from_numpy(found.copy())
+    return torch.from_numpy(tensors.halves_across(numpy_of(tri.to(torch.int32))).copy())
 
 
 @operator(

@@ -11,6 +11,7 @@ High-Performance Differentiable Rendering", ACM Transactions on Graphics, 2020.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -366,7 +367,21 @@ def smooth_vjp(
     return g_color, g_pos
 
 
+#: Triangles, and what lies across their edges, of the last calls.
+known: deque[tuple[NDArray[np.int32], NDArray[np.int32]]] = deque(maxlen=4)
+
+
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return what `find_halves_across` does, of the last meshes as it was found; it is not to be written to."""
+    for triangles, across in list(known):
+        if triangles.shape == tri.shape and np.array_equal(triangles, tri):
+            return across
+    found = find_halves_across(tri)
+    known.append((tri.copy(), found))
+    return found
+
+
+def find_halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return for each edge 3 * the triangle across it + its opposite corner there, int32 (T, 3); -1: none.
 
     Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next; there, and

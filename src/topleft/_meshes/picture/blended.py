@@ -30,9 +30,10 @@ from topleft._core.raster.view import View
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import AlphaMode, Material
 from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
+from topleft._meshes.picture.buffers import place
 from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.holes import Mask, cuts_of, draw_solid
-from topleft._meshes.picture.instances import PlacedScene, place
+from topleft._meshes.picture.instances import PlacedScene
 from topleft._meshes.picture.look import kept_look
 from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot

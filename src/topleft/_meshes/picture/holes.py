@@ -28,8 +28,9 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.picture.bend import BentMesh
+from topleft._meshes.picture.buffers import draw_nearest, lent, place, rasterize_shot
 from topleft._meshes.picture.fragments import SceneFragments
-from topleft._meshes.picture.instances import PlacedScene, draw_nearest, lent, place, rasterize_shot
+from topleft._meshes.picture.instances import PlacedScene
 from topleft._meshes.picture.look import ShadingInputs, Surface, kept_look
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed

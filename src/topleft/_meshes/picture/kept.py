@@ -23,8 +23,9 @@ from topleft._core.raster.view import View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.blended import blended_masks
+from topleft._meshes.picture.buffers import lent
 from topleft._meshes.picture.holes import cuts_of
-from topleft._meshes.picture.instances import DrawnScene, PlacedScene, lent
+from topleft._meshes.picture.instances import DrawnScene, PlacedScene
 from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import NUMBERS, Lit, ShadingOptions, ShownInstance
 from topleft._meshes.scene.scene import EYE, scene_of

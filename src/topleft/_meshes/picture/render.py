@@ -22,11 +22,11 @@ from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
 from topleft._meshes.picture.blended import blended_masks, transparent_pass
+from topleft._meshes.picture.buffers import rasterize_shot
 from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
 from topleft._meshes.picture.edges import draw_all_edges
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.holes import draw_visible
-from topleft._meshes.picture.instances import rasterize_shot
 from topleft._meshes.picture.kept import kept_picture
 from topleft._meshes.picture.scene_shade import shade_by
 from topleft._meshes.picture.shade import LookOptions, ShadingOptions

@@ -15,8 +15,8 @@ from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
+from topleft._meshes.picture.buffers import cover_shot
 from topleft._meshes.picture.cloud import draw_share
-from topleft._meshes.picture.instances import cover_shot
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption, SamplingOption

@@ -20,9 +20,9 @@ from topleft._core.raster.composite import composite
 from topleft._core.raster.peel import DepthLayers
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import Camera, CameraLike
+from topleft._meshes.picture.buffers import peel_shot
 from topleft._meshes.picture.fragments import SceneDepthLayers
 from topleft._meshes.picture.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
-from topleft._meshes.picture.instances import peel_shot
 from topleft._meshes.picture.scene_shade import shade
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
