@@ -93,30 +93,6 @@ def samples_beside_one() -> Scenes:
         yield name, {way: partial(read, draws[way], what) for way, (_, what) in SAMPLES.items()}
 
 
-def fresh_beside_kept() -> Scenes:
-    """Verbs that return arrays of their own beside `Rasterizer`, which overwrites its own: 1,000 triangles."""
-    import topleft as tl
-
-    rng, n = np.random.default_rng(0), 1000
-    for side in (64, 256, 640, 1024, 2048, 4096):
-        middles = np.repeat(rng.uniform(0, side, (n, 2)), 3, axis=0)
-        corners = (middles + rng.normal(0, side / 50, (3 * n, 2))).astype(np.float32)
-        deep = np.column_stack([corners, rng.random(len(corners), np.float32)])
-        triangles = np.arange(3 * n, dtype=np.int32).reshape(-1, 3)
-        colors = rng.integers(0, 256, (n, 4)).astype(np.uint8)
-        size, kept = (side, side), tl.Rasterizer((side, side), threads=1)
-        for verb, arrays, sampling in (
-            ("coverage", (corners, triangles), "center"), ("coverage", (corners, triangles), "area"),
-            ("overdraw", (corners, triangles), "center"), ("fill", (corners, triangles, colors), "center"),
-            ("rasterize", (deep, triangles), "center"), ("rasterize", (deep, triangles), "msaa4"),
-            ("wireframe", (corners, triangles), None),
-        ):  # fmt: skip
-            options = {} if sampling is None else {"sampling": sampling}
-            fresh = partial(getattr(tl, verb), *arrays, size, threads=1, **options)
-            own = partial(getattr(kept, verb), *arrays, **options)
-            yield f"{side}x{side}, {verb} {sampling or ''}".strip(), {"Rasterizer": own, "fresh arrays": fresh}
-
-
 def layers_beside_picture() -> Scenes:
     """Each layer of a view beside its picture: a mesh of 70,000 triangles at 512x512; calls share nothing."""
     import topleft as tl
@@ -154,8 +130,7 @@ def levels_beside_whole() -> Scenes:
                 }  # fmt: skip
 
 
-TERRAINS = (1_000_000, 4_000_000, 10_000_000)
-"""Triangles."""
+TERRAINS = (1_000_000, 4_000_000, 10_000_000)  # triangles
 
 
 def parts_beside_whole() -> Scenes:
@@ -270,7 +245,6 @@ class Pairs:
 PAIRS = {
     "large": Pairs(verbs_beside_fill, "time one large triangle beside a fill of the same memory", 60),
     "samples": Pairs(samples_beside_one, "time several samples a pixel beside one", 9, 0.2),
-    "fresh": Pairs(fresh_beside_kept, "time verbs that return arrays of their own beside `Rasterizer`", 30),
     "layers": Pairs(layers_beside_picture, "time each layer of a view beside its picture", 40),
     "tolerance": Pairs(levels_beside_whole, "time views with `tolerance=` beside the same without", 31),
     "terrain": Pairs(parts_beside_whole, "time views of terrains with `tolerance=` beside the same without", 15),
