@@ -200,7 +200,20 @@ def test_parts_outside_of_the_picture_are_coarse(ground):
     assert 0 < behind.sum() < 0.2 * (hills().vertices[ground.triangles][:, :, 1].max(axis=1) < 0.4).sum()
 
 
-def test_scene_of_a_parted_mesh_has_whole_levels(ground):
+@pytest.mark.parametrize("options", [{}, {"sampling": "msaa4"}, {"subpixel_bits": "exact"}, {"edges": True}], ids=str)
+def test_scene_of_one_in_parts_is_the_mesh(painted, options):
+    scene = tl.Scene([painted])
+    for draw in (tl.render, tl.rasterize_mesh)[: 1 if options else 2]:
+        one, other = (draw(subject, ALONG, SIZE, tolerance=0.5, **options) for subject in (painted, scene))
+        same = np.array_equal(one, other) if draw is tl.render else np.array_equal(one.triangle, other.triangle)
+        assert same
+    aside = np.eye(4)
+    aside[0, 3] = 0.25
+    moved = tl.rasterize_mesh(tl.Scene([(painted, aside)]), ALONG, SIZE, tolerance=0.5)
+    assert moved.triangle.max() >= len(painted.triangles)  # rows of parts of coarser levels
+
+
+def test_scene_of_several_has_whole_levels(ground):
     scene = tl.Scene([ground, (ground, np.diag([1.0, 1, -1, 1]))])
     frags = tl.rasterize_mesh(scene, ALONG, SIZE, tolerance=0.5)
     assert np.array_equal(frags.triangle, tl.rasterize_mesh(scene, ALONG, SIZE).triangle)

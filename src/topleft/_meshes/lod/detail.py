@@ -131,8 +131,8 @@ def choose_detail(
     each other, and their light, may differ by more.
 
     Of a mesh of 500,000 triangles or more each part has a level of its own where that leaves at most half of the
-    triangles. `rasterize_mesh` and `render` draw these parts where the mesh stands alone, without edges and without
-    anything that shows through; otherwise one level is drawn, which all of the mesh allows.
+    triangles. `rasterize_mesh` and `render` draw these parts where the mesh is the only one, in a scene, too, without
+    edges and without anything that shows through; otherwise one level is drawn, which all of the mesh allows.
 
     It is the mesh itself where no bound holds: with a lens; where the mesh may reach the near or the far plane or the
     eye; where a side is culled, since turns of triangles are not bounded; where materials cut holes.
