@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from outlines import SIZE, SLACK, farthest_px
+from outlines import SIZE, check_outlines
 
 import topleft as tl
 from topleft._apps.cli import main
@@ -12,16 +12,6 @@ from topleft._meshes.camera.matrices import orbit_view
 
 BLOB = tl.Mesh(*tl.scenes.shape("blob", n_triangles=6000))
 KNOT = tl.Mesh(*tl.scenes.shape("torus-knot", segments=128, sections=16))
-
-
-def check_outlines(mesh, camera, tolerance):
-    """Compare outlines both ways; return the level."""
-    found = tl.choose_detail(mesh, camera, SIZE, tolerance=tolerance)
-    assert found.bound_px <= tolerance
-    matrix = camera.clip_from_world(SIZE)
-    for one, other in ((mesh, found.mesh), (found.mesh, mesh)):
-        assert farthest_px(one, other, matrix) <= found.bound_px + SLACK
-    return found.level
 
 
 @settings(deadline=None, max_examples=15)

@@ -37,3 +37,13 @@ def farthest_px(one, other, matrix):
 #: A point lies in a square of a sample whose middle is half a diagonal away; both surfaces are snapped to 1/256 of a
 #: sample, by 1/512 along each axis.
 SLACK = (np.sqrt(0.5) + 2 * np.sqrt(2) / 512) / FINENESS
+
+
+def check_outlines(mesh, camera, tolerance):
+    """Compare the outlines of a mesh and of what is drawn of it within a tolerance, both ways; return its level."""
+    found = tl.choose_detail(mesh, camera, SIZE, tolerance=tolerance)
+    assert found.bound_px <= tolerance
+    matrix = camera.clip_from_world(SIZE)
+    for one, other in ((mesh, found.mesh), (found.mesh, mesh)):
+        assert farthest_px(one, other, matrix) <= found.bound_px + SLACK
+    return found.level
