@@ -309,6 +309,10 @@ def texels_vjp(
     return g_levels, g_uv, g_da, g_bias
 
 
+#: Triangles whose outline is worth a thread: 0.1 ms.
+MIN_TRIANGLES_PER_PART = 10_000
+
+
 @dataclass(frozen=True)
 class Outline:
     """Silhouette edges in pictures, of `outline_of`: `across` (T, 3), `places` (B or 1, V, 2), `edges` (B or 1, T)."""
@@ -324,13 +328,18 @@ class Outline:
 
 def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outline:
     """Return the silhouette edges of triangles and the places of vertices; `across` is that of `halves_across`."""
-    places, edges = empty((*pos.shape[:2], 2), np.float64), empty((len(pos), len(grid.tri)), np.int32)
+    n, n_threads = len(pos), grid.bands.threads
+    places, edges = empty((*pos.shape[:2], 2), np.float64), empty((n, len(grid.tri)), np.int32)
+    sides, views = empty(edges.shape, np.int32), [grid.view(one) for one in pos]
+    n_parts = max(1, min(n_threads, len(grid.tri) // MIN_TRIANGLES_PER_PART))
 
-    def write(first: int, end: int) -> None:
-        for i in range(first, end):
-            grid.view(pos[i]).outline(across, places[i], edges[i])
+    for has_sides in (False, True):
 
-    run_parts(write, len(pos), grid.bands.threads)
+        def write(i: int, _: int, *, has_sides: bool = has_sides) -> None:
+            k, part = divmod(i, n_parts)
+            views[k].outline((across, places[k], edges[k]), sides[k], has_sides, part, n_parts)
+
+        run_parts(write, n * n_parts, n * n_parts, n_threads)
     return Outline(across, places, edges)
 
 
