@@ -20,7 +20,7 @@ class Added:
 
 
 def add_up(monkeypatch, threads, work):
-    """Work on four bands; returns in which order they were added, what `work` returned, and how many rooms there were."""
+    """Work on four bands; returns the order in which they were added, what `work` returned, and the number of rooms."""
     order, made = [], []
 
     def make(_):
