@@ -208,13 +208,7 @@ def render_batch(
 
 
 def workers_on(executor: object, time_limit: float | None) -> Workers | None:
-    """Return the workers of a Dask cluster, or those of `workers_of`.
-
-    Raises
-    ------
-    ValueError
-        If a time limit is no positive number, or not for a cluster.
-    """
+    """Return the workers of a Dask cluster, which alone has a time limit, or of `workers_of`; else a `ValueError`."""
     limit = None if time_limit is None else as_number("time_limit", time_limit)
     if limit is not None and not limit > 0:
         raise ValueError(f"time_limit must be positive, got {time_limit}")

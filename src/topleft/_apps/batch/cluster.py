@@ -92,15 +92,7 @@ class ClusterWorkers(Workers):
         return max(1, sum(self._client.nthreads().values()))
 
     def start(self) -> None:
-        """Look whether all workers have the package.
-
-        Raises
-        ------
-        MissingPackageError
-            If one has not.
-        TopleftError
-            If one has another version.
-        """
+        """Look whether all workers have the package, of this version; errors as of `check_workers`."""
         check_workers(self._client)
 
     def prepare(self, jobs: Jobs) -> Jobs:

@@ -62,15 +62,7 @@ def _put_off(number: signal.Signals) -> Iterator[None]:
 
 
 def workers_of(executor: object) -> Workers | None:
-    """Return the workers of an executor; None for the calling thread.
-
-    Raises
-    ------
-    TypeError
-        If it is neither a number nor an executor.
-    ValueError
-        If the number is below 1.
-    """
+    """Return the workers of an executor or of a number from 1 on, else an error; None for the calling thread."""
     if executor is None:
         return None
     if isinstance(executor, int) and not isinstance(executor, bool):

@@ -42,16 +42,10 @@ class ValueLevels(NamedTuple):
         return self.texels.shape[1]
 
     def look_up(self, ids: NDArray[np.int32], uv: F32, slopes: F32 | None, background: float) -> F32:
-        """Return the values (P, C) of pixels.
+        """Return the values (P, C) of pixels with `ids` (P,) int32; -1: the background.
 
-        Parameters
-        ----------
-        ids : (P,) int32
-            -1 where the value is the background.
-        uv : (P, 2) float32
-        slopes : (P, 2, 2) float32, or None
-            Slopes of u and v, the first axis, from pixel to pixel along x and y; None unless there are halvings.
-        background : float
+        `uv` (P, 2) float32. `slopes` (P, 2, 2) float32: of u and v, the first axis, from pixel to pixel along x and y;
+        None unless there are halvings.
         """
         out = np.empty((len(ids), self.n_channels), np.float32)
         engine.fill_texels(self.texels, self.rows, self.codes, ids, uv, slopes, background, out)
@@ -59,23 +53,11 @@ class ValueLevels(NamedTuple):
 
 
 def as_levels(texture: object, filter: str, wrap: object, encoding: str | None) -> ValueLevels:  # noqa: A002
-    """Return the texels of a lookup.
+    """Return the texels of a lookup: of a `Texture`, which keeps its levels, or of (H, W) or (H, W, C) real numbers.
 
-    Parameters
-    ----------
-    texture : Texture, or (H, W) or (H, W, C) array_like of real numbers
-        A `Texture` tells filter, wrap and encoding itself, and keeps its levels.
-    filter : {"trilinear", "bilinear", "nearest", "pixelated"}
-    wrap : {"repeat", "clamp", "mirror"}, or a pair of them
-    encoding : {"linear", "srgb"}, optional
-        "srgb": the first three channels are decoded to light. Unsigned bytes become 0 to 1 either way.
-
-    Raises
-    ------
-    TypeError
-        If it holds no real numbers.
-    ValueError
-        If it has another shape or no texels, or an option is unknown.
+    A `Texture` tells filter, wrap (one word, or two for u and v) and encoding itself. "srgb": the first three channels
+    are decoded to light; otherwise "linear". Unsigned bytes become 0 to 1 either way. Anything but real numbers is a
+    `TypeError`, another shape, no texels or an unknown option a `ValueError`.
     """
     if hasattr(texture, "value_levels"):
         found: ValueLevels = texture.value_levels()

@@ -184,10 +184,8 @@ def polygons(
 def in_crs_of(size: object, rings: Any, crs: object) -> RingSet:
     """Return the rings in the CRS of a grid, if that has one.
 
-    Raises
-    ------
-    ValueError
-        If the rings say that they are of another one, and `crs` does not; if `crs` is given and the grid has none.
+    A `ValueError` if they say that they are of another one, and `crs` does not; or if `crs` is given and the grid has
+    none.
     """
     given, own, of_grid = as_rings(rings), crs_text(crs), size.crs if isinstance(size, Grid) else None
     if of_grid is None:

@@ -72,11 +72,8 @@ class SampledLimits(NamedTuple):
 def forced(**values: Any) -> Iterator[None]:
     """Force choices, for the whole process, while the context lasts.
 
-    Parameters
-    ----------
-    **values
-        By the name of a function of this module: its answer, or a function that gives it. By the name of a row of
-        `Costs`: its value.
+    By the name of a function of this module: its answer, or a function that gives it. By that of a row of `Costs`: a
+    value.
     """
     names, table, rows = globals(), cost_table(), Costs.__dataclass_fields__.keys()
     costs = {name: value for name, value in values.items() if name in rows}

@@ -681,15 +681,7 @@ CameraLike: TypeAlias = Camera | npt.NDArray[Any]
 
 
 def as_camera(camera: object, name: str = "camera") -> Camera:
-    """The camera, or that of a matrix (4, 4), clip from world.
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
-    ValueError
-        As `Camera.from_matrix` does.
-    """
+    """The camera, or that of a matrix (4, 4) by `Camera.from_matrix`; a `TypeError` if it is neither."""
     if isinstance(camera, Camera):
         return camera
     wish = f"{name} must be a Camera or a (4, 4) matrix, clip from world"

@@ -125,21 +125,11 @@ def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
 
 
 def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = False) -> F64:
-    """The place of a camera that fits the box round the picture of all points into the middle of its frame.
+    """The place of a camera that fits the box round the picture of points (N, 3) into the middle of its frame.
 
-    In the middle also along the axis that it does not fill, to within 1e-6 of its width.
-
-    Parameters
-    ----------
-    points : (N, 3) float64
-        In eye axes: z towards the viewer.
-    tan_x, tan_y : float
-        Tangents of half the fields of view; without perspective half the sides of the frame; only their ratio counts.
-
-    Returns
-    -------
-    (3,) float64
-        The eye; without perspective x and y, and half the height of the frame.
+    In the middle also along the axis that it does not fill, to within 1e-6 of its width. Points are in eye axes: z
+    towards the viewer. `tan_x`, `tan_y`: tangents of half the fields of view; without perspective half the sides of the
+    frame; only their ratio counts. Returns the eye; without perspective x and y, and half the height of the frame.
     """
     x, y, z = points.T
     if ortho:

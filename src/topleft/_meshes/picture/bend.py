@@ -60,43 +60,22 @@ cos(w/2) < 2^-12."""
 
 
 class SubdividedTriangles(NamedTuple):
-    """The parts of triangles that are not drawn as they are.
+    """The parts of triangles that are not drawn as they are."""
 
-    Attributes
-    ----------
-    source : (T',) int32
-        The triangle of the mesh that each triangle of the bent mesh is, or is a part of.
-    rows : (P,)
-        The triangles that are parts.
-    weights : (P, 3, 3) float64
-        Each corner of a part as a mean of the corners of its triangle.
-    is_outline : (P, 3) uint8
-        Which sides (0-1, 1-2, 2-0) of a part lie on a side of its triangle.
-    """
-
-    source: I32
-    rows: npt.NDArray[np.intp]
-    weights: F64
-    is_outline: npt.NDArray[np.uint8]
+    source: I32  # (T',): the triangle of the mesh that each triangle of the bent mesh is, or is a part of
+    rows: npt.NDArray[np.intp]  # (P,): the triangles that are parts
+    weights: F64  # (P, 3, 3): each corner of a part as a mean of the corners of its triangle
+    is_outline: npt.NDArray[np.uint8]  # (P, 3): which sides (0-1, 1-2, 2-0) of a part lie on a side of its triangle
 
 
 @dataclass(frozen=True, eq=False)
 class BentMesh:
-    """Triangles that a camera without lens draws as the lens would show the mesh.
-
-    Attributes
-    ----------
-    points_eye : (V', 3) float64
-        Eye space, for `Camera.clip_from_eye`. First the vertices of the mesh that are used, then those of parts.
-    triangles : (T', 3) int32
-        Rows of `points_eye`; triangles that the lens cannot see are left out.
-    parts : SubdividedTriangles or None
-        None: the triangles are those of the mesh.
-    """
+    """Triangles that a camera without lens draws as the lens would show the mesh."""
 
     points_eye: F64
-    triangles: I32
-    parts: SubdividedTriangles | None
+    """(V', 3), for `Camera.clip_from_eye`: first the vertices of the mesh that are used, then those of parts."""
+    triangles: I32  # (T', 3): rows of `points_eye`; triangles that the lens cannot see are left out
+    parts: SubdividedTriangles | None  # None: the triangles are those of the mesh
 
     __setstate__ = set_aligned
 
@@ -317,24 +296,9 @@ def bend(
     *,
     near_clip: bool = True,
 ) -> BentMesh:
-    """The mesh as a lens in front of the camera sees it in a picture of this size.
+    """The mesh, vertices (V, 3) in the world, as a lens in front of the camera sees it in a picture of this size.
 
-    Parameters
-    ----------
-    vertices : (V, 3) float
-        World positions.
-    triangles : (T, 3) integers
-    camera : Camera
-    lens : Lens
-        That of the camera.
-    size : (width, height), pixels
-        Of the whole picture.
-    near_clip : bool
-        Whether triangles nearer than the near plane may be left out.
-
-    Returns
-    -------
-    BentMesh
+    `near_clip`: whether triangles nearer than the near plane may be left out.
     """
     projection = camera.clip_from_eye(size)
     # A place (x, y) in the image plane is the direction (x, -y, -1) in eye axes.

@@ -32,13 +32,7 @@ NOWHERE_PX = 1e12
 def draw_cloud(
     cloud: Points, camera: Camera, size: tuple[int, int], *, depth_test: str | None = "less", **options: Any
 ) -> PointFragments:
-    """The visibility buffer of a cloud; options as those of `points`.
-
-    Raises
-    ------
-    ValueError
-        If an option has no meaning for points.
-    """
+    """The visibility buffer of a cloud; options as of `points`, a `ValueError` for those without a meaning."""
     if depth_test != "less":
         raise ValueError(f"points are drawn with depth_test 'less', got {depth_test!r}")
     if options.get("cull") not in (None, "none"):
@@ -92,10 +86,7 @@ def w_of(bent: F64, projection: F64) -> F64:
 def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:
     """The picture (H, W, 4) of a cloud: its colours, lit where it has normals.
 
-    Raises
-    ------
-    ValueError
-        If an option has no meaning for points.
+    A `ValueError` if an option has no meaning for points.
     """
     if options.mode is Shading.MATCAP or options.material is not None or options.environment is not None:
         raise ValueError("points have colours of their own: they take neither a material, a matcap nor an environment")
@@ -180,10 +171,7 @@ def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
 def normals_at(cloud: Points, camera: Camera, turn: F64) -> F64:
     """Unit normals (N, 3) of points on the side that is seen, turned from eye space by a matrix (3, 3); 0: none.
 
-    Raises
-    ------
-    ValueError
-        If there are no normals.
+    A `ValueError` if there are no normals.
     """
     if cloud.normals is None:
         raise ValueError("normals need points that have them")

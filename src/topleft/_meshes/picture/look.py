@@ -47,46 +47,26 @@ MOST_TABLES = 256
 
 @dataclass(frozen=True, eq=False)
 class CameraRays:
-    """The camera's fields of `tl_shading` in csrc/shading.h, in a shading space with its origin at `center`.
-
-    Attributes
-    ----------
-    eye : (3,) float64
-        Where the camera is; without perspective the unit vector to it.
-    ray : (4, 3) float64
-        The ray of pixel position (0, 0), and its steps per column, per row and, without perspective, along the depth.
-    eye_from, origin : (3, 3) and (3,) float64
-        Eye space from shading space: `eye_from @ p + origin` up to a scale.
-    scale : float
-        Units of eye space in one of the shading space.
-    distance_start, distance_scale : float
-        The distance along the view: `start + scale * w`, or `start + scale * depth` without perspective.
-    """
+    """The camera's fields of `tl_shading` in csrc/shading.h, in a shading space with its origin at `center`."""
 
     has_perspective: bool
-    eye: F64
+    eye: F64  # (3,): where the camera is; without perspective the unit vector to it
     ray: F64
-    eye_from: F64
-    origin: F64
-    scale: float
-    distance_start: float
+    """(4, 3): of pixel position (0, 0), and its steps per column, per row and, without perspective, along the depth."""
+    eye_from: F64  # (3, 3): eye space from shading space is eye_from @ p + origin, up to a scale
+    origin: F64  # (3,)
+    scale: float  # units of eye space in one of the shading space
+    distance_start: float  # along the view: start + scale * w, or start + scale * depth without perspective
     distance_scale: float
 
 
 class ShadingMesh:
-    """A mesh as the shading kernels read it.
+    """A mesh as the shading kernels read it; `positions` (V, 3) are those of the mesh, or stretched.
 
-    Attributes
-    ----------
-    positions : (V, 3) float
-        As in the mesh, or stretched.
-    center : (3,) float64
-        The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
-        float32 is fine enough.
-    normals : (N, 4) float32
-        Unit normals of the vertices, then of creased corners, 0 where there is none, and 1.
-    colors : (V, 4) float32, optional
-        sRGB of the vertices, 0 to 255, or their light, 0 to 1, and opacity, 0 to 1.
+    `center`: (3,) float64, the middle of the box round the vertices in use: the origin of the space that light is
+    computed in, so that float32 is fine enough. `normals`: (N, 4) float32, unit normals of the vertices, then of
+    creased corners, 0 where there is none, and 1. `colors`: (V, 4) float32, if any: sRGB of the vertices, 0 to 255, or
+    their light, 0 to 1, and opacity, 0 to 1.
     """
 
     def __init__(self, mesh: Mesh, stretch: F64 | None = None) -> None:
@@ -257,19 +237,10 @@ def light_rows(lights: Sequence[Light]) -> F64:
 class ShadingInputs:
     """The numbers of instances in a picture, as the kernels read them, a table each.
 
-    Parameters
-    ----------
-    shown
-        The mesh of each snapped, as drawn, the mesh itself, and its surface.
-    camera : Camera
-    places : (N, 4, 4) float64
-        Where each mesh stands in the world.
-    size : (width, height), pixels
-    finds_inverse_w : bool
-        Whether 1/w is found for the vertices that show, where it can be; otherwise for all.
+    `shown`: of each the mesh snapped, as drawn, the mesh itself, and its surface; `places` (N, 4, 4): where it stands
+    in the world. `finds_inverse_w`: whether 1/w is found for the vertices that show, where it can be; otherwise for
+    all.
 
-    Notes
-    -----
     Light needs angles and lengths as they are in eye space. A mesh whose matrix to it changes angles, or mirrors, is
     stretched first, by a triangular matrix that leaves a rotation of the other. That comes from the products of its
     columns, rounded to 40 bits, so that it stays wherever the instance and the camera turn.

@@ -356,20 +356,8 @@ def shade_normals(
 ) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
-    Parameters
-    ----------
-    shown
-        At least the instances that show, in the order of their ids.
-    ids : (H, W) int32
-    camera : Camera
-        That of the picture.
-    turn : (3, 3) float64
-        From eye space to the space of the result.
-    threads : int, optional
-        Never changes a bit.
+    `shown`: at least the instances that show, in the order of their ids. `turn`: (3, 3), from eye space to the result.
 
-    Notes
-    -----
     A triangle seen from behind has its normals turned round as a whole, never pixel by pixel: so a mesh whose faces are
     inverted looks like one whose faces are not, and no edge of light runs through a triangle. Where those of the
     corners cancel, or there are none, it is the normal of the face.

@@ -150,13 +150,7 @@ class Facts:
 def find_facts(
     vertices: ArrayLike, triangles: ArrayLike, view: View, verb: str, outputs: tuple[str, ...], test: DepthTest | None
 ) -> tuple[Facts, NDArray[np.int32]]:
-    """Return the facts of a scene, and a copy of its triangles that nobody changes.
-
-    Raises
-    ------
-    ValueError, TypeError, IndexError
-        As the verb would.
-    """
+    """Return the facts of a scene, and a copy of its triangles that nobody changes; errors as of the verb."""
     decided = count_decided(vertices, triangles, view) if view.is_exact else None
     asked, view = view, replace(view, is_exact=False)  # the census is that of the snapped triangles
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)

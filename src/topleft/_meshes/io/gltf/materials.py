@@ -52,13 +52,7 @@ class Materials:
         self._pictures: dict[int, npt.NDArray[np.uint8] | None] = {}
 
     def material(self, index: Any) -> Material:
-        """A material of the file.
-
-        Raises
-        ------
-        MeshError
-            If there is none.
-        """
+        """A material of the file; a `MeshError` if there is none."""
         row = entry(self._tree, "materials", index)
         if index not in self._materials:
             self._source.budget.spend("max_nodes", 1)
@@ -264,13 +258,7 @@ def _wrap_of(sampler: Tree) -> tuple[WrapOption, WrapOption]:
 
 
 def transform_of(row: Tree) -> npt.NDArray[np.float64]:
-    """The matrix (2, 3) of KHR_texture_transform, for v upwards.
-
-    Raises
-    ------
-    MeshError
-        If it holds other values than numbers.
-    """
+    """The matrix (2, 3) of KHR_texture_transform, for v upwards; a `MeshError` if it holds no numbers."""
     angle = _number(row, "rotation", 0)
     (du, dv), (su, sv) = _numbers(row, "offset", (0, 0)), _numbers(row, "scale", (1, 1))
     cos, sin = engine.cosine_and_sine(math.degrees(angle))
