@@ -9,7 +9,7 @@ Image Warping", 1989 (the footprint of a pixel from derivatives).
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32
 from topleft._core.base.arrays import as_array
 from topleft._core.base.color import LIGHT_OF_SRGB, decode_srgb
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MOST_KEPT_BYTES = 1 << 27
@@ -26,6 +26,8 @@ MOST_KEPT_BYTES = 1 << 27
 
 FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2, "pixelated": 3}  # tl_filter in csrc/shading.h
 WRAP_CODES = {"repeat": 0, "clamp": 1, "mirror": 2}  # tl_wrap
+HALVING = ("trilinear", "pixelated")
+"""Filters that look at halvings of the picture."""
 
 
 class ValueLevels(NamedTuple):
@@ -63,13 +65,13 @@ def as_levels(texture: object, filter: str, wrap: object, encoding: str | None) 
         found: ValueLevels = texture.value_levels()
         return found
     encoding = "linear" if encoding is None else encoding
-    check_choice("filter", filter, get_args(FilterOption))
-    check_choice("encoding", encoding, get_args(EncodingOption))
+    parse(FilterOption, "filter", filter)
+    parse(EncodingOption, "encoding", encoding)
     wraps = (wrap, wrap) if isinstance(wrap, str) else wrap
     if not isinstance(wraps, tuple | list) or len(wraps) != 2:
         raise ValueError(f"wrap must be one word, or two for u and v, got {wrap!r}")
     for one in wraps:
-        check_choice("wrap", one, get_args(WrapOption))
+        parse(WrapOption, "wrap", one)
     array = as_array("texture", texture)  # type: ignore[arg-type]
     if array.dtype.kind not in "fiub":
         raise TypeError(f"texture must be a Texture or real numbers, got dtype {array.dtype}")
@@ -98,7 +100,7 @@ def levels_of(values: F32, filter: str, wraps: tuple[str, str]) -> ValueLevels: 
     """Return contiguous values (H, W, C) with their halvings, where the filter looks at those."""
     height, width, n_channels = values.shape
     rows = [(0, width, height)]
-    while filter in ("trilinear", "pixelated") and max(width, height) > 1:
+    while filter in HALVING and max(width, height) > 1:
         offset, width, height = rows[-1]
         offset, width, height = offset + height * width, max(1, width // 2), max(1, height // 2)
         rows.append((offset, width, height))

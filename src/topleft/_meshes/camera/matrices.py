@@ -8,7 +8,7 @@ Based on: Segal, M., and K. Akeley, "The OpenGL Graphics System", 1992 (the matr
 from __future__ import annotations
 
 import math
-from typing import TypeAlias, get_args
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_number, as_real, check_regular
 from topleft._core.base.defaults import THREE_QUARTER_DEG
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
 from topleft._meshes.model.points import Points
 from topleft._meshes.scene.adapt import is_mesh_like
@@ -190,7 +190,7 @@ def orbit_view(
     up: UpOption = "y",
 ) -> F64:
     """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`."""
-    check_choice("up", up, get_args(UpOption))
+    parse(UpOption, "up", up)
     if not math.isfinite(as_number("azimuth_deg", azimuth_deg)):
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")
     if not -90 <= as_number("elevation_deg", elevation_deg) <= 90:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_crease, set_read_only, shown
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft._core.raster import choices
 from topleft._core.raster.clusters import Clusters, box_of
 from topleft._meshes.model.material import Material
@@ -130,7 +130,7 @@ class Mesh:
             if getattr(self, name) is not None:
                 keep(self, name, read_only(_uv_array(name, getattr(self, name), len(vertices))))
         keep(self, "crease", as_crease(self.crease))
-        check_choice("color_interpolation", self.color_interpolation, get_args(EncodingOption))
+        parse(EncodingOption, "color_interpolation", self.color_interpolation)
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))

@@ -25,12 +25,13 @@ from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import set_aligned
 from topleft._core.base.color import spread_colors
 from topleft._core.base.memory import empty
-from topleft._core.base.options import Cull, parse
+from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts, threads_of_rows
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.lens import FLIP, Lens
 from topleft._meshes.model.mesh import Mesh, keep_corner_normals
 from topleft._meshes.model.normals import CornerNormals, moved
+from topleft.typing import CullOption
 
 WIDEST = np.radians(160)
 """Points farther from the axis are never drawn: a triangle round the back of the axis would cover everything. Those
@@ -146,7 +147,7 @@ class BentMesh:
         """
         x, y = engine.product(self.points_eye[:, :2] / -self.points_eye[:, 2:], projection[:2, :2].T)[self.triangles].T
         area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
-        sign = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: -1}[parse(Cull, "cull", cull)]
+        sign = {"none": 0, "back": 1, "front": -1}[parse(CullOption, "cull", cull)]
         is_drawn = np.ones(self.triangles.shape, bool)
         places: npt.NDArray[np.signedinteger[Any]] = self.triangles
         if self.parts is not None:  # parts have points of their own

@@ -21,8 +21,8 @@ from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts, threads_of_rows
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT, Environment
-from topleft._meshes.model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
-from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.light import TO_HEADLIGHT, Fog, Light
+from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, is_laid
 from topleft._meshes.model.normals import (
     box_of_triangles,
@@ -34,7 +34,7 @@ from topleft._meshes.model.normals import (
 )
 from topleft._meshes.model.texture import Texture
 
-LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1, LightKind.SPOT: 3}  # tl_light_kind in csrc/shading.h
+LIGHT_CODES = {"directional": 0, "point": 1, "spot": 3}  # tl_light_kind in csrc/shading.h
 
 Kept = TypeVar("Kept")
 
@@ -216,7 +216,7 @@ def material_row(one: Material, mesh: Mesh, surface: Surface, back_side: float) 
     back = light_of(one.back_color or (0, 0, 0))[:3]
     side = 0.0 if one.back_color is None else back_side
     shininess = one.shininess if one.specular > 0 else 0.0
-    cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
+    cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode == "mask" else 0.0
     full = full_part(one, mesh) if surface.all_full or is_full(one) else None
     compiled = None if texture is None else texture.compiled_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
     return color, back, side, (one.specular,) * 3, shininess, surface.is_unlit or one.unlit, cutoff, compiled, full
@@ -228,9 +228,7 @@ def light_rows(lights: Sequence[Light]) -> F64:
     for one in lights:
         color = [one.intensity * c for c in light_of(one.color)[:3]]
         spot = *(one.direction or (0.0, 0.0, 0.0)), *one.cone
-        rows.append(
-            (LIGHT_CODES[LightKind(one.kind)], *one.at, one.falloff, *color, *spot, one.space is LightSpace.EYE)
-        )
+        rows.append((LIGHT_CODES[one.kind], *one.at, one.falloff, *color, *spot, one.space == "eye"))
     return np.array(rows, np.float64).reshape(-1, 14)
 
 
@@ -290,7 +288,7 @@ class ShadingInputs:
         """Have an instance take the environment, or the default one, which only metallic surfaces mirror."""
         own = DEFAULT_ENVIRONMENT if environment is None else environment
         rows = self.rays(k).eye_from
-        if own.space is LightSpace.WORLD:
+        if own.space == "world":
             rows = engine.product(engine.inverse(self.views[k, :3, :3]), rows)
             rows = engine.product(self.places[k, :3, :3], rows)
         rows = engine.product(own.axes, rows / engine.cube_root(abs(engine.determinant(rows))))

@@ -21,7 +21,7 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, encode_srgb
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._meshes.io.references import InputFile
-from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.material import Material
 from topleft._meshes.model.texture import Texture
 from topleft.errors import MeshError
 from topleft.typing import EncodingOption, FilterOption, WrapOption
@@ -84,7 +84,7 @@ class Materials:
                 "metallic_roughness_texture": self._texture(rough.get("metallicRoughnessTexture"), "linear"),
             }
         mode = row.get("alphaMode", "OPAQUE")
-        own["alpha_mode"] = {"MASK": AlphaMode.MASK, "BLEND": AlphaMode.BLEND}.get(mode, AlphaMode.OPAQUE)
+        own["alpha_mode"] = {"MASK": "mask", "BLEND": "blend"}.get(mode, "opaque")
         if mode == "MASK":
             own |= cutoff_of(_number(row, "alphaCutoff", 0.5))
         if is_unlit:
