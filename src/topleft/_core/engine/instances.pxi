@@ -2,7 +2,7 @@
 
 
 cdef class MeshList:
-    """Vertices (V, 3), float32 or float64, and checked triangles of a scene's instances, to be placed again and again."""
+    """Vertices (V, 3), float32 or float64, and checked triangles of a scene's meshes, to be placed again and again."""
 
     cdef object arrays
     cdef uint8_t[::1] source_room, mesh_room
@@ -28,7 +28,7 @@ cdef class MeshList:
 
 
 cdef class PlacedMeshes:
-    """Some instances of a list of meshes, by their numbers: `project` makes them ready to be drawn.
+    """Instances of some meshes of a list, by their numbers: `project` makes them ready to be drawn.
 
     `matrices`: clip from object of each. `culls`, `numbers`: the `tl_cull` of each, and the id of its triangle 0.
     `is_apart`: 1 where one is left out. `how`: that of a view. `room`: records of all vertices, uint8, or points

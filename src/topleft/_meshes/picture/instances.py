@@ -207,9 +207,10 @@ class PlacedScene:
         if len(self._in_parts):  # of which all parts would be drawn
             is_apart = is_apart.copy()
             is_apart[self._in_parts] = True
+        meshes, of_instance = self.scene.mesh_list
         placed = engine.PlacedMeshes(
-            self.scene.mesh_list, some.astype(np.int64, copy=False), self._clip_from_objects[some], culls[some],
-            self._numbers[some], is_apart[some].view(np.uint8), view.engine_viewport(), view.how, room, firsts,
+            meshes, of_instance[some], self._clip_from_objects[some], culls[some], self._numbers[some],
+            is_apart[some].view(np.uint8), view.engine_viewport(), view.how, room, firsts,
         )  # fmt: skip
         run_parts(placed.project, n, n_threads)
         return placed

@@ -225,12 +225,15 @@ class Scene:
         return found
 
     @property
-    def mesh_list(self) -> engine.MeshList:
-        """The meshes of the instances, in their order."""
+    def mesh_list(self) -> tuple[engine.MeshList, npt.NDArray[np.int64]]:
+        """The different meshes, and which of them each instance has, (N,)."""
         found = self.known.get("mesh list")
         if found is None:
-            meshes = [(instance.mesh.vertices, instance.mesh.triangles) for instance in self.instances]
-            found = self.known["mesh list"] = engine.MeshList(meshes)
+            of_instance: npt.NDArray[np.int64] = np.empty(len(self), np.int64)
+            for k, (_, at) in enumerate(self.meshes.values()):
+                of_instance[at] = k
+            meshes = engine.MeshList([(mesh.vertices, mesh.triangles) for mesh, _ in self.meshes.values()])
+            found = self.known["mesh list"] = meshes, of_instance
         return found
 
     @cached_property
