@@ -131,14 +131,19 @@ def levels_beside_whole() -> Scenes:
 
 
 TERRAINS = (1_000_000, 4_000_000, 10_000_000)  # triangles
+TREES = 500
 
 
 def parts_beside_whole() -> Scenes:
-    """Views of terrains that begin at the camera, within half a pixel beside without; levels are made before."""
+    """Views of terrains that begin at the camera, within half a pixel beside without; levels are made before.
+
+    Then those of the second one among trees.
+    """
     import topleft as tl
 
-    for n in TERRAINS:
+    for n, n_trees in (*((n, 0) for n in TERRAINS), (TERRAINS[1], TREES)):
         mesh = tl.Mesh(*terrain_arrays(n))
+        subject, name = (among_trees(mesh, n_trees), f" with {n_trees} trees") if n_trees else (mesh, "")
         top = float(mesh.vertices[:, 1].max())
         looks = {
             "from its edge": ((0, 0.16, 1.1), (0, 0, 0), 0.01),
@@ -149,12 +154,24 @@ def parts_beside_whole() -> Scenes:
             camera = tl.Camera.look_at(eye, target, fov_y_deg=50, near=near, far=100)
             found = tl.choose_detail(mesh, camera, HD, tolerance=0.5)
             for verb in (tl.rasterize_mesh, tl.render):
-                draw = partial(verb, mesh, camera, HD, threads=1, rasterizer=tl.Rasterizer(HD, threads=1))
+                kept = {} if n_trees else {"rasterizer": tl.Rasterizer(HD, threads=1)}
+                draw = partial(verb, subject, camera, HD, threads=1, **kept)
                 for _ in range(17):  # after which meshlets are there
                     draw()
-                yield f"terrain of {n:,}, {look}, {verb.__name__}", {
+                yield f"terrain of {n:,}{name}, {look}, {verb.__name__}", {
                     "whole": draw, f"{found.n_drawn:,} in {found.n_parts} parts": partial(draw, tolerance=0.5),
                 }  # fmt: skip
+
+
+def among_trees(ground: Any, n: int) -> Any:
+    """The scene of a ground and so many balls of 4,000 triangles that stand on its vertices."""
+    import topleft as tl
+
+    tree = tl.Mesh(*tl.scenes.blob(4000))
+    places = np.tile(np.diag([*3 * [0.004 / np.abs(tree.bounds).max()], 1.0]), (n, 1, 1))
+    rows = np.random.default_rng(1).choice(len(ground.vertices), n, replace=False)
+    places[:, :3, 3] = ground.vertices[rows] + [0, 0.004, 0]
+    return tl.Scene([ground, *((tree, place) for place in places)])
 
 
 FRAME_PX = 1024
