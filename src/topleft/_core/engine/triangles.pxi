@@ -138,16 +138,17 @@ cdef class SnappedMesh:
         cdef const tl_vertex *v = self.snapped.mesh.vertices
         cdef const int32_t *t = self.snapped.triangles
         cdef const int32_t *given
-        cdef const double *point
-        cdef int64_t n_triangles = self.snapped.n_triangles, last = self.snapped.mesh.n_vertices - 1, n, i, n_seen = 0
+        cdef const double *points = NULL
+        cdef int64_t n_triangles = self.snapped.n_triangles, last = self.snapped.mesh.n_vertices - 1, n, i, k, n_seen = 0, stride = 0
         cdef double left = self.x_px, top = self.y_px, right = left + width, bottom = top + height, cols, rows
-        cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, unit = 2.0**self.subpixel_bits, each
+        cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, each, unit = 2.0**-self.subpixel_bits
         cdef double x[3]
         cdef double y[3]
         cdef bint is_wide
         cdef int32_t at
         if self.exact is not None:
             t, n_triangles, last = self.exact.points.triangles, self.exact.points.n_triangles, self.exact.points.n_points - 1
+            points, stride = self.exact.points.points, self.exact.points.stride
         n = min(n_triangles, 128)
         for i in range(n):
             given, is_wide = t + 3 * (i * n_triangles // n), False
@@ -155,11 +156,10 @@ cdef class SnappedMesh:
                 at = given[k]  # read once: another thread may write it
                 if not 0 <= at <= last:
                     return 0.0, 0.0, 0.0  # an error that draw finds
-                if self.exact is not None:
-                    point = self.exact.points.points + <int64_t>at * self.exact.points.stride
-                    x[k], y[k] = point[0], point[1]
+                if points != NULL:
+                    x[k], y[k] = points[at * stride], points[at * stride + 1]
                 else:
-                    x[k], y[k] = v[at].x_fx / unit, v[at].y_fx / unit
+                    x[k], y[k] = v[at].x_fx * unit, v[at].y_fx * unit
                     is_wide = is_wide or v[at].x_fx == TL_SPECIAL
             cols = min(max(x[0], x[1], x[2]), right) - max(min(x[0], x[1], x[2]), left)
             rows = min(max(y[0], y[1], y[2]), bottom) - max(min(y[0], y[1], y[2]), top)
