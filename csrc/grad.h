@@ -75,15 +75,25 @@ typedef struct {
     void *g_uv, *g_uv_da, *g_bias; /* or NULL */
 } tl_grad_texture;
 
-/* Pairs of neighbours across silhouettes. */
+/* What the edges of a mesh are in a view, found in parts. */
 typedef struct {
-    const void *rast;
     /* (n_triangles, 3), of the edge opposite to a corner: 3 * the other triangle + its corner, -1 for none; -2 less
      * that where the two are wound differently or there are more */
     const int32_t *across;
-    const double *places;   /* (n_vertices, 2): pixels */
-    const int32_t *outline; /* (n_triangles): see grad_outline */
-    int32_t *ids;           /* (3, width + TL_IDS_ROOM): scratch */
+    double *places; /* (n_vertices, 2): pixels */
+    /* (n_triangles): the side, and whether it lies before the eye, -1 for a triangle without corners; and with these
+     * the edges that are silhouettes */
+    int32_t *sides, *outline;
+    int64_t part, n_parts;
+} tl_grad_outline;
+
+/* Pairs of neighbours across silhouettes. */
+typedef struct {
+    const void *rast;
+    const int32_t *across; /* as of tl_grad_outline, as the next two are */
+    const double *places;
+    const int32_t *outline;
+    int32_t *ids; /* (3, width + TL_IDS_ROOM): scratch */
     tl_pair_rule rule;
     const void *color;
     int64_t n_channels;

@@ -423,9 +423,11 @@ TL_KERNEL(void, grad_texels, const tl_grad_view *view, const tl_grad_texture *te
 /* Its gradients: sums by texel, a multiple of four columns, unless NULL; and those of where it is looked at. */
 TL_KERNEL(void, grad_texels_vjp, const tl_grad_view *view, const tl_grad_texture *texture, tl_grad_sums *sums)
 
-/* Of a mesh in a view, whatever the band: where its vertices are, (n_vertices, 2) pixels; and of each triangle the
- * edges that are silhouettes, its side, whether it lies before the eye, -1 for one without corners. */
-TL_KERNEL(void, grad_outline, const tl_grad_view *view, const int32_t *across, double *places, int32_t *outline)
+/* Of a part of a mesh in a view, whatever the band: where vertices are, and sides of triangles. */
+TL_KERNEL(void, grad_sides, const tl_grad_view *view, const tl_grad_outline *outline)
+
+/* When the sides of all parts are known: its outline. */
+TL_KERNEL(void, mark_silhouettes, const tl_grad_view *view, const tl_grad_outline *outline)
 
 /* A band with smooth silhouettes; or backward the gradients of its colours, and the sums by vertex. */
 TL_KERNEL(void, grad_edges, const tl_grad_view *view, const tl_grad_edges *edges, tl_grad_sums *sums)

@@ -5,6 +5,7 @@
 #define TL_GRAD_OUTLINE_C
 
 #include <stdint.h>
+#include <string.h>
 
 #include "topleft.h"
 #include "grad/pixels.h"
@@ -23,14 +24,21 @@ TL_INLINE void load_vertices_of(const tl_grad_view *view, const int32_t *vertice
         columns[k] = vd_from_vf(vf_of_bits(bits[k]));
 }
 
+/* The share of a part among n of something: [*first, *end). */
+TL_INLINE void share_of_part(int64_t n, const tl_grad_outline *o, int64_t *first, int64_t *end)
+{
+    *first = n * o->part / o->n_parts, *end = n * (o->part + 1) / o->n_parts;
+}
+
 /* Pixels of the picture. */
-TL_INLINE void place_vertices(const tl_grad_view *view, double *places, int is_f64)
+TL_INLINE void place_vertices(const tl_grad_view *view, const tl_grad_outline *o, int is_f64)
 {
     int32_t rows[TL_MAX_LANES];
     double px[2][TL_MAX_LANES];
     vd columns[4];
-    for (int64_t i = 0; i < view->n_vertices; i += TL_LANES) {
-        const int64_t n = view->n_vertices - i < TL_LANES ? view->n_vertices - i : TL_LANES;
+    int64_t i, end;
+    for (share_of_part(view->n_vertices, o, &i, &end); i < end; i += TL_LANES) {
+        const int64_t n = end - i < TL_LANES ? end - i : TL_LANES;
         for (int64_t k = 0; k < TL_LANES; k++)
             rows[k] = (int32_t)(k < n ? i + k : i);
         load_vertices_of(view, rows, columns, is_f64);
@@ -38,8 +46,24 @@ TL_INLINE void place_vertices(const tl_grad_view *view, double *places, int is_f
             vd_store(px[axis], vd_div(vd_sub(vd_div(columns[axis], columns[3]), vd_set1(view->shift[axis])),
                                       vd_set1(2.0 * view->scale[axis])));
         for (int64_t k = 0; k < n; k++)
-            places[2 * (i + k)] = px[0][k], places[2 * (i + k) + 1] = px[1][k];
+            o->places[2 * (i + k)] = px[0][k], o->places[2 * (i + k) + 1] = px[1][k];
     }
+}
+
+/* Three numbers of each of TL_LANES triangles from i on, zeros beyond n, as columns. */
+TL_INLINE void load_threes(const int32_t *rows, int64_t i, int64_t n, vi *columns)
+{
+    int32_t last[3 * TL_MAX_LANES + 4];
+    vf bits[4];
+    const int32_t *some = rows + 3 * i;
+    if (n - i <= TL_LANES) { /* a row beyond is read */
+        memset(last, 0, sizeof last);
+        memcpy(last, some, (size_t)(3 * (n - i)) * sizeof *last);
+        some = last;
+    }
+    load_columns_f32((const float *)some, 3, bits);
+    for (int k = 0; k < 3; k++)
+        columns[k] = vi_bits_of_vf(bits[k]);
 }
 
 /* The sign of TL_LANES numbers: 1 above 0, 2 below, 0 else. */
@@ -52,22 +76,23 @@ TL_INLINE vi sign_code(vd area)
 }
 
 /* Sides of triangles; what lies behind the eye and what does not exist. */
-TL_INLINE void face_triangles(const tl_grad_view *view, int32_t *outline, int is_f64)
+TL_INLINE void face_triangles(const tl_grad_view *view, const tl_grad_outline *o, int is_f64)
 {
     const vd zero = vd_set1(0.0);
     const vi n_vertices = vi_set1(clamped_to_int(view->n_vertices)), none = vi_set1(0);
     int32_t rows[TL_MAX_LANES];
     vd p[3][4];
-    for (int64_t i = 0; i < view->n_triangles && !view->n_vertices; i++)
-        outline[i] = -1;
-    for (int64_t i = 0; i < view->n_triangles && view->n_vertices; i += TL_LANES) {
-        const vm m = vm_first(view->n_triangles - i);
+    int64_t i, end;
+    share_of_part(view->n_triangles, o, &i, &end);
+    for (; i < end && !view->n_vertices; i++)
+        o->sides[i] = -1;
+    for (; i < end; i += TL_LANES) {
+        const vm m = vm_first(end - i);
         vi corners[3], ahead = vi_set1(TL_IS_AHEAD);
         vm is_there = m;
-        for (int k = 0; k < 3; k++) {
-            corners[k] = vi_gather(m, view->tri + 3 * i + k, vi_mul(vi_iota(), vi_set1(3)));
+        load_threes(view->tri, i, view->n_triangles, corners);
+        for (int k = 0; k < 3; k++)
             is_there = vm_and(is_there, vi_gt_unsigned(n_vertices, corners[k]));
-        }
         for (int k = 0; k < 3; k++) {
             vi_spill(rows, vi_select(is_there, corners[k], none));
             load_vertices_of(view, rows, p[k], is_f64);
@@ -79,14 +104,14 @@ TL_INLINE void face_triangles(const tl_grad_view *view, int32_t *outline, int is
         const vd c = vd_sub(vd_mul(p[1][0], p[2][1]), vd_mul(p[1][1], p[2][0]));
         const vd area = vd_add(vd_add(vd_mul(p[0][0], a), vd_mul(p[0][1], b)), vd_mul(p[0][3], c));
         const vi side = vi_or(vi_shift_left(sign_code(area), TL_SIDE_SHIFT), ahead);
-        vi_store_masked(outline + i, m, vi_select(is_there, side, vi_set1(-1)));
+        vi_store_masked(o->sides + i, m, vi_select(is_there, side, vi_set1(-1)));
     }
 }
 
 /* Whether the surface folds at an edge of triangles that are wound differently, or of more than two. */
-TL_INLINE int is_twisted_fold(const tl_grad_view *view, const int32_t *outline, int32_t id, int k, int32_t other)
+TL_INLINE int is_twisted_fold(const tl_grad_view *view, const int32_t *sides, int32_t id, int k, int32_t other)
 {
-    const int32_t own = outline[id] & TL_SIDES, across = outline[other / 3] & TL_SIDES;
+    const int32_t own = sides[id] & TL_SIDES, across = sides[other / 3] & TL_SIDES;
     const int32_t *a = view->tri + 3 * (int64_t)id, *b = view->tri + 3 * (int64_t)(other / 3);
     const int is_reversed = a[(k + 1) % 3] != b[(other % 3 + 1) % 3];
     return is_reversed ? (own | across) == TL_SIDES : own && own == across;
@@ -98,47 +123,47 @@ TL_INLINE vi triangles_of_halves(vi a)
     return vi_round(vd_mul(vd_from_vi(vi_sub(a, vi_set1(1))), vd_set1(1.0 / 3.0)));
 }
 
-/* Adds the edges beyond which nothing lies, or the surface folds. */
-TL_INLINE void mark_silhouettes(const tl_grad_view *view, const int32_t *across, int32_t *outline)
+/* Sides, and the edges beyond which nothing lies, or the surface folds. */
+static void mark_silhouettes(const tl_grad_view *view, const tl_grad_outline *o)
 {
-    const vi none = vi_set1(-1), sides = vi_set1(TL_SIDES), end = vi_set1((int32_t)(3 * view->n_triangles));
+    const vi none = vi_set1(-1), sides = vi_set1(TL_SIDES), most = vi_set1((int32_t)(3 * view->n_triangles));
     int32_t halves[TL_MAX_LANES];
-    for (int64_t i = 0; i < view->n_triangles; i += TL_LANES) {
-        const vm m = vm_first(view->n_triangles - i);
-        const vi own = vi_load_masked(m, outline + i);
-        vi marks = own;
+    int64_t i, end;
+    for (share_of_part(view->n_triangles, o, &i, &end); i < end; i += TL_LANES) {
+        const vm m = vm_first(end - i);
+        const vi own = vi_load_masked(m, o->sides + i);
+        vi marks = own, across[3];
+        load_threes(o->across, i, view->n_triangles, across);
         for (int k = 0; k < 3; k++) {
-            const vi half = vi_gather(m, across + 3 * i + k, vi_mul(vi_iota(), vi_set1(3)));
-            const vi other = vi_select(vi_gt(none, half), vi_sub(vi_set1(-2), half), half);
-            vm is_there = vm_and(m, vm_and(vi_gt(other, none), vi_gt(end, other)));
-            const vi beyond = vi_gather(is_there, outline, triangles_of_halves(other));
+            const vi other = vi_select(vi_gt(none, across[k]), vi_sub(vi_set1(-2), across[k]), across[k]);
+            vm is_there = vm_and(m, vm_and(vi_gt(other, none), vi_gt(most, other)));
+            const vi beyond = vi_gather(is_there, o->sides, triangles_of_halves(other));
             is_there = vm_and(is_there, vi_gt(beyond, none));
             const vm goes_on = vm_and_not(is_there, vi_eq(vi_and(vi_or(own, beyond), sides), sides));
             unsigned bits = vm_bits(goes_on);
-            unsigned twisted = vm_bits(vm_and(vm_and(is_there, vi_gt(own, none)), vi_gt(none, half)));
+            unsigned twisted = vm_bits(vm_and(vm_and(is_there, vi_gt(own, none)), vi_gt(none, across[k])));
             vi_spill(halves, other);
             for (; twisted; twisted &= twisted - 1) {
                 const int lane = __builtin_ctz(twisted);
-                const int folds = is_twisted_fold(view, outline, (int32_t)i + lane, k, halves[lane]);
+                const int folds = is_twisted_fold(view, o->sides, (int32_t)i + lane, k, halves[lane]);
                 bits = (bits & ~(1u << lane)) | (unsigned)!folds << lane;
             }
             marks = vi_select(vm_from_bits(bits), marks, vi_or(marks, vi_set1(1 << k)));
         }
-        vi_store_masked(outline + i, m, vi_select(vi_gt(own, none), marks, own));
+        vi_store_masked(o->outline + i, m, vi_select(vi_gt(own, none), marks, own));
     }
 }
 
 /* See kernels.h. */
-static void grad_outline(const tl_grad_view *view, const int32_t *across, double *places, int32_t *outline)
+static void grad_sides(const tl_grad_view *view, const tl_grad_outline *o)
 {
     if (view->is_f64) {
-        place_vertices(view, places, 1);
-        face_triangles(view, outline, 1);
+        place_vertices(view, o, 1);
+        face_triangles(view, o, 1);
     } else {
-        place_vertices(view, places, 0);
-        face_triangles(view, outline, 0);
+        place_vertices(view, o, 0);
+        face_triangles(view, o, 0);
     }
-    mark_silhouettes(view, across, outline);
 }
 
 #endif

@@ -293,6 +293,7 @@ typedef struct {
 } point_gradients;
 
 #define TL_ALMOST_ONE (1.0f - 0x1p-20f) /* weights of float32 whose sum is below it are not clamped */
+#define TL_TIE 0x1p-30 /* weights so little outside are those of a centre on an edge, which rounding moved */
 
 /* What a row of pixels sums up. */
 typedef struct {
@@ -312,10 +313,11 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
     const double u = a[0] * r, v = a[1] * r;
     double g_u = g->u, g_v = g->v, g_total = 0.0, g_a[4] = {0};
     const double u_in = clamped(u, 0.0, 1.0), v_in = clamped(v, 0.0, 1.0), sum = u_in + v_in;
-    if (u != u_in || v != v_in || sum > 1.0) {
-        const double scale = sum > 1.0 ? 1.0 / sum : 1.0;
-        const double g_sum = sum > 1.0 ? (g_u * u_in + g_v * v_in) * scale * scale : 0.0;
-        g_u = u == u_in ? g_u * scale - g_sum : 0.0, g_v = v == v_in ? g_v * scale - g_sum : 0.0;
+    const int has_u = fabs(u - u_in) <= TL_TIE, has_v = fabs(v - v_in) <= TL_TIE, is_over = sum > 1.0 + TL_TIE;
+    if (!has_u || !has_v || is_over) {
+        const double scale = is_over ? 1.0 / sum : 1.0;
+        const double g_sum = is_over ? (g_u * u_in + g_v * v_in) * scale * scale : 0.0;
+        g_u = has_u ? g_u * scale - g_sum : 0.0, g_v = has_v ? g_v * scale - g_sum : 0.0;
     }
     for (int axis = 0; has_db && axis < 2; axis++) {
         const double step = 2.0 * view->scale[axis] * r, g_du = g->db[axis] * step, g_dv = g->db[2 + axis] * step;

@@ -41,6 +41,14 @@ def test_run_parts_returns_the_results_in_the_order_of_the_parts():
     assert parts_of(0, 4) == [(0, 0)]
 
 
+def test_run_parts_by_one_thread_leaves_all_to_the_calling_one():
+    def work(first, end):
+        time.sleep(0.005)
+        return first, end, threading.get_ident()
+
+    assert run_parts(work, 4, 4, 1) == [(i, i + 1, threading.get_ident()) for i in range(4)]
+
+
 @pytest.mark.parametrize("n_times", [1, 2])
 def test_run_parts_interrupted_while_it_waits_raises_after_all_threads_are_done(n_times):
     done = threading.Event()

@@ -86,6 +86,20 @@ def test_batch_spools_many_meshes_in_bounded_room(processes, monkeypatch):
     assert len(most) == 40
 
 
+def test_spool_has_all_meshes_in_use_and_few_others():
+    meshes = [tl.Mesh(BOX.vertices + i, BOX.triangles) for i in range(crews.N_SPOOLED + 4)]
+    spool = crews.Spool()
+    try:
+        places = [spool.hold(mesh) for mesh in meshes]
+        assert all(np.array_equal(at().vertices, mesh.vertices) for at, mesh in zip(places, meshes, strict=True))
+        for mesh in meshes:
+            spool.release(mesh)
+        assert spool.hold(meshes[-1]) == places[-1]
+        assert len(list(Path(spool.token).iterdir())) == crews.N_SPOOLED
+    finally:
+        spool.close()
+
+
 def test_batch_leaves_no_spool(processes, tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with tl.render_batch(views(9), executor=processes) as results:

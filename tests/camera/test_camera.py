@@ -215,7 +215,7 @@ def test_from_intrinsics_at_half_the_size_is_the_picture_scaled():
         (lambda: Camera.framing(np.empty((0, 3))), "nothing to frame"),
         (lambda: Camera.framing([(1, 2)]), r"must have shape \(N, 3\), got \(1, 2\)"),
         (lambda: Camera.framing([(1, 2, np.inf)]), "points to frame must be finite"),
-        (lambda: Camera.framing([(0, 0, 0)], up="x"), 'up must be "y" or "z", got \'x\''),
+        (lambda: Camera.framing([(0, 0, 0)], up="x"), "up must be one of 'y', 'z', got 'x'"),
         (lambda: Camera.framing([(0, 0, 0)], elevation_deg=91), "elevation_deg must lie in -90 to 90, got 91"),
         (lambda: Camera.framing([(0, 0, 0)], azimuth_deg=np.nan), "azimuth_deg must be finite, got nan"),
         (lambda: Camera.framing([(0, 0, 0)], fov_y_deg=0), "fov_y_deg must lie between 0 and 180, got 0"),
@@ -343,7 +343,7 @@ def test_off_center_halves_make_the_whole(ortho):
         ),
         (
             lambda: Camera.framing([(0, 0, 0)], fit="tight"),
-            'fit must be "sphere", "box", "points" or "silhouette", got \'tight\'',
+            "fit must be one of 'sphere', 'box', 'points', 'silhouette', got 'tight'",
         ),
     ],
 )

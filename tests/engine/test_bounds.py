@@ -9,7 +9,7 @@ from pages import before_a_page, behind_a_page
 import topleft as tl
 from topleft._core import engine
 from topleft._core.base.memory import FreshMemory
-from topleft._core.base.options import DepthTest, Sink
+from topleft._core.base.options import Sink
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Route
 from topleft._core.raster.rasterize import draw_fragments
@@ -147,7 +147,7 @@ def test_bounds_are_kept_for_large_triangles(n, reach, width, pays):
     points = np.concatenate([corners, rng.uniform(size=(n, 3, 1))], axis=-1).reshape(-1, 3)
     view = View.parse(size, {})
     snapped = snap_mesh(FreshMemory(), points, np.arange(3 * n).reshape(-1, 3), view, with_depth=True, out=None)
-    route, drawing = choices.route(view, snapped, DepthTest.LESS, wants_depth=False)
+    route, drawing = choices.route(view, snapped, "less", wants_depth=False)
     assert (route, drawing.is_bounded) == (Route.DEPTH, pays)
 
 

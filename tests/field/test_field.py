@@ -256,7 +256,7 @@ def test_grid_centers_go_with_the_rows():
         (lambda: tl.field((SQUARE, HALVES), [1] * 4), "a grid needs either size or pixel_size"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), pixel_size=1), "a grid needs either size or pixel_size"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, pixel_size=0), "pixel_size must be positive, got 0"),
-        (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), y="left"), 'y must be "up" or "down", got \'left\''),
+        (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), y="left"), "y must be one of 'up', 'down', got 'left'"),
         (
             lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), extent=(0, 1, 2)),
             r"extent must be \(x_min, x_max, y_min",
@@ -279,7 +279,10 @@ def test_grid_centers_go_with_the_rows():
             "must be finite",
         ),
         (lambda: tl.height_map((SQUARE, HALVES), 1), r"a height map needs points of shape \(V, 3\), got \(4, 2\)"),
-        (lambda: tl.height_map((SQUARE, HALVES), 1, surface="top"), 'surface must be "upper" or "lower", got \'top\''),
+        (
+            lambda: tl.height_map((SQUARE, HALVES), 1, surface="top"),
+            "surface must be one of 'upper', 'lower', got 'top'",
+        ),
         (
             lambda: tl.height_map(([[0, 0, 0], [1, 0, np.nan], [0, 1, 0]], [[0, 1, 2]]), 1),
             "vertices must be finite where a triangle uses them",

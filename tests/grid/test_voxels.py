@@ -179,7 +179,7 @@ def test_middles_of_voxels_stand_where_the_transform_says():
         ({"pitch": 1e-9}, ValueError, "voxels must be at most 16384 along an axis"),
         ({"shape": 3, "samples": 3}, ValueError, "samples must be one of 1, 2, 4, 8, got 3"),
         ({"shape": 3, "samples": 2, "solid": False}, ValueError, "samples must be 1 for a surface"),
-        ({"shape": 3, "rule": "half"}, ValueError, 'rule must be "center" or "touched", got'),
+        ({"shape": 3, "rule": "half"}, ValueError, "rule must be one of 'center', 'touched', got"),
         ({"shape": 3, "bounds": [0, 1]}, ValueError, r"bounds must have shape \(2, 3\)"),
         ({"shape": 3, "bounds": [[1, 1, 1], [0, 0, 0]]}, ValueError, "bounds must be a finite lower and upper corner"),
     ],

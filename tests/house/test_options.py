@@ -10,50 +10,24 @@ import pytest
 
 import topleft as tl
 import topleft.typing as words
-from topleft._apps.batch.batch import OnError, Order
 from topleft._apps.tiles import geotiff, zarr_files
 from topleft._core.base import options
-from topleft._core.polygons.polygons import Rule
 from topleft._core.raster.view import ViewOptions
-from topleft._meshes.model.light import LightKind, LightSpace
-from topleft._meshes.model.material import AlphaMode
-from topleft._meshes.model.points import PointUnit
-from topleft._meshes.model.texture import Encoding, Filter, Wrap
 from topleft._meshes.picture.layers import LAYERS
-from topleft._meshes.picture.shade import Shading
 from topleft._meshes.plan.plan import OUTPUTS
 from topleft._meshes.windows.drawing import KINDS
 from topleft.methods import ALIASES, CLASSICS, METHODS
 
 #: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_read_from_the_types`.
 TAKEN = {
-    "AlphaModeOption": AlphaMode,
-    "AlphaOption": options.Alpha,
-    "BlendOption": options.Blend,
-    "ClipDepthOption": options.ClipDepth,
-    "CullOption": options.Cull,
-    "DepthTestOption": options.DepthTest,
-    "EncodingOption": Encoding,
-    "FilterOption": Filter,
     "LayerOption": LAYERS,
-    "LightKindOption": LightKind,
     "MethodOption": [*METHODS, *ALIASES, *CLASSICS],
-    "OnErrorOption": OnError,
-    "OrderOption": Order,
     "OutputOption": OUTPUTS,
-    "PerOption": options.Per,
-    "PointShapeOption": options.PointShape,
-    "PointUnitOption": PointUnit,
     "RasterKindOption": KINDS,
-    "ResolveOption": options.Resolve,
-    "RuleOption": Rule,
     "SamplesOption": [one for one in options.Sampling if one == "center" or one.n_samples > 1],
     "SamplingOption": options.Sampling,
-    "ShadingOption": Shading,
-    "SpaceOption": LightSpace,
     "TiffCompressionOption": geotiff.COMPRESSIONS,
     "WindingOption": sorted({"either"} | {one.claims.winding for one in CLASSICS.values()}),
-    "WrapOption": Wrap,
     "ZarrCompressionOption": zarr_files.COMPRESSIONS,
 }  # fmt: skip
 
@@ -65,6 +39,25 @@ FLAT = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]], [[0, 1, 2]]
 
 #: Options whose check reads the type: a call of each.
 READ = {
+    "AlphaModeOption": lambda word: tl.Material(alpha_mode=word),
+    "AlphaOption": lambda word: tl.fill(*FLAT, [9], 4, alpha=word),
+    "BlendOption": lambda word: tl.fill(*FLAT, [[9, 9]], 4, blend=word),
+    "ClipDepthOption": lambda word: tl.coverage(*FLAT, 4, clip_depth=word),
+    "CullOption": lambda word: tl.coverage(*FLAT, 4, cull=word),
+    "DepthTestOption": lambda word: tl.rasterize(*FLAT, 4, depth_test=word),
+    "EncodingOption": lambda word: tl.Texture([[0]], encoding=word),
+    "FilterOption": lambda word: tl.Texture([[0]], filter=word),
+    "LightKindOption": lambda word: tl.Light((0, 0, 1), word, direction=(0, 0, -1) if word == "spot" else None),
+    "OnErrorOption": lambda word: tl.render_batch([], on_error=word),
+    "OrderOption": lambda word: tl.render_batch([], order=word),
+    "PerOption": lambda word: tl.fill(*FLAT, [9] * (3 if word == "vertex" else 1), 4, per=word),
+    "PointShapeOption": lambda word: tl.points([[1, 1]], 4, shape=word),
+    "PointUnitOption": lambda word: tl.Points([[0, 0, 0]], unit=word),
+    "ResolveOption": lambda word: tl.fill(*FLAT, [9], 4, sampling="msaa2", resolve=word),
+    "RuleOption": lambda word: tl.polygons([[[0, 0], [2, 0], [0, 2]]], 4, rule=word),
+    "ShadingOption": lambda word: tl.render(CUBE, size=4, shading=word, matcap=tl.Texture([[0]])),
+    "SpaceOption": lambda word: tl.Light((0, 0, 1), space=word),
+    "WrapOption": lambda word: tl.Texture([[0]], wrap=word),
     "EdgesOption": lambda word: tl.rasterize(*FLAT, (4, 4)).antialias(np.ones((4, 4)), edges=word),
     "BakeOption": lambda word: tl.bake(SQUARE, word, 2, source=SQUARE),
     "BakeRuleOption": lambda word: tl.bake(SQUARE, "position", 2, rule=word),

@@ -347,6 +347,7 @@ def complaints(function, right, wrong_names, arguments, *, is_formula=False):
 
 
 @pytest.mark.usefixtures("folder")
+@pytest.mark.filterwarnings("ignore:.*encountered in divide:RuntimeWarning")  # of points at the eye
 @pytest.mark.parametrize("name", CALLS)
 def test_arguments_that_suit_are_taken(name):
     function, right = CALLS[name]

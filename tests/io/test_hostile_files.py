@@ -248,6 +248,7 @@ def test_load_does_not_wait_for_a_pipe_that_a_file_names(tmp_path):
     assert "material libraries not found: 'a.mtl'" in found[0]
 
 
+@pytest.mark.filterwarnings("ignore:.*lines not drawn")
 def test_load_leaves_out_pictures_with_too_many_pixels(folder):
     Image.new("L", (20_000, 10_000)).save(folder / "a.png")  # 200 million, which Pillow calls a bomb
     with pytest.warns(MeshWarning, match="textures of more pixels than Pillow opens not read: 'a.png'"):
@@ -286,6 +287,7 @@ def test_load_of_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, suffix
         tl.load(path, max_unpacked_bytes=1000)
 
 
+@pytest.mark.filterwarnings("ignore:.*lines not drawn")
 @pytest.mark.parametrize("suffix", [".zip", ".tar.gz", ".tar.bz2", ".obj.gz", ".obj.bz2"])
 def test_load_of_an_archive_is_that_of_its_mesh(tmp_path, suffix):
     (tmp_path / f"a{suffix}").write_bytes(archive_of(suffix, OBJ))

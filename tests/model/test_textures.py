@@ -29,7 +29,7 @@ def test_levels_by_blocks_of_rows_are_those_of_the_whole(size, n_texels, encodin
     monkeypatch.setattr(module, "BLOCK_TEXELS", n_texels)
     image = RNG.integers(0, 256, (*size, 4)).astype(np.uint8)
     rows = module.level_rows(size[1], size[0], has_halves=True)
-    light = module.LIGHT_OF_BYTE[module.Encoding(encoding)]
+    light = module.LIGHT_OF_BYTE[encoding]
     assert_same(module.texels_of(image, rows, light=light), levels_at_once(image, light))
 
 

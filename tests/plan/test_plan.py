@@ -11,7 +11,6 @@ from comparing import assert_same
 import topleft as tl
 from topleft._core import engine
 from topleft._core.base.memory import KeptMemory
-from topleft._core.base.options import DepthTest
 from topleft._core.engine.isa import build_info
 from topleft._core.raster import costs
 from topleft._core.raster.view import View
@@ -429,7 +428,7 @@ def test_stages_are_estimated_by_what_they_do(threads):
     assert ms["depth"] == pytest.approx(table.flat_pixel * n_pixels / threads / 1e6)
     assert ms["snap"] == pytest.approx(table.snap[1] * n_vertices / 1e6)
     assert ms["input"] == pytest.approx((table.call[3] + table.index * 3000) / 1e6)
-    facts, _ = find_facts(vertices, triangles, plan._view, "rasterize", (), DepthTest.LESS)
+    facts, _ = find_facts(vertices, triangles, plan._view, "rasterize", (), "less")
     counts = costs.draw_features(facts.census, n_pixels)
     assert ms["method"] == pytest.approx(table.draw_ms("count", counts, threads, is_sliced=False))
     assert plan.estimated_ms == pytest.approx(sum(value for value in ms.values() if value))

@@ -74,6 +74,22 @@ def test_interpolate_vjp_is_differences(isa, transform, origin):
     np.testing.assert_allclose(by_vertices, by_differences(lambda v: number(v, values), vertices), rtol=1e-6, atol=1e-6)
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize("seed", [2, 6, 10])
+def test_interpolate_vjp_of_centres_on_edges_is_that_of_centres_inside(isa, seed):
+    rng = np.random.default_rng(seed)
+    at = np.array([[0.5, 0.5], [7.5, 0.5], [7.5, 7.5], [0.5, 7.5]])  # sides and diagonal go through centres,
+    w = rng.uniform(0.6, 1.2, 4)  # where rounding takes weights of 0 to either side
+    vertices = np.c_[(at / 4 - 1) * [1, -1] * w[:, None], 0.1 * w, w]
+    triangles, values, g = np.array([[0, 1, 2], [0, 2, 3]]), rng.normal(size=(4, 1)), rng.normal(size=(8, 8, 1))
+    with on(isa):
+        frags = tl.rasterize(vertices, triangles, (8, 8))
+        _, by_vertices = frags.interpolate_vjp(values, g)
+    assert (frags.barycentric()[frags.mask] == 0).any(-1).sum() == 19
+    expected = by_differences(lambda v: (g * attribute(frags, v, values)[0]).sum(), vertices)
+    np.testing.assert_allclose(by_vertices, expected, rtol=1e-6, atol=1e-6)
+
+
 def test_interpolate_vjp_of_corners_and_of_one_attribute():
     vertices, triangles = clip_scene()
     frags = tl.rasterize(vertices, triangles, (12, 10))

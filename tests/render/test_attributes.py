@@ -193,7 +193,7 @@ def test_texture_of_a_scene_takes_uv_of_each_instance():
         ((np.eye(2), [0, 0, 0]), {}, r"uv must have two columns, \(V, 2\) or \(T, 3, 2\), got one"),
         ((np.eye(2), [[0, 0]] * 3), {"filter": "cubic"}, "filter must be"),
         ((np.eye(2), [[0, 0]] * 3), {"wrap": ("clamp",) * 3}, "wrap must be one word, or two"),
-        ((np.eye(2), [[0, 0]] * 3), {"encoding": "xyz"}, 'encoding must be "srgb" or "linear"'),
+        ((np.eye(2), [[0, 0]] * 3), {"encoding": "xyz"}, "encoding must be one of 'srgb', 'linear'"),
         ((np.eye(2),), {}, "sample takes the number of a sample, or a texture and uv, got ndarray"),
     ],
 )

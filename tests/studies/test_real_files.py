@@ -30,6 +30,7 @@ def test_files_of_a_folder_are_those_of_known_suffixes(folder):
     assert [path.name for path in files_of(folder, (".txt",))] == ["notes.txt"]
 
 
+@pytest.mark.filterwarnings("ignore::topleft.MeshWarning")
 def test_drawing_says_what_came_of_a_file(folder, tmp_path):
     rows = {path.name: drawing.draw(path, tmp_path / "a.png") for path in files_of(folder)}
     assert {name: row["outcome"] for name, row in rows.items()} == {

@@ -7,7 +7,7 @@ import numpy as np
 
 from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT
 from topleft._meshes.model.normals import face_normals, unit_or_zero
-from topleft._meshes.model.texture import LIGHT_OF_BYTE, Encoding, halved_along
+from topleft._meshes.model.texture import LIGHT_OF_BYTE, halved_along
 
 TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
 
@@ -15,7 +15,7 @@ TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
 def light_of_image(rgba, encoding="srgb"):
     """Linear light and opacity (H, W, 4) float64, 0 to 1, of a picture."""
     light = np.empty(rgba.shape)
-    light[..., :3] = LIGHT_OF_BYTE[Encoding(encoding)][rgba[..., :3]]
+    light[..., :3] = LIGHT_OF_BYTE[encoding][rgba[..., :3]]
     light[..., 3] = rgba[..., 3] / 255
     return light
 

@@ -10,7 +10,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
-from enum import StrEnum
 from queue import SimpleQueue
 from types import TracebackType
 from typing import Any
@@ -28,20 +27,6 @@ from topleft.errors import MeshWarning, MissingPackageError
 from topleft.typing import OnErrorOption, OrderOption
 
 Progress = Callable[["Result"], object]
-
-
-class OnError(StrEnum):
-    """How a batch treats an error of a job: raises it, or collects it."""
-
-    RAISE = "raise"
-    COLLECT = "collect"
-
-
-class Order(StrEnum):
-    """The order of results."""
-
-    JOBS = "jobs"
-    COMPLETED = "completed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,31 +175,26 @@ def render_batch(
         raise TypeError(f"jobs must be an iterable of Job, got {shown(jobs)}")
     if not (progress is None or isinstance(progress, bool) or callable(progress)):
         raise TypeError(f"progress must be a function of a Result, True or None, got {shown(progress)}")
-    wish = parse(Order, "order", order)
-    collects = parse(OnError, "on_error", on_error) is OnError.COLLECT
+    wish = parse(OrderOption, "order", order)
+    collects = parse(OnErrorOption, "on_error", on_error) == "collect"
     workers = workers_on(executor, time_limit)
     n_jobs = len(jobs) if isinstance(jobs, Sized) else None
     if workers is None:
         results = _one_by_one(iter(jobs), resume)
     else:
-        in_flight = _InFlight(workers, n_window or 2 * workers.n_workers + 2, wish is Order.COMPLETED)
+        in_flight = _InFlight(workers, n_window or 2 * workers.n_workers + 2, wish == "completed")
 
         def most(job: Job, index: int) -> int:
             return n_chunk or workers.together(job, None if n_jobs is None else n_jobs - index)
 
         chunks = _chunks(iter(jobs), most, resume)
         results = in_flight.results(chunks)
-    return Batch(results, _bar(n_jobs) if progress is True else progress or None, collects=collects)
+    bar = _bar(n_jobs) if progress is True else None
+    return Batch(results, progress if callable(progress) else None, bar, collects=collects)
 
 
 def workers_on(executor: object, time_limit: float | None) -> Workers | None:
-    """Return the workers of a Dask cluster, or those of `workers_of`.
-
-    Raises
-    ------
-    ValueError
-        If a time limit is no positive number, or not for a cluster.
-    """
+    """Return the workers of a Dask cluster, which alone has a time limit, or of `workers_of`; else a `ValueError`."""
     limit = None if time_limit is None else as_number("time_limit", time_limit)
     if limit is not None and not limit > 0:
         raise ValueError(f"time_limit must be positive, got {time_limit}")
@@ -232,10 +212,8 @@ def workers_on(executor: object, time_limit: float | None) -> Workers | None:
 class Batch(Iterator[Result]):
     """The results of `render_batch`, drawn while it is iterated over."""
 
-    def __init__(self, results: Iterator[Result], progress: Progress | _Bar | None, *, collects: bool) -> None:
-        self._results = results
-        self._progress = progress
-        self._collects = collects
+    def __init__(self, results: Iterator[Result], progress: Progress | None, bar: Any, *, collects: bool) -> None:
+        self._results, self._progress, self._bar, self._collects = results, progress, bar, collects
         self._told: set[str] = set()
 
     def __iter__(self) -> Batch:
@@ -251,7 +229,9 @@ class Batch(Iterator[Result]):
             if line not in self._told:
                 self._told.add(line)
                 warnings.warn(line, MeshWarning, stacklevel=2)
-        if self._progress:
+        if self._bar is not None:
+            self._bar.update()
+        if self._progress is not None:
             self._progress(result)
         if result.error is not None and not self._collects:
             self.close()
@@ -270,8 +250,8 @@ class Batch(Iterator[Result]):
     def close(self) -> None:
         """End it: jobs that have not begun are dropped, those that have are finished."""
         self._results.close()  # type: ignore[attr-defined]
-        if isinstance(self._progress, _Bar):
-            self._progress.close()
+        if self._bar is not None:
+            self._bar.close()
 
     def finish(self) -> Summary:
         """Go through all results and return how many there were; pictures that went to no file are lost."""
@@ -455,23 +435,10 @@ def _is_done(job: Job) -> bool:
     return bool(files) and all(map(is_whole, files))
 
 
-class _Bar:
+def _bar(n_jobs: int | None) -> Any:
     """A bar with rate and remaining time."""
-
-    def __init__(self, bar: Any) -> None:
-        self._bar = bar
-
-    def __call__(self, _: Result) -> None:
-        self._bar.update()
-
-    def close(self) -> None:
-        """Leave it on the screen as it is."""
-        self._bar.close()
-
-
-def _bar(n_jobs: int | None) -> _Bar:
     try:
         from tqdm import tqdm
     except ImportError:
         raise MissingPackageError("progress=True needs tqdm: pip install tqdm") from None
-    return _Bar(tqdm(total=n_jobs, unit="picture"))
+    return tqdm(total=n_jobs, unit="picture")

@@ -12,18 +12,17 @@ from __future__ import annotations
 
 import os
 import threading
-from collections import OrderedDict, deque
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from topleft import Level, Levels, Mesh, plan
+from topleft import Mesh, plan
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
-from topleft._apps.batch.workers import N_SPOOLED, Jobs, Workers, coarser_levels_of, needs_levels
+from topleft._apps.batch.workers import HeldScenes, Jobs, Workers, coarser_levels_of, needs_levels, runner_of
 from topleft._apps.cluster import MOST_RESTARTS, check_workers, lost, quiet, result_of, send_again
-from topleft._meshes.lod.levels import keep_levels
 from topleft.errors import MissingPackageError
 
 MESH_KEY = "topleft-mesh"
@@ -46,29 +45,22 @@ GRACE_S = 5.0
 """How long a job may take to end once its time is over, before its process is ended."""
 
 
-class HeldScene:
-    """A mesh or scene in the memory of a worker, with its coarser levels."""
-
-    def __init__(self, scene: Any, coarser: list[tuple[Mesh, tuple[Level, ...], Any]]) -> None:
-        self.scene, self.coarser = scene, coarser
-
-    def __call__(self) -> Any:
-        """Return it."""
-        for mesh, *levels in self.coarser:
-            keep_levels(mesh, Levels(mesh, *levels))
-        return self.scene
-
-
-def hold_scene(held: HeldScene) -> HeldScene:
+def hold_scene(held: Callable[[], Any]) -> Callable[[], Any]:
     """Keep a scene as the result of a task."""
     return held
 
 
-@dataclass
-class _Kept:
-    scene: Any  # held, so that no other object gets its id
-    future: Any
-    n_users: int = 0
+class ClusterScenes(HeldScenes):
+    """Scenes on a Dask cluster."""
+
+    def __init__(self, client: Any, token: str) -> None:
+        super().__init__()
+        self._client, self._key = client, f"{MESH_KEY}-{token}"
+
+    def put(self, held: Callable[[], Any]) -> Any:
+        """Send a scene there, and return its future."""
+        with quiet():
+            return self._client.submit(hold_scene, held, key=f"{self._key}-{os.urandom(8).hex()}")
 
 
 class ClusterWorkers(Workers):
@@ -78,12 +70,12 @@ class ClusterWorkers(Workers):
         self._client = client
         self._time_limit = time_limit
         self._lock = threading.RLock()
-        self._kept: OrderedDict[tuple[int, bool], _Kept] = OrderedDict()
         self._ends = False
         self._suspects: deque[tuple[tuple[int, Job], Future[list[Outcome]], int]] = deque()
         self._is_trying = False
         self._dropped: set[Future[list[Outcome]]] = set()
         self._token = f"{os.getpid()}-{os.urandom(6).hex()}"
+        self._scenes = ClusterScenes(client, self._token)
         self._together: dict[int, int] = {}
 
     @property
@@ -92,15 +84,7 @@ class ClusterWorkers(Workers):
         return max(1, sum(self._client.nthreads().values()))
 
     def start(self) -> None:
-        """Look whether all workers have the package.
-
-        Raises
-        ------
-        MissingPackageError
-            If one has not.
-        TopleftError
-            If one has another version.
-        """
+        """Look whether all workers have the package, of this version; errors as of `check_workers`."""
         check_workers(self._client)
 
     def prepare(self, jobs: Jobs) -> Jobs:
@@ -119,9 +103,8 @@ class ClusterWorkers(Workers):
         self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int = 0, n_trials: int = 0
     ) -> None:
         if n_restarts:
-            self._forget_cancelled()
-        with_levels = needs_levels(jobs[0][1])
-        held = self._hold(jobs[0][1].scene, with_levels)
+            self._scenes.forget(lambda future: future.status in GONE)
+        held = self._scenes.hold(jobs[0][1].scene, needs_levels(jobs[0][1]))
         light = [(index, replace(job, scene=None) if held is not None else job) for index, job in jobs]
         with quiet():
             task = self._client.submit(
@@ -203,41 +186,10 @@ class ClusterWorkers(Workers):
             self._together[key] = jobs_of_task(job)
         return self._together[key]
 
-    def _hold(self, scene: Any, with_levels: bool) -> Any:
-        """Return the future of a mesh on the cluster; None for names and functions, which stay as they are."""
-        if isinstance(scene, str | os.PathLike) or callable(scene):
-            return None
-        key = id(scene), with_levels
-        with self._lock:
-            kept = self._kept.get(key)
-            if kept is None:
-                held = HeldScene(scene, coarser_levels_of(scene) if with_levels else [])
-                with quiet():
-                    future = self._client.submit(
-                        hold_scene, held, key=f"{MESH_KEY}-{self._token}-{key[0]}-{os.urandom(4).hex()}"
-                    )
-                kept = self._kept[key] = _Kept(scene, future)
-                idle = [one for one, entry in self._kept.items() if not entry.n_users and one != key]
-                for one in idle[: max(0, len(self._kept) - N_SPOOLED)]:
-                    del self._kept[one]
-            self._kept.move_to_end(key)
-            kept.n_users += 1
-            return kept.future
-
-    def _forget_cancelled(self) -> None:
-        """Forget the meshes that went with the cluster; they are sent again."""
-        with self._lock:
-            for key in [key for key, kept in self._kept.items() if kept.future.status in GONE]:
-                del self._kept[key]
-
     def release(self, jobs: Jobs) -> None:
         """Free their mesh."""
-        if not jobs:
-            return
-        with self._lock:
-            kept = self._kept.get((id(jobs[0][1].scene), needs_levels(jobs[0][1])))
-            if kept is not None:
-                kept.n_users -= 1
+        if jobs:
+            self._scenes.release(jobs[0][1].scene, needs_levels(jobs[0][1]))
 
     def cancel(self, futures: Sequence[Future[Any]]) -> None:
         """Drop tasks that have not begun; tasks that are lost from now on are not sent again."""
@@ -246,8 +198,7 @@ class ClusterWorkers(Workers):
 
     def stop(self) -> None:
         """Free the meshes."""
-        with self._lock:
-            self._kept.clear()
+        self._scenes.forget(lambda _: True)
 
 
 def came_of(task: Any) -> tuple[list[Outcome] | None, BaseException | None]:
@@ -277,21 +228,15 @@ def jobs_of_task(job: Job) -> int:
     return max(1, min(MOST_TOGETHER, int(TASK_MS / max(0.1, 3 * estimated))))
 
 
-_runner: tuple[str, JobRunner] | None = None
-
-
 def draw_on_worker(
-    token: str, jobs: list[tuple[int, Job]], held: HeldScene | None, time_limit: float | None
+    token: str, jobs: list[tuple[int, Job]], held: Callable[[], Any] | None, time_limit: float | None
 ) -> list[Outcome]:
-    """Draw jobs on a worker, which keeps the meshes that it has read for the rest of the batch."""
-    global _runner
-    known = _runner
-    if known is None or known[0] != token:
-        known = _runner = token, JobRunner()
+    """Draw jobs on a worker."""
+    runner = runner_of(token)
     own = [(index, replace(job, scene=held) if held is not None else job) for index, job in jobs]
     if time_limit is None:
-        return known[1].draw(own)
-    return [outcome for one in own for outcome in draw_in_time(known[1], one, time_limit)]
+        return runner.draw(own)
+    return [outcome for one in own for outcome in draw_in_time(runner, one, time_limit)]
 
 
 class _TimeIsOver(BaseException):

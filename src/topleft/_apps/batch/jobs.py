@@ -113,13 +113,7 @@ class Job:
 
 
 def as_job(item: object, index: int) -> Job:
-    """Return a job as it is, or that of a tuple of its fields.
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
-    """
+    """Return a job as it is, or that of a tuple of its fields; a `TypeError` if it is neither."""
     if isinstance(item, Job):
         return item
     names = [entry.name for entry in fields(Job) if not entry.kw_only]
@@ -205,13 +199,7 @@ class MeshCache:
 
 
 class JobRunner:
-    """Draws jobs; each thread draws by itself, in memory that it keeps from picture to picture.
-
-    Parameters
-    ----------
-    n_meshes : int
-        The number of meshes that are kept for jobs to come.
-    """
+    """Draws jobs; each thread in memory that it keeps from picture to picture. `n_meshes` are kept for jobs to come."""
 
     def __init__(self, n_meshes: int = 4) -> None:
         self._cache = MeshCache(n_meshes)
@@ -259,7 +247,7 @@ class JobRunner:
         arrays = draw_layers(layers, gbuffer)
         if path is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
-        matrix = None if gbuffer.camera.lens is not None else gbuffer.camera.clip_from_world(size)
+        matrix = None if gbuffer.shot.camera.lens is not None else gbuffer.shot.camera.clip_from_world(size)
         save_layers(path, arrays, matrix=matrix, background=_opaque(options))
         return None
 

@@ -9,10 +9,11 @@ import os
 import signal
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,15 +63,7 @@ def _put_off(number: signal.Signals) -> Iterator[None]:
 
 
 def workers_of(executor: object) -> Workers | None:
-    """Return the workers of an executor; None for the calling thread.
-
-    Raises
-    ------
-    TypeError
-        If it is neither a number nor an executor.
-    ValueError
-        If the number is below 1.
-    """
+    """Return the workers of an executor or of a number from 1 on, else an error; None for the calling thread."""
     if executor is None:
         return None
     if isinstance(executor, int) and not isinstance(executor, bool):
@@ -191,7 +184,8 @@ class LocalProcesses(Workers):
 
     def prepare(self, jobs: Jobs) -> Jobs:
         """Return jobs with their meshes replaced by files."""
-        return [(index, replace(job, scene=self._spool.hold(job.scene, needs_levels(job)))) for index, job in jobs]
+        held = [(self._spool.hold(job.scene, needs_levels(job)) or job.scene) for _, job in jobs]
+        return [(index, replace(job, scene=scene)) for (index, job), scene in zip(jobs, held, strict=True)]
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
         """Submit jobs together."""
@@ -207,6 +201,68 @@ class LocalProcesses(Workers):
         self._spool.close()
 
 
+def with_levels_of(scene: Any, coarser: list[tuple[Mesh, tuple[Level, ...], Any]]) -> Any:
+    """Return a mesh or scene after giving it its coarser levels."""
+    for mesh, *levels in coarser:
+        keep_levels(mesh, Levels(mesh, *levels))
+    return scene
+
+
+@dataclass
+class _Held:
+    scene: Any  # held, so that no other object gets its id
+    at: Any
+    n_users: int = 0
+
+
+class HeldScenes:
+    """Meshes and scenes where workers find them, each put there once; those in use and the latest others."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._entries: OrderedDict[tuple[int, bool], _Held] = OrderedDict()
+
+    def put(self, held: Callable[[], Any]) -> Any:
+        """Put a function that returns a scene where workers find it, and return where that is."""
+        raise NotImplementedError
+
+    def drop(self, at: Any) -> None:
+        """Free what `put` has returned."""
+
+    def hold(self, scene: Any, with_levels: bool = False) -> Any:
+        """Return where a scene is until it is released; None for names and functions, which stay as they are.
+
+        Levels of detail are made here where they are needed, once, and not in each worker.
+        """
+        if isinstance(scene, str | os.PathLike) or callable(scene):
+            return None
+        key = id(scene), with_levels
+        with self._lock:
+            if key not in self._entries:
+                at = self.put(partial(with_levels_of, scene, coarser_levels_of(scene) if with_levels else []))
+                self._entries[key] = _Held(scene, at)
+            entry = self._entries[key]
+            self._entries.move_to_end(key)
+            entry.n_users += 1
+            idle = [key for key, one in self._entries.items() if not one.n_users]
+            for key in idle[: max(0, len(self._entries) - N_SPOOLED)]:
+                self.drop(self._entries.pop(key).at)
+            return entry.at
+
+    def release(self, scene: Any, with_levels: bool = False) -> None:
+        """Count one user of the scene less."""
+        with self._lock:
+            entry = self._entries.get((id(scene), with_levels))
+            if entry is not None:
+                entry.n_users -= 1
+
+    def forget(self, is_gone: Callable[[Any], bool]) -> None:
+        """Forget the scenes that are gone from where they were; they are put there again."""
+        with self._lock:
+            for key in [key for key, entry in self._entries.items() if is_gone(entry.at)]:
+                del self._entries[key]
+
+
 @dataclass(frozen=True)
 class SpooledMesh:
     """A mesh that another process has put into a file, and its levels of detail."""
@@ -218,28 +274,18 @@ class SpooledMesh:
         import pickle
 
         with open(self.path, "rb") as file:
-            scene, coarser = pickle.load(file)
-        for mesh, *levels in coarser:
-            keep_levels(mesh, Levels(mesh, *levels))
-        return scene
+            return pickle.load(file)()
 
 
-@dataclass
-class _Spooled:
-    scene: Any  # held, so that no other object gets its id
-    at: SpooledMesh
-    n_users: int = 0
-
-
-class Spool:
-    """Meshes in files of a temporary folder, each pickled once; those in use and the latest others."""
+class Spool(HeldScenes):
+    """Meshes in files of a temporary folder."""
 
     def __init__(self) -> None:
         import tempfile
 
+        super().__init__()
         self._pid = os.getpid()
         self._folder = tempfile.mkdtemp(prefix="topleft-")
-        self._entries: OrderedDict[tuple[int, bool], _Spooled] = OrderedDict()
         self._n_written = 0
 
     @property
@@ -247,39 +293,19 @@ class Spool:
         """The name of this batch among others."""
         return self._folder
 
-    def hold(self, scene: Any, with_levels: bool = False) -> Any:
-        """Return the spooled mesh, which stays in its file until it is released; names stay as they are.
+    def put(self, held: Callable[[], Any]) -> SpooledMesh:
+        """Write a mesh and its levels to a file."""
+        import pickle
 
-        Levels of detail are made here where they are needed, once, and not in each worker.
-        """
-        if isinstance(scene, (str, os.PathLike)) or callable(scene):
-            return scene
-        key = id(scene), with_levels
-        entry = self._entries.get(key)
-        if entry is None:
-            import pickle
+        at = SpooledMesh(str(Path(self._folder, f"{self._n_written}.pickle")))
+        self._n_written += 1
+        with open(at.path, "xb") as file:
+            pickle.dump(held, file, pickle.HIGHEST_PROTOCOL)
+        return at
 
-            path = Path(self._folder, f"{self._n_written}.pickle")
-            self._n_written += 1
-            coarser = coarser_levels_of(scene) if with_levels else []
-            with open(path, "xb") as file:
-                pickle.dump((scene, coarser), file, pickle.HIGHEST_PROTOCOL)
-            entry = self._entries[key] = _Spooled(scene, SpooledMesh(str(path)))
-            self._trim()
-        self._entries.move_to_end(key)
-        entry.n_users += 1
-        return entry.at
-
-    def release(self, scene: Any, with_levels: bool = False) -> None:
-        """Count one user of the mesh less."""
-        entry = self._entries.get((id(scene), with_levels))
-        if entry is not None:
-            entry.n_users -= 1
-
-    def _trim(self) -> None:
-        idle = [key for key, entry in self._entries.items() if not entry.n_users]
-        for key in idle[: max(0, len(self._entries) - N_SPOOLED)]:
-            os.unlink(self._entries.pop(key).at.path)
+    def drop(self, at: SpooledMesh) -> None:
+        """Remove a file."""
+        os.unlink(at.path)
 
     def close(self) -> None:
         """Remove the files; in a forked child they are the parent's."""
@@ -308,9 +334,15 @@ def needs_levels(job: Job) -> bool:
 _runner: tuple[str, JobRunner] | None = None
 
 
-def draw_in_process(token: str, jobs: Jobs) -> list[Outcome]:
-    """Draw jobs in a worker process, which keeps the meshes that it has read for the rest of the batch."""
+def runner_of(token: str) -> JobRunner:
+    """The runner of this process for a batch, which keeps the meshes that it has read for the rest of the batch."""
     global _runner
-    if _runner is None or _runner[0] != token:
-        _runner = token, JobRunner()
-    return _runner[1].draw(jobs)
+    known = _runner
+    if known is None or known[0] != token:
+        known = _runner = token, JobRunner()
+    return known[1]
+
+
+def draw_in_process(token: str, jobs: Jobs) -> list[Outcome]:
+    """Draw jobs in a worker process."""
+    return runner_of(token).draw(jobs)

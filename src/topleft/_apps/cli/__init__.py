@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from typing import NoReturn
 
 from topleft import build_info
-from topleft._apps.cli.arguments import FAILED, REFUSED, Parser, add_render_arguments
+from topleft._apps.cli.arguments import FAILED, REFUSED, RENDER_HELP, Parser, add_command, add_render_arguments
 from topleft._apps.cli.bake import add_bake_command
 from topleft._apps.cli.bop import add_bop_command
 from topleft._apps.cli.doctor import add_doctor_command
@@ -94,11 +94,8 @@ def _parser() -> Parser:
     parser.add_argument("--version", action="version", version=f"topleft {build_info()['version']}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
     parser.set_defaults(run=None)
-    info = commands.add_parser("info", help="print the version and the build", description=run_info.__doc__)
-    info.set_defaults(run=run_info)
-    render = commands.add_parser("render", help="render meshes to pictures", description="Render meshes to pictures.")
-    add_render_arguments(render)
-    render.set_defaults(run=run_render)
+    add_command(commands, "info", run_info, "print the version and the build")
+    add_render_arguments(add_command(commands, "render", run_render, "render meshes to pictures", RENDER_HELP))
     add_plan_commands(commands)
     add_mask_command(commands)
     add_bop_command(commands)

@@ -46,25 +46,11 @@ def check_animation(path: Path) -> None:
 def save_animation(
     path: Path, files: Sequence[Path], *, fps: float = 20.0, background: tuple[int, int, int] = (255, 255, 255)
 ) -> None:
-    """Write pictures as an animation in a loop, or as a video.
+    """Write pictures of one size as an animation in a loop, or as a video; `fps` pictures a second.
 
-    Parameters
-    ----------
-    path : Path
-        GIF (256 colours), WebP and APNG (every bit), or a video, by the end of the name.
-    files : sequence of Path
-        Pictures of one size.
-    fps : float
-        Pictures a second.
-    background : (3,) of 0 to 255
-        The colour behind transparent pixels in a video, which has no alpha.
-
-    Raises
-    ------
-    ImageError, MissingPackageError
-        As in `check_animation`, or if ffmpeg fails.
-    OSError
-        If a file cannot be read or written.
+    GIF (256 colours), WebP and APNG (every bit), or a video, by the end of the name. `background`: sRGB of 0 to 255
+    behind transparent pixels in a video, which has no alpha. Errors are those of `check_animation`, of ffmpeg
+    (`ImageError`) and of files.
     """
     from PIL import Image
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterable
-from typing import Literal, NoReturn, get_args
+from typing import Any, Literal, NoReturn, get_args
 
 from topleft._apps.cli.animation import ANIMATION_SUFFIXES
 from topleft._core.base.arrays import as_crease, as_point_size, as_scale, as_seconds
@@ -19,11 +19,11 @@ from topleft._core.base.defaults import (
     SUFFIXES,
     THREE_QUARTER_DEG,
 )
-from topleft._core.base.options import LAYER_NAMES, Cull, Sampling, check_layers
+from topleft._core.base.options import LAYER_NAMES, Sampling, check_layers
 from topleft._meshes.io.limits.budget import LIMITS
 from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
-from topleft.typing import ShadingOption
+from topleft.typing import CullOption, ShadingOption
 
 FAILED, REFUSED = 1, 2
 """Exit status: a part of the work failed; nothing could be done."""
@@ -140,10 +140,17 @@ POINT_SIZE = number(lambda size: float(as_point_size("--point-size", size, 1)), 
 RATE = number(within(0.1, 100), "a number from 0.1 to 100")
 
 
-def add_render_arguments(parser: Parser) -> None:
+def add_command(commands: Any, name: str, run: Callable[[argparse.Namespace], int], help: str, more: str = "") -> Any:  # noqa: A002
+    """Return the parser of a new command, which its docstring describes; `more` stands below its arguments."""
+    parser = commands.add_parser(
+        name, help=help, description=run.__doc__, epilog=more, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_render_arguments(parser: argparse.ArgumentParser) -> None:
     """Add all arguments of `topleft render`."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = RENDER_HELP
     parser.add_argument("meshes", nargs="*", metavar="MESH", help="a file or a built-in shape")
     add_picture_arguments(parser)
     many = parser.add_argument_group("many pictures")
@@ -171,11 +178,9 @@ def add_render_arguments(parser: Parser) -> None:
 
 def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments that a job of a job file may have, too."""
-    azimuth, elevation = THREE_QUARTER_DEG
-    width, height = DEFAULT_SIZE
     add = parser.add_argument
     add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
-    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help="pixels (default {}x{})".format(*DEFAULT_SIZE))
     add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="layers to write; see below (default color)")
     add("--time", type=SECONDS, metavar="SECONDS", help="of an animation of a glTF file (default: at rest)")
@@ -187,13 +192,8 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="of a picture (default: as many as there are cores, 1 with --jobs)",
     )
-    add = parser.add_argument_group("camera").add_argument
-    add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
-    add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
-    add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
-    add("--ortho", action="store_true", help="no perspective")
+    add = add_orbit_arguments(parser.add_argument_group("camera"))
     add("--camera", type=_index, metavar="N", help="the camera N of a glTF file, from 0")
-    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
     add = parser.add_argument_group("look").add_argument
     add(
         "--shading",
@@ -234,7 +234,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--wireframe", action="store_true", help="draw the edges over it")
     add(
         "--cull",
-        choices=[str(side) for side in Cull],
+        choices=get_args(CullOption),
         help="the side to leave out, whatever materials say (default: backs of those that have one side)",
     )
     samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
@@ -255,6 +255,18 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     )
     for option, limit in LIMITS.items():
         add(f"--{option.replace('_', '-')}", type=positive, metavar="N", help=f"refuse files of more {limit.what}")
+
+
+def add_orbit_arguments(parser: Any) -> Callable[..., Any]:
+    """Add the arguments of `targets.Orbit` to a parser or a group, and return what adds others."""
+    azimuth, elevation = THREE_QUARTER_DEG
+    add: Callable[..., Any] = parser.add_argument
+    add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
+    add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
+    add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
+    add("--ortho", action="store_true", help="no perspective")
+    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
+    return add
 
 
 def add_scale(parser: argparse.ArgumentParser) -> None:

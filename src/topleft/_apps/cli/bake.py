@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import Baked, Mesh, bake, load, save_image
-from topleft._apps.cli.arguments import UsageError, positive, size
+from topleft._apps.cli.arguments import UsageError, add_command, positive, size
 from topleft._apps.cli.report import complain
 from topleft._core.base.defaults import SUFFIXES
 from topleft.errors import MeshError
@@ -69,24 +69,19 @@ def drawn(baked: Baked, options: argparse.Namespace) -> npt.NDArray[Any]:
 
 def add_bake_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
-    parser = commands.add_parser(
+    add = add_command(
+        commands,
         "bake",
-        help="write the normals, colours, positions or triangles of a mesh into its texture",
-        description=run_bake.__doc__,
-        epilog=BAKE_HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("mesh", metavar="MESH", help="mesh file with texture coordinates")
-    parser.add_argument("-o", "--out", metavar="OUT", required=True, help="file to be written")
-    parser.add_argument(
-        "--what", choices=get_args(BakeOption), default="normal", help="the values to bake (default: normal)"
-    )
-    parser.add_argument("--size", type=size, default=(1024, 1024), metavar="WxH", help="texels (default: 1024x1024)")
-    parser.add_argument(
-        "--rule", choices=get_args(BakeRuleOption), default="center", help="which triangles a texel has"
-    )
-    parser.add_argument("--gutter", type=int, default=8, metavar="N", help="texels round charts (default: 8)")
-    parser.add_argument("--source", metavar="FILE", help="another mesh: its nearest points give the values")
-    parser.add_argument("--max-distance", type=float, metavar="D", help="of those points, units of the mesh")
-    parser.add_argument("--threads", type=positive, metavar="N", help="threads that draw")
-    parser.set_defaults(run=run_bake)
+        run_bake,
+        "write the normals, colours, positions or triangles of a mesh into its texture",
+        BAKE_HELP,
+    ).add_argument
+    add("mesh", metavar="MESH", help="mesh file with texture coordinates")
+    add("-o", "--out", metavar="OUT", required=True, help="file to be written")
+    add("--what", choices=get_args(BakeOption), default="normal", help="the values to bake (default: normal)")
+    add("--size", type=size, default=(1024, 1024), metavar="WxH", help="texels (default: 1024x1024)")
+    add("--rule", choices=get_args(BakeRuleOption), default="center", help="which triangles a texel has")
+    add("--gutter", type=int, default=8, metavar="N", help="texels round charts (default: 8)")
+    add("--source", metavar="FILE", help="another mesh: its nearest points give the values")
+    add("--max-distance", type=float, metavar="D", help="of those points, units of the mesh")
+    add("--threads", type=positive, metavar="N", help="threads that draw")

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from topleft import Camera, Mesh, ObjectMasks, Scene, load, object_masks, save_image
-from topleft._apps.cli.arguments import UsageError, add_scale, number, positive, size, within
+from topleft._apps.cli.arguments import UsageError, add_command, add_scale, number, positive, size, within
+from topleft._apps.cli.report import write_json
 from topleft._core.base.array_types import Array
-from topleft._core.base.whole_file import write_whole
 from topleft._meshes.model.pose import as_pose
 from topleft.errors import MeshError
 
@@ -141,30 +141,18 @@ def save_masks(folder: Path, image: int, found: ObjectMasks) -> None:
             save_image(folder / name / f"{image:06d}_{i:06d}.png", mask_of(i))
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write a file that is whole or not there."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, lambda file: file.write(json.dumps(content).encode()))
-
-
 def add_bop_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
-    bop = commands.add_parser(
-        "bop",
-        help="write boxes, visible shares and masks of objects in BOP's format",
-        description=run_bop.__doc__,
-        epilog=BOP_HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    bop = add_command(
+        commands, "bop", run_bop, "write boxes, visible shares and masks of objects in BOP's format", BOP_HELP
     )
-    bop.set_defaults(run=run_bop)
-    bop.add_argument("scene", metavar="SCENE", help="a folder with scene_camera.json and scene_gt.json")
-    bop.add_argument("--models", required=True, metavar="DIR", help="the folder of obj_000001.ply and so on")
-    bop.add_argument("-o", "--out", required=True, metavar="OUT", help="where scene_gt_info.json goes")
-    bop.add_argument("--coco", metavar="FILE", help="annotations of COCO with run lengths, besides")
-    bop.add_argument("--masks", metavar="DIR", help="a folder for mask/ and mask_visib/, besides")
-    bop.add_argument("--size", type=size, metavar="WxH", help="of the images (that of their pictures)")
-    bop.add_argument(
-        "--beyond", type=PICTURES, default=1.0, metavar="N", help="how many pictures beyond the frame count (1)"
-    )
+    add = bop.add_argument
+    add("scene", metavar="SCENE", help="a folder with scene_camera.json and scene_gt.json")
+    add("--models", required=True, metavar="DIR", help="the folder of obj_000001.ply and so on")
+    add("-o", "--out", required=True, metavar="OUT", help="where scene_gt_info.json goes")
+    add("--coco", metavar="FILE", help="annotations of COCO with run lengths, besides")
+    add("--masks", metavar="DIR", help="a folder for mask/ and mask_visib/, besides")
+    add("--size", type=size, metavar="WxH", help="of the images (that of their pictures)")
+    add("--beyond", type=PICTURES, default=1.0, metavar="N", help="how many pictures beyond the frame count (1)")
     add_scale(bop)
-    bop.add_argument("--threads", type=positive, metavar="N", help="how many at most")
+    add("--threads", type=positive, metavar="N", help="how many at most")

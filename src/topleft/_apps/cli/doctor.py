@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from topleft import build_info
+from topleft._apps.cli.arguments import add_command
 from topleft._core.base.threads import available_threads
 from topleft._core.raster.costs import cache_file, load_costs
 
@@ -78,5 +79,4 @@ def installed(name: str) -> str | None:
 
 def add_doctor_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
-    doctor = commands.add_parser("doctor", help="check the installation", description=run_doctor.__doc__)
-    doctor.set_defaults(run=run_doctor)
+    add_command(commands, "doctor", run_doctor, "check the installation")

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import Any, get_args
 
 from topleft import Points, plan
 from topleft._apps.cli.arguments import (
     SUBPIXEL_BITS_HELP,
-    UP_HELP,
     UsageError,
+    add_command,
+    add_orbit_arguments,
     positive,
     size,
     subpixel_bits,
     tolerance,
 )
 from topleft._apps.cli.targets import MeshSource, Orbit
-from topleft._core.base.defaults import DEFAULT_FOV_Y_DEG, DEFAULT_SIZE, THREE_QUARTER_DEG
-from topleft._core.base.options import Cull, Sampling
+from topleft._core.base.defaults import DEFAULT_SIZE
+from topleft._core.base.options import Sampling
 from topleft._core.raster.costs import save_costs
+from topleft.typing import CullOption
 
 
 def run_explain(options: argparse.Namespace) -> int:
@@ -64,26 +66,16 @@ def run_calibrate(_: argparse.Namespace) -> int:
 
 def add_plan_commands(commands: Any) -> None:
     """Add both commands to the parsers of the command line."""
-    azimuth, elevation = THREE_QUARTER_DEG
-    width, height = DEFAULT_SIZE
-    explain = commands.add_parser("explain", help="tell how a mesh is drawn, and why", description=run_explain.__doc__)
-    explain.set_defaults(run=run_explain)
-    add = explain.add_argument
+    add = add_orbit_arguments(add_command(commands, "explain", run_explain, "tell how a mesh is drawn, and why"))
     add("mesh", metavar="MESH", help="a file or a built-in shape")
     verbs = ["rasterize", "coverage", "overdraw", "fill"]
     add("--verb", choices=verbs, default=verbs[0], help="(default %(default)s)")
-    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
-    add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
-    add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
-    add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
-    add("--ortho", action="store_true", help="no perspective")
-    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
-    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help="pixels (default {}x{})".format(*DEFAULT_SIZE))
+    add("--cull", choices=get_args(CullOption), default="none", help="leave out triangles (default none)")
     add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
     add("--threads", type=positive, metavar="N", help="(default: as many as pay)")
     add("--measure", action="store_true", help="draw it, and show the times of the stages")
     add("--json", action="store_true", help="numbers and sentences as JSON")
-    calibrate = commands.add_parser("calibrate", help="measure this machine", description=run_calibrate.__doc__)
-    calibrate.set_defaults(run=run_calibrate)
+    add_command(commands, "calibrate", run_calibrate, "measure this machine")

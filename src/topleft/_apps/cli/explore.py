@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from topleft._apps.cli.arguments import Parser, UsageError, size
+from topleft._apps.cli.arguments import UsageError, add_command, size
 
 EXPLORE_HELP = """\
 WHAT is a mesh file, an .npz file with arrays `vertices`, `triangles` and maybe `size`, the name of a scene
@@ -47,23 +47,16 @@ def run_explore(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_explore_command(commands: argparse._SubParsersAction[Parser]) -> None:
+def add_explore_command(commands: Any) -> None:
     """Add the command to those of `topleft`."""
-    command: Any = commands.add_parser(
-        "explore",
-        help="move triangles in the browser and watch their pixels",
-        description=EXPLORE_HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.add_argument("what", nargs="?", metavar="WHAT", help="a file, the name of a scene, or a link")
-    command.add_argument("--size", type=size, metavar="WxH", help="of the magnified picture, for an .npz file")
-    command.add_argument("--no-browser", action="store_true", help="print the address alone")
-    command.add_argument("--export", metavar="DIR", help="write the page there, as files that need no Python")
-    command.add_argument("--port", type=int, default=0, help="a free one unless given")
-    command.add_argument(
+    what = "move triangles in the browser and watch their pixels"
+    add = add_command(commands, "explore", run_explore, what, EXPLORE_HELP).add_argument
+    add("what", nargs="?", metavar="WHAT", help="a file, the name of a scene, or a link")
+    add("--size", type=size, metavar="WxH", help="of the magnified picture, for an .npz file")
+    add("--no-browser", action="store_true", help="print the address alone")
+    add("--export", metavar="DIR", help="write the page there, as files that need no Python")
+    add("--port", type=int, default=0, help="a free one unless given")
+    add(
         "--host", help="let other machines see the page, too, at this address of this machine; traffic is not encrypted"
     )
-    command.add_argument(
-        "--idle", type=float, default=30.0, metavar="SECONDS", help="after the page was closed, until the end: 30"
-    )
-    command.set_defaults(run=run_explore)
+    add("--idle", type=float, default=30.0, metavar="SECONDS", help="after the page was closed, until the end: 30")

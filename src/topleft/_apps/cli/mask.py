@@ -15,12 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import Grid, polygons, save_image
-from topleft._apps.cli.arguments import FAILED, UsageError, positive, size
-from topleft._apps.cli.report import complain
+from topleft._apps.cli.arguments import FAILED, UsageError, add_command, positive, size
+from topleft._apps.cli.report import complain, write_json
 from topleft._core.base.defaults import MAX_CROSSINGS, SUFFIXES
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.options import Sampling
-from topleft._core.base.whole_file import write_whole
 from topleft._core.polygons.rle import encode_polygons
 from topleft._core.raster.rle import annotation_of
 from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
@@ -103,9 +102,7 @@ def write_annotations(pictures: list[PolygonPicture], options: argparse.Namespac
             complain(f"{picture.name}: {picture.n_skipped} objects are no polygons and were left out")
             status = FAILED
     content = {"images": images, "annotations": annotations, "categories": categories_of(pictures)}
-    path = Path(options.out)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, lambda file: file.write(json.dumps(content).encode()))
+    write_json(Path(options.out), content)
     return status
 
 
@@ -221,34 +218,25 @@ def grid_over(points: npt.NDArray[np.float64], options: argparse.Namespace) -> G
 
 def add_mask_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
-    mask = commands.add_parser(
-        "mask",
-        help="write masks or labels of polygons",
-        description=run_mask.__doc__,
-        epilog=MASK_HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    mask.set_defaults(run=run_mask)
-    mask.add_argument("file", metavar="FILE", help="GeoJSON, a vector file, or annotations of COCO")
-    mask.add_argument("-o", "--out", required=True, metavar="OUT", help="where the picture goes; see below")
-    mask.add_argument("--labels", metavar="NAME", help="write numbers: index, or a property")
-    mask.add_argument("--rule", choices=get_args(RuleOption), default="evenodd", help="the fill rule (evenodd)")
-    mask.add_argument("--sampling", choices=[str(s) for s in Sampling], default="center", help="how pixels are sampled")
-    mask.add_argument("--size", type=size, metavar="WxH", help=f"of the picture (the longer side {DEFAULT_SIDE})")
-    mask.add_argument(
-        "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="the window to draw (all)"
-    )
-    mask.add_argument("--crs", metavar="CRS", help="the CRS of the picture, EPSG:25832 say: polygons are transformed")
-    mask.add_argument("--like", metavar="RASTER", help="take size, extent, CRS and nodata of a raster")
-    mask.add_argument("--nodata", type=int, metavar="N", help="the background of --labels (0)")
-    mask.add_argument("--layer", metavar="NAME", help="of a vector file (the first one)")
-    mask.add_argument("--no-crowds", action="store_true", help="leave out annotations of COCO that are crowds")
-    mask.add_argument("--image", metavar="NAME", help="the one of several images, its file name without the end")
-    mask.add_argument(
+    add = add_command(commands, "mask", run_mask, "write masks or labels of polygons", MASK_HELP).add_argument
+    add("file", metavar="FILE", help="GeoJSON, a vector file, or annotations of COCO")
+    add("-o", "--out", required=True, metavar="OUT", help="where the picture goes; see below")
+    add("--labels", metavar="NAME", help="write numbers: index, or a property")
+    add("--rule", choices=get_args(RuleOption), default="evenodd", help="the fill rule (evenodd)")
+    add("--sampling", choices=[str(s) for s in Sampling], default="center", help="how pixels are sampled")
+    add("--size", type=size, metavar="WxH", help=f"of the picture (the longer side {DEFAULT_SIDE})")
+    add("--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="the window to draw (all)")
+    add("--crs", metavar="CRS", help="the CRS of the picture, EPSG:25832 say: polygons are transformed")
+    add("--like", metavar="RASTER", help="take size, extent, CRS and nodata of a raster")
+    add("--nodata", type=int, metavar="N", help="the background of --labels (0)")
+    add("--layer", metavar="NAME", help="of a vector file (the first one)")
+    add("--no-crowds", action="store_true", help="leave out annotations of COCO that are crowds")
+    add("--image", metavar="NAME", help="the one of several images, its file name without the end")
+    add(
         "--max-crossings",
         type=positive,
         default=MAX_CROSSINGS,
         metavar="N",
         help=f"refuse rings that cross more often with --sampling area, outer and inner ({MAX_CROSSINGS})",
     )
-    mask.add_argument("--threads", type=positive, metavar="N", help="how many at most")
+    add("--threads", type=positive, metavar="N", help="how many at most")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from topleft._apps.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, positive, size, subpixel_bits
+from topleft._apps.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, add_command, positive, size, subpixel_bits
 from topleft._apps.cli.render import client_of
 from topleft._apps.cli.report import complain
 from topleft._apps.tiles.tiles import Tiles, tiles
@@ -185,38 +185,27 @@ def raster_of(options: argparse.Namespace) -> Tiles:
 
 def add_raster_command(commands: Any) -> None:
     """Add the command to the parsers of the command line."""
-    raster = commands.add_parser(
-        "raster",
-        help="write a raster of any size: heights, values, labels, polygons",
-        description=run_raster.__doc__,
-        epilog=RASTER_HELP,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    raster.set_defaults(run=run_raster)
-    raster.add_argument("mesh", metavar="MESH", help="a mesh file, vertices.npy,triangles.npy, or polygons")
-    raster.add_argument("-o", "--out", required=True, metavar="OUT", help="a file .tif or .dzi, or a folder .zarr")
-    raster.add_argument(
-        "--pixel-size", type=float, nargs="+", metavar="N", help="width, and height if it differs, of a pixel in units"
-    )
-    raster.add_argument("--size", type=size, metavar="WxH", help="how many pixels, instead")
-    raster.add_argument(
-        "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="the window to draw (all)"
-    )
-    raster.add_argument("--crs", metavar="CRS", help="the CRS of x and y: EPSG:25832, say")
-    raster.add_argument("--labels", action="store_true", help="write which triangle shows, -1 for none")
-    raster.add_argument("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
-    raster.add_argument("--kind", choices=DIRECT_KINDS, help="the content of pixels")
-    raster.add_argument("--surface", choices=("upper", "lower"), help="the surface that gives heights (upper)")
-    raster.add_argument("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
-    raster.add_argument("--nodata", type=float, metavar="N", help="the background, in values and .tif")
-    raster.add_argument("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
-    raster.add_argument("--uncompressed", action="store_true", help="store pixels as they are")
-    raster.add_argument("--window", type=positive, default=WINDOW, metavar="N", help=f"side of a window ({WINDOW})")
-    raster.add_argument("--resume", action="store_true", help="continue an interrupted run")
-    raster.add_argument("--overwrite", action="store_true", help="replace OUT, if topleft wrote it")
-    raster.add_argument("--folder", metavar="DIR", help="where temporary files go")
-    raster.add_argument("--threads", type=positive, metavar="N", help="how many at most")
-    raster.add_argument(
-        "--dask", metavar="ADDRESS", help="let the workers of a Dask cluster draw: its scheduler, or local"
-    )
-    raster.add_argument("--quiet", action="store_true", help="show no bar and print nothing")
+    add = add_command(
+        commands, "raster", run_raster, "write a raster of any size: heights, values, labels, polygons", RASTER_HELP
+    ).add_argument
+    add("mesh", metavar="MESH", help="a mesh file, vertices.npy,triangles.npy, or polygons")
+    add("-o", "--out", required=True, metavar="OUT", help="a file .tif or .dzi, or a folder .zarr")
+    add("--pixel-size", type=float, nargs="+", metavar="N", help="width, and height if it differs, of a pixel in units")
+    add("--size", type=size, metavar="WxH", help="how many pixels, instead")
+    add("--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="the window to draw (all)")
+    add("--crs", metavar="CRS", help="the CRS of x and y: EPSG:25832, say")
+    add("--labels", action="store_true", help="write which triangle shows, -1 for none")
+    add("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
+    add("--kind", choices=DIRECT_KINDS, help="the content of pixels")
+    add("--surface", choices=("upper", "lower"), help="the surface that gives heights (upper)")
+    add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
+    add("--nodata", type=float, metavar="N", help="the background, in values and .tif")
+    add("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
+    add("--uncompressed", action="store_true", help="store pixels as they are")
+    add("--window", type=positive, default=WINDOW, metavar="N", help=f"side of a window ({WINDOW})")
+    add("--resume", action="store_true", help="continue an interrupted run")
+    add("--overwrite", action="store_true", help="replace OUT, if topleft wrote it")
+    add("--folder", metavar="DIR", help="where temporary files go")
+    add("--threads", type=positive, metavar="N", help="how many at most")
+    add("--dask", metavar="ADDRESS", help="let the workers of a Dask cluster draw: its scheduler, or local")
+    add("--quiet", action="store_true", help="show no bar and print nothing")

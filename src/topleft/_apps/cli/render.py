@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,7 @@ CONNECT_S = 20
 
 
 def run_render(options: argparse.Namespace) -> int:
-    """Render every mesh and return the exit status."""
+    """Render meshes to pictures."""
     with ExitStack() as stack:
         groups = _plan(options, stack)
         animations = _animations(groups, options)
@@ -123,7 +124,7 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[Res
     with ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", MeshWarning)  # results have them
-        bar = stack.enter_context(_Progress(len(jobs)))
+        has_bar = len(jobs) > 1 and sys.stderr.isatty() and find_spec("tqdm") is not None  # somebody looks at it
         executor = (
             _executor(groups, options.jobs, stack)
             if options.dask is None
@@ -132,7 +133,7 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[Res
         chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
         batch = stack.enter_context(
             render_batch(
-                jobs, executor=executor, progress=bar.step, on_error="collect", order="completed",
+                jobs, executor=executor, progress=has_bar, on_error="collect", order="completed",
                 resume=options.resume, chunk=None if options.dask or isinstance(executor, int) else chunk,
             )
         )  # fmt: skip
@@ -256,27 +257,3 @@ def _check_pictures(groups: Sequence[MeshJobs], options: argparse.Namespace) -> 
 def _color_files(group: MeshJobs) -> list[Path]:
     """The pictures of a mesh, view by view."""
     return [Path(os.fspath(job.destination or "").replace("{layer}", "color")) for job in group.jobs]
-
-
-class _Progress:
-    """A bar on stderr when a person looks at it and there is more than one picture; nothing otherwise."""
-
-    def __init__(self, n_pictures: int) -> None:
-        self._bar: Any = None
-        if n_pictures > 1 and sys.stderr.isatty():
-            try:
-                from tqdm import tqdm
-            except ImportError:
-                return
-            self._bar = tqdm(total=n_pictures, unit="picture", file=sys.stderr)
-
-    def __enter__(self) -> _Progress:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
-
-    def step(self, _: Result) -> None:
-        if self._bar is not None:
-            self._bar.update()

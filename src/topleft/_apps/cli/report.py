@@ -61,8 +61,13 @@ def write_report(path: Path, sources: Iterable[str], results: Sequence[Result]) 
     """Write the result of each picture; `sources` has the mesh of each."""
     rows = [_row(source, result) for source, result in zip(sources, results, strict=True)]
     document = {**Counter(written=0, skipped=0, failed=0), **Counter(row["status"] for row in rows), "pictures": rows}
+    write_json(path, document, indent=1)
+
+
+def write_json(path: Path, content: Any, indent: int | None = None) -> None:
+    """Write a file that is whole or not there, and its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, lambda file: file.write(json.dumps(document, indent=1).encode()))
+    write_whole(path, lambda file: file.write(json.dumps(content, indent=indent).encode()))
 
 
 def _row(source: str, result: Result) -> dict[str, Any]:

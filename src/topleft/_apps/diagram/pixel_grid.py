@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_count, as_path, as_size, as_vertices, shown
 from topleft._core.base.color import ColorLike, as_color, id_colors
-from topleft._core.base.options import Sampling, parse
+from topleft._core.base.options import Sampling, parse_sampling
 from topleft._core.base.whole_file import write_whole
 from topleft._core.raster.sampling import sample_positions
 from topleft.errors import ImageError
@@ -113,7 +113,7 @@ def pixel_grid(
         color = "#{:02x}{:02x}{:02x}".format(*as_color("edge_color", edge_color, 3))
         shapes += draw_edges(vertices, triangles, scale, color)
     if sampling is not None:
-        shapes += draw_samples(parse(Sampling, "sampling", sampling), width, height, scale)
+        shapes += draw_samples(parse_sampling(sampling), width, height, scale)
     full = (width + 2 * MARGIN_PX) * scale, (height + 2 * MARGIN_PX) * scale
     svg = as_svg(shapes, full)
     if path is not None:

@@ -80,15 +80,8 @@ class PostingPage:
 class Server:
     """The page of a content at an address, until it is closed or nobody looks at it any more.
 
-    Parameters
-    ----------
-    content : Content
-    host : str
-        The loopback, unless others shall see it, too.
-    port : int
-        0 takes a free one.
-    idle : float
-        Seconds after the last page was closed until the server ends; infinite for never.
+    `host`: the loopback, unless others shall see it, too; port 0: a free one. `idle`: seconds after the last page was
+    closed until the server ends; infinite for never.
     """
 
     def __init__(self, content: Content, host: str = LOOPBACK, port: int = 0, idle: float = 30.0) -> None:

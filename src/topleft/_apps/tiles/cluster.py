@@ -37,13 +37,7 @@ def run_write(job: WriteJob) -> None:
 
 
 class ClusterWriters:
-    """Workers of a cluster that write windows.
-
-    Raises
-    ------
-    MissingPackageError, TopleftError
-        If a worker lacks the package, or has another version.
-    """
+    """Workers of a cluster that write windows; errors as of `check_workers`."""
 
     def __init__(self, client: Any) -> None:
         check_workers(client)

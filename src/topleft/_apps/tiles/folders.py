@@ -140,12 +140,8 @@ def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = Non
 def only_writer(path: Location) -> Iterator[None]:
     """Hold the lock of a file or folder: a file beside it, locked by the system as long as this process lives.
 
-    URLs have none: two writers of the same raster write the same bytes.
-
-    Raises
-    ------
-    BlockingIOError
-        If another call writes it, here or in another process.
+    URLs have none: two writers of the same raster write the same bytes. A `BlockingIOError` if another call writes it,
+    here or in another process.
     """
     if isinstance(path, RemotePath):
         yield

@@ -118,14 +118,9 @@ def write_levels(
 ) -> Written:
     """Write all blocks that are not there yet, level by level.
 
-    Parameters
-    ----------
-    halve : function of an array, optional
-        Makes the level above, instead of `halved`.
-    prepare : function of an array, optional
-        Converts the pixels of a window to those of the file.
-    executor : dask.distributed.Client, optional
-        Its workers draw and write the windows; the levels are made of these here.
+    `halve` makes the level above, instead of `halved`; `prepare` converts the pixels of a window to those of the file.
+    The workers of an `executor`, a `dask.distributed.Client`, draw and write the windows; levels are made of these
+    here.
     """
     there = blocks_with_pixels(raster, store.n_levels)
     n_blocks = int(sum(level.sum() for level in there))

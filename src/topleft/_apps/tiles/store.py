@@ -175,14 +175,8 @@ def begin(
 ) -> bool:
     """Resume the raster that is there, or make room for a new one; return whether it resumes.
 
-    Parameters
-    ----------
-    there : list of (place, fingerprint)
-        Files and folders at the place of the raster; the fingerprint is None if topleft did not write them.
-    n_copies : int
-        The number of copies of all tiles on the disk at a time.
-    prepare : function of an array
-        Converts the pixels of a window to those of the file.
+    `there`: files and folders at the place of the raster, and their fingerprints, None if topleft did not write them.
+    `n_copies`: of all tiles, on the disk at a time. `prepare` converts the pixels of a window to those of the file.
     """
     if resume and overwrite:
         raise ValueError("resume=True continues the store, overwrite=True replaces it: give one of them")

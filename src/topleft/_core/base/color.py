@@ -63,24 +63,11 @@ def spread_colors(colors: U8, are_light: bool, spread: Callable[[Array], F64]) -
 
 
 def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
-    """The colour as whole numbers of 0 to 255; RGB becomes opaque RGBA if that is wanted.
+    """The colour as whole numbers of 0 to 255; RGB becomes opaque RGBA if four channels are wanted.
 
-    Parameters
-    ----------
-    name : str
-        Of the argument, for messages.
-    color : str, or 3 or 4 numbers
-        A name of CSS ("red", "#f2a65a", "rgb(255, 0, 0)", for a background "transparent"); integers of 0 to 255; or
-        floats of 0 to 1, which one float among the numbers makes of them all: (1.0, 0, 0) is red, (1, 0, 0) nearly
-        black.
-    n_channels : 3 or 4
-
-    Raises
-    ------
-    ValueError
-        If it is no name of a colour, has another number of channels or a channel outside its range.
-    TypeError
-        If it is something else.
+    It may be a name of CSS ("red", "#f2a65a", "rgb(255, 0, 0)", for a background "transparent"); integers of 0 to 255;
+    or floats of 0 to 1, which one float among the numbers makes of them all: (1.0, 0, 0) is red, (1, 0, 0) nearly
+    black. Another name, number of channels or range is a `ValueError`, anything else a `TypeError`.
     """
     if isinstance(color, str) and color == "transparent" and n_channels == 4:
         return (0, 0, 0, 0)

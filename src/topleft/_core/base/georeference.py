@@ -114,16 +114,10 @@ def nodata_tag(nodata: float) -> tuple[str, bytes]:
 
 
 def frame_of_raster(raster: Any) -> tuple[Sequence[float], tuple[int, int], str | None, float | None]:
-    """The transform, the size, the CRS and the number of no data of a raster.
+    """The transform, the size, the CRS and the number of no data of a raster; of anything else a `TypeError`.
 
-    `raster` is an open dataset of rasterio, a DataArray or Dataset of xarray, or a file that rasterio opens.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If it is none of these, or its coordinates are not evenly spaced.
-    MissingPackageError
-        If it is a file and rasterio is not installed.
+    `raster` is an open dataset of rasterio, a DataArray or Dataset of xarray with evenly spaced coordinates, or a file,
+    which needs rasterio.
     """
     if isinstance(raster, str | os.PathLike):
         try:

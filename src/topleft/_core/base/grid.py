@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_array, as_number, as_real, as_size, shown
 from topleft._core.base.georeference import crs_text, data_array, frame_of_raster
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft.typing import YOption
 
 Extent = tuple[float, float, float, float]
@@ -85,7 +85,7 @@ class Grid:
                 f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
             )
         object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
-        check_choice("y", self.y, get_args(YOption))
+        parse(YOption, "y", self.y)
         object.__setattr__(self, "crs", crs_text(self.crs))
         if self.nodata is not None:
             as_number("nodata", self.nodata)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import threading
+from collections import deque
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,6 +28,9 @@ MAX_WAITING_BYTES = 512 << 20
 
 #: Most bytes that one name of a thread's scratch keeps between module-level calls; `SCRATCH_NAMES` are all.
 MAX_SCRATCH_BYTES = 64 << 20
+
+#: Bands of pictures, whose memory is kept for those of the next calls.
+MOST_SPARE = 8
 
 #: Scratch that no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
 SCRATCH_NAMES = frozenset(
@@ -141,8 +145,36 @@ class MemoryOf:
         return self.memory.constant(f"{name} of {self.owner}", n, value)
 
 
+class SpareMemory:
+    """Memory of calls that have ended, as they made it, for calls of the same needs; that of the last few is kept."""
+
+    def __init__(self, most: int) -> None:
+        self._kept: deque[tuple[object, Any]] = deque(maxlen=most)
+
+    def take(self, need: object) -> Any:
+        """Return what was put back for a need that is equal to this one, the last first; None if there is nothing."""
+        for _ in range(len(self._kept)):
+            try:
+                own, made = self._kept.pop()
+            except IndexError:  # another thread was faster
+                return None
+            if own == need:
+                return made
+            self._kept.appendleft((own, made))
+        return None
+
+    def put(self, need: object, made: object) -> None:
+        """Keep what was made for a need, which nobody uses any longer."""
+        self._kept.append((need, made))
+
+    def release(self) -> None:
+        """Forget all."""
+        self._kept.clear()
+
+
 FRESH = FreshMemory()
 SCRATCH = ScratchMemory()
+SPARE = SpareMemory(MOST_SPARE)
 
 
 engine.keep_blocks(MAX_WAITING_BYTES)
@@ -195,7 +227,8 @@ def release_memory() -> None:
 
     These are results that have died, 512 MiB of the process at most, and the scratch of `coverage`, `overdraw`, `fill`
     and `wireframe` for the calling thread: snapped vertices, converted indices, labels, cells and edges, at most 64 MiB
-    each, nothing once the thread has ended. `Rasterizer` objects keep their own memory for as long as they live.
+    each, nothing once the thread has ended; and that of the last eight bands of pictures whose gradients were computed.
+    `Rasterizer` objects keep their own memory for as long as they live.
 
     Examples
     --------
@@ -204,6 +237,7 @@ def release_memory() -> None:
     >>> tl.release_memory()
     """
     SCRATCH.release()
+    SPARE.release()
     engine.keep_blocks(0)
     engine.keep_blocks(MAX_WAITING_BYTES)
 

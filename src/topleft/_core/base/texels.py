@@ -9,7 +9,7 @@ Image Warping", 1989 (the footprint of a pixel from derivatives).
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32
 from topleft._core.base.arrays import as_array
 from topleft._core.base.color import LIGHT_OF_SRGB, decode_srgb
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MOST_KEPT_BYTES = 1 << 27
@@ -26,6 +26,8 @@ MOST_KEPT_BYTES = 1 << 27
 
 FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2, "pixelated": 3}  # tl_filter in csrc/shading.h
 WRAP_CODES = {"repeat": 0, "clamp": 1, "mirror": 2}  # tl_wrap
+HALVING = ("trilinear", "pixelated")
+"""Filters that look at halvings of the picture."""
 
 
 class ValueLevels(NamedTuple):
@@ -42,16 +44,10 @@ class ValueLevels(NamedTuple):
         return self.texels.shape[1]
 
     def look_up(self, ids: NDArray[np.int32], uv: F32, slopes: F32 | None, background: float) -> F32:
-        """Return the values (P, C) of pixels.
+        """Return the values (P, C) of pixels with `ids` (P,) int32; -1: the background.
 
-        Parameters
-        ----------
-        ids : (P,) int32
-            -1 where the value is the background.
-        uv : (P, 2) float32
-        slopes : (P, 2, 2) float32, or None
-            Slopes of u and v, the first axis, from pixel to pixel along x and y; None unless there are halvings.
-        background : float
+        `uv` (P, 2) float32. `slopes` (P, 2, 2) float32: of u and v, the first axis, from pixel to pixel along x and y;
+        None unless there are halvings.
         """
         out = np.empty((len(ids), self.n_channels), np.float32)
         engine.fill_texels(self.texels, self.rows, self.codes, ids, uv, slopes, background, out)
@@ -59,35 +55,23 @@ class ValueLevels(NamedTuple):
 
 
 def as_levels(texture: object, filter: str, wrap: object, encoding: str | None) -> ValueLevels:  # noqa: A002
-    """Return the texels of a lookup.
+    """Return the texels of a lookup: of a `Texture`, which keeps its levels, or of (H, W) or (H, W, C) real numbers.
 
-    Parameters
-    ----------
-    texture : Texture, or (H, W) or (H, W, C) array_like of real numbers
-        A `Texture` tells filter, wrap and encoding itself, and keeps its levels.
-    filter : {"trilinear", "bilinear", "nearest", "pixelated"}
-    wrap : {"repeat", "clamp", "mirror"}, or a pair of them
-    encoding : {"linear", "srgb"}, optional
-        "srgb": the first three channels are decoded to light. Unsigned bytes become 0 to 1 either way.
-
-    Raises
-    ------
-    TypeError
-        If it holds no real numbers.
-    ValueError
-        If it has another shape or no texels, or an option is unknown.
+    A `Texture` tells filter, wrap (one word, or two for u and v) and encoding itself. "srgb": the first three channels
+    are decoded to light; otherwise "linear". Unsigned bytes become 0 to 1 either way. Anything but real numbers is a
+    `TypeError`, another shape, no texels or an unknown option a `ValueError`.
     """
     if hasattr(texture, "value_levels"):
         found: ValueLevels = texture.value_levels()
         return found
     encoding = "linear" if encoding is None else encoding
-    check_choice("filter", filter, get_args(FilterOption))
-    check_choice("encoding", encoding, get_args(EncodingOption))
+    parse(FilterOption, "filter", filter)
+    parse(EncodingOption, "encoding", encoding)
     wraps = (wrap, wrap) if isinstance(wrap, str) else wrap
     if not isinstance(wraps, tuple | list) or len(wraps) != 2:
         raise ValueError(f"wrap must be one word, or two for u and v, got {wrap!r}")
     for one in wraps:
-        check_choice("wrap", one, get_args(WrapOption))
+        parse(WrapOption, "wrap", one)
     array = as_array("texture", texture)  # type: ignore[arg-type]
     if array.dtype.kind not in "fiub":
         raise TypeError(f"texture must be a Texture or real numbers, got dtype {array.dtype}")
@@ -116,7 +100,7 @@ def levels_of(values: F32, filter: str, wraps: tuple[str, str]) -> ValueLevels: 
     """Return contiguous values (H, W, C) with their halvings, where the filter looks at those."""
     height, width, n_channels = values.shape
     rows = [(0, width, height)]
-    while filter in ("trilinear", "pixelated") and max(width, height) > 1:
+    while filter in HALVING and max(width, height) > 1:
         offset, width, height = rows[-1]
         offset, width, height = offset + height * width, max(1, width // 2), max(1, height // 2)
         rows.append((offset, width, height))

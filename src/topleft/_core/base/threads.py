@@ -88,17 +88,18 @@ def threads_of_rows(n: int, threads: int | None = None) -> int:
     return 1 if n < 2 * MIN_ROWS_PER_THREAD else min(count_threads(None, n), n // MIN_ROWS_PER_THREAD)
 
 
-def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Part]:
+def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int, n_threads: int | None = None) -> list[Part]:
     """Return ``work(first, end)`` of ranges that together are [0, n); the calling thread takes the first of them.
 
-    It also takes those that no other thread has begun: all of them where there are no threads, or no longer any, as
-    while Python ends.
+    A thread that is done takes the next part that none has begun; there is a thread for each part, or `n_threads`. The
+    calling thread takes all of them where there are no threads, or no longer any, as while Python ends.
     """
     n_parts = max(1, min(n_parts, n))
-    if n_parts == 1:
-        return [work(0, n)]
-    bounds = [n * i // n_parts for i in range(n_parts + 1)]
-    waiting = deque(enumerate(pairwise(bounds)))
+    n_threads = n_parts if n_threads is None else min(n_threads, n_parts)
+    parts = list(pairwise(n * i // n_parts for i in range(n_parts + 1)))
+    if n_threads == 1:
+        return [work(*part) for part in parts]
+    waiting = deque(enumerate(parts))
     results: dict[int, Part] = {}
 
     def take() -> None:
@@ -112,7 +113,7 @@ def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Pa
     jobs: list[Future[None]] = []
     stop = engine.Stop()
     try:
-        _start(lambda: stop.run(take), n_parts - 1, jobs)
+        _start(lambda: stop.run(take), n_threads - 1, jobs)
         take()
         _finish(jobs)
     except BaseException:

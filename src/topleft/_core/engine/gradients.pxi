@@ -159,11 +159,22 @@ cdef class GradientView:
         with nogil:
             K.grad_texels_vjp(&view, &t, of_texels)
 
-    def outline(self, const int32_t[:, ::1] across, double[:, ::1] places, int32_t[::1] outline):
-        """Write places of vertices (V, 2) in pixels, and the silhouette edges of triangles (T), for `edges`."""
-        if across.shape[0]:
-            with nogil:
-                K.grad_outline(&self.view, &across[0, 0], &places[0, 0] if places.shape[0] else NULL, &outline[0])
+    def outline(self, mesh: tuple[Array, Array, Array], int32_t[::1] sides, bint has_sides, int64_t part, int64_t n_parts):
+        """Write a part of the places of vertices (V, 2), pixels, and of sides (T); then, with all sides, of outlines (T).
+
+        `mesh`: across, places, outline, as `edges` takes them.
+        """
+        cdef tl_grad_outline o
+        if not sides.shape[0]:
+            return
+        o.across, o.places = <const int32_t *>first_of(mesh[0]), <double *>first_of(mesh[1])
+        o.sides, o.outline = &sides[0], <int32_t *>first_of(mesh[2])
+        o.part, o.n_parts = part, n_parts
+        with nogil:
+            if has_sides:
+                K.mark_silhouettes(&self.view, &o)
+            else:
+                K.grad_sides(&self.view, &o)
 
     def edges(self, mesh: tuple[Array, Array, Array], int32_t[:, ::1] scratch, int rule,
               arrays: tuple[Array | None, ...], GradientSums sums or None, int64_t first, int64_t end):

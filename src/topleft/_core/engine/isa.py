@@ -9,17 +9,9 @@ NAMES = ("scalar", "simd128", "avx2", "avx512")
 
 
 def select() -> str:
-    """Return the name of the instruction set to use.
+    """Return the instruction set in use: ``TOPLEFT_ISA`` if it is set, else the widest that was built and can run here.
 
-    Returns
-    -------
-    str
-        ``TOPLEFT_ISA`` when it is set, else the widest instruction set that was built and that this machine can run.
-
-    Raises
-    ------
-    ValueError
-        When ``TOPLEFT_ISA`` names an instruction set that does not exist, was not built, or cannot run here.
+    A `ValueError` when ``TOPLEFT_ISA`` names one that does not exist, was not built, or cannot run here.
     """
     available = kernels.isa_available()
     name = os.environ.get("TOPLEFT_ISA", "").strip().lower()

@@ -6,36 +6,80 @@ the size of a picture alone, so every number of threads gives the same bits.
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Callable, Sequence
-from functools import partial
-from itertools import chain
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.memory import SCRATCH, empty
+from topleft._core.base.memory import FRESH, SPARE, empty
 from topleft._core.base.threads import available_threads, parse_threads, run_parts
 
 #: Pixels of a band, which has whole rows: a call of the engine costs 30 us more than its pixels.
 BAND_PX = 1 << 16
 
-#: Pixels that are worth a thread, and sums of bands that a thread holds until those before them are added.
+#: Pixels that are worth a thread.
 MIN_PX_PER_THREAD = 1 << 15
-WAITING_BANDS = 4
+
+#: Most bytes of a band that are kept for the next calls; of three attributes and 100,000 triangles it has 90 MB, of
+#: which it uses a few.
+MAX_SPARE_BYTES = 128 << 20
 
 Array = NDArray[Any]
 Found = TypeVar("Found")
-Made = TypeVar("Made", bound=Sequence[Any])
 
 
 class Band(NamedTuple):
-    """Rows [first, end) of a picture."""
+    """Rows [first, end) of a picture, and how many bands come before."""
 
     picture: int
     first: int
     end: int
+    number: int
+
+
+class Sums(NamedTuple):
+    """Sums of the rows of a tensor, of which a pixel touches so many at most."""
+
+    n_rows: int
+    n_columns: int
+    rows_per_px: int
+
+
+class Room(NamedTuple):
+    """Memory of bands of at most `n_px` pixels: sums, and arrays by shape and dtype."""
+
+    n_px: int
+    sums: tuple[Sums, ...]
+    arrays: tuple[tuple[tuple[int, ...], DTypeLike], ...] = ()
+
+    def make(self) -> list[Any]:
+        """Return the sums, then the arrays: of a call that has ended where there are such."""
+        kept: list[Any] | None = SPARE.take(self)
+        if kept is not None:
+            return kept
+        made: list[Any] = []
+        for n_rows, n_columns, rows_per_px in self.sums:
+            n = min(n_rows, self.n_px * rows_per_px)
+            slots = FRESH.constant("slots", n_rows, -1)
+            made.append(engine.GradientSums(slots, empty((n,), np.int32), empty((n, n_columns), np.float64)))
+        return made + [empty(shape, dtype) for shape, dtype in self.arrays]
+
+    def put_back(self, made: list[Any]) -> None:
+        """Let other calls have what `make` returned."""
+        if bytes_of(self) <= MAX_SPARE_BYTES:
+            SPARE.put(self, made)
+
+
+@lru_cache(64)
+def bytes_of(room: Room) -> int:
+    """Return how large the memory of a band is."""
+    sums = sum(4 * n + min(n, room.n_px * per_px) * (4 + 8 * n_columns) for n, n_columns, per_px in room.sums)
+    return sums + sum(math.prod(shape) * np.dtype(dtype).itemsize for shape, dtype in room.arrays)
 
 
 class Bands:
@@ -43,69 +87,55 @@ class Bands:
 
     def __init__(self, n_pictures: int, height: int, width: int, threads: int | None = None) -> None:
         rows = max(1, BAND_PX // max(1, width))
-        self.all = [
-            Band(picture, first, min(first + rows, height))
-            for picture in range(n_pictures if width else 0)
-            for first in range(0, height, rows)
-        ]
-        self.width = width
+        firsts = [(picture, first) for picture in range(n_pictures if width else 0) for first in range(0, height, rows)]
+        self.all = [Band(picture, first, min(first + rows, height), i) for i, (picture, first) in enumerate(firsts)]
+        self.n_px = min(rows, height) * width
         n_px = n_pictures * height * width
         most = parse_threads(threads) or min(available_threads(), max(1, n_px // MIN_PX_PER_THREAD))
         self.threads = max(1, min(most, len(self.all)))
 
-    def run(self, work: Callable[[Band], int | None]) -> int:
-        """Call `work` of each band; returns the largest number that one returned, or -1."""
-        parts = run_parts(lambda first, end: [work(b) for b in self.all[first:end]], len(self.all), self.threads)
-        return max((bad for part in parts for bad in part if bad is not None), default=-1)
+    def run(self, work: Callable[[Band], Found]) -> list[Found]:
+        """Return what `work` does of each band."""
+        n = len(self.all)
+        return run_parts(lambda i, _: work(self.all[i]), n, n, self.threads) if n else []
 
-    def add_up(self, work: Callable[[Band, engine.GradientSums], int | None], out: Array, rows_per_px: int) -> int:
-        """Add the sums of `work` in each band to `out` (B or 1, N, K), by row of `out`; returns as `run` does.
+    def add_up(self, room: Room, work: Callable[[Band, list[Any]], Found], outs: Sequence[Array]) -> list[Found]:
+        """Return what `work` does of each band, and add its sums to `outs` (B or 1, N, K), in the order of bands.
 
-        rows_per_px: the most rows that a pixel has a share in.
+        `room` has as many sums as there are `outs`, first of all. A band that is done while those before it are not
+        waits with its memory; the thread that adds one adds those that wait for it.
         """
-        found = self.add_up_all(
-            lambda room: [room.sums("rows", out.shape[1], out.shape[2], rows_per_px)],
-            lambda band, sums: work(band, *sums),
-            [out],
-        )
-        return max((bad for bad in found if bad is not None), default=-1)
+        done: dict[int, list[Any]] = {}
+        free: list[list[Any]] = []
+        adding = threading.Lock()
+        n_added = 0
 
-    def add_up_all(
-        self, make: Callable[[Room], Made], work: Callable[[Band, Made], Found], outs: Sequence[Array]
-    ) -> list[Found]:
-        """Add sums of each band to `outs`; returns what `work` does.
+        def add() -> None:
+            nonlocal n_added
+            if not adding.acquire(blocking=False):
+                return
+            try:
+                while n_added in done:
+                    made, picture = done.pop(n_added), self.all[n_added].picture
+                    for sums, out in zip(made, outs, strict=False):
+                        sums.add_to(out[picture if len(out) > 1 else 0])
+                    free.append(made)
+                    n_added += 1
+            finally:
+                adding.release()
 
-        `make` returns what `work` takes beside a band, which some bands use one after the other: as many sums as there
-        are `outs`, then others.
-        """
-        results: list[Found] = []
-        at_a_time = min(len(self.all), self.threads * WAITING_BANDS if self.threads > 1 else 1)
-        made = [make(Room(i, (self.all[0].end - self.all[0].first) * self.width)) for i in range(at_a_time)]
-        for start in range(0, len(self.all), max(1, at_a_time)):
-            some = list(zip(self.all[start : start + at_a_time], made, strict=False))
-            parts = run_parts(partial(work_on, work, some), len(some), self.threads)
-            results.extend(chain.from_iterable(parts))
-            for band, own in some:
-                for sums, out in zip(own, outs, strict=False):
-                    sums.add_to(out[band.picture if len(out) > 1 else 0])
+        def work_on(band: Band) -> Found:
+            try:
+                made = free.pop()
+            except IndexError:
+                made = room.make()
+            found = work(band, made)
+            done[band.number] = made
+            add()
+            return found
+
+        results = self.run(work_on)
+        add()  # those that were done while another thread was about to end
+        for made in free:
+            room.put_back(made)
         return results
-
-
-class Room(NamedTuple):
-    """Memory of the bands that are worked on one after the other, of which none has more pixels."""
-
-    number: int
-    n_px: int
-
-    def sums(self, name: str, n_rows: int, n_columns: int, rows_per_px: int) -> engine.GradientSums:
-        """Return sums of `n_rows` rows, of which a pixel touches so many at most."""
-        slots = SCRATCH.constant(f"gradient {name} {self.number}", n_rows, -1)
-        room = min(n_rows, self.n_px * rows_per_px)
-        return engine.GradientSums(slots, empty((room,), np.int32), empty((room, n_columns), np.float64))
-
-
-def work_on(
-    work: Callable[[Band, Made], Found], some: Sequence[tuple[Band, Made]], first: int, end: int
-) -> list[Found]:
-    """Return the results of `work` for some bands, of which [first, end)."""
-    return [work(band, made) for band, made in some[first:end]]

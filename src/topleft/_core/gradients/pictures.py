@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX
 from topleft._core.base.memory import empty
-from topleft._core.gradients.bands import Array, Band, Room
+from topleft._core.gradients.bands import Array, Band, Room, Sums
 from topleft._core.gradients.tensors import (
     EdgeRule,
     Outline,
@@ -24,6 +24,7 @@ from topleft._core.gradients.tensors import (
     points,
     points_vjp,
     row_columns,
+    scratch_of,
     smooth,
     smooth_vjp,
     values,
@@ -42,18 +43,18 @@ class Seen(NamedTuple):
     pairs: NDArray[np.uint8]
     steps: NDArray[np.float32]
 
-    @classmethod
-    def room(cls, n_rows: int, n_px: int, n_triangles: int, n_columns: int) -> Seen:
-        """Return memory for any band of so many rows and pixels."""
+    @staticmethod
+    def room(n_rows: int, n_px: int, n_triangles: int, n_columns: int) -> tuple[tuple[tuple[int, ...], type], ...]:
+        """Return shapes and dtypes for any band of so many rows and pixels."""
         n_faces = min(n_triangles, n_px) + engine.IDS_ROOM
-        return cls(
-            empty((n_rows + 1,), np.int64),
-            empty((n_rows + 1,), np.int64),
-            empty((n_px + engine.IDS_ROOM,), np.int32),
-            empty((n_px + engine.IDS_ROOM,), np.int32),
-            empty((engine.FACE_ROWS, n_faces), np.int32),
-            empty((2 * n_px, engine.PAIR_BYTES), np.uint8),
-            empty((2 * n_px, n_columns), np.float32),
+        return (
+            ((n_rows + 1,), np.int64),
+            ((n_rows + 1,), np.int64),
+            ((n_px + engine.IDS_ROOM,), np.int32),
+            ((n_px + engine.IDS_ROOM,), np.int32),
+            ((engine.FACE_ROWS, n_faces), np.int32),
+            ((2 * n_px, engine.PAIR_BYTES), np.uint8),
+            ((2 * n_px, n_columns), np.float32),
         )
 
     def copy(self, n_rows: int, n_faces: int) -> Seen:
@@ -134,34 +135,37 @@ class AttributePictures:
 
         `seen` where `pixels` are gradients; it is kept where they are a picture.
         """
-        n, width, n_triangles = self.attr.shape[2], self.grid.width, len(self.grid.tri)
-        bands, views = self.grid.bands, self.grid.views(self.pos)
-        numbers = {band: i for i, band in enumerate(bands.all)}
-
-        def make(room: Room) -> list[Any]:
-            beyond = room.n_px + 4 * width
-            around = Room(room.number, beyond)
-            return [
-                around.sums("points", self.pos.shape[1], 4, 9),
-                around.sums("rows", self.attr.shape[1], row_columns(n), 3),
-                around.sums("faces", n_triangles, engine.HEAD_OF_FACE + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
-                None if seen else Seen.room(beyond // max(1, width), beyond, n_triangles, n),
-                empty((3, width + engine.IDS_ROOM), np.int32),
-                empty((engine.ROWS_KEPT * width * n + engine.IDS_ROOM,), np.float32),
-                empty((16 * width * n,), np.float64),
-                empty((4 * width,), np.float32),
-            ]
+        n, views = self.attr.shape[2], self.grid.views(self.pos)
+        room = self.room(is_given=seen is not None)
 
         def work(band: Band, made: list[Any]) -> tuple[float, Seen, int]:
-            i, (points, rows, faces, room, *scratch) = band.picture, made
-            own, n_faces = seen[numbers[band]] if seen else (room, 0)
+            i, (points, rows, faces, *scratch) = band.picture, made
+            own, n_faces = seen[band.number] if seen else (Seen(*scratch[4:]), 0)
             of_pixels = pixels(i)
             found, n_faces = views[i].picture(
                 self.ids[i], of(self.attr, i), self.outline.of_picture(i), (int(self.rule), weight), of_pixels, own,
-                n_faces, tuple(scratch), (faces, points, rows), band.first, band.end,
+                n_faces, tuple(scratch[:4]), (faces, points, rows), band.first, band.end,
             )  # fmt: skip
             n_rows = min(band.end + 1, self.grid.height) - max(band.first - 1, 0)
             is_picture = of_pixels[0] is not None and n > 0
             return found, own.copy(n_rows, n_faces) if is_picture else own, n_faces
 
-        return bands.add_up_all(make, work, outs)
+        return self.grid.bands.add_up(room, work, outs)
+
+    def room(self, *, is_given: bool) -> Room:
+        """Return what a band works on; with what it shows, unless that is given."""
+        n, width, n_triangles = self.attr.shape[2], self.grid.width, len(self.grid.tri)
+        n_px = self.grid.bands.n_px + 4 * width
+        sums = (
+            Sums(self.pos.shape[1], 4, 9),
+            Sums(self.attr.shape[1], row_columns(n), 3),
+            Sums(n_triangles, engine.HEAD_OF_FACE + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
+        )
+        scratch = (
+            scratch_of(self.grid),
+            ((engine.ROWS_KEPT * width * n + engine.IDS_ROOM,), np.float32),
+            ((16 * width * n,), np.float64),
+            ((4 * width,), np.float32),
+        )
+        shown = () if is_given else Seen.room(n_px // max(1, width), n_px, n_triangles, n)
+        return Room(n_px, sums, scratch + shown)

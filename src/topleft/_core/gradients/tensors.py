@@ -15,6 +15,8 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +25,7 @@ from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts
-from topleft._core.gradients.bands import Array, Band, Bands, Room
+from topleft._core.gradients.bands import Array, Band, Bands, Room, Sums
 
 
 class TexelFilter(IntEnum):
@@ -67,7 +69,7 @@ class PixelGrid:
     def __post_init__(self) -> None:
         check_counted("tri", self.tri.shape)
 
-    @property
+    @cached_property
     def bands(self) -> Bands:
         """The bands of all pictures."""
         return Bands(self.n_pictures, self.height, self.width, self.threads)
@@ -86,8 +88,9 @@ class PixelGrid:
         """Return the shape of a tensor of pixels."""
         return (self.n_pictures, self.height, self.width, *columns)
 
-    def refuse(self, bad: int) -> None:
-        """Raise an error for the id of a triangle that does not exist."""
+    def refuse(self, found: Sequence[int]) -> None:
+        """Raise an error for the largest id that a band has met of a triangle that does not exist; -1: none."""
+        bad = max(found, default=-1)
         if bad >= 0:
             raise IndexError(f"rast must hold ids of the {len(self.tri)} triangles of tri plus 1, got {bad + 1}")
 
@@ -126,16 +129,14 @@ def points(
 def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Array | None) -> Array:
     """Return the gradient of `pos`."""
     out, views = np.zeros(pos.shape, pos.dtype), grid.views(pos)
-
-    def make(room: Room) -> list[engine.GradientSums]:
-        return [room.sums("rows", pos.shape[1], 4, 3), room.sums("faces", len(grid.tri), engine.SUMS_OF_POINTS, 1)]
+    room = Room(grid.bands.n_px, (Sums(pos.shape[1], 4, 3), Sums(len(grid.tri), engine.SUMS_OF_POINTS, 1)))
 
     def work(band: Band, sums: list[engine.GradientSums]) -> int:
         i = band.picture
         slopes = None if g_db is None else g_db[i]
         return views[i].points_vjp(rast[i], g_rast[i], slopes, sums[1], sums[0], band.first, band.end)
 
-    grid.refuse(max(grid.bands.add_up_all(make, work, [out]), default=-1))
+    grid.refuse(grid.bands.add_up(room, work, [out]))
     return out
 
 
@@ -173,13 +174,13 @@ def values_vjp(
     g_db = None if g_da is None else empty(rast.shape, attr.dtype)
     view, columns = grid.view(attr[0, :0]), np.asarray(wanted if g_da is not None else (), np.int32)
 
-    def work(band: Band, sums: engine.GradientSums) -> int:
+    def work(band: Band, sums: list[engine.GradientSums]) -> int:
         i = band.picture
         db, da, g = (None if one is None else one[i] for one in (rast_db, g_da, g_db))
         arrays = rast[i], db, g_out[i], da, g_rast[i], g
-        return view.values(of(attr, i), columns, arrays, sums, band.first, band.end)
+        return view.values(of(attr, i), columns, arrays, sums[0], band.first, band.end)
 
-    grid.refuse(grid.bands.add_up(work, g_attr, 3))
+    grid.refuse(grid.bands.add_up(Room(grid.bands.n_px, (Sums(attr.shape[1], attr.shape[2], 3),)), work, [g_attr]))
     return g_attr, g_rast, g_db
 
 
@@ -199,19 +200,15 @@ def colors_vjp(
     g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
     views = grid.views(pos)
 
-    def make(room: Room) -> list[engine.GradientSums]:
-        n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, attr.shape[2] - 1) // 3)
-        return [
-            room.sums("points", pos.shape[1], 4, 3),
-            room.sums("rows", attr.shape[1], row_columns(attr.shape[2]), 3),
-            room.sums("faces", len(grid.tri), n_columns, 1),
-        ]
+    n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, attr.shape[2] - 1) // 3)
+    of_rows = Sums(attr.shape[1], row_columns(attr.shape[2]), 3)
+    room = Room(grid.bands.n_px, (Sums(pos.shape[1], 4, 3), of_rows, Sums(len(grid.tri), n_columns, 1)))
 
     def work(band: Band, sums: list[engine.GradientSums]) -> int:
         i, (points, rows, faces) = band.picture, sums
         return views[i].colors_vjp(of(attr, i), corners, rast[i], g_out[i], (faces, points, rows), band.first, band.end)
 
-    grid.refuse(max(grid.bands.add_up_all(make, work, [g_pos, g_attr]), default=-1))
+    grid.refuse(grid.bands.add_up(room, work, [g_pos, g_attr]))
     return g_pos, g_attr
 
 
@@ -297,20 +294,23 @@ def texels_vjp(
 
     g_texels = np.zeros((n_pictures, ends[-1] if of_levels else 0, n_channels), dtype)
 
-    def make(room: Room) -> list[engine.GradientSums]:
-        per_px = 8 if look.filter is TexelFilter.LINEAR_MIPMAP_LINEAR else 4
-        columns = -(-n_channels // 4) * 4
-        return [room.sums("texels", g_texels.shape[1], columns, per_px)] if of_levels else []
+    per_px = 8 if look.filter is TexelFilter.LINEAR_MIPMAP_LINEAR else 4
+    of_texels = Sums(g_texels.shape[1], -(-n_channels // 4) * 4, per_px)
 
     def work(band: Band, sums: list[engine.GradientSums]) -> None:
         i = band.picture
         arrays = look.arrays(i, g_out, g_uv, g_da, g_bias)
         view.texels_vjp(look.of_picture(i), codes, arrays, sums[0] if sums else None, band.first, band.end)
 
-    grid.bands.add_up_all(make, work, [g_texels] if of_levels else [])
+    room = Room(grid.bands.n_px, (of_texels,) if of_levels else ())
+    grid.bands.add_up(room, work, [g_texels] if of_levels else [])
     parts = np.split(g_texels, ends[:-1], axis=1) if of_levels else []
     g_levels = [part.reshape(level.shape) for part, level in zip(parts, look.levels, strict=of_levels)]
     return g_levels, g_uv, g_da, g_bias
+
+
+#: Triangles whose outline is worth a thread: 0.1 ms.
+MIN_TRIANGLES_PER_PART = 10_000
 
 
 @dataclass(frozen=True)
@@ -328,14 +328,24 @@ class Outline:
 
 def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outline:
     """Return the silhouette edges of triangles and the places of vertices; `across` is that of `halves_across`."""
-    places, edges = empty((*pos.shape[:2], 2), np.float64), empty((len(pos), len(grid.tri)), np.int32)
+    n, n_threads = len(pos), grid.bands.threads
+    places, edges = empty((*pos.shape[:2], 2), np.float64), empty((n, len(grid.tri)), np.int32)
+    sides, views = empty(edges.shape, np.int32), [grid.view(one) for one in pos]
+    n_parts = max(1, min(n_threads, len(grid.tri) // MIN_TRIANGLES_PER_PART))
 
-    def write(first: int, end: int) -> None:
-        for i in range(first, end):
-            grid.view(pos[i]).outline(across, places[i], edges[i])
+    for has_sides in (False, True):
 
-    run_parts(write, len(pos), grid.bands.threads)
+        def write(i: int, _: int, *, has_sides: bool = has_sides) -> None:
+            k, part = divmod(i, n_parts)
+            views[k].outline((across, places[k], edges[k]), sides[k], has_sides, part, n_parts)
+
+        run_parts(write, n * n_parts, n * n_parts, n_threads)
     return Outline(across, places, edges)
+
+
+def scratch_of(grid: PixelGrid) -> tuple[tuple[int, int], type[np.int32]]:
+    """Return shape and dtype of the ids of rows that the search for edges works on."""
+    return (3, grid.width + engine.IDS_ROOM), np.int32
 
 
 def smooth(grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, rast: Array, color: Array) -> Array:
@@ -343,7 +353,7 @@ def smooth(grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, rast: 
     out, views = empty(color.shape, color.dtype), grid.views(pos)
 
     def work(band: Band) -> None:
-        i, scratch = band.picture, empty((3, grid.width + engine.IDS_ROOM), np.int32)
+        i, scratch = band.picture, empty(*scratch_of(grid))
         arrays = rast[i], color[i], out[i]
         views[i].edges(outline.of_picture(i), scratch, int(rule), arrays, None, band.first, band.end)
 
@@ -356,14 +366,14 @@ def smooth_vjp(
 ) -> tuple[Array, Array]:
     """Return the gradients of the colours and of `pos`."""
     g_color, g_pos = empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)
-    views = grid.views(pos)
+    views, room = grid.views(pos), Room(grid.bands.n_px, (Sums(pos.shape[1], 4, 6),), (scratch_of(grid),))
 
-    def work(band: Band, sums: engine.GradientSums) -> None:
-        i, scratch = band.picture, empty((3, grid.width + engine.IDS_ROOM), np.int32)
+    def work(band: Band, made: list[Any]) -> None:
+        i, (sums, scratch) = band.picture, made
         arrays = rast[i], color[i], g_out[i], g_color[i]
         views[i].edges(outline.of_picture(i), scratch, int(rule), arrays, sums, band.first, band.end)
 
-    grid.bands.add_up(work, g_pos, 6)
+    grid.bands.add_up(room, work, [g_pos])
     return g_color, g_pos
 
 

@@ -23,7 +23,7 @@ from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
 from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.draw import cells_for
-from topleft._core.polygons.polygons import Rule, frame_of, in_crs_of, warn_if_apart
+from topleft._core.polygons.polygons import frame_of, in_crs_of, warn_if_apart
 from topleft._core.polygons.prepared import Prepared, prepare
 from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.errors import MissingPackageError
@@ -352,7 +352,7 @@ def overlap(
     >>> table.means([[1, 2], [3, 4]])
     array([1.75, 3.25])
     """
-    is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
+    is_nonzero = parse(RuleOption, "rule", rule) == "nonzero"
     if triangles is None:
         given = in_crs_of(size, rings, crs)
     else:

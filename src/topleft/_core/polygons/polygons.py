@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any, Literal
 
 import numpy as np
@@ -18,7 +17,7 @@ from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import crs_text, is_same_crs, transformed
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, empty
-from topleft._core.base.options import Sampling, parse
+from topleft._core.base.options import Sampling, parse, parse_sampling
 from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.polygons.draw import add_shares, draw_labels, draw_mask
 from topleft._core.polygons.prepared import Frame, Prepared, prepare
@@ -26,13 +25,6 @@ from topleft._core.polygons.rings import RingSet, as_rings
 from topleft._core.raster.rasterize import Canvas, canvas_of
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, sample_positions
 from topleft.typing import RuleOption, SamplingOption
-
-
-class Rule(StrEnum):
-    """The fill rule: which winding numbers are inside."""
-
-    EVENODD = "evenodd"
-    NONZERO = "nonzero"
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +138,8 @@ def polygons(
     array([[1. , 0.5],
            [0.5, 0. ]], dtype=float32)
     """
-    how = parse(Sampling, "sampling", sampling)
-    is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
+    how = parse_sampling(sampling)
+    is_nonzero = parse(RuleOption, "rule", rule) == "nonzero"
     given = in_crs_of(size, rings, crs).apart_from(out)
     found, frame = frame_of(given, size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
     shape = frame.size[::-1]
@@ -184,10 +176,8 @@ def polygons(
 def in_crs_of(size: object, rings: Any, crs: object) -> RingSet:
     """Return the rings in the CRS of a grid, if that has one.
 
-    Raises
-    ------
-    ValueError
-        If the rings say that they are of another one, and `crs` does not; if `crs` is given and the grid has none.
+    A `ValueError` if they say that they are of another one, and `crs` does not; or if `crs` is given and the grid has
+    none.
     """
     given, own, of_grid = as_rings(rings), crs_text(crs), size.crs if isinstance(size, Grid) else None
     if of_grid is None:

@@ -15,7 +15,7 @@ from topleft._core.base.arrays import as_array
 from topleft._core.base.memory import SCRATCH
 from topleft._core.base.options import parse
 from topleft._core.polygons.draw import draw_mask
-from topleft._core.polygons.polygons import Rule, frame_of, polygons
+from topleft._core.polygons.polygons import frame_of, polygons
 from topleft._core.polygons.prepared import prepare
 from topleft._core.polygons.rings import as_rings
 from topleft._core.raster.rle import RunTable, encode_ids, encode_masks
@@ -119,7 +119,7 @@ def encode_polygons(
 
     `owners`: the object that each is part of, ascending from 0 on; then of each object, the union of its parts.
     """
-    is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
+    is_nonzero = parse(RuleOption, "rule", rule) == "nonzero"
     found, frame = frame_of(as_rings(rings), size, (0, 0), subpixel_bits, 1, 1)  # type: ignore[arg-type]
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     table, boxes = RunTable(frame.size), prepared.compiled.boxes_px.tolist()

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.base.options import Cull, DepthTest, Sampling, Sink
+from topleft._core.base.options import Sampling, Sink
 from topleft._core.base.threads import available_threads, count_threads
 from topleft._core.raster.costs import Costs, cost_table, use_costs
 from topleft._core.raster.view import CULL_CODES, View
 from topleft.methods import METHODS
+from topleft.typing import DepthTestOption
 
 if TYPE_CHECKING:
     from topleft._core.raster.cluster_draw import Survey
@@ -72,11 +73,8 @@ class SampledLimits(NamedTuple):
 def forced(**values: Any) -> Iterator[None]:
     """Force choices, for the whole process, while the context lasts.
 
-    Parameters
-    ----------
-    **values
-        By the name of a function of this module: its answer, or a function that gives it. By the name of a row of
-        `Costs`: its value.
+    By the name of a function of this module: its answer, or a function that gives it. By that of a row of `Costs`: a
+    value.
     """
     names, table, rows = globals(), cost_table(), Costs.__dataclass_fields__.keys()
     costs = {name: value for name, value in values.items() if name in rows}
@@ -194,11 +192,11 @@ def is_sliced(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
     return n_parts > 1 and pays and fits_lanes and shares
 
 
-def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
+def fragment_sink(test: DepthTestOption | None, *, has_depth: bool) -> Sink:
     """Return the sink of `rasterize`: the nearer, the farther or the later triangle stays."""
     if test is None or not has_depth:
         return Sink.PAINT
-    return Sink.FARTHEST if test is DepthTest.GREATER else Sink.NEAREST
+    return Sink.FARTHEST if test == "greater" else Sink.NEAREST
 
 
 def pays_float_lanes(view: View) -> bool:
@@ -259,7 +257,7 @@ def pays_to_draw_samples(
     route: ClusterRoute, view: View, n_triangles: int, survey: Survey, find_beyond: Callable[[], float]
 ) -> bool:
     """Tell whether several samples of a mesh are drawn from clusters or meshlets, one after the other."""
-    costs, is_culled = cost_table(), view.cull != CULL_CODES[Cull.NONE]
+    costs, is_culled = cost_table(), view.cull != CULL_CODES["none"]
     if route is ClusterRoute.MESHLETS:
         limits = SampledLimits(*(costs.sampled_meshlet_culled if is_culled else costs.sampled_meshlet))
     else:
@@ -277,7 +275,7 @@ def pays_to_draw_samples(
 
 def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
     """Tell whether a view of a mesh in clusters is drawn from these; `survey`: their visibility in it."""
-    costs, is_culled = cost_table(), view.cull != CULL_CODES[Cull.NONE]
+    costs, is_culled = cost_table(), view.cull != CULL_CODES["none"]
     limits = costs.cluster_small, costs.cluster_middle, (math.inf, 0.0, 0.0)
     least = next(shares[is_culled] for below, *shares in limits if n_triangles < below)
     return survey.front <= costs.cluster_front and survey.outside >= least
@@ -311,7 +309,7 @@ def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: 
     `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom.
     """
     costs = cost_table()
-    limits = MeshletLimits(*(costs.meshlet_both if view.cull == CULL_CODES[Cull.NONE] else costs.meshlet_culled))
+    limits = MeshletLimits(*(costs.meshlet_both if view.cull == CULL_CODES["none"] else costs.meshlet_culled))
     density = n_triangles * (1.0 - survey.outside) / (view.size[0] * view.size[1])
     are_dense = density >= limits.density or survey.outside >= costs.meshlet_sparse
     are_many = n_triangles >= limits.triangles or (survey.outside >= limits.outside and are_dense)
@@ -505,7 +503,7 @@ class Route(Enum):
     SAMPLES = "ids and depth of each sample"
 
 
-def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: bool) -> tuple[Route, Drawing]:
+def route(view: View, snapped: Snapped, test: DepthTestOption | None, *, wants_depth: bool) -> tuple[Route, Drawing]:
     """Return how `rasterize` draws a mesh; `wants_depth`: into an array of the caller's."""
     has_depth = snapped.has_depth
     sink = fragment_sink(test, has_depth=has_depth)
@@ -532,7 +530,7 @@ def pays_to_split(view: View, n_triangles: int) -> bool:
     return view.size[0] * view.size[1] * view.sampling.n_samples > least + of_triangle * n_triangles
 
 
-def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
+def earlier_wins(test: DepthTestOption | None, *, has_depth: bool) -> bool:
     """Tell whether the triangle with the lower index shows where depths are equal; otherwise the later one does."""
     return test is not None and has_depth
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft._core.base.arrays import apart_from, as_background, as_checked_triangles, as_out, as_triangles, as_vertices
 from topleft._core.base.memory import Memory, empty
-from topleft._core.base.options import Per, Sampling, Sink, parse
+from topleft._core.base.options import Sampling, Sink, parse
 from topleft._core.raster.view import View
 from topleft.methods import Method, load_kernel
 from topleft.typing import PerOption
@@ -105,7 +105,7 @@ def fill_classic(
 ) -> NDArray[Any]:
     """Return the picture of triangles in one colour each, the later over the earlier."""
     n_triangles = len(as_triangles(triangles))
-    if parse(Per, "per", per) is Per.VERTEX or len(colors) != n_triangles:
+    if parse(PerOption, "per", per) == "vertex" or len(colors) != n_triangles:
         raise ValueError(
             f"colors must have {n_triangles} rows, one per triangle, for method {method.name!r}, got {len(colors)}"
         )

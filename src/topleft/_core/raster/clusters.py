@@ -194,18 +194,11 @@ def measure_clusters(
 
 
 class Meshlets:
-    """A copy of a mesh in meshlets: up to 64 vertices and 96 triangles each.
+    """A copy of a mesh in N meshlets: up to 64 vertices and 96 triangles each.
 
-    Attributes
-    ----------
-    blocks : (N * MESHLET_BYTES,) uint8
-        `tl_meshlet` of ``csrc/meshlets.h``: vertices, corners, and which triangle of the mesh each is.
-    bounds : (MESHLET_BOUNDS, N + MESHLET_TAIL) float32
-        The bounds of each.
-    counts : (N + MESHLET_TAIL,) uint8
-        Their triangles, with the empty ones.
-    n_bytes : int
-        How much memory the copy takes.
+    `blocks`: (N * MESHLET_BYTES,) uint8, `tl_meshlet` of ``csrc/meshlets.h``: vertices, corners, and which triangle of
+    the mesh each is. `bounds`: (MESHLET_BOUNDS, N + MESHLET_TAIL) float32. `counts`: (N + MESHLET_TAIL,) uint8, the
+    triangles of each, with the empty ones. `n_bytes`: of the copy.
     """
 
     def __init__(self, clusters: Clusters) -> None:

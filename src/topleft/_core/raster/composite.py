@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import apart_from, as_array, as_background, as_number, as_out
 from topleft._core.base.memory import empty
-from topleft._core.base.options import Per, parse
+from topleft._core.base.options import parse
 from topleft._core.base.threads import available_threads, parse_threads, run_parts
 from topleft._core.raster.peel import DepthLayers
 from topleft.typing import PerOption
@@ -149,7 +149,7 @@ def find_owner(palette: NDArray[Any], per: str, layers: DepthLayers) -> str:
         rows["vertex"] = (layers.n_vertices,)
     if per == "pixel" or (per == "auto" and palette.ndim == 4):
         choices = ["pixel"]
-    elif parse(Per, "per", per) is Per.AUTO:
+    elif parse(PerOption, "per", per) == "auto":
         choices = [name for name in ("triangle", "vertex") if palette.shape[:-1] == rows.get(name)]
         if len(choices) > 1:
             raise ValueError(

@@ -7,7 +7,7 @@ colours are weighted by it: the mean of premultiplied colours, made straight aga
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -16,7 +16,7 @@ from topleft._core import engine
 from topleft._core.base.arrays import apart_from, as_array, as_background, as_colors, shown
 from topleft._core.base.color import srgb_tables
 from topleft._core.base.memory import Memory
-from topleft._core.base.options import Alpha, Blend, Per, Resolve, Sampling, Sink, parse
+from topleft._core.base.options import Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.classic import fill_classic
@@ -26,7 +26,7 @@ from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
 
-BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csrc/topleft.h
+BLEND_CODES = {mode: code for code, mode in enumerate(get_args(BlendOption))}  # tl_blend in csrc/topleft.h
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +45,8 @@ class Style:
 class Blending:
     """How `fill` puts a colour into a pixel."""
 
-    mode: Blend
-    alpha: Alpha
+    mode: BlendOption
+    alpha: AlphaOption
     by_area: bool
     has_alpha: bool
 
@@ -54,25 +54,25 @@ class Blending:
     def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending:
         """Check the options of a call."""
         n_channels = 1 if colors.ndim == 1 else colors.shape[1]
-        modes = parse(Blend, "blend", mode), parse(Alpha, "alpha", alpha)
+        modes = parse(BlendOption, "blend", mode), parse(AlphaOption, "alpha", alpha)
         chosen = cls(*modes, by_area=view.sampling is Sampling.AREA, has_alpha=n_channels in (2, 4))
-        if chosen.mode is Blend.OVER and not chosen.has_alpha:
+        if chosen.mode == "over" and not chosen.has_alpha:
             raise ValueError(
                 f"colors must have 2 or 4 channels, the last of them alpha, for blend 'over', got {n_channels}"
             )
-        if view.classic and chosen.mode is not Blend.REPLACE:
+        if view.classic and chosen.mode != "replace":
             raise ValueError(f"blend must be 'replace' for method {view.classic.name!r}, got {str(chosen.mode)!r}")
         return chosen
 
     @property
     def is_needed(self) -> bool:
         """False when a triangle simply replaces the colour of its samples."""
-        return self.by_area or self.mode is not Blend.REPLACE
+        return self.by_area or self.mode != "replace"
 
     @property
     def is_straight(self) -> bool:
         """Whether the mode treats the last channel as alpha that colours have not been multiplied by."""
-        return self.has_alpha and self.alpha is Alpha.STRAIGHT and self.mode in (Blend.OVER, Blend.REPLACE)
+        return self.has_alpha and self.alpha == "straight" and self.mode in ("over", "replace")
 
 
 class Painting(NamedTuple):
@@ -210,22 +210,22 @@ def draw_labels(
 
 def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
     """Tell whether a row of colours belongs to a triangle; otherwise it belongs to a vertex."""
-    choice = parse(Per, "per", per)
+    choice = parse(PerOption, "per", per)
     n_triangles = snapped.n_triangles
     fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
-    if choice is Per.AUTO and fits_triangles and fits_vertices and n_colors:
+    if choice == "auto" and fits_triangles and fits_vertices and n_colors:
         raise ValueError(
             f"colors has {n_colors} rows, and there are as many triangles as vertices: "
             "say per='triangle' or per='vertex'"
         )
-    if choice is not Per.VERTEX and fits_triangles:
+    if choice != "vertex" and fits_triangles:
         return True
-    if choice is not Per.TRIANGLE and fits_vertices:
+    if choice != "triangle" and fits_vertices:
         return False
     wish = {
-        Per.TRIANGLE: f"{n_triangles} rows, one per triangle",
-        Per.VERTEX: f"{snapped.n_vertices} rows, one per vertex",
-        Per.AUTO: f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
+        "triangle": f"{n_triangles} rows, one per triangle",
+        "vertex": f"{snapped.n_vertices} rows, one per vertex",
+        "auto": f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
     }[choice]
     raise ValueError(f"colors must have {wish}, got {n_colors}")
 
@@ -315,7 +315,7 @@ def blend_picture(
     packed = p.memory.empty("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
     n_cells = engine.blend_cells(width)
     cells = p.memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
-    code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
+    code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha == "premultiplied"
 
     def blend_part(i: int, _: int) -> int:
         first, end = height * i // n_parts, height * (i + 1) // n_parts
@@ -331,7 +331,7 @@ def blend_picture(
 
 def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> engine.Transfer | None:
     """Return how samples are averaged; None for the mean of values."""
-    is_linear = parse(Resolve, "resolve", resolve) is Resolve.LINEAR
+    is_linear = parse(ResolveOption, "resolve", resolve) == "linear"
     if is_linear and colors.dtype != np.uint8:
         raise ValueError(
             f"resolve 'linear' takes sRGB colours of uint8, got {colors.dtype}: float32 is averaged as it is"

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import apart_from, as_array, as_number
 from topleft._core.base.memory import Memory
-from topleft._core.base.options import DepthTest, parse
+from topleft._core.base.options import parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import canvas_of
@@ -63,7 +63,7 @@ def draw_wireframe(
     width, height = view.size
     hides = as_depth(depth, (height, width))
     hides = None if hides is None else np.asarray(apart_from(out, "depth", hides))
-    is_farthest = parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
+    is_farthest = parse(DepthTestOption, "depth_test", depth_test) == "greater"
     bias = as_number("depth_bias", depth_bias)
     if not math.isfinite(bias):
         raise ValueError(f"depth_bias must be finite, got {depth_bias!r}")

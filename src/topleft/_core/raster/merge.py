@@ -15,12 +15,12 @@ import numpy as np
 from topleft._core import engine
 from topleft._core.base.array_types import F32, I32
 from topleft._core.base.arrays import INT32_MAX, as_array, shown
-from topleft._core.base.options import DepthTest, parse
+from topleft._core.base.options import parse
 from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.raster.fragments import Fragments
 from topleft.typing import DepthTestOption
 
-RULES = {DepthTest.LESS: 0, DepthTest.GREATER: 1, None: 2}  # tl_merge_rule in csrc/tiles.h
+RULES = {"less": 0, "greater": 1, None: 2}  # tl_merge_rule in csrc/tiles.h
 
 #: Pixels a thread; below that starting it costs more than it saves.
 MIN_PIXELS_PER_THREAD = 1 << 18
@@ -77,7 +77,7 @@ def merge(
     >>> np.array_equal(ids, whole.triangle), np.array_equal(depth, whole.depth)
     (True, True)
     """
-    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    test = None if depth_test is None else parse(DepthTestOption, "depth_test", depth_test)
     n_threads = parse_threads(threads)
     if isinstance(buffers, Fragments | str | bytes | dict | set) or not hasattr(type(buffers), "__iter__"):
         raise TypeError(f"buffers must be an iterable of Fragments or pairs (ids, depth), got {shown(buffers)}")
@@ -115,7 +115,7 @@ def _merge_into(
     own_ids: I32,
     own_depth: F32,
     names: int | I32 | None,
-    test: DepthTest | None,
+    test: DepthTestOption | None,
     threads: int | None,
 ) -> None:
     flat = ids.reshape(-1), depth.reshape(-1), own_ids.reshape(-1), own_depth.reshape(-1)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import shown
 from topleft._core.base.memory import FRESH, SCRATCH, Memory, check_fits
-from topleft._core.base.options import DepthTest, Sampling, parse
+from topleft._core.base.options import Sampling, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.fragments import Fragments
@@ -173,7 +173,7 @@ def check_peel(view: View, layers: int, depth_test: str) -> tuple[int, bool]:
     view.refuse_classic("depth")
     if view.sampling is not Sampling.CENTER:
         raise ValueError(f"sampling {str(view.sampling)!r} gives no sorted layers: peel takes 'center'")
-    return as_layers(layers), parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
+    return as_layers(layers), parse(DepthTestOption, "depth_test", depth_test) == "greater"
 
 
 def as_layers(layers: object) -> int:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import as_array, as_count, as_number, as_places, as_point_size, as_real, as_vertices
 from topleft._core.base.memory import FRESH, Memory, check_fits
-from topleft._core.base.options import DepthTest, PointShape, Sink, parse
+from topleft._core.base.options import Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.fragments import Fragments
@@ -186,13 +186,13 @@ def points(
     checked.refuse_classic("points")
     if checked.cull:
         raise ValueError("points have no side to cull")
-    kind, test = parse(PointShape, "shape", shape), parse(DepthTest, "depth_test", depth_test)
+    kind, test = parse(PointShapeOption, "shape", shape), parse(DepthTestOption, "depth_test", depth_test)
     n_points = (as_array("positions", positions).shape or (0,))[0]
     sizes = as_point_size("point_size", point_size, n_points)
     largest = float(np.max(sizes, initial=0.0))
     if largest > MOST_POINT_PX:
         raise ValueError(f"point_size must be at most {MOST_POINT_PX} pixels, got {largest:g}")
-    is_farthest = test is DepthTest.GREATER
+    is_farthest = test == "greater"
     return draw_points(FRESH, positions, sizes, kind, checked, is_farthest=is_farthest)
 
 
@@ -200,7 +200,7 @@ def draw_points(
     memory: Memory,
     positions: ArrayLike,
     sizes_px: float | NDArray[np.float64],
-    shape: PointShape,
+    shape: PointShapeOption,
     view: View,
     *,
     is_farthest: bool = False,
@@ -230,13 +230,13 @@ def draw_points(
 def rows_of(
     records: NDArray[np.uint8],
     sizes_fx: tuple[int, NDArray[np.int32] | None],
-    shape: PointShape,
+    shape: PointShapeOption,
     at: tuple[int, int],
     target: engine.Target,
     view: View,
 ) -> Callable[[int, int], None]:
     """Return a function that draws rows [first, end) of points, as one sample sees them."""
-    is_disc = shape is PointShape.DISC
+    is_disc = shape == "disc"
 
     def draw_rows(first: int, end: int) -> None:
         engine.draw_cloud(records, *sizes_fx, is_disc, *at, target, view.origin, view.grid_bits, first, end - first)

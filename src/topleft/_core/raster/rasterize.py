@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import as_number, as_out
 from topleft._core.base.memory import Memory, MemoryOf, check_fits, empty
-from topleft._core.base.options import DepthTest, Sampling, Sink, parse
+from topleft._core.base.options import Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Drawing, Route
@@ -233,7 +233,7 @@ def draw_all_samples(
 class FragmentOptions(NamedTuple):
     """The options of `rasterize` beside those of all verbs."""
 
-    test: DepthTest | None
+    test: DepthTestOption | None
     background: float  # depth where nothing is
     ids_out: object
     depth_out: object
@@ -241,9 +241,9 @@ class FragmentOptions(NamedTuple):
     @classmethod
     def parse(cls, depth_test: str | None, background_depth: float | None, out: object) -> FragmentOptions:
         """Check the options of a call."""
-        test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+        test = None if depth_test is None else parse(DepthTestOption, "depth_test", depth_test)
         if background_depth is None:
-            background_depth = -np.inf if test is DepthTest.GREATER else np.inf
+            background_depth = -np.inf if test == "greater" else np.inf
         background_depth = as_number("background_depth", background_depth)
         try:
             ids_out, depth_out = (None, None) if out is None else cast("tuple[object, object]", out)

@@ -145,10 +145,7 @@ def annotation_of(rle: dict[str, Any], own: int, image: int, category: int) -> d
 def read_counts(text: str) -> I64:
     """Return run lengths from a string, as `write_counts` of csrc/pixels/rle.c and pycocotools write them.
 
-    Raises
-    ------
-    ValueError
-        If it is no such text: with the first character that is none, or where it ends.
+    A `ValueError` if it is no such text: with the first character that is none, or where it ends.
     """
     lengths: list[int] = []
     value = shift = 0

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import as_size, as_subpixel_bits, as_transform, as_window
-from topleft._core.base.options import ClipDepth, Cull, Sampling, parse
+from topleft._core.base.options import Sampling, parse, parse_sampling
 from topleft._core.base.threads import parse_threads
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS
 from topleft.methods import Method, find_method
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
 EXACT_BITS = 8  # of the grid that all samples lie on: TL_GRID_BITS in csrc/exact
 MAX_EXACT_PX = 2**48
-CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
+CULL_CODES = {"none": 0, "back": 1, "front": 2}  # tl_cull in csrc/topleft.h
 
 
 class Planned(Protocol):
@@ -180,7 +180,7 @@ class View:
         given_bits = options.get("subpixel_bits", 8)
         is_exact = isinstance(given_bits, str) and given_bits == "exact"
         bits = EXACT_BITS if is_exact else as_subpixel_bits(given_bits)
-        sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
+        sampling = parse_sampling(options.get("sampling", "center"))
         grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
         viewport = options.get("viewport")
         transform = options.get("transform")
@@ -197,9 +197,9 @@ class View:
             grid_bits=grid_bits,
             sampling=sampling,
             method=method.code or 0,
-            cull=CULL_CODES[Cull.NONE if cull is None else parse(Cull, "cull", cull)],
-            zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
-            is ClipDepth.ZERO_TO_ONE,
+            cull=CULL_CODES["none" if cull is None else parse(CullOption, "cull", cull)],
+            zero_to_one=parse(ClipDepthOption, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
+            == "zero_to_one",
             near_clip=bool(options.get("near_clip", True)),
             far_clip=bool(options.get("far_clip", True)),
             threads=parse_threads(options.get("threads")),

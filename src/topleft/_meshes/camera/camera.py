@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,7 @@ from topleft._core.base.arrays import (
     shown,
 )
 from topleft._core.base.defaults import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft._meshes.camera.calibration import Calibration, of_colmap, of_nerfstudio, of_opengl, of_pytorch3d
 from topleft._meshes.camera.lens import FLIP, Lens, lens_of_opencv
 from topleft._meshes.camera.matrices import (
@@ -651,7 +651,7 @@ class Camera:
         """
         framed = as_framed(subject)
         ends = ends_to_frame(framed)
-        check_choice("fit", fit, get_args(FitOption))
+        parse(FitOption, "fit", fit)
         points = None if fit == "sphere" else box_corners(ends) if fit == "box" else points_to_frame(framed)
         angles = azimuth_deg, elevation_deg, fov_y_deg
         fills = fit == "silhouette"
@@ -681,15 +681,7 @@ CameraLike: TypeAlias = Camera | npt.NDArray[Any]
 
 
 def as_camera(camera: object, name: str = "camera") -> Camera:
-    """The camera, or that of a matrix (4, 4), clip from world.
-
-    Raises
-    ------
-    TypeError
-        If it is neither.
-    ValueError
-        As `Camera.from_matrix` does.
-    """
+    """The camera, or that of a matrix (4, 4) by `Camera.from_matrix`; a `TypeError` if it is neither."""
     if isinstance(camera, Camera):
         return camera
     wish = f"{name} must be a Camera or a (4, 4) matrix, clip from world"

@@ -8,7 +8,7 @@ Based on: Segal, M., and K. Akeley, "The OpenGL Graphics System", 1992 (the matr
 from __future__ import annotations
 
 import math
-from typing import TypeAlias, get_args
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import as_number, as_real, check_regular
 from topleft._core.base.defaults import THREE_QUARTER_DEG
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft._meshes.model.mesh import Mesh, extreme_points, used_vertices
 from topleft._meshes.model.points import Points
 from topleft._meshes.scene.adapt import is_mesh_like
@@ -125,21 +125,11 @@ def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
 
 
 def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = False) -> F64:
-    """The place of a camera that fits the box round the picture of all points into the middle of its frame.
+    """The place of a camera that fits the box round the picture of points (N, 3) into the middle of its frame.
 
-    In the middle also along the axis that it does not fill, to within 1e-6 of its width.
-
-    Parameters
-    ----------
-    points : (N, 3) float64
-        In eye axes: z towards the viewer.
-    tan_x, tan_y : float
-        Tangents of half the fields of view; without perspective half the sides of the frame; only their ratio counts.
-
-    Returns
-    -------
-    (3,) float64
-        The eye; without perspective x and y, and half the height of the frame.
+    In the middle also along the axis that it does not fill, to within 1e-6 of its width. Points are in eye axes: z
+    towards the viewer. `tan_x`, `tan_y`: tangents of half the fields of view; without perspective half the sides of the
+    frame; only their ratio counts. Returns the eye; without perspective x and y, and half the height of the frame.
     """
     x, y, z = points.T
     if ortho:
@@ -200,7 +190,7 @@ def orbit_view(
     up: UpOption = "y",
 ) -> F64:
     """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`."""
-    check_choice("up", up, get_args(UpOption))
+    parse(UpOption, "up", up)
     if not math.isfinite(as_number("azimuth_deg", azimuth_deg)):
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")
     if not -90 <= as_number("elevation_deg", elevation_deg) <= 90:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from topleft._core.base.array_types import F64, I32, MeshLike
 from topleft._core.base.arrays import apart_from, as_array, as_checked_triangles, as_number, as_pair
 from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
 from topleft._core.base.memory import SCRATCH
-from topleft._core.base.options import Per, Sink, check_choice, parse
+from topleft._core.base.options import Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.rasterize import canvas_of, draw
@@ -121,7 +121,7 @@ def field(
     array = as_array("values", apart_from(out, "values", values))
     if array.dtype.kind not in "fiub":
         raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
-    is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
+    is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(PerOption, "per", per))
     grid = grid_of(size, pixel_size, extent, y, partial(extent_of, polygons))
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     points_px = grid.to_pixels(points)
@@ -191,7 +191,7 @@ def height_map(
     array([[nan, nan],
            [1.5, nan]])
     """
-    check_choice("surface", surface, get_args(SurfaceOption))
+    parse(SurfaceOption, "surface", surface)
     polygons = as_polygons(mesh)
     points = _plane_points(polygons)
     if points.shape[1] != 3:
@@ -267,18 +267,18 @@ def extent_of(polygons: Polygons) -> Extent:
     return float(x.min()), float(x.max()), float(y.min()), float(y.max())
 
 
-def is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: Per) -> bool:
+def is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: PerOption) -> bool:
     """Whether values are of faces; of vertices otherwise."""
     fits_vertices, fits_faces = values.shape == (n_vertices,), values.shape == (n_faces,)
-    if per is Per.AUTO and fits_vertices and fits_faces:
+    if per == "auto" and fits_vertices and fits_faces:
         raise ValueError(
             f"values has {n_faces} numbers, and there are as many faces as vertices: say per='triangle' or per='vertex'"
         )
-    if fits_faces and per is not Per.VERTEX:
+    if fits_faces and per != "vertex":
         return True
-    if fits_vertices and per is not Per.TRIANGLE:
+    if fits_vertices and per != "triangle":
         return False
-    wishes = {Per.VERTEX: f"({n_vertices},)", Per.TRIANGLE: f"({n_faces},)"}
+    wishes = {"vertex": f"({n_vertices},)", "triangle": f"({n_faces},)"}
     wish = wishes.get(per, f"({n_vertices},) per vertex or ({n_faces},) per face")
     raise ValueError(f"values must have shape {wish}, got {values.shape}")
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ from topleft._core.base.array_types import F32, F64, I32, U8, MeshLike
 from topleft._core.base.arrays import as_array, as_number, as_size, as_values, shown
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import FRESH, check_fits
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.verbs import overdraw, rasterize
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
@@ -146,8 +146,8 @@ def bake(
     mesh = as_mesh(mesh)
     other = None if source is None else as_mesh(source)
     width, height = as_size(size, smallest=1)
-    check_choice("rule", rule, get_args(BakeRuleOption))
-    check_choice("blend", blend, get_args(TakenOption))
+    parse(BakeRuleOption, "rule", rule)
+    parse(TakenOption, "blend", blend)
     if not (isinstance(gutter, int | np.integer) and 0 <= gutter <= MOST_GUTTER):
         raise ValueError(f"gutter must be a number of texels in [0, {MOST_GUTTER}], got {gutter!r}")
     if max_distance is not None and not as_number("max_distance", max_distance) >= 0:
@@ -158,7 +158,7 @@ def bake(
     if cameras is not None:
         return with_gutter(from_pictures(chart, pictures_of(what, cameras), blend), gutter, chart.n_threads)
     if isinstance(what, str):
-        check_choice("what", what, get_args(BakeOption))
+        parse(BakeOption, "what", what)
     if isinstance(what, str) and what == "triangle" and other is None:
         _, ids = chart.values_of(np.zeros((len(mesh.vertices), 1), np.float32))
         return with_gutter(Baked(ids.copy(), ids, ids >= 0), gutter, chart.n_threads)

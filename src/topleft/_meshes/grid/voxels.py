@@ -11,7 +11,7 @@ from __future__ import annotations
 import operator
 import warnings
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast, get_args
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64, I32, U8, MeshLike
 from topleft._core.base.arrays import as_count, as_number, as_real, shown
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
@@ -164,7 +164,7 @@ def voxelize(
     np.int64(56)
     """
     subject = as_meshes(mesh)
-    check_choice("rule", rule, get_args(VoxelRuleOption))
+    parse(VoxelRuleOption, "rule", rule)
     if not isinstance(solid, bool | np.bool_):
         raise TypeError(f"solid must be True or False, got {shown(solid)}")
     if as_count("samples", samples) not in SAMPLES:

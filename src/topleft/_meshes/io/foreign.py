@@ -274,13 +274,7 @@ class _CountedModule:
         return getattr(self._module, name)
 
     def decompress(self, content: bytes) -> bytes:
-        """All that the module unpacks of some bytes.
-
-        Raises
-        ------
-        MeshError
-            If it is more than allowed.
-        """
+        """All that the module unpacks of some bytes; a `MeshError` if it is more than allowed."""
         budget = _unpacking.get()
         if budget is None:
             return self._module.decompress(content)

@@ -20,8 +20,8 @@ import numpy as np
 from topleft._core.base.array_types import U8
 from topleft._core.base.color import Color, decode_srgb
 from topleft._meshes.io.references import ROWS_AT_ONCE, InputFile
-from topleft._meshes.model.material import AlphaMode, Material
-from topleft._meshes.model.texture import Texture, Wrap
+from topleft._meshes.model.material import Material
+from topleft._meshes.model.texture import Texture
 from topleft.errors import MeshError
 from topleft.typing import EncodingOption
 
@@ -53,7 +53,7 @@ class _Map:
         (su, sv), (du, dv) = self.scale, self.offset
         is_moved = (su, sv, du, dv) != (1, 1, 0, 0)
         matrix = np.array([[su, 0, du], [0, sv, dv]]) if is_moved else None
-        return {"wrap": Wrap.CLAMP if self.is_clamped else Wrap.REPEAT, "transform": matrix}
+        return {"wrap": "clamp" if self.is_clamped else "repeat", "transform": matrix}
 
 
 @dataclass
@@ -209,7 +209,7 @@ class _Makers:
             self._source.notes.add("materials that are wholly transparent")
         own: dict[str, Any] = {"opacity": opacity}
         if opacity < 1:
-            own["alpha_mode"] = AlphaMode.BLEND
+            own["alpha_mode"] = "blend"
         kind = _opacity_kind(maps)
         picture = None if kind is None else self._picture(maps[kind])
         if kind is None or picture is None:
@@ -231,7 +231,7 @@ class _Makers:
         if own.get("alpha_mode") is None:
             alpha = np.zeros((1, 1), np.uint8) if texture is None else texture.image[..., 3]
             between = (alpha > NEARLY_CLEAR) & (alpha < NEARLY_OPAQUE)
-            own["alpha_mode"] = AlphaMode.BLEND if between.mean() > 0.05 else AlphaMode.MASK
+            own["alpha_mode"] = "blend" if between.mean() > 0.05 else "mask"
         return own
 
     def _emission(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:

@@ -35,13 +35,7 @@ UNREAD = {
 
 
 def read_obj(source: InputFile) -> list[Mesh]:
-    """The faces of an OBJ file, cut into triangles, in the order of the file.
-
-    Raises
-    ------
-    MeshError
-        If the file is broken.
-    """
+    """The faces of an OBJ file, cut into triangles, in the order of the file; a `MeshError` if it is broken."""
     content = source.content()
     source.budget.spend("max_lines", content.count(b"\n") + content.count(b"\r"))
     text = _Text(content)

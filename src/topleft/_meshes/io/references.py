@@ -62,16 +62,8 @@ class Moment(NamedTuple):
 class InputFile:
     """A mesh file and the files beside it, with their limits and notes of missing ones.
 
-    Parameters
-    ----------
-    path : Path
-        The mesh file.
-    budget : Budget
-        The limits of its contents.
-    archive : InputFile, optional
-        The archive that it was unpacked from, which gets its notes and its points.
-    home : Path, optional
-        The folder that it may name files of: its own unless given.
+    `archive`: that it was unpacked from, which gets its notes and its points. `home`: the folder that it may name files
+    of, its own unless given.
     """
 
     def __init__(

@@ -56,13 +56,9 @@ class Reach(NamedTuple):
 
 
 class TriangleTree:
-    """Triangles among which the nearest are found.
+    """Triangles (T, 3) int32 of points (V, 3) float64, at least one, among which the nearest are found.
 
-    Parameters
-    ----------
-    points : (V, 3) float64
-    triangles : (T, 3) int32
-        At least one. Vertices at one place should have one index: neighbours are found by them.
+    Vertices at one place should have one index: neighbours are found by them.
     """
 
     def __init__(self, points: F64, triangles: I32) -> None:
@@ -112,10 +108,7 @@ class TriangleTree:
 def measure(one: TriangleTree, other: TriangleTree) -> DistanceBounds:
     """Bounds on the Hausdorff distance between two surfaces: of the point farthest from the other surface, either way.
 
-    Returns
-    -------
-    DistanceBounds
-        `bound` holds for every point of both, rounding included.
+    `bound` holds for every point of both, rounding included.
     """
     ends = [(one, other), (other, one)]
     at_corners = max(target.farthest(some_points(source)) for source, target in ends)

@@ -44,21 +44,12 @@ OF_VERTICES = ("vertices", "normals", "colors", "uv", "uv1")
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Where the parts of each level lie, the mesh itself first, and their distances from it.
+    """Where the parts of each level lie, the mesh itself first, and their distances from it."""
 
-    Attributes
-    ----------
-    order : (T,) int32
-        The triangles of the mesh, part by part. Those of other levels are in order.
-    starts : tuple of (N + 1,) int64
-        Where the triangles of each part of a level begin, and the end of the last.
-    bounds : tuple of (N,) float64
-        No point of a part, nor of the part of the mesh that it stands for, is farther than that from the other.
-    """
-
-    order: I32
-    starts: tuple[npt.NDArray[np.int64], ...]
+    order: I32  # (T,): the triangles of the mesh, part by part; those of other levels are in order
+    starts: tuple[npt.NDArray[np.int64], ...]  # (N + 1,): where those of each part of a level begin, the last ends
     bounds: tuple[F64, ...]
+    """(N,): no point of a part, nor of the part of the mesh that it stands for, is farther than that from the other."""
 
 
 def parts_of_arrays(array: Callable[[str], Any], meshes: Sequence[Mesh]) -> Parts | None:

@@ -28,7 +28,7 @@ from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import as_array, as_number, as_vector, set_read_only
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, ColorLike, as_color, light_of
 from topleft._core.base.options import parse
-from topleft._meshes.model.light import TO_HEADLIGHT, LightSpace, as_not_negative
+from topleft._meshes.model.light import TO_HEADLIGHT, as_not_negative
 from topleft.typing import SpaceOption
 
 N_ROUGH = 8
@@ -117,7 +117,7 @@ class Environment:
         keep(self, "turn", as_number("turn", self.turn))
         if not np.isfinite(self.turn):
             raise ValueError(f"turn must be finite, got {self.turn!r}")
-        keep(self, "space", parse(LightSpace, "space", self.space))
+        keep(self, "space", parse(SpaceOption, "space", self.space))
 
     @property
     def colors(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

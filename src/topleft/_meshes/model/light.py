@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,21 +30,6 @@ AMBIENT = 0.03
 The headlight adds the rest: it falls off as ((1 + n . l) / 2)**3 and so reaches 0 smoothly, at the far side of a
 sphere. Lambert's max(0, n . l) ends in a line, which on coarse meshes reads as a seam.
 """
-
-
-class LightKind(StrEnum):
-    """Where light comes from."""
-
-    DIRECTIONAL = "directional"
-    POINT = "point"
-    SPOT = "spot"
-
-
-class LightSpace(StrEnum):
-    """The space that a light is fixed to."""
-
-    WORLD = "world"
-    EYE = "eye"
 
 
 @dataclass(frozen=True)
@@ -83,7 +67,7 @@ class Light:
     Examples
     --------
     >>> Light((0, 1, 0)).kind
-    <LightKind.DIRECTIONAL: 'directional'>
+    'directional'
     """
 
     at: tuple[float, float, float]
@@ -113,15 +97,15 @@ class Light:
 
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
-        keep(self, "kind", parse(LightKind, "kind", self.kind))
-        keep(self, "space", parse(LightSpace, "space", self.space))
+        keep(self, "kind", parse(LightKindOption, "kind", self.kind))
+        keep(self, "space", parse(SpaceOption, "space", self.space))
         keep(self, "color", as_color("color", self.color, 3))
         keep(self, "at", tuple(as_vector("at", self.at).tolist()))
-        if self.kind == LightKind.DIRECTIONAL and not any(self.at):
+        if self.kind == "directional" and not any(self.at):
             raise ValueError(f"at must be a direction, got {self.at}")
         for name in ("intensity", "falloff"):
             keep(self, name, as_not_negative(name, getattr(self, name)))
-        if (self.kind == LightKind.SPOT) != (self.direction is not None):
+        if (self.kind == "spot") != (self.direction is not None):
             raise ValueError(f"direction must be given for a spot, and for no other kind, got {self.direction}")
         if self.direction is not None:
             keep(self, "direction", tuple(as_vector("direction", self.direction).tolist()))
@@ -133,7 +117,7 @@ class Light:
     @property
     def cone(self) -> tuple[float, float]:
         """Scale and offset of a spot, which sends the square of scale * cosine + offset, cut off at 0 and 1."""
-        if self.kind != LightKind.SPOT:
+        if self.kind != "spot":
             return 0.0, 0.0
         inner, outer = (engine.cosine_and_sine(angle)[0] for angle in (self.inner_deg, self.outer_deg))
         return 1 / (inner - outer), -outer / (inner - outer)

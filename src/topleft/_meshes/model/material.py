@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,14 +14,6 @@ from topleft._meshes.model.texture import Texture
 from topleft.typing import AlphaModeOption
 
 TEXTURES = ("texture", "emission_texture", "metallic_roughness_texture", "occlusion_texture", "normal_texture")
-
-
-class AlphaMode(StrEnum):
-    """The effect of a material's opacity."""
-
-    OPAQUE = "opaque"
-    MASK = "mask"
-    BLEND = "blend"
 
 
 @dataclass(frozen=True)
@@ -139,7 +130,7 @@ class Material:
         told = (
             (name, str(value) if isinstance(value, str) else value)
             for name, value, plain in own
-            if value not in (plain, AlphaMode.OPAQUE)
+            if value not in (plain, "opaque")
         )
         words = (f"{name}={value!r}" for name, value in told)
         return f"Material({', '.join(words)})"
@@ -161,9 +152,9 @@ class Material:
         emission = as_vector("emission", self.emission).tolist()
         keep(self, "emission", tuple(as_not_negative("emission", value) for value in emission))
         if self.alpha_mode is None:
-            keep(self, "alpha_mode", AlphaMode.OPAQUE if self.alpha_cutoff is None else AlphaMode.MASK)
-        keep(self, "alpha_mode", parse(AlphaMode, "alpha_mode", self.alpha_mode))
-        if self.alpha_mode is AlphaMode.MASK and self.alpha_cutoff is None:
+            keep(self, "alpha_mode", "opaque" if self.alpha_cutoff is None else "mask")
+        keep(self, "alpha_mode", parse(AlphaModeOption, "alpha_mode", self.alpha_mode))
+        if self.alpha_mode == "mask" and self.alpha_cutoff is None:
             keep(self, "alpha_cutoff", 0.5)
         for name in TEXTURES:
             value = getattr(self, name)

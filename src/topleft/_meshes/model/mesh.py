@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_crease, set_read_only, shown
-from topleft._core.base.options import check_choice
+from topleft._core.base.options import parse
 from topleft._core.raster import choices
 from topleft._core.raster.clusters import Clusters, box_of
 from topleft._meshes.model.material import Material
@@ -130,7 +130,7 @@ class Mesh:
             if getattr(self, name) is not None:
                 keep(self, name, read_only(_uv_array(name, getattr(self, name), len(vertices))))
         keep(self, "crease", as_crease(self.crease))
-        check_choice("color_interpolation", self.color_interpolation, get_args(EncodingOption))
+        parse(EncodingOption, "color_interpolation", self.color_interpolation)
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
@@ -328,17 +328,10 @@ def used_vertices(mesh: Mesh) -> FloatArray:
 
 
 def extreme_points(*parts: Callable[[], FloatArray]) -> F64:
-    """A few points, float64, which have the box and the bounding sphere of all points of all parts (N, 3), N > 0.
+    """A few points (7 P, 3), float64, which have the box and the bounding sphere of all of P parts (N, 3), N > 0.
 
-    Parameters
-    ----------
-    *parts : callable
-        Each returns its points, twice: one part is in memory at a time.
-
-    Returns
-    -------
-    (7 P, 3) float64
-        Of each of P parts the two ends along each axis, and the point farthest from the centre of the box of all parts.
+    Each part returns its points, twice: one part is in memory at a time. Of each there are the two ends along each
+    axis, and the point farthest from the centre of the box of all parts.
     """
     # column by column: NumPy takes twenty times as long along rows of three
     ends = np.concatenate([_ends(part()) for part in parts]).astype(np.float64)
@@ -365,19 +358,10 @@ def _farthest(points: FloatArray, center: F64) -> FloatArray:
 
 
 def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Groups of rows that are equal in all the attributes, compared exactly.
+    """Groups of rows that are equal in all the attributes, (V, K) arrays, compared exactly.
 
-    Parameters
-    ----------
-    *attributes : (V, K) arrays
-        Positions, say, or positions and colours.
-
-    Returns
-    -------
-    first : (G,) int
-        The lowest row of each group, ascending.
-    group : (V,) int
-        The group that each row belongs to: `attribute[first][group]` equals `attribute`.
+    Returns the lowest row of each group, ascending, (G,) int, and the group that each row belongs to, (V,) int:
+    `attribute[first][group]` equals `attribute`.
     """
     groups = _groups_by_hash(attributes)
     if groups is not None:

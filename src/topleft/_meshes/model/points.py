@@ -6,7 +6,6 @@ Input: anything NumPy can read. Output: `Points`, whose arrays the other stages 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,16 +15,9 @@ import numpy.typing as npt
 from topleft._core.base.array_types import F64, U8
 from topleft._core.base.arrays import INT32_MAX, as_point_size, set_read_only
 from topleft._core.base.defaults import DEFAULT_POINT_SIZE
-from topleft._core.base.options import PointShape, parse
+from topleft._core.base.options import parse
 from topleft._meshes.model.mesh import FloatArray, as_color_array, as_real_array, extreme_points, read_only
 from topleft.typing import PointShapeOption, PointUnitOption
-
-
-class PointUnit(StrEnum):
-    """The unit of a point's size."""
-
-    PX = "px"
-    WORLD = "world"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,8 +64,8 @@ class Points:
     colors: U8 | None = None
     normals: FloatArray | None = None
     size: float | F64 = DEFAULT_POINT_SIZE
-    unit: str = "px"
-    shape: str = "disc"
+    unit: PointUnitOption = "px"
+    shape: PointShapeOption = "disc"
 
     if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 
@@ -105,8 +97,8 @@ class Points:
                 raise ValueError(f"normals must have shape ({len(positions)}, 3), got {normals.shape}")
             keep(self, "normals", read_only(normals))
         keep(self, "size", as_point_size("size", self.size, len(positions)))
-        keep(self, "unit", parse(PointUnit, "unit", self.unit))
-        keep(self, "shape", parse(PointShape, "shape", self.shape))
+        keep(self, "unit", parse(PointUnitOption, "unit", self.unit))
+        keep(self, "shape", parse(PointShapeOption, "shape", self.shape))
 
     def __len__(self) -> int:
         return len(self.positions)

@@ -18,22 +18,10 @@ MAX_STEPS = 1 << 30
 
 
 def triangulate(points: Array, corners: Array, n_corners: Array) -> tuple[I64, I64]:
-    """Triangles of polygons.
+    """Triangles (T, 3) int64 of polygons, with their winding, as rows of `corners`; and the polygon (T,) int64 of each.
 
-    Parameters
-    ----------
-    points : (V, 2) or (V, 3) of real numbers
-    corners : (C,) of integers
-        Rows of points, the corners of one polygon after the other.
-    n_corners : (F,) of integers
-        How many each has; those with fewer than three have no triangles.
-
-    Returns
-    -------
-    triangles : (T, 3) int64
-        Rows of `corners`, in the order of the polygons and with their winding.
-    faces : (T,) int64
-        The polygon of each triangle.
+    `points`: (V, 2) or (V, 3). `corners`: (C,) rows of points, those of one polygon after the other. `n_corners`: (F,)
+    how many each has; those with fewer than three have no triangles.
     """
     n_corners = n_corners.astype(np.int64)
     if (n_corners == 3).all():

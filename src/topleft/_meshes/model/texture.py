@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -21,35 +20,22 @@ from topleft._core.base.array_types import F64, U8, U16
 from topleft._core.base.arrays import as_array, set_read_only
 from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.options import parse
-from topleft._core.base.texels import FILTER_CODES, MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
+from topleft._core.base.texels import (
+    FILTER_CODES,
+    HALVING,
+    MOST_KEPT_BYTES,
+    WRAP_CODES,
+    ValueLevels,
+    as_light,
+    levels_of,
+)
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MAX_TEXTURE_SIZE = 1 << 15
 """Texels of a side: 16 levels."""
 
 
-class Filter(StrEnum):
-    """The value of a texture between its texels, and where they are smaller than a pixel."""
-
-    NEAREST = "nearest"
-    BILINEAR = "bilinear"
-    TRILINEAR = "trilinear"
-    PIXELATED = "pixelated"
-
-    @property
-    def has_halves(self) -> bool:
-        """Whether it looks at halvings of the picture."""
-        return self in (Filter.TRILINEAR, Filter.PIXELATED)
-
-
-class Encoding(StrEnum):
-    """The meaning of a picture's values."""
-
-    SRGB = "srgb"
-    LINEAR = "linear"
-
-
-LIGHT_OF_BYTE = {Encoding.SRGB: LIGHT_OF_SRGB.astype(np.float64), Encoding.LINEAR: np.arange(256) / 255}
+LIGHT_OF_BYTE = {"srgb": LIGHT_OF_SRGB.astype(np.float64), "linear": np.arange(256) / 255}
 N_COVERAGE_POINTS = 1 << 12
 """Points at which the share of a texture that an alpha test lets through is counted; a thousandth of them may miss."""
 
@@ -58,17 +44,6 @@ LEAST_SCALE, MOST_SCALE = 1 / 16, 256.0
 
 BLOCK_TEXELS = 1 << 17
 """Texels that are halved together: 4 MB of float64, which stay in a cache."""
-
-
-class Wrap(StrEnum):
-    """The continuation of a texture beyond its borders."""
-
-    REPEAT = "repeat"
-    CLAMP = "clamp"
-    MIRROR = "mirror"
-
-
-WRAP_CODES = {Wrap.REPEAT: 0, Wrap.CLAMP: 1, Wrap.MIRROR: 2}  # tl_wrap in csrc/shading.h
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +83,7 @@ class Texture:
     Examples
     --------
     >>> Texture([[0, 255]]).filter
-    <Filter.TRILINEAR: 'trilinear'>
+    'trilinear'
     """
 
     image: U8
@@ -133,12 +108,12 @@ class Texture:
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
         keep(self, "image", as_image("image", self.image))
-        keep(self, "filter", parse(Filter, "filter", self.filter))
+        keep(self, "filter", parse(FilterOption, "filter", self.filter))
         both = (self.wrap, self.wrap) if isinstance(self.wrap, str) else self.wrap
         if not isinstance(both, tuple | list) or len(both) != 2:
             raise ValueError(f"wrap must be one word, or two for u and v, got {self.wrap!r}")
-        keep(self, "wrap", tuple(parse(Wrap, "wrap", one) for one in both))
-        keep(self, "encoding", parse(Encoding, "encoding", self.encoding))
+        keep(self, "wrap", tuple(parse(WrapOption, "wrap", one) for one in both))
+        keep(self, "encoding", parse(EncodingOption, "encoding", self.encoding))
         if self.uv_set not in (0, 1):
             raise ValueError(f"uv_set must be 0 or 1, got {self.uv_set!r}")
         if self.transform is not None:
@@ -161,7 +136,7 @@ class Texture:
 
     def compiled_cut_at(self, cutoff: float) -> engine.Mipmap:
         """The same for an alpha test: its halvings let through as much of their area as the picture does."""
-        if not self.has_alpha or not Filter(self.filter).has_halves or not 0 < cutoff <= 1:
+        if not self.has_alpha or self.filter not in HALVING or not 0 < cutoff <= 1:
             return self.compiled
         cut: dict[float, engine.Mipmap] = self.__dict__.setdefault("_cut", {})
         if cutoff not in cut:
@@ -170,12 +145,12 @@ class Texture:
 
     def _mipmap(self, cutoff: float | None) -> engine.Mipmap:
         height, width = self.image.shape[:2]
-        rows = level_rows(width, height, has_halves=Filter(self.filter).has_halves)
-        texels = texels_of(self.image, rows, light=LIGHT_OF_BYTE[Encoding(self.encoding)])
+        rows = level_rows(width, height, has_halves=self.filter in HALVING)
+        texels = texels_of(self.image, rows, light=LIGHT_OF_BYTE[self.encoding])
         if cutoff is not None:
             keep_coverage(texels, rows, 65535 * cutoff, self.wrap)
-        wrap_u, wrap_v = (WRAP_CODES[Wrap(one)] for one in self.wrap)
-        filter_code = FILTER_CODES[str(self.filter)]
+        wrap_u, wrap_v = (WRAP_CODES[one] for one in self.wrap)
+        filter_code = FILTER_CODES[self.filter]
         table = np.array(rows, dtype=np.int32)
         if self.transform is None:
             return engine.Mipmap(texels, table, filter_code, wrap_u, wrap_v, self.uv_set)
@@ -190,7 +165,7 @@ class Texture:
         found: ValueLevels | None = self.__dict__.get("_value_levels")
         if found is None:
             wrap_u, wrap_v = map(str, self.wrap)
-            found = levels_of(as_light(self.image, str(self.encoding)), str(self.filter), (wrap_u, wrap_v))
+            found = levels_of(as_light(self.image, self.encoding), self.filter, (wrap_u, wrap_v))
             if found.texels.nbytes <= MOST_KEPT_BYTES:
                 self.__dict__["_value_levels"] = found
         return found
@@ -301,7 +276,7 @@ def around_points(level: U16, wrap: str | tuple[str, str]) -> tuple[F64, F64]:
         place = (0.5 + number * step) % 1 * n - 0.5
         first = np.floor(place)
         pair = np.stack([first, first + 1]).astype(np.intp)
-        pairs.append(pair % n if how == Wrap.REPEAT else pair.clip(0, n - 1))
+        pairs.append(pair % n if how == "repeat" else pair.clip(0, n - 1))
         shares.append(np.stack([1 - (place - first), place - first]))
     (rows, columns), (down, right) = pairs, shares
     corners = level[rows[:, None], columns].astype(np.float64)

@@ -25,12 +25,13 @@ from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import set_aligned
 from topleft._core.base.color import spread_colors
 from topleft._core.base.memory import empty
-from topleft._core.base.options import Cull, parse
+from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts, threads_of_rows
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.lens import FLIP, Lens
 from topleft._meshes.model.mesh import Mesh, keep_corner_normals
 from topleft._meshes.model.normals import CornerNormals, moved
+from topleft.typing import CullOption
 
 WIDEST = np.radians(160)
 """Points farther from the axis are never drawn: a triangle round the back of the axis would cover everything. Those
@@ -60,43 +61,22 @@ cos(w/2) < 2^-12."""
 
 
 class SubdividedTriangles(NamedTuple):
-    """The parts of triangles that are not drawn as they are.
+    """The parts of triangles that are not drawn as they are."""
 
-    Attributes
-    ----------
-    source : (T',) int32
-        The triangle of the mesh that each triangle of the bent mesh is, or is a part of.
-    rows : (P,)
-        The triangles that are parts.
-    weights : (P, 3, 3) float64
-        Each corner of a part as a mean of the corners of its triangle.
-    is_outline : (P, 3) uint8
-        Which sides (0-1, 1-2, 2-0) of a part lie on a side of its triangle.
-    """
-
-    source: I32
-    rows: npt.NDArray[np.intp]
-    weights: F64
-    is_outline: npt.NDArray[np.uint8]
+    source: I32  # (T',): the triangle of the mesh that each triangle of the bent mesh is, or is a part of
+    rows: npt.NDArray[np.intp]  # (P,): the triangles that are parts
+    weights: F64  # (P, 3, 3): each corner of a part as a mean of the corners of its triangle
+    is_outline: npt.NDArray[np.uint8]  # (P, 3): which sides (0-1, 1-2, 2-0) of a part lie on a side of its triangle
 
 
 @dataclass(frozen=True, eq=False)
 class BentMesh:
-    """Triangles that a camera without lens draws as the lens would show the mesh.
-
-    Attributes
-    ----------
-    points_eye : (V', 3) float64
-        Eye space, for `Camera.clip_from_eye`. First the vertices of the mesh that are used, then those of parts.
-    triangles : (T', 3) int32
-        Rows of `points_eye`; triangles that the lens cannot see are left out.
-    parts : SubdividedTriangles or None
-        None: the triangles are those of the mesh.
-    """
+    """Triangles that a camera without lens draws as the lens would show the mesh."""
 
     points_eye: F64
-    triangles: I32
-    parts: SubdividedTriangles | None
+    """(V', 3), for `Camera.clip_from_eye`: first the vertices of the mesh that are used, then those of parts."""
+    triangles: I32  # (T', 3): rows of `points_eye`; triangles that the lens cannot see are left out
+    parts: SubdividedTriangles | None  # None: the triangles are those of the mesh
 
     __setstate__ = set_aligned
 
@@ -167,7 +147,7 @@ class BentMesh:
         """
         x, y = engine.product(self.points_eye[:, :2] / -self.points_eye[:, 2:], projection[:2, :2].T)[self.triangles].T
         area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
-        sign = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: -1}[parse(Cull, "cull", cull)]
+        sign = {"none": 0, "back": 1, "front": -1}[parse(CullOption, "cull", cull)]
         is_drawn = np.ones(self.triangles.shape, bool)
         places: npt.NDArray[np.signedinteger[Any]] = self.triangles
         if self.parts is not None:  # parts have points of their own
@@ -317,24 +297,9 @@ def bend(
     *,
     near_clip: bool = True,
 ) -> BentMesh:
-    """The mesh as a lens in front of the camera sees it in a picture of this size.
+    """The mesh, vertices (V, 3) in the world, as a lens in front of the camera sees it in a picture of this size.
 
-    Parameters
-    ----------
-    vertices : (V, 3) float
-        World positions.
-    triangles : (T, 3) integers
-    camera : Camera
-    lens : Lens
-        That of the camera.
-    size : (width, height), pixels
-        Of the whole picture.
-    near_clip : bool
-        Whether triangles nearer than the near plane may be left out.
-
-    Returns
-    -------
-    BentMesh
+    `near_clip`: whether triangles nearer than the near plane may be left out.
     """
     projection = camera.clip_from_eye(size)
     # A place (x, y) in the image plane is the direction (x, -y, -1) in eye axes.

@@ -28,18 +28,18 @@ from topleft._core.raster.fragments import SeenSamples
 from topleft._core.raster.peel import peel_meshes
 from topleft._core.raster.view import View
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
 from topleft._meshes.picture.buffers import place
 from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.holes import Mask, cuts_of, draw_solid
 from topleft._meshes.picture.instances import PlacedScene
 from topleft._meshes.picture.look import kept_look
-from topleft._meshes.picture.shade import Lit, Shading, ShadingOptions, ShownInstance
+from topleft._meshes.picture.shade import Lit, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
 
-BLENDING = (Shading.SMOOTH, Shading.FLAT, Shading.UNLIT)
+BLENDING = ("smooth", "flat", "unlit")
 """Pictures of other shadings show the nearest surface, as if it were opaque."""
 
 LAYERS, MOST_LAYERS = 4, 16
@@ -55,7 +55,7 @@ def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
     """The blended triangles (T,), by the materials of the mesh or this one; None if there are none."""
     given = mesh.materials if material is None else (material,)
     materials = given or (COLORED,)
-    are_blended = [one.alpha_mode is AlphaMode.BLEND and has_opacity(one, mesh) for one in materials]
+    are_blended = [one.alpha_mode == "blend" and has_opacity(one, mesh) for one in materials]
     if not any(are_blended):
         return None
     rows = mesh.material_of_triangle if given is mesh.materials else None

@@ -14,16 +14,15 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, U8
 from topleft._core.base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._core.base.memory import FRESH
-from topleft._core.base.options import PointShape
 from topleft._core.raster.points import PointFragments, draw_points
 from topleft._core.raster.rasterize import refuse_many
 from topleft._core.raster.view import View, ViewOptions
 from topleft._meshes.camera.camera import Camera, pixels_of
 from topleft._meshes.camera.lens import Lens
-from topleft._meshes.model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
+from topleft._meshes.model.light import TO_HEADLIGHT, Light
 from topleft._meshes.model.normals import moved, turn_of_normals, unit_or_zero
-from topleft._meshes.model.points import Points, PointUnit
-from topleft._meshes.picture.shade import Shading, ShadingOptions, eye_distance, shade_each, shade_numbers
+from topleft._meshes.model.points import Points
+from topleft._meshes.picture.shade import ShadingOptions, eye_distance, shade_each, shade_numbers
 
 NOWHERE_PX = 1e12
 """The place of points that a lens does not see: outside of every window."""
@@ -32,13 +31,7 @@ NOWHERE_PX = 1e12
 def draw_cloud(
     cloud: Points, camera: Camera, size: tuple[int, int], *, depth_test: str | None = "less", **options: Any
 ) -> PointFragments:
-    """The visibility buffer of a cloud; options as those of `points`.
-
-    Raises
-    ------
-    ValueError
-        If an option has no meaning for points.
-    """
+    """The visibility buffer of a cloud; options as of `points`, a `ValueError` for those without a meaning."""
     if depth_test != "less":
         raise ValueError(f"points are drawn with depth_test 'less', got {depth_test!r}")
     if options.get("cull") not in (None, "none"):
@@ -48,11 +41,11 @@ def draw_cloud(
     sizes: float | F64 = cloud.size
     if camera.lens is None:
         options["transform"] = camera.clip_from_world(frame)
-    if camera.lens is not None or cloud.unit != PointUnit.PX:
+    if camera.lens is not None or cloud.unit != "px":
         eye = moved(positions, camera.view)
         bent = eye if camera.lens is None else camera.lens.bend(eye)
         projection = camera.clip_from_eye(frame)
-        if cloud.unit != PointUnit.PX:
+        if cloud.unit != "px":
             unit_of_eye = abs(engine.determinant(camera.view[:3, :3])) ** (1 / 3)
             scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
             sizes = np.asarray(cloud.size) * scale / w_of(bent, projection)
@@ -61,7 +54,7 @@ def draw_cloud(
     view = View.parse(size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
     refuse_many(view, "a cloud")
     view.refuse_classic("points")
-    return draw_points(FRESH, positions, sizes, PointShape(cloud.shape), view)
+    return draw_points(FRESH, positions, sizes, cloud.shape, view)
 
 
 def draw_share(cloud: Points, camera: Camera, size: tuple[int, int], **options: Any) -> npt.NDArray[Any]:
@@ -92,16 +85,13 @@ def w_of(bent: F64, projection: F64) -> F64:
 def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:
     """The picture (H, W, 4) of a cloud: its colours, lit where it has normals.
 
-    Raises
-    ------
-    ValueError
-        If an option has no meaning for points.
+    A `ValueError` if an option has no meaning for points.
     """
-    if options.mode is Shading.MATCAP or options.material is not None or options.environment is not None:
+    if options.mode == "matcap" or options.material is not None or options.environment is not None:
         raise ValueError("points have colours of their own: they take neither a material, a matcap nor an environment")
-    if options.mode is Shading.NORMALS and cloud.normals is None:
+    if options.mode == "normals" and cloud.normals is None:
         raise ValueError("shading 'normals' needs points that have normals")
-    if options.mode in (Shading.IDS, Shading.DEPTH):
+    if options.mode in ("ids", "depth"):
         return shade_numbers(frags, camera, options)
     return shade_each(
         frags._seen(), options.background, lambda ids, depth: colors_of(ids, depth, cloud, camera, options)
@@ -115,12 +105,12 @@ def colors_of(ids: npt.NDArray[np.int32], depth: F32, cloud: Points, camera: Cam
     is_seen[ids] = True
     rows = np.flatnonzero(is_seen)
     row_of = np.cumsum(is_seen) - 1
-    if options.mode is Shading.NORMALS:
+    if options.mode == "normals":
         return np.rint(127.5 * in_eye_space(cloud, camera, rows)[1] + 127.5).astype(np.uint8)[row_of[ids]]
     plain = np.array(options.color or DEFAULT_COLOR, np.uint8)
     own = np.broadcast_to(plain, (len(rows), 3)) if cloud.colors is None else cloud.colors[rows, :3]
     light = decode[own] / LINEAR_ONE
-    if cloud.normals is not None and options.mode is not Shading.UNLIT:
+    if cloud.normals is not None and options.mode != "unlit":
         light *= light_at(cloud, camera, rows, options)
     if options.fog is None:
         return encode[steps_of(light)][row_of[ids]]
@@ -161,16 +151,16 @@ def light_at(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp], options:
 
 def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
     """The cosine of one light at some points (P, 3) in eye space, times its intensity: (P,)."""
-    is_point = light.kind != LightKind.DIRECTIONAL
+    is_point = light.kind != "directional"
     at, axis = np.array([light.at]), np.array([light.direction or (0, 0, 0)])
-    if light.space == LightSpace.WORLD:
+    if light.space == "world":
         turn = np.vstack([np.c_[view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
         at, axis = moved(at, view if is_point else turn), moved(axis, turn)
     way = at - eye if is_point else at
     cosine = light.intensity * np.maximum(engine.row_products(normals, unit_or_zero(way)), 0)
     if not is_point:
         return cosine
-    if light.kind == LightKind.SPOT:
+    if light.kind == "spot":
         scale, offset = light.cone
         cosine *= (offset - scale * engine.row_products(unit_or_zero(way), unit_or_zero(axis))).clip(0, 1) ** 2
     unit_of_eye = abs(engine.determinant(view[:3, :3])) ** (1 / 3)
@@ -180,10 +170,7 @@ def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
 def normals_at(cloud: Points, camera: Camera, turn: F64) -> F64:
     """Unit normals (N, 3) of points on the side that is seen, turned from eye space by a matrix (3, 3); 0: none.
 
-    Raises
-    ------
-    ValueError
-        If there are no normals.
+    A `ValueError` if there are no normals.
     """
     if cloud.normals is None:
         raise ValueError("normals need points that have them")

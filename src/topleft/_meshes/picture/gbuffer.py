@@ -27,7 +27,6 @@ from topleft._meshes.picture.fragments import VisiblePart, join, parts_of, shown
 from topleft._meshes.picture.holes import cuts_of, draw_visible
 from topleft._meshes.picture.shade import ShownInstance
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.scene import Scene
 
 
 class PointKind(IntEnum):
@@ -79,55 +78,20 @@ def points_of(part: VisiblePart) -> F64:
 
 @dataclass(frozen=True, eq=False)
 class GBuffer:
-    """A mesh, scene or cloud and its camera.
-
-    Parameters
-    ----------
-    shot : Shot
-    options : dict
-        `cull`, `subpixel_bits` and `threads`, as `rasterize_mesh` takes them.
-    look : dict
-        Further options of `render`, for colours.
-    camera_to : Camera, optional
-        The camera at the end of the flow.
-    transforms_to : (N, 4, 4) float64, optional
-        Where the instances are then.
-    rasterizer : Rasterizer, optional
-        Layers may lie in its memory, which the next picture overwrites.
-    """
+    """A mesh, scene or cloud and its camera."""
 
     shot: Shot
-    options: dict[str, Any] = field(default_factory=dict)
-    look: dict[str, Any] = field(default_factory=dict)
-    camera_to: Camera | None = None
-    transforms_to: F64 | None = None
-    rasterizer: Rasterizer | None = None
-
-    @property
-    def scene(self) -> Scene:
-        """The scene of the shot."""
-        return self.shot.scene
-
-    @property
-    def n_instances(self) -> int:
-        """How many meshes stand in it."""
-        return len(self.scene)
-
-    @property
-    def camera(self) -> Camera:
-        """The camera of the shot."""
-        return self.shot.camera
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of the picture."""
-        return self.shot.size
+    options: dict[str, Any] = field(default_factory=dict)  # `cull`, `subpixel_bits`, `threads` of `rasterize_mesh`
+    look: dict[str, Any] = field(default_factory=dict)  # further options of `render`, for colours
+    camera_to: Camera | None = None  # at the end of the flow
+    transforms_to: F64 | None = None  # (N, 4, 4): where the instances are then
+    rasterizer: Rasterizer | None = None  # layers may lie in its memory, which the next picture overwrites
 
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels, without the holes of materials."""
         if self.shot.cloud is not None:
-            return draw_cloud(self.shot.cloud, self.camera, self.size, **self.options)
+            return draw_cloud(self.shot.cloud, self.shot.camera, self.shot.size, **self.options)
         return draw_visible(self.shot, self.rasterizer, self.look.get("material"), **self.options)
 
     def sampled(self, sampling: str) -> Fragments:
@@ -137,12 +101,12 @@ class GBuffer:
     @cached_property
     def has_holes(self) -> bool:
         """Whether materials cut holes."""
-        return self.shot.cloud is None and any(cuts_of(self.scene, self.look.get("material")))
+        return self.shot.cloud is None and any(cuts_of(self.shot.scene, self.look.get("material")))
 
     @cached_property
     def parts(self) -> Sequence[VisiblePart]:
         """The visible pixels of each instance that shows any."""
-        return parts_of(self.frags, self.scene)
+        return parts_of(self.frags, self.shot.scene)
 
     def join(
         self, channels: tuple[int, ...], background: float, make: Callable[[VisiblePart], npt.NDArray[Any]]
@@ -160,10 +124,10 @@ class GBuffer:
             if not shown:
                 return np.full((*ids.shape, *channels), background, np.float32)
             rows = np.array([rows_of(one) for one in shown])
-            return evaluate(shown, ids, kind, rows, background, size=self.size, threads=threads)
+            return evaluate(shown, ids, kind, rows, background, size=self.shot.size, threads=threads)
 
         if ids.dtype == np.int32:
-            return make(shown_of(self.frags, self.scene), ids)
+            return make(shown_of(self.frags, self.shot.scene), ids)
         return self.join(channels, background, lambda part: make([part.shown], part.frags._seen().ids[0]))
 
     def tell(

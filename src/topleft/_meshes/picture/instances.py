@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, set_aligned
 from topleft._core.base.memory import FRESH
-from topleft._core.base.options import Cull, Sink
+from topleft._core.base.options import Sink
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh, equal_bands
@@ -251,7 +251,7 @@ class PlacedScene:
             material = whole.material if self._material is None else self._material
             is_single = whole.mesh.single_sided(material) if self._view.sides_by_material else None
             is_all = is_single is not None and bool(is_single.all())
-            found = CULL_CODES[Cull.BACK] if is_all else self._view.cull, None if is_all else is_single
+            found = CULL_CODES["back"] if is_all else self._view.cull, None if is_all else is_single
             self._sides_of_looks[key] = found
         return found
 
@@ -278,7 +278,7 @@ class PlacedScene:
         one, (cull, is_single) = self.scene[i], self._sides_of(self.whole[i])
         is_mirrored, single_sided = one.is_mirrored, None
         if is_single is not None:
-            back = CULL_CODES[Cull.FRONT if is_mirrored else Cull.BACK]
+            back = CULL_CODES["front" if is_mirrored else "back"]
             single_sided = is_single if self.bent is None else is_single[self.bent[i].source], back
         cull = int(MIRRORED[cull]) if is_mirrored else cull
         transform, static = self._clip_from_objects[i], one.mesh if self._may_cluster else None

@@ -31,15 +31,15 @@ NOT_OF_LIGHT = ("cull", "edges", "sampling", "subpixel_bits")
 
 def color(gbuffer: GBuffer) -> Array:
     """The picture (H, W, 4) uint8 of `render`, or of `render_transparent` if the look has an `opacity`."""
-    scene, camera, options = gbuffer.scene, gbuffer.camera, {**gbuffer.options, **gbuffer.look}
+    scene, camera, options = gbuffer.shot.scene, gbuffer.shot.camera, {**gbuffer.options, **gbuffer.look}
     if gbuffer.shot.cloud is not None:
-        return render(gbuffer.shot.cloud, camera, gbuffer.size, **options)
+        return render(gbuffer.shot.cloud, camera, gbuffer.shot.size, **options)
     if "opacity" in options:
-        return render_transparent(scene, camera, gbuffer.size, **options)
+        return render_transparent(scene, camera, gbuffer.shot.size, **options)
     look = {name: value for name, value in options.items() if name not in NOT_OF_LIGHT}
     checked = ShadingOptions.parse(**look)
     if options.get("sampling", "center") != "center" or blended_masks(scene, checked) is not None:
-        return render(gbuffer.shot.subject, camera, gbuffer.size, rasterizer=gbuffer.rasterizer, **options)
+        return render(gbuffer.shot.subject, camera, gbuffer.shot.size, rasterizer=gbuffer.rasterizer, **options)
     picture = shade_by(gbuffer.frags, scene, camera, checked)
     if options.get("edges"):
         draw_all_edges(picture, gbuffer.frags, scene, camera, checked, cull=options["cull"])
@@ -61,7 +61,9 @@ def silhouette(gbuffer: GBuffer) -> Array:
         return gbuffer.frags.mask
     if gbuffer.has_holes:
         return (gbuffer.sampled(sampling).samples_triangle >= 0).mean(axis=-1, dtype=np.float32)
-    return draw_silhouette(gbuffer.shot.subject, gbuffer.camera, gbuffer.size, sampling=sampling, **gbuffer.options)
+    return draw_silhouette(
+        gbuffer.shot.subject, gbuffer.shot.camera, gbuffer.shot.size, sampling=sampling, **gbuffer.options
+    )
 
 
 def depth(gbuffer: GBuffer) -> Array:
@@ -71,14 +73,14 @@ def depth(gbuffer: GBuffer) -> Array:
 
 def distance(gbuffer: GBuffer) -> Array:
     """Distance along the view (H, W) float32, world units, +inf where nothing is."""
-    return gbuffer.tell(PointKind.ROWS, lambda place: engine.product(-gbuffer.camera.view[2:3], place), (), np.inf)
+    return gbuffer.tell(PointKind.ROWS, lambda place: engine.product(-gbuffer.shot.camera.view[2:3], place), (), np.inf)
 
 
 def ray_distance(gbuffer: GBuffer) -> Array:
     """Distance from the eye (H, W) float32, world units, +inf where nothing is; along the view without perspective."""
-    if not gbuffer.camera.projection[3, :3].any():
+    if not gbuffer.shot.camera.projection[3, :3].any():
         return distance(gbuffer)
-    return gbuffer.tell(PointKind.LENGTH, lambda place: engine.product(gbuffer.camera.view[:3], place), (), np.inf)
+    return gbuffer.tell(PointKind.LENGTH, lambda place: engine.product(gbuffer.shot.camera.view[:3], place), (), np.inf)
 
 
 def triangle(gbuffer: GBuffer) -> Array:
@@ -108,21 +110,21 @@ def camera_normal(gbuffer: GBuffer) -> Array:
 
 def world_normal(gbuffer: GBuffer) -> Array:
     """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
-    return normals_of(gbuffer, gbuffer.camera.view[:3, :3].T)  # the transpose, where positions take the inverse
+    return normals_of(gbuffer, gbuffer.shot.camera.view[:3, :3].T)  # the transpose, where positions take the inverse
 
 
 def normals_of(gbuffer: GBuffer, turn: F64) -> npt.NDArray[np.float32]:
     """Unit normals (H, W, 3), from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
     frags, cloud = gbuffer.frags, gbuffer.shot.cloud
     if cloud is not None:
-        return frags.interpolate(normals_at(cloud, gbuffer.camera, turn), background=0.0)
-    seen, shown = frags._seen(), shown_of(frags, gbuffer.scene)
-    return shade_normals(shown, seen.ids[0], gbuffer.camera, turn, threads=gbuffer.options.get("threads"))
+        return frags.interpolate(normals_at(cloud, gbuffer.shot.camera, turn), background=0.0)
+    seen, shown = frags._seen(), shown_of(frags, gbuffer.shot.scene)
+    return shade_normals(shown, seen.ids[0], gbuffer.shot.camera, turn, threads=gbuffer.options.get("threads"))
 
 
 def uv(gbuffer: GBuffer) -> Array:
     """Texture coordinates, (H, W, 2) float32, NaN where nothing is or a mesh has none."""
-    if all(one.mesh.uv is None for one in gbuffer.scene):
+    if all(one.mesh.uv is None for one in gbuffer.shot.scene):
         raise ValueError("layer 'uv' needs a mesh that has texture coordinates")
 
     def make(part: VisiblePart) -> Array:
@@ -137,7 +139,7 @@ def flow(gbuffer: GBuffer) -> Array:
     """Where the point of each pixel moves to in the picture, (H, W, 2) float32 pixels, NaN where nothing is."""
     if gbuffer.camera_to is None and gbuffer.transforms_to is None:
         raise ValueError("layer 'flow' needs camera_to or transforms_to")
-    begin, end, size = gbuffer.camera, gbuffer.camera_to or gbuffer.camera, gbuffer.size
+    begin, end, size = gbuffer.shot.camera, gbuffer.camera_to or gbuffer.shot.camera, gbuffer.shot.size
     if gbuffer.shot.cloud is not None:
         centres, here = gbuffer.shot.cloud.positions.astype(np.float64), np.eye(4)
         there = here if gbuffer.transforms_to is None else gbuffer.transforms_to[0]
@@ -178,13 +180,7 @@ NOT_OF_POINTS = ("barycentric", "uv")
 
 
 def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array]:
-    """Return arrays by name, in the given order.
-
-    Raises
-    ------
-    ValueError
-        If there is no such layer, or one cannot be had of this view.
-    """
+    """Return arrays by name, in the given order; a `ValueError` for a layer that this view has not."""
     checked = check_layers(names)
     for name in checked:
         if gbuffer.shot.cloud is not None and name in NOT_OF_POINTS:

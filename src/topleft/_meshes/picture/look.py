@@ -21,8 +21,8 @@ from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts, threads_of_rows
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT, Environment
-from topleft._meshes.model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
-from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.light import TO_HEADLIGHT, Fog, Light
+from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, is_laid
 from topleft._meshes.model.normals import (
     box_of_triangles,
@@ -34,7 +34,7 @@ from topleft._meshes.model.normals import (
 )
 from topleft._meshes.model.texture import Texture
 
-LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1, LightKind.SPOT: 3}  # tl_light_kind in csrc/shading.h
+LIGHT_CODES = {"directional": 0, "point": 1, "spot": 3}  # tl_light_kind in csrc/shading.h
 
 Kept = TypeVar("Kept")
 
@@ -47,46 +47,26 @@ MOST_TABLES = 256
 
 @dataclass(frozen=True, eq=False)
 class CameraRays:
-    """The camera's fields of `tl_shading` in csrc/shading.h, in a shading space with its origin at `center`.
-
-    Attributes
-    ----------
-    eye : (3,) float64
-        Where the camera is; without perspective the unit vector to it.
-    ray : (4, 3) float64
-        The ray of pixel position (0, 0), and its steps per column, per row and, without perspective, along the depth.
-    eye_from, origin : (3, 3) and (3,) float64
-        Eye space from shading space: `eye_from @ p + origin` up to a scale.
-    scale : float
-        Units of eye space in one of the shading space.
-    distance_start, distance_scale : float
-        The distance along the view: `start + scale * w`, or `start + scale * depth` without perspective.
-    """
+    """The camera's fields of `tl_shading` in csrc/shading.h, in a shading space with its origin at `center`."""
 
     has_perspective: bool
-    eye: F64
+    eye: F64  # (3,): where the camera is; without perspective the unit vector to it
     ray: F64
-    eye_from: F64
-    origin: F64
-    scale: float
-    distance_start: float
+    """(4, 3): of pixel position (0, 0), and its steps per column, per row and, without perspective, along the depth."""
+    eye_from: F64  # (3, 3): eye space from shading space is eye_from @ p + origin, up to a scale
+    origin: F64  # (3,)
+    scale: float  # units of eye space in one of the shading space
+    distance_start: float  # along the view: start + scale * w, or start + scale * depth without perspective
     distance_scale: float
 
 
 class ShadingMesh:
-    """A mesh as the shading kernels read it.
+    """A mesh as the shading kernels read it; `positions` (V, 3) are those of the mesh, or stretched.
 
-    Attributes
-    ----------
-    positions : (V, 3) float
-        As in the mesh, or stretched.
-    center : (3,) float64
-        The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
-        float32 is fine enough.
-    normals : (N, 4) float32
-        Unit normals of the vertices, then of creased corners, 0 where there is none, and 1.
-    colors : (V, 4) float32, optional
-        sRGB of the vertices, 0 to 255, or their light, 0 to 1, and opacity, 0 to 1.
+    `center`: (3,) float64, the middle of the box round the vertices in use: the origin of the space that light is
+    computed in, so that float32 is fine enough. `normals`: (N, 4) float32, unit normals of the vertices, then of
+    creased corners, 0 where there is none, and 1. `colors`: (V, 4) float32, if any: sRGB of the vertices, 0 to 255, or
+    their light, 0 to 1, and opacity, 0 to 1.
     """
 
     def __init__(self, mesh: Mesh, stretch: F64 | None = None) -> None:
@@ -236,7 +216,7 @@ def material_row(one: Material, mesh: Mesh, surface: Surface, back_side: float) 
     back = light_of(one.back_color or (0, 0, 0))[:3]
     side = 0.0 if one.back_color is None else back_side
     shininess = one.shininess if one.specular > 0 else 0.0
-    cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
+    cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode == "mask" else 0.0
     full = full_part(one, mesh) if surface.all_full or is_full(one) else None
     compiled = None if texture is None else texture.compiled_cut_at(cutoff / max(one.opacity, cutoff or 1.0))
     return color, back, side, (one.specular,) * 3, shininess, surface.is_unlit or one.unlit, cutoff, compiled, full
@@ -248,28 +228,17 @@ def light_rows(lights: Sequence[Light]) -> F64:
     for one in lights:
         color = [one.intensity * c for c in light_of(one.color)[:3]]
         spot = *(one.direction or (0.0, 0.0, 0.0)), *one.cone
-        rows.append(
-            (LIGHT_CODES[LightKind(one.kind)], *one.at, one.falloff, *color, *spot, one.space is LightSpace.EYE)
-        )
+        rows.append((LIGHT_CODES[one.kind], *one.at, one.falloff, *color, *spot, one.space == "eye"))
     return np.array(rows, np.float64).reshape(-1, 14)
 
 
 class ShadingInputs:
     """The numbers of instances in a picture, as the kernels read them, a table each.
 
-    Parameters
-    ----------
-    shown
-        The mesh of each snapped, as drawn, the mesh itself, and its surface.
-    camera : Camera
-    places : (N, 4, 4) float64
-        Where each mesh stands in the world.
-    size : (width, height), pixels
-    finds_inverse_w : bool
-        Whether 1/w is found for the vertices that show, where it can be; otherwise for all.
+    `shown`: of each the mesh snapped, as drawn, the mesh itself, and its surface; `places` (N, 4, 4): where it stands
+    in the world. `finds_inverse_w`: whether 1/w is found for the vertices that show, where it can be; otherwise for
+    all.
 
-    Notes
-    -----
     Light needs angles and lengths as they are in eye space. A mesh whose matrix to it changes angles, or mirrors, is
     stretched first, by a triangular matrix that leaves a rotation of the other. That comes from the products of its
     columns, rounded to 40 bits, so that it stays wherever the instance and the camera turn.
@@ -319,7 +288,7 @@ class ShadingInputs:
         """Have an instance take the environment, or the default one, which only metallic surfaces mirror."""
         own = DEFAULT_ENVIRONMENT if environment is None else environment
         rows = self.rays(k).eye_from
-        if own.space is LightSpace.WORLD:
+        if own.space == "world":
             rows = engine.product(engine.inverse(self.views[k, :3, :3]), rows)
             rows = engine.product(self.places[k, :3, :3], rows)
         rows = engine.product(own.axes, rows / engine.cube_root(abs(engine.determinant(rows))))

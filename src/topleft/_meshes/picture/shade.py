@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import lru_cache
 from typing import Any, NamedTuple, TypedDict
 
@@ -44,20 +43,8 @@ MIN_PX_PER_THREAD = 1 << 14
 """Pixels whose light is worth a thread: a tenth of a millisecond. A scene is shaded instance by instance."""
 
 
-class Shading(StrEnum):
-    """The meaning of a pixel's colour."""
-
-    SMOOTH = "smooth"
-    FLAT = "flat"
-    UNLIT = "unlit"
-    MATCAP = "matcap"
-    IDS = "ids"
-    DEPTH = "depth"
-    NORMALS = "normals"
-
-
-SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
-NUMBERS = frozenset({Shading.IDS, Shading.DEPTH})
+SHOW_CODES = {"normals": 1, "matcap": 2}  # tl_show in csrc/shading.h; light: 0
+NUMBERS = frozenset({"ids", "depth"})
 """Those that colour numbers of the buffer, without light."""
 
 PLAIN = Surface((Material(),), is_by_triangle=False)
@@ -82,7 +69,7 @@ class LookOptions(TypedDict, total=False):
 class ShadingOptions:
     """The options of `topleft.shade`, checked."""
 
-    mode: Shading
+    mode: ShadingOption
     color: Color
     background: Color
     depth_range: tuple[float, float] | None
@@ -112,14 +99,14 @@ class ShadingOptions:
         threads: int | None = None,
     ) -> ShadingOptions:
         """Check the options of a call."""
-        mode = parse(Shading, "shading", shading)
+        mode = parse(ShadingOption, "shading", shading)
         lights = None if lights is None else as_lights(lights)
         kinds = {"material": Material, "matcap": Texture, "fog": Fog, "environment": Environment}
         for (name, kind), value in zip(kinds.items(), (material, matcap, fog, environment), strict=True):
             if value is not None and not isinstance(value, kind):
                 article = "an" if kind is Environment else "a"
                 raise TypeError(f"{name} must be {article} {kind.__name__}, got {type(value).__name__}")
-        if mode is Shading.MATCAP and matcap is None:
+        if mode == "matcap" and matcap is None:
             raise ValueError("matcap must be a Texture for shading 'matcap', got None")
         if environment is not None:  # which lights by itself
             lights, ambient = lights or (), ambient or 0.0
@@ -270,7 +257,7 @@ def surface_of(shown: ShownInstance, options: ShadingOptions) -> Surface:
     mesh = shown.mesh
     material = shown.material if options.material is None else options.material
     is_full = options.environment is not None or options.shows_opacity
-    look = options.mode is Shading.FLAT, options.mode is Shading.UNLIT, is_full
+    look = options.mode == "flat", options.mode == "unlit", is_full
 
     def make() -> Surface:
         own = mesh.materials if material is None else (material,)
@@ -283,7 +270,7 @@ def surface_of(shown: ShownInstance, options: ShadingOptions) -> Surface:
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
     """Colour each triangle by its id, or by its distance: the picture (H, W, 4) uint8."""
     seen = frags._seen()
-    if options.mode is Shading.IDS:
+    if options.mode == "ids":
         return shade_each(seen, options.background, lambda ids, _: id_colors(frags._whole(ids)))
     ends = options.depth_range or distances(seen, camera)
     return shade_each(seen, options.background, lambda _, depth: greys_of(depth, camera, ends))
@@ -356,20 +343,8 @@ def shade_normals(
 ) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
-    Parameters
-    ----------
-    shown
-        At least the instances that show, in the order of their ids.
-    ids : (H, W) int32
-    camera : Camera
-        That of the picture.
-    turn : (3, 3) float64
-        From eye space to the space of the result.
-    threads : int, optional
-        Never changes a bit.
+    `shown`: at least the instances that show, in the order of their ids. `turn`: (3, 3), from eye space to the result.
 
-    Notes
-    -----
     A triangle seen from behind has its normals turned round as a whole, never pixel by pixel: so a mesh whose faces are
     inverted looks like one whose faces are not, and no edge of light runs through a triangle. Where those of the
     corners cancel, or there are none, it is the normal of the face.
@@ -379,7 +354,7 @@ def shade_normals(
         return np.zeros((*ids.shape, 3), np.float32)
     out = empty((*ids.shape, 3), np.float32)
     inputs = inputs_of(shown, [PLAIN] * len(shown), camera, (ids.shape[1], ids.shape[0]))
-    inputs.set_turn(SHOW_CODES[Shading.NORMALS], turn)
+    inputs.set_turn(SHOW_CODES["normals"], turn)
     scene = scene_of_tables(shown, inputs.tables)
     run_parts(lambda first, end: scene.shade_normals(ids, out, first, end - first), len(ids),
               threads_for(threads, n_triangles))  # fmt: skip

@@ -243,7 +243,7 @@ def render_layers(
         if name in LAYERS:
             raise ValueError(f"attributes must not have the name of a layer, got {name!r}")
         found[name] = gbuffer.frags.interpolate(values, background=np.nan)
-    return ViewLayers(found, gbuffer.n_instances)
+    return ViewLayers(found, len(gbuffer.shot.scene))
 
 
 def gbuffer_of(
@@ -260,15 +260,7 @@ def gbuffer_of(
     rasterizer: Rasterizer | None = None,
     **look: Any,
 ) -> GBuffer:
-    """Return the G-buffer that layers are made from; arguments as for `render_layers`.
-
-    Raises
-    ------
-    TypeError
-        If an option is unknown.
-    ValueError
-        If the mesh has no triangles and no camera is given, or `transforms_to` holds no matrices.
-    """
+    """Return the G-buffer that layers are made from; arguments and errors as for `render_layers`."""
     for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
         raise TypeError(f"there is no option {option!r} of a picture")
     shot = Shot.of(mesh, camera, size)

@@ -56,18 +56,7 @@ class Sample:
 
 
 def calibrate(*, n_rounds: int = 5) -> Costs:
-    """Measure this machine: half a minute.
-
-    Parameters
-    ----------
-    n_rounds : int
-        Each number is the least of this many measurements.
-
-    Returns
-    -------
-    Costs
-        With today's date, and their errors for scenes that were not fitted.
-    """
+    """Measure this machine for half a minute; return costs with their errors for scenes that were not fitted."""
     fits: dict[str, Any] = {}
     ratios = []
     for group, sink in GROUPS.items():

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core import engine
 from topleft._core.base.arrays import as_array
 from topleft._core.base.memory import FRESH, empty
-from topleft._core.base.options import DepthTest, Sampling, Sink
+from topleft._core.base.options import Sampling, Sink
 from topleft._core.raster import choices
 from topleft._core.raster.choices import ClusterRoute, Drawing, Route
 from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
@@ -24,6 +24,7 @@ from topleft._core.raster.sampling import area_cells, band_bytes, sample_positio
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.mesh import Mesh
+from topleft.typing import DepthTestOption
 
 #: The names of `tl_class` in ``csrc/topleft.h``.
 CLASSES = (
@@ -69,7 +70,7 @@ class Facts:
     verb: str
     outputs: tuple[str, ...]
     view: View
-    test: DepthTest | None
+    test: DepthTestOption | None
     route: Route | None  # of `rasterize`
     drawing: Drawing
     vertex_dtype: str  # as given
@@ -148,15 +149,14 @@ class Facts:
 
 
 def find_facts(
-    vertices: ArrayLike, triangles: ArrayLike, view: View, verb: str, outputs: tuple[str, ...], test: DepthTest | None
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    view: View,
+    verb: str,
+    outputs: tuple[str, ...],
+    test: DepthTestOption | None,
 ) -> tuple[Facts, NDArray[np.int32]]:
-    """Return the facts of a scene, and a copy of its triangles that nobody changes.
-
-    Raises
-    ------
-    ValueError, TypeError, IndexError
-        As the verb would.
-    """
+    """Return the facts of a scene, and a copy of its triangles that nobody changes; errors as of the verb."""
     decided = count_decided(vertices, triangles, view) if view.is_exact else None
     asked, view = view, replace(view, is_exact=False)  # the census is that of the snapped triangles
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
@@ -240,7 +240,7 @@ def find_sink(verb: str, view: View) -> Sink:
     return Sink.SAMPLES if view.sampling.n_samples > 1 else Sink.MASK
 
 
-def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None) -> ClusterFacts:
+def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTestOption | None) -> ClusterFacts:
     """Return the clusters that `rasterize_mesh` draws from the second picture of a mesh on, made if need be."""
     n_triangles = len(mesh.triangles)
     if verb != "rasterize":

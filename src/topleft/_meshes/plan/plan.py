@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._core.base.memory import KeptMemory
-from topleft._core.base.options import DepthTest, Sampling, parse
+from topleft._core.base.options import Sampling, parse
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.costs import cost_table
 from topleft._core.raster.fill import Style, draw_fill
@@ -318,7 +318,7 @@ def plan(
     """
     wanted = as_names("outputs", outputs)
     verb = find_verb(wanted)
-    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    test = None if depth_test is None else parse(DepthTestOption, "depth_test", depth_test)
     options = ViewOptions(**view)
     if options.pop("plan", None) is not None:
         raise TypeError("plan takes no plan=")

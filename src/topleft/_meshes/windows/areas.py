@@ -17,7 +17,7 @@ from topleft._core.base.array_types import I32, Array
 from topleft._core.base.arrays import set_aligned
 from topleft._core.base.grid import Extent, Grid
 from topleft._core.base.memory import FRESH, Memory
-from topleft._core.base.options import Sampling, parse
+from topleft._core.base.options import Sampling, parse_sampling
 from topleft._core.polygons.polygons import as_paint, in_crs_of, polygons
 from topleft._core.polygons.rings import RingSet
 from topleft._meshes.windows.drawing import Painter, Size
@@ -168,7 +168,7 @@ class AreaPainter(Painter):
             raise ValueError(f"values are for the kind 'fill', which needs them, got {kind!r}")
         view = {name: options[name] for name in ("subpixel_bits",) if name in options}
         painter = cls(grid, options, view, 2)
-        how = parse(Sampling, "sampling", options.get("sampling", "center"))
+        how = parse_sampling(options.get("sampling", "center"))
         if kind == "coverage":
             is_share = how is Sampling.AREA or how.n_samples > 1
             painter.dtype, painter.empty = (np.dtype(np.float32), 0.0) if is_share else (np.dtype(bool), False)

@@ -191,14 +191,9 @@ def received(array: Array | MappedArray) -> Array:
 
 
 def triangles_of(mesh: Any, folder: str | os.PathLike[str] | None) -> Triangles:
-    """Return the triangles of whatever `tiles` takes.
+    """Return the triangles of whatever `tiles` takes; anything else is a `TypeError`.
 
-    Raises
-    ------
-    MeshError
-        If a file is broken, or has no triangles.
-    TypeError, ValueError
-        If it is none of those, or arrays have the wrong shape.
+    A `MeshError` if a file is broken or has no triangles, a `ValueError` if arrays have the wrong shape.
     """
     if isinstance(mesh, IndexedTriangles | SeparateTriangles):
         return mesh

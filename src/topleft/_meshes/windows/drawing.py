@@ -21,13 +21,14 @@ from topleft._core.base.array_types import F64, I32, Array
 from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
-from topleft._core.base.options import Per, Sampling, check_choice, parse
+from topleft._core.base.options import Sampling, parse, parse_sampling
 from topleft._core.raster.rasterize import FragmentOptions, canvas_of, draw_fragments
 from topleft._core.raster.verbs import coverage, fill, overdraw
 from topleft._core.raster.view import View
 from topleft._meshes.field.field import draw_field, draw_heights, dtype_of_field, is_per_face, nodata_of
 from topleft._meshes.windows.ahead import kept_memory
 from topleft._meshes.windows.blocks import Triangles
+from topleft.typing import PerOption, SurfaceOption
 
 Size = tuple[int, int]
 
@@ -159,7 +160,7 @@ class CoveragePainter(Painter):
 
     def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
         """Check options and values against the mesh."""
-        sampling = parse(Sampling, "sampling", self.options.get("sampling", "center"))
+        sampling = parse_sampling(self.options.get("sampling", "center"))
         is_share = sampling is Sampling.AREA or sampling.n_samples > 1
         self.dtype, self.empty = (np.dtype(np.float32), 0.0) if is_share else (np.dtype(bool), False)
         self.view["sampling"] = str(sampling)
@@ -177,7 +178,7 @@ class OverdrawPainter(Painter):
 
     def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
         """Check options and values against the mesh."""
-        sampling = parse(Sampling, "sampling", self.options.get("sampling", "center"))
+        sampling = parse_sampling(self.options.get("sampling", "center"))
         if sampling.n_samples > 1:
             raise ValueError(f"sampling must be of one number a pixel for overdraw in tiles, got {str(sampling)!r}")
         is_area = sampling is Sampling.AREA
@@ -262,7 +263,7 @@ class FillPainter(Painter):
         dtype = self.options.get("dtype")
         colors = as_array("colors", values)
         self.values = colors if dtype is not None else as_colors(colors)
-        per = parse(Per, "per", self.options.get("per", "auto"))
+        per = parse(PerOption, "per", self.options.get("per", "auto"))
         self.is_flat = dtype is not None or _is_flat(self.values, triangles, per)
         self.view["sampling"] = self.options.get("sampling", "center")
         self.style = {name: value for name, value in self.options.items() if name not in self.view and name != "per"}
@@ -300,7 +301,7 @@ class FieldPainter(Painter):
         array = as_array("values", values)
         if array.dtype.kind not in "fiub":
             raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
-        per = parse(Per, "per", self.options.get("per", "auto"))
+        per = parse(PerOption, "per", self.options.get("per", "auto"))
         self.is_of_faces = is_per_face(array, triangles.n_vertices, triangles.n_faces, per)
         self.faces = triangles.faces
         nodata = self.options.get("nodata")
@@ -346,7 +347,7 @@ class HeightPainter(Painter):
     def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
         """Check options and values against the mesh."""
         self.surface = self.options.get("surface", "upper")
-        check_choice("surface", self.surface, ("upper", "lower"))
+        parse(SurfaceOption, "surface", self.surface)
         if triangles.n_components != 3:
             raise ValueError(f"a height map needs points of shape (V, 3), got (V, {triangles.n_components})")
         empty = np.nan if self.grid is None or self.grid.nodata is None else self.grid.nodata
@@ -413,13 +414,13 @@ def without_values(painter: Painter) -> Painter:
     return light
 
 
-def _is_flat(colors: Array, triangles: Triangles, per: Per) -> bool:
+def _is_flat(colors: Array, triangles: Triangles, per: PerOption) -> bool:
     fits_triangles, fits_vertices = len(colors) == triangles.n, len(colors) == triangles.n_vertices
-    if per is Per.AUTO and fits_triangles and fits_vertices:
+    if per == "auto" and fits_triangles and fits_vertices:
         raise ValueError(f"colors has {len(colors)} rows, as many as triangles and as vertices: say per=")
-    if fits_triangles and per is not Per.VERTEX:
+    if fits_triangles and per != "vertex":
         return True
-    if fits_vertices and per is not Per.TRIANGLE:
+    if fits_vertices and per != "triangle":
         return False
     raise ValueError(
         f"colors must have {triangles.n} rows, one per triangle, or {triangles.n_vertices}, one per vertex, "

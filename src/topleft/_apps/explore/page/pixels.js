@@ -36,8 +36,7 @@ function pairOf(name, value, least, greatest) {
 }
 
 function chosen(name, value, words) {
-  const marked = words.map((word) => `"${word}"`);
-  if (!words.includes(value)) refuse(`${name} must be ${marked.slice(0, -1).join(", ")} or ${marked.at(-1)}, got ${repr(value)}`);
+  if (!words.includes(value)) refuse(`${name} must be one of ${quoted(words)}, got ${repr(value)}`);
 }
 
 // A method is one of the kernels' or of the literature.

@@ -61,10 +61,7 @@ class Accessors:
     def array(self, index: Any) -> Array:
         """The array (N, K) of an accessor: integers as they are, float32, and normalized integers as float32.
 
-        Raises
-        ------
-        MeshError
-            If it is no valid accessor, or lies beyond its buffer.
+        A `MeshError` if it is no valid accessor, or lies beyond its buffer.
         """
         row = entry(self._tree, "accessors", index)
         if index not in self._arrays:

@@ -21,7 +21,7 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, encode_srgb
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._meshes.io.references import InputFile
-from topleft._meshes.model.material import AlphaMode, Material
+from topleft._meshes.model.material import Material
 from topleft._meshes.model.texture import Texture
 from topleft.errors import MeshError
 from topleft.typing import EncodingOption, FilterOption, WrapOption
@@ -52,13 +52,7 @@ class Materials:
         self._pictures: dict[int, npt.NDArray[np.uint8] | None] = {}
 
     def material(self, index: Any) -> Material:
-        """A material of the file.
-
-        Raises
-        ------
-        MeshError
-            If there is none.
-        """
+        """A material of the file; a `MeshError` if there is none."""
         row = entry(self._tree, "materials", index)
         if index not in self._materials:
             self._source.budget.spend("max_nodes", 1)
@@ -90,7 +84,7 @@ class Materials:
                 "metallic_roughness_texture": self._texture(rough.get("metallicRoughnessTexture"), "linear"),
             }
         mode = row.get("alphaMode", "OPAQUE")
-        own["alpha_mode"] = {"MASK": AlphaMode.MASK, "BLEND": AlphaMode.BLEND}.get(mode, AlphaMode.OPAQUE)
+        own["alpha_mode"] = {"MASK": "mask", "BLEND": "blend"}.get(mode, "opaque")
         if mode == "MASK":
             own |= cutoff_of(_number(row, "alphaCutoff", 0.5))
         if is_unlit:
@@ -264,13 +258,7 @@ def _wrap_of(sampler: Tree) -> tuple[WrapOption, WrapOption]:
 
 
 def transform_of(row: Tree) -> npt.NDArray[np.float64]:
-    """The matrix (2, 3) of KHR_texture_transform, for v upwards.
-
-    Raises
-    ------
-    MeshError
-        If it holds other values than numbers.
-    """
+    """The matrix (2, 3) of KHR_texture_transform, for v upwards; a `MeshError` if it holds no numbers."""
     angle = _number(row, "rotation", 0)
     (du, dv), (su, sv) = _numbers(row, "offset", (0, 0)), _numbers(row, "scale", (1, 1))
     cos, sin = engine.cosine_and_sine(math.degrees(angle))

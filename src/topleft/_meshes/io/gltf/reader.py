@@ -83,10 +83,7 @@ class CameraOfFile:
 def read_gltf(source: InputFile) -> list[Mesh]:
     """The parts of a glTF or GLB file, as its nodes place them.
 
-    Raises
-    ------
-    MeshError
-        If the file is broken or needs an extension that is not read.
+    A `MeshError` if the file is broken or needs an extension that is not read.
     """
     tree, blob = _tree_and_blob(source)
     _check_extensions(tree, source)

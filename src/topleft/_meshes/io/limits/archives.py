@@ -69,13 +69,7 @@ class Counted:
         self._budget = budget
 
     def read(self, size: int) -> bytes:
-        """The next bytes.
-
-        Raises
-        ------
-        MeshError
-            If they are more than allowed.
-        """
+        """The next bytes; a `MeshError` if they are more than allowed."""
         piece = self._content.read(min(size, PIECE_BYTES))
         self._budget.spend("max_unpacked_bytes", len(piece))
         return piece

@@ -38,12 +38,7 @@ LIMITS = {
 class Budget:
     """The part of its limits that a file, with all that it names and holds, has used.
 
-    Parameters
-    ----------
-    name : str
-        Of the file, for errors.
-    **limits : int or None
-        Options of `LIMITS`; those that are not given, or None, follow the bytes of the file.
+    `name`: of the file, for errors. Options of `LIMITS` that are not given, or None, follow the bytes of the file.
     """
 
     def __init__(self, name: str, **limits: int | None) -> None:
@@ -75,23 +70,11 @@ class Budget:
             )
 
     def spend(self, option: str, n: int) -> None:
-        """Count so many more.
-
-        Raises
-        ------
-        MeshError
-            If they are more than allowed.
-        """
+        """Count so many more; errors as of `check`."""
         self.check(option, n)
         self._spent[option] += n
 
     def read(self, n_bytes: int) -> None:
-        """Count the bytes of a file on disk.
-
-        Raises
-        ------
-        MeshError
-            If they are more than allowed.
-        """
+        """Count the bytes of a file on disk; errors as of `check`."""
         self.spend("max_bytes", n_bytes)
         self._n_bytes += n_bytes

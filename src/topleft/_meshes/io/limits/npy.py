@@ -37,10 +37,7 @@ def check_header(file: IO[bytes], n_bytes: int) -> None:
 def arrays_of(path: Path, budget: Budget) -> Iterator[Callable[[str], Array | None]]:
     """A function that reads an array of an .npz file by its name; None if there is none.
 
-    Raises
-    ------
-    MeshError
-        If an array is broken, or all that are asked for have more bytes than allowed.
+    A `MeshError` if an array is broken, or all that are asked for have more bytes than allowed.
     """
     import zipfile  # which few need, and which imports much
 
