@@ -1,13 +1,13 @@
-/* The kernels of an instruction set: TL_KERNEL(result, name, parameters ...), which is a member of the table at the end of
- * topleft.h, and its value in kernels.c.  Part of the contract of topleft.h. */
+/* The kernels of an instruction set: TL_KERNEL(result, name, parameters ...), which is a member of the table at the end
+ * of topleft.h, and its value in kernels.c.  Part of the contract of topleft.h. */
 #include "topleft.h" /* read by itself: the types */
 
 #ifndef TL_KERNEL
 #define TL_KERNEL(result, name, ...)
 #endif
 
-/* The pixels of vertices [first, end) to snapped vertices.  z is read when with_depth and n_components = 3.
- * `wide` may be NULL: wide vertices are then counted, and the caller comes again with a table. */
+/* The pixels of vertices [first, end) to snapped vertices.  z is read when with_depth and n_components = 3. `wide` may
+ * be NULL: wide vertices are then counted, and the caller comes again with a table. */
 TL_KERNEL(tl_vertex_counts, snap, const tl_source *source, int64_t first, int64_t end, int subpixel_bits,
           int with_depth, tl_vertex *out, tl_wide *wide)
 
@@ -15,8 +15,8 @@ TL_KERNEL(tl_vertex_counts, snap, const tl_source *source, int64_t first, int64_
 TL_KERNEL(tl_vertex_counts, project, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
           tl_vertex *out, tl_wide *wide)
 
-/* Cuts the triangles that have TL_CLIPPED vertices: of all n, or of the n in ids, which ascend.  With
- * pieces->vertices NULL only counts. */
+/* Cuts the triangles that have TL_CLIPPED vertices: of all n, or of the n in ids, which ascend.  With pieces->vertices
+ * NULL only counts. */
 TL_KERNEL(void, clip, const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids,
           int64_t n, const tl_view *view, tl_pieces *pieces)
 
@@ -38,13 +38,13 @@ TL_KERNEL(void, sort_keys, const uint32_t *keys, int64_t n, uint64_t *room, uint
 TL_KERNEL(int64_t, cut_clusters, const int32_t *triangles, const int32_t *order, int64_t n, int32_t *seen,
           tl_cluster *clusters, int32_t *vertices, uint8_t *corners, int64_t *n_used)
 
-/* Measures clusters [first, end), a multiple of TL_CLUSTER_GROUP, with vertices in `source`, and the boxes of
- * their groups. */
+/* Measures clusters [first, end), a multiple of TL_CLUSTER_GROUP, with vertices in `source`, and the boxes of their
+ * groups. */
 TL_KERNEL(void, measure_clusters, const tl_source *source, const uint8_t *corners, int64_t first, int64_t end,
           tl_cluster *clusters, double *group_boxes)
 
-/* Counts some clusters, one of each `step`, by their visibility in a view, hidden or not: outside of the
- * window, turned away and culled, showing their backs, the others. */
+/* Counts some clusters, one of each `step`, by their visibility in a view, hidden or not: outside of the window, turned
+ * away and culled, showing their backs, the others. */
 TL_KERNEL(void, survey_clusters, const tl_clustered *mesh, const tl_cluster_view *view, int64_t step,
           int64_t n_of[TL_N_VISIBILITIES])
 
@@ -53,8 +53,8 @@ TL_KERNEL(void, survey_clusters, const tl_clustered *mesh, const tl_cluster_view
 TL_KERNEL(int64_t, count_hidden, const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window,
           const tl_target *target, int64_t step, int64_t *n_hidden)
 
-/* Tells of n boxes, each under a matrix of its own in place of the view's, whether they may show: not outside of
- * the window, nor, unless target is NULL, behind its surfaces. */
+/* Tells of n boxes, each under a matrix of its own in place of the view's, whether they may show: not outside of the
+ * window, nor, unless target is NULL, behind its surfaces. */
 TL_KERNEL(void, find_shown, const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
           const tl_window *window, const tl_target *target, uint8_t *shown)
 
@@ -69,20 +69,19 @@ TL_KERNEL(int64_t, first_bad_row, const int32_t *triangles, int64_t n_triangles,
 TL_KERNEL(int64_t, narrow_triangles, const int64_t *triangles, int64_t n_triangles, int64_t n_vertices, int32_t *out)
 
 /* Returns -1, or, when it has met an index outside [0, n_vertices), the number of a row at or before which there is
- * one; the picture is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
- * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of
- * 0.  A bad row of a mesh without snapped vertices may also be that of one that is not finite; it is drawn
- * without clusters and not to SAMPLES. */
+ * one; the picture is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every other
+ * beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0.  A bad row
+ * of a mesh without snapped vertices may also be that of one that is not finite; it is drawn without clusters and not
+ * to SAMPLES. */
 TL_KERNEL(int64_t, draw_mesh, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
           tl_slice *slice)
 
 /* The numbers of vertices [first, end) as float64 in `points`, or NULL: they stay where they are.  Returns how many
- * cannot be drawn: not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are
- * rounded to 2^-bits px, and those beyond 2^62 of these cannot be drawn. */
+ * cannot be drawn: not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are rounded to
+ * 2^-bits px, and those beyond 2^62 of these cannot be drawn. */
 TL_KERNEL(int64_t, take_points, const tl_source *source, int64_t first, int64_t end, int bits, double *points)
 
-/* As project.  Points have TL_PLACED numbers each; one that cannot be drawn has x NaN, and y says why: a
- * tl_special. */
+/* As project.  Points have TL_PLACED numbers each; one that cannot be drawn has x NaN, and y says why: a tl_special. */
 TL_KERNEL(tl_vertex_counts, project_to, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
           const tl_projected *out)
 
@@ -95,17 +94,17 @@ TL_KERNEL(void, clip_points, const tl_source *source, const double *points, cons
 TL_KERNEL(int64_t, count_classes, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
           tl_census *census)
 
-/* The depth of n pixels, one for all triangles: `depth` where there is an id, `background` elsewhere.  The
- * ids are xored with `flip` first. */
+/* The depth of n pixels, one for all triangles: `depth` where there is an id, `background` elsewhere.  The ids are
+ * xored with `flip` first. */
 TL_KERNEL(void, set_flat_depth, int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out)
 
-/* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they
- * may be a few too many.  Returns as `draw_mesh` does; the window as for a share of a part. */
+/* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they may
+ * be a few too many.  Returns as `draw_mesh` does; the window as for a share of a part. */
 TL_KERNEL(int64_t, bin, const tl_snapped *snapped, const tl_window *window, int32_t reach_fx, int band_bits,
           tl_bins *bins)
 
-/* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands
- * + 2 numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
+/* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands + 2
+ * numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
 TL_KERNEL(void, list_bins, const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed)
 
 /* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach. */
@@ -114,12 +113,12 @@ TL_KERNEL(void, find_columns, const tl_bins *bins, int64_t n_bands, int32_t *col
 /* Writes rows of a picture of that width, from their first number on, past the caches. */
 TL_KERNEL(void, lay_rows, const tl_laid_rows *rows, int32_t *to, int64_t width)
 
-/* Lists pixels that show several triangles, from place `at` on, where there is room for 16 more than there
- * are; returns where they end. */
+/* Lists pixels that show several triangles, from place `at` on, where there is room for 16 more than there are; returns
+ * where they end. */
 TL_KERNEL(int64_t, split_pixels, const tl_seen_samples *seen, const tl_split *split, int64_t at)
 
-/* Writes rows of `width` ids that sample k, not the first, sees, from those of the first and `split`, which
- * begins with the same row. */
+/* Writes rows of `width` ids that sample k, not the first, sees, from those of the first and `split`, which begins with
+ * the same row. */
 TL_KERNEL(void, spread_ids, const tl_split *split, int k, int64_t n_rows, int64_t width, const int32_t *first_ids,
           int32_t *ids)
 
@@ -128,26 +127,25 @@ TL_KERNEL(void, spread_ids, const tl_split *split, int k, int64_t n_rows, int64_
 TL_KERNEL(void, find_instances, const int32_t *ids, int64_t n_rows, int64_t width, const int64_t *first_ids, int64_t n,
           int32_t *out, int32_t *boxes)
 
-/* Appends the runs of a window to a table of *n, which has room for n_room; `rows` has TL_RLE_LINE * height
- * numbers.  Returns whether there was room for all. */
+/* Appends the runs of a window to a table of *n, which has room for n_room; `rows` has TL_RLE_LINE * height numbers.
+ * Returns whether there was room for all. */
 TL_KERNEL(int, list_column_runs, const tl_run_source *source, int32_t *rows, tl_run *runs, int64_t n_room, int64_t *n)
 
-/* The counts of objects from n runs in their order: run i is of object[i], of none where that is below 0.  Then
- * these as text, that of object k from text_starts[k] to text_starts[k + 1]: room for 13 characters a count. */
+/* The counts of objects from n runs in their order: run i is of object[i], of none where that is below 0.  Then these
+ * as text, that of object k from text_starts[k] to text_starts[k + 1]: room for 13 characters a count. */
 TL_KERNEL(void, count_runs, const tl_run *runs, const int32_t *object, int64_t n, const tl_rles *rles)
 TL_KERNEL(void, write_counts, const tl_rles *rles, int64_t *text_starts, uint8_t *text)
 
-/* The exact area that the triangles of a slice, from its first on, cover of each pixel, their sum; the window has
- * fewer than 2^31 cells.  Returns as `draw_mesh` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
+/* The exact area that the triangles of a slice, from its first on, cover of each pixel, their sum; the window has fewer
+ * than 2^31 cells.  Returns as `draw_mesh` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
 TL_KERNEL(int64_t, draw_area, const tl_snapped *snapped, const tl_window *window, const tl_slice *slice,
           const tl_area *target)
 
 /* Blends the colours of triangles into the canvas in their order.  Returns as `draw_mesh` does. */
 TL_KERNEL(int64_t, blend, const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
 
-/* Fills the canvas, its ground not NULL, with the flat colours of a few triangles: tl_is_large_shapes.
- * 2^sample_bits samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as
- * `draw_mesh` does. */
+/* Fills the canvas, its ground not NULL, with the flat colours of a few triangles: tl_is_large_shapes. 2^sample_bits
+ * samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as `draw_mesh` does. */
 TL_KERNEL(int64_t, fill_large_shapes, const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
           const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer)
 
@@ -176,16 +174,16 @@ TL_KERNEL(void, levels_seen, const tl_levels *array, const float *slopes, int64_
 TL_KERNEL(void, halve_rows, const float *level, int64_t width, int64_t height, int n_channels, int64_t first,
           int64_t end, float *out)
 
-/* Colours where labels are not -1: per triangle, or interpolated screen-linearly from those of the vertices.
- * n_channels of uint8 or float32 a colour.  `ground`, or NULL: the colour elsewhere. */
+/* Colours where labels are not -1: per triangle, or interpolated screen-linearly from those of the vertices. n_channels
+ * of uint8 or float32 a colour.  `ground`, or NULL: the colour elsewhere. */
 TL_KERNEL(void, paint_flat, const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes,
           const uint8_t *ground, uint8_t *pixels)
 TL_KERNEL(void, paint_gouraud, const tl_snapped *snapped, const tl_window *window, const int32_t *labels,
           const void *colors, int n_channels, int is_u8, void *pixels)
 
-/* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from
- * planes of colours.  Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they
- * are.  A row of a palette of uint8 has four numbers, whatever n_channels. */
+/* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from planes of
+ * colours.  Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are.  A row of a
+ * palette of uint8 has four numbers, whatever n_channels. */
 TL_KERNEL(void, mean_flat, const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette,
           int n_channels, int is_u8, const tl_transfer *transfer, void *pixels)
 TL_KERNEL(void, mean_colors, const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
@@ -202,27 +200,27 @@ TL_KERNEL(void, set_inverse_w, const tl_source *source, const float *rows, int64
 TL_KERNEL(void, shade, const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
           const float *depth, uint8_t *pixels)
 
-/* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target.
- * With `split`, its rows those of the window, there is the plane of the first sample alone. */
+/* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target. With
+ * `split`, its rows those of the window, there is the plane of the first sample alone. */
 TL_KERNEL(void, shade_samples, const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
           int sample_bits, int64_t stride, const int32_t *ids, const float *depth, const tl_split *split,
           uint8_t *pixels)
 
-/* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show
- * is NORMALS. */
+/* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show is
+ * NORMALS. */
 TL_KERNEL(void, shade_normals, const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, float *out)
 
 /* Per pixel of `ids` (rows of window->width): the value of its point, float32 or float64.  No shading is read. */
 TL_KERNEL(void, fill_points, const tl_shaded_scene *scene, const tl_window *window, const tl_points *points,
           const int32_t *ids, void *out)
 
-/* Draws n alpha-tested triangles over a target, NEAREST or PEEL, of all others; the window
- * as for a share of a part, and fewer than 2^31 pixels. */
+/* Draws n alpha-tested triangles over a target, NEAREST or PEEL, of all others; the window as for a share of a part,
+ * and fewer than 2^31 pixels. */
 TL_KERNEL(void, cut_out, const tl_snapped *snapped, const tl_window *window, const tl_view *view,
           const tl_shading *shading, const int32_t *triangles, int64_t n, const tl_target *target)
 
-/* Copies triangles [first, end).  A single-sided one turned the way that the mesh culls is collapsed to a
- * point; if a plane cuts it, so are its pieces, in place.  The result is drawn with any cull. */
+/* Copies triangles [first, end).  A single-sided one turned the way that the mesh culls is collapsed to a point; if a
+ * plane cuts it, so are its pieces, in place.  The result is drawn with any cull. */
 TL_KERNEL(void, drop_sides, const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
           int32_t *triangles)
 
@@ -255,8 +253,8 @@ TL_KERNEL(int64_t, vertex_normals, const tl_source *source, const int32_t *trian
 TL_KERNEL(int64_t, face_normals, const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
           double *out, float *rows)
 
-/* 1 for the triangles of [first, end) with corner normals, rows of four, that point to the other side, else
- * 0; row_of_corner is (n_triangles, 3), the triangles themselves where vertices have a row each. */
+/* 1 for the triangles of [first, end) with corner normals, rows of four, that point to the other side, else 0;
+ * row_of_corner is (n_triangles, 3), the triangles themselves where vertices have a row each. */
 TL_KERNEL(int64_t, find_turned, const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
           const float *normals, const int32_t *row_of_corner, uint8_t *is_turned)
 
@@ -276,16 +274,16 @@ TL_KERNEL(void, find_creases, const tl_fans *fans, int64_t first, int64_t end, u
 /* Normals of vertices [first, end) as vertex_normals has them, and of their groups. */
 TL_KERNEL(void, sum_creases, const tl_fans *fans, const tl_creases *creases, int64_t first, int64_t end)
 
-/* Triangles of faces with any number of corners, as rows of `corners`: n_corners - 2 of each that has three; room
- * as tl_ear_words tells for the largest.  Returns how many faces are finished. */
+/* Triangles of faces with any number of corners, as rows of `corners`: n_corners - 2 of each that has three; room as
+ * tl_ear_words tells for the largest.  Returns how many faces are finished. */
 TL_KERNEL(int64_t, cut_faces, const tl_faces *faces, int64_t *triangles, int64_t *room)
 
 /* Low and high of the corners of triangles [first, end): six numbers. */
 TL_KERNEL(int64_t, box_of_faces, const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
           double *box)
 
-/* Vectors [first, end), times a matrix (3, 3) from the right unless that is NULL, scaled to length 1; 0 where they
- * have none, or are not finite.  Out as for face_normals. */
+/* Vectors [first, end), times a matrix (3, 3) from the right unless that is NULL, scaled to length 1; 0 where they have
+ * none, or are not finite.  Out as for face_normals. */
 TL_KERNEL(void, unit_vectors, const tl_source *vectors, const double *turn, int64_t first, int64_t end, double *out,
           float *rows)
 
@@ -295,16 +293,16 @@ TL_KERNEL(void, move_points, const tl_source *points, const double *matrix, int6
 /* The first three of n_channels of colours [first, end) as float32 (n, 4) and 1. */
 TL_KERNEL(void, color_rows, const uint8_t *colors, int n_channels, int64_t first, int64_t end, float *rows)
 
-/* Bends vertices [first, end), float32 or float64, moved to eye space by the rows of an affine matrix, as far as
- * they lie well in the picture; their records. */
+/* Bends vertices [first, end), float32 or float64, moved to eye space by the rows of an affine matrix, as far as they
+ * lie well in the picture; their records. */
 TL_KERNEL(void, bend_vertices, const tl_lens *lens, const tl_source *source, const double *eye_from, int64_t first,
           int64_t end, double *bent, float *records)
 
 /* The places (n, 2) in the image plane at which a lens sees points (n, 3) in eye space. */
 TL_KERNEL(void, see_points, const tl_lens *lens, const double *points, int64_t n, double *places)
 
-/* Lists the triangles [first, end) that a lens may bend, and those that it cannot see, with room for end - first +
- * 16 each; returns how many it may bend. */
+/* Lists the triangles [first, end) that a lens may bend, and those that it cannot see, with room for end - first + 16
+ * each; returns how many it may bend. */
 TL_KERNEL(int64_t, find_bent, const tl_lens *lens, const float *records, int64_t n_vertices, const int32_t *triangles,
           int64_t first, int64_t end, int32_t *bent, int32_t *outside, int64_t *n_outside)
 
@@ -312,17 +310,16 @@ TL_KERNEL(int64_t, find_bent, const tl_lens *lens, const float *records, int64_t
 TL_KERNEL(void, split_bent, const tl_lens *lens, const double *points, const float *records, int64_t n_vertices,
           const int32_t *triangles, const int32_t *ids, int64_t n, tl_bent_parts *parts)
 
-/* Groups of n equal rows of n_words words, in the order of their first rows: the first row of each, and the group
- * of every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 where
- * many hashes meet. */
+/* Groups of n equal rows of n_words words, in the order of their first rows: the first row of each, and the group of
+ * every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 where many
+ * hashes meet. */
 TL_KERNEL(int64_t, group_rows, const uint32_t *rows, int n_words, int64_t n, int table_bits, int32_t *table,
           int32_t *first, int32_t *group)
 
 /* Sets the boxes of a surface's nodes; all else of it is there. */
 TL_KERNEL(void, build_tree, tl_surface *surface)
 
-/* The nearest triangle of points [first, end), and where on it unless `at` is NULL.  Returns the largest
- * distance. */
+/* The nearest triangle of points [first, end), and where on it unless `at` is NULL.  Returns the largest distance. */
 TL_KERNEL(double, nearest_of_points, const tl_surface *surface, const double *points, int64_t first, int64_t end,
           int32_t *triangle, double *at)
 
@@ -336,9 +333,8 @@ TL_KERNEL(void, find_reach, const tl_surface *surface, const double *points, con
 TL_KERNEL(void, set_feet, const double *points, const int32_t *triangles, const double *from, const int32_t *triangle,
           const int32_t *point, int64_t n, double *at, double *squared)
 
-/* The pixels of points [first, end) to columns of coordinates: rounded to 2^-bits pixels, counted in 2^-grid_bits
- * from the corner.  With wide_fx NULL points that are not narrow are counted, and the caller comes again with a
- * table. */
+/* The pixels of points [first, end) to columns of coordinates: rounded to 2^-bits pixels, counted in 2^-grid_bits from
+ * the corner.  With wide_fx NULL points that are not narrow are counted, and the caller comes again with a table. */
 TL_KERNEL(tl_vertex_counts, snap_points, const tl_source *source, int64_t first, int64_t end, int bits, int grid_bits,
           const int64_t *corner_px, int32_t *x_fx, int32_t *y_fx, int64_t *wide_fx)
 
@@ -346,14 +342,14 @@ TL_KERNEL(tl_vertex_counts, snap_points, const tl_source *source, int64_t first,
 TL_KERNEL(int64_t, bound_polygons, const tl_polygons *polygons, int64_t first, int64_t end, int64_t width,
           int64_t height, uint8_t *is_wide, tl_polygon_box *boxes)
 
-/* The polygons of each band of rows, in their order: those of band k are listed[starts[k]] to listed[starts[k +
- * 1] - 1]. A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`; `starts` has
- * n_bands + 2 numbers. */
+/* The polygons of each band of rows, in their order: those of band k are listed[starts[k]] to listed[starts[k + 1] -
+ * 1]. A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`; `starts` has n_bands + 2
+ * numbers. */
 TL_KERNEL(void, sort_polygons, const tl_polygon_box *boxes, int64_t n, int64_t band_rows, int64_t n_bands,
           int64_t *starts, int32_t *listed)
 
-/* Sets weights and is_simple of polygons [first, end); room as tl_certify_words tells.  `trust_polygons`: of
- * polygons that are known to be valid, the first ring of each its border and the others holes. */
+/* Sets weights and is_simple of polygons [first, end); room as tl_certify_words tells.  `trust_polygons`: of polygons
+ * that are known to be valid, the first ring of each its border and the others holes. */
 TL_KERNEL(void, certify_polygons, const tl_polygons *polygons, int64_t first, int64_t end, int8_t *weights,
           uint8_t *is_simple, int64_t *room)
 TL_KERNEL(void, trust_polygons, const tl_polygons *polygons, int64_t first, int64_t end, int8_t *weights,
@@ -368,14 +364,12 @@ TL_KERNEL(void, mask_nonzero, const tl_polygons *polygons, int64_t polygon, int6
 /* Paints polygons over rows, the later over the earlier. */
 TL_KERNEL(void, label_polygons, const tl_polygons *polygons, const tl_label_job *job)
 
-/* Exact shares of pixels.  Returns how many polygons of the job are finished: fewer than all when the table is
- * full. */
+/* Exact shares of pixels.  Returns how many polygons of the job are finished: fewer than all when the table is full. */
 TL_KERNEL(int64_t, share_polygons, const tl_polygons *polygons, const tl_share_job *job)
 
-/* The windows that n triangles, corners (n, 3, 2) in pixels, may touch.  With out = NULL sets `boxes`,
- * adds to starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be
- * snapped, or -1.  Otherwise writes the spans of each row from starts[row] on, which is then where they end, by the
- * boxes. */
+/* The windows that n triangles, corners (n, 3, 2) in pixels, may touch.  With out = NULL sets `boxes`, adds to
+ * starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be snapped, or -1.
+ * Otherwise writes the spans of each row from starts[row] on, which is then where they end, by the boxes. */
 TL_KERNEL(int64_t, list_spans, const tl_tiling *tiling, const double *corners_px, int64_t n, int64_t first_triangle,
           tl_window_box *boxes, int64_t *starts, tl_window_span *out)
 
@@ -384,13 +378,13 @@ TL_KERNEL(int64_t, list_spans, const tl_tiling *tiling, const double *corners_px
  * end.  Returns how many spans are longer. */
 TL_KERNEL(int64_t, sort_spans, const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out)
 
-/* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to the differences of triangle counts from
- * window to window: rows of n_columns + 1 numbers. */
+/* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to the differences of triangle counts from window to
+ * window: rows of n_columns + 1 numbers. */
 TL_KERNEL(void, count_windows, const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
           int32_t *steps)
 
-/* The corners of n triangles, those from `first` on unless `which` names them: their rows, one after the other.
- * Returns the first that names a vertex that does not exist, or -1. */
+/* The corners of n triangles, those from `first` on unless `which` names them: their rows, one after the other. Returns
+ * the first that names a vertex that does not exist, or -1. */
 TL_KERNEL(int64_t, take_corners, const tl_corners *mesh, const int32_t *which, int64_t first, int64_t n, void *out)
 
 /* Pixels [first, end) of two visibility buffers into the first. */
@@ -399,13 +393,13 @@ TL_KERNEL(void, merge_fragments, const tl_merge *merge, int64_t first, int64_t e
 /* Ids [first, end) become names[1 + id]. */
 TL_KERNEL(void, name_triangles, int32_t *ids, int64_t first, int64_t end, const int32_t *names)
 
-/* Where the pixels of a band lie in the triangles that they show: `ids` is its picture's lowest row, -1 for none,
- * the next one stands `step` numbers on, and first_id is added.  rast_db may be NULL. */
+/* Where the pixels of a band lie in the triangles that they show: `ids` is its picture's lowest row, -1 for none, the
+ * next one stands `step` numbers on, and first_id is added.  rast_db may be NULL. */
 TL_KERNEL(void, grad_points, const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
           void *rast_db)
 
-/* The gradients of vertices from those of `rast` and `rast_db`, summed in a band.  Returns, as those of values and
- * of colors do, the number of a triangle that does not exist, or -1. */
+/* The gradients of vertices from those of `rast` and `rast_db`, summed in a band.  Returns, as those of values and of
+ * colors do, the number of a triangle that does not exist, or -1. */
 TL_KERNEL(int64_t, grad_points_vjp, const tl_grad_view *view, const tl_grad_points *points)
 
 /* Attributes in a band, and their slopes. */
@@ -432,23 +426,23 @@ TL_KERNEL(void, mark_silhouettes, const tl_grad_view *view, const tl_grad_outlin
 /* A band with smooth silhouettes; or backward the gradients of its colours, and the sums by vertex. */
 TL_KERNEL(void, grad_edges, const tl_grad_view *view, const tl_grad_edges *edges, tl_grad_sums *sums)
 
-/* A band of attributes with smooth silhouettes; or the sums of its gradients; or these, and the sum of squares of
- * its differences from another picture. */
+/* A band of attributes with smooth silhouettes; or the sums of its gradients; or these, and the sum of squares of its
+ * differences from another picture. */
 TL_KERNEL(double, grad_picture, const tl_grad_view *view, tl_grad_picture *picture)
 
 /* The gradients of vertices from those of areas. */
 TL_KERNEL(void, grad_area, const tl_grad_area *area)
 
-/* Rows [first, end) of an atlas, (rows of) width texels.  Where an id is -1, that of the nearest triangle that
- * meets the texel, and its values there; `squared` has a number a texel of these rows, INFINITY.  Or means over
- * covered areas: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */
+/* Rows [first, end) of an atlas, (rows of) width texels.  Where an id is -1, that of the nearest triangle that meets
+ * the texel, and its values there; `squared` has a number a texel of these rows, INFINITY.  Or means over covered
+ * areas: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */
 TL_KERNEL(void, touch_texels, const tl_atlas *atlas, int64_t first, int64_t end, int32_t *ids, float *squared,
           float *out)
 TL_KERNEL(void, average_texels, const tl_atlas *atlas, int64_t first, int64_t end, double *sums, float *most,
           int32_t *ids, float *out)
 
-/* The nearest texel with an id, within `reach` < TL_NO_TEXEL: along rows; then by Euclid, its index or -1, with
- * room for 2 * width numbers; and texels [first, end) of n_bytes copied from there. */
+/* The nearest texel with an id, within `reach` < TL_NO_TEXEL: along rows; then by Euclid, its index or -1, with room
+ * for 2 * width numbers; and texels [first, end) of n_bytes copied from there. */
 TL_KERNEL(void, find_in_rows, const int32_t *ids, int64_t width, int64_t first, int64_t end, int reach, int16_t *along)
 TL_KERNEL(void, find_gutter, const int16_t *along, int64_t width, int64_t height, int64_t first, int64_t end, int reach,
           int32_t *room, int32_t *from)
@@ -462,8 +456,8 @@ TL_KERNEL(void, add_taken, const tl_taken *taken, const float *positions, const 
 /* Rows [first, end) of how high above the ground something is seen; NaN where there is no ground, or too far. */
 TL_KERNEL(void, view_heights, const tl_terrain *terrain, int64_t first, int64_t end, double *out)
 
-/* Columns of tl_crossings: filled by the even-odd rule in place, where the number of odd ones is returned; a byte
- * or a share of each voxel, n_steps a column; each bit at strides of a row, a column and a step. */
+/* Columns of tl_crossings: filled by the even-odd rule in place, where the number of odd ones is returned; a byte or a
+ * share of each voxel, n_steps a column; each bit at strides of a row, a column and a step. */
 TL_KERNEL(int64_t, fill_columns, uint64_t *bits, int64_t n_columns, int64_t n_words)
 TL_KERNEL(void, expand_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out)
 TL_KERNEL(void, count_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps,
