@@ -59,7 +59,8 @@ typedef struct {
     tl_grad_values values;
     const int32_t *corners; /* (n_triangles, 3): the row of the attributes of each corner */
     tl_grad_sums *faces; /* by triangle, TL_SUMS_OF_POINTS columns and TL_SUMS_OF_THREE for each three more: scratch */
-    tl_grad_sums *vertices, *attr;
+    tl_grad_sums *vertices, *attr; /* may be the same: those of attributes begin at first_column */
+    int64_t first_column;
 } tl_grad_colors;
 
 /* A texture with its halvings, and where it is looked at.  Backward `out` is a gradient, and the last are written. */
@@ -125,11 +126,11 @@ typedef struct {
     void *pairs;  /* (2 n_px, TL_PAIR_BYTES) */
     float *steps; /* (2 n_px, n_columns): of pairs */
     /* Scratch. */
-    float *window;       /* TL_ROWS_KEPT rows of n_columns numbers a pixel, + TL_IDS_ROOM */
-    double *moves;       /* 16 rows of n_columns numbers a pixel */
-    float *rast;         /* a row of four numbers a pixel */
-    tl_grad_sums *faces; /* by triangle, TL_HEAD_OF_FACE columns and TL_SUMS_OF_FACE for each three attributes */
-    tl_grad_sums *of_points, *of_attr; /* not scratch; NULL where the picture is drawn alone */
+    float *window;          /* TL_ROWS_KEPT rows of n_columns numbers a pixel, + TL_IDS_ROOM */
+    double *moves;          /* 16 rows of n_columns numbers a pixel */
+    float *rast;            /* a row of four numbers a pixel */
+    tl_grad_sums *faces;    /* by triangle, TL_HEAD_OF_FACE columns and TL_SUMS_OF_FACE for each three attributes */
+    tl_grad_sums *vertices; /* not scratch: x, y, z, w, then attributes; NULL where the picture is drawn alone */
 } tl_grad_picture;
 
 /* Areas of triangles in pixels, each times the values of the triangle, NULL for 1. */

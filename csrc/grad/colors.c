@@ -121,7 +121,7 @@ static void pull_clamped(const tl_grad_view *view, const tl_grad_colors *p, cons
     load_seen_triangle(view, run->id, x, y, &t, 0);
     for (int k = 0; k < 3; k++) {
         rows[k] = v->n_columns * p->corners[3 * (int64_t)run->id + k];
-        to[k] = sums_of(p->attr, p->corners[3 * (int64_t)run->id + k]);
+        to[k] = sums_of(p->attr, p->corners[3 * (int64_t)run->id + k]) + p->first_column;
     }
     for (int64_t i = 0; i < run->n; i++) {
         const float *rast = (const float *)v->rast + 4 * (run->at + i);
@@ -177,13 +177,22 @@ static int64_t pull_colors(const tl_grad_view *view, const tl_grad_colors *p)
     }
 }
 
-/* TL_LANES triangles to close, of which n have sums: the rows of their corners and attributes, where they begin. */
+/* Where triangles to close have their sums: from `moments` on, `stride` further for each three attributes. */
 typedef struct {
-    const double *sums; /* of the first one, from `moments` on, `stride` further for each three attributes */
-    int64_t n_columns, moments, stride;
-    const int32_t *column,
-        *row; /* sums count pixels from these, and by the total there; NULL: from x and y, which are */
-    int n;    /* the first two sums */
+    int64_t moments, stride;
+    /* The corners of triangles, which are their rows of attributes, too, and the pixels that sums count from, by the
+     * total there.  NULL: corners as they stand in the mesh; sums count from x and y, which are the first two. */
+    int32_t *const *corners;
+    const int32_t *column, *row;
+} closing_places;
+
+/* TL_LANES triangles to close, of which n have sums: the rows of their corners and attributes. */
+typedef struct {
+    const double *sums; /* of the first one */
+    int64_t n_columns;
+    const closing_places *places;
+    int64_t first;
+    int n;
     int32_t from[TL_MAX_LANES]; /* 0, 1, 2 and so on; the first one's beyond n */
     int32_t corners[3][TL_MAX_LANES], rows[3][TL_MAX_LANES];
     vd v[3][3], q[3][3], units[3];
@@ -193,24 +202,33 @@ TL_INLINE void load_closing(const tl_grad_view *view, const tl_grad_colors *p, c
                             vd *x0, vd *y0)
 {
     const int32_t *const corners[3] = {l->corners[0], l->corners[1], l->corners[2]};
+    const closing_places *places = l->places;
     double about[2][TL_MAX_LANES];
     vd z[3];
-    for (int i = 0; i < TL_LANES; i++) {
-        const int from = l->from[i] = i < l->n ? i : 0;
+    for (int i = 0; i < TL_LANES; i++)
+        l->from[i] = i < l->n ? i : 0;
+    if (places->corners) { /* lanes beyond n have corners, too */
         for (int k = 0; k < 3; k++) {
-            l->corners[k][i] = view->tri[3 * (int64_t)ids[from] + k];
-            l->rows[k][i] = p->corners[3 * (int64_t)ids[from] + k];
+            const vi some = vi_load(places->corners[k] + l->first);
+            vi_store(l->corners[k], some), vi_store(l->rows[k], some);
         }
-        for (int k = 0; k < 2 && !l->column; k++)
-            about[k][i] = l->sums[from * l->n_columns + k];
+        *x0 = middles_at(view, 0, vi_load(places->column + l->first));
+        *y0 = middles_at(view, 1, vi_load(places->row + l->first));
+    } else {
+        for (int i = 0; i < TL_LANES; i++) {
+            const int64_t id = 3 * (int64_t)ids[l->from[i]];
+            for (int k = 0; k < 3; k++)
+                l->corners[k][i] = view->tri[id + k], l->rows[k][i] = p->corners[id + k];
+            for (int k = 0; k < 2; k++)
+                about[k][i] = l->sums[l->from[i] * l->n_columns + k];
+        }
+        *x0 = vd_load(about[0]), *y0 = vd_load(about[1]);
     }
-    *x0 = l->column ? middles_at(view, 0, vi_load(l->column)) : vd_load(about[0]);
-    *y0 = l->column ? middles_at(view, 1, vi_load(l->row)) : vd_load(about[1]);
     load_triangles(view, corners, *x0, *y0, l->v, l->q, z);
     const vd total = sum_of_three(l->q[0][2], l->q[1][2], l->q[2][2]), one = vd_set1(1.0);
-    const vd unit = l->column ? vd_div(one, one_for_zero(total)) : one;
+    const vd unit = places->corners ? vd_div(one, one_for_zero(total)) : one;
     for (int c = 0; c < 3; c++)
-        l->units[c] = l->column && c < 2 ? vd_mul(vd_set1(2.0 * view->scale[c]), unit) : unit;
+        l->units[c] = places->corners && c < 2 ? vd_mul(vd_set1(2.0 * view->scale[c]), unit) : unit;
 }
 
 /* Adds four columns of n lanes to the rows of their corners, one triangle after the other, from column `first` on. */
@@ -233,13 +251,12 @@ TL_INLINE void find_rows(tl_grad_sums *sums, int n, const int32_t rows[3][TL_MAX
 }
 
 /* Adds the gradients of the attributes of corners; returns those of q_k, added. */
-TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l, vd by_q[3][3])
+TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l, double *const to[3][TL_MAX_LANES],
+                                vd by_q[3][3])
 {
     const int64_t n = p->values.n_columns;
-    double *to[3][TL_MAX_LANES];
-    find_rows(p->attr, l->n, l->rows, to);
     for (int64_t first = 0; first < n; first += 3) {
-        const double *moments = l->sums + l->moments + first / 3 * l->stride;
+        const double *moments = l->sums + l->places->moments + first / 3 * l->places->stride;
         vd m[12], at[3][3], found[3][4];
         for (int j = 0; j < 12; j += 4)
             vd_load_records(moments + j, (int)l->n_columns, l->from, m + j);
@@ -252,7 +269,7 @@ TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l,
                     sum_of_three(vd_mul(l->q[k][0], m[c]), vd_mul(l->q[k][1], m[4 + c]), vd_mul(l->q[k][2], m[8 + c]));
             found[k][3] = vd_set1(0.0);
         }
-        add_rows(l->n, to, first, found);
+        add_rows(l->n, to, p->first_column + first, found);
         for (int j = 0; j < 3; j++)
             for (int c = 0; c < 3; c++) {
                 by_q[0][j] = vd_add(by_q[0][j], vd_mul(vd_sub(at[0][c], at[2][c]), m[4 * j + c]));
@@ -271,7 +288,8 @@ static void close_triangles(const tl_grad_view *view, const tl_grad_colors *p, c
     load_closing(view, p, ids, l, &x0, &y0);
     for (int k = 0; k < 9; k++)
         by_q[k / 3][k % 3] = g[k / 3][k % 3] = vd_set1(0.0);
-    close_attributes(p, l, by_q);
+    find_rows(p->attr, l->n, l->rows, to);
+    close_attributes(p, l, to, by_q);
     for (int k = 0; k < 3; k++) { /* q_k = v_i x v_j */
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         for (int a = 0; a < 3; a++) {
@@ -284,22 +302,20 @@ static void close_triangles(const tl_grad_view *view, const tl_grad_colors *p, c
         g[k][3] = vd_sub(g[k][2], vd_add(vd_mul(x0, g[k][0]), vd_mul(y0, g[k][1])));
         g[k][2] = vd_set1(0.0);
     }
-    find_rows(p->vertices, l->n, l->corners, to);
+    if (p->vertices != p->attr)
+        find_rows(p->vertices, l->n, l->corners, to);
     add_rows(l->n, to, 0, g);
 }
 
 /* Ends a band: from sums of triangles to those of their corners. */
-TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, int64_t moments, int64_t stride,
-                            const int32_t *column, const int32_t *row)
+TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, const closing_places *places)
 {
     const tl_grad_sums *faces = p->faces;
     for (int64_t i = 0; i < faces->n; i += TL_LANES) {
         closing_lanes l = {.sums = faces->sums + i * faces->n_columns,
                            .n_columns = faces->n_columns,
-                           .moments = moments,
-                           .stride = stride,
-                           .column = column ? column + i : 0,
-                           .row = column ? row + i : 0,
+                           .places = places,
+                           .first = i,
                            .n = (int)(faces->n - i < TL_LANES ? faces->n - i : TL_LANES)};
         close_triangles(view, p, faces->rows + i, &l);
     }
@@ -312,7 +328,7 @@ TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, i
 static int64_t grad_colors_vjp(const tl_grad_view *view, const tl_grad_colors *p)
 {
     const int64_t bad_id = pull_colors(view, p);
-    close_colors(view, p, FACE_X, TL_SUMS_OF_THREE, 0, 0);
+    close_colors(view, p, &(closing_places){.moments = FACE_X, .stride = TL_SUMS_OF_THREE});
     return bad_id;
 }
 

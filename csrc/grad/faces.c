@@ -54,17 +54,14 @@ static picture_pass open_pass(const tl_grad_view *view, tl_grad_picture *l)
     return p;
 }
 
-/* The face of a triangle that a pixel shows; -1 if its corners do not exist. */
-TL_INLINE int32_t find_face(picture_pass *p, int32_t id, int32_t column, int64_t row)
+/* The face of a triangle that has none until then, as a pixel shows it first; -1 if its corners do not exist. */
+TL_INLINE int32_t make_face(picture_pass *p, int32_t id, int32_t column, int64_t row)
 {
     const tl_grad_view *view = p->view;
     const int64_t n_rows = p->l->n_attr < view->n_vertices ? p->l->n_attr : view->n_vertices;
-    if (id < 0 || id >= view->n_triangles)
+    if (!has_corners(view, n_rows, id))
         return -1;
-    int32_t face = p->l->faces->slot_of[id];
-    if (face >= 0 || !has_corners(view, n_rows, id))
-        return face;
-    face = p->l->faces->slot_of[id] = (int32_t)p->l->faces->n++;
+    const int32_t face = p->l->faces->slot_of[id] = (int32_t)p->l->faces->n++;
     p->l->faces->rows[face] = id;
     for (int k = 0; k < 3; k++)
         p->corners[k][face] = view->tri[3 * (int64_t)id + k];
@@ -83,11 +80,33 @@ TL_INLINE int64_t list_row_runs(const picture_pass *p, const int32_t *ids, int32
         const vm m = vm_first(width - x);
         const vi id = vi_max(x + TL_LANES <= width ? vi_load(ids + x) : vi_load_masked(m, ids + x), none);
         const vm starts = vm_and_not(m, vi_eq(id, vi_shift_in(id, before)));
+        before = id;
+        if (!vm_any(starts)) /* most of what is empty */
+            continue;
         vi_compress(begins + n, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
         n += __builtin_popcount(vm_bits(starts));
-        before = id;
     }
     return n;
+}
+
+/* Finds the faces of the runs of a row from `first` on, and makes those that there were not. */
+TL_INLINE void find_faces(picture_pass *p, const int32_t *ids, int64_t row, int64_t first, int64_t n_runs)
+{
+    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(p->view->n_triangles));
+    int32_t id[TL_MAX_LANES];
+    for (int64_t r = first; r < n_runs; r += TL_LANES) {
+        const vm m = vm_first(n_runs - r);
+        const vi shown = vi_gather(m, ids, vi_load(p->l->begins + r));
+        const vm is_there = vm_and(m, vm_and(vi_gt(shown, none), vi_gt(end, shown)));
+        const vi face = vi_select(is_there, vi_gather(is_there, p->l->faces->slot_of, shown), none);
+        vi_store(p->faces + r, vi_add(face, face)); /* runs beyond come later */
+        vi_spill(id, shown);
+        for (unsigned made = vm_bits(vm_and(is_there, vi_gt(vi_set1(0), face))); made; made &= made - 1) {
+            const int k = __builtin_ctz(made);
+            const int32_t slot = p->l->faces->slot_of[id[k]]; /* of another run of these */
+            p->faces[r + k] = 2 * (slot >= 0 ? slot : make_face(p, id[k], p->l->begins[r + k], row));
+        }
+    }
 }
 
 /* Lists runs, row by row, and faces in the order of their first pixels. */
@@ -99,8 +118,7 @@ static void list_faces(picture_pass *p)
         const int64_t first = n_runs;
         p->l->row_runs[row - p->all.first_row] = n_runs;
         n_runs += list_row_runs(p, ids, p->l->begins + n_runs);
-        for (int64_t r = first; r < n_runs; r++)
-            p->faces[r] = 2 * find_face(p, ids[p->l->begins[r]], p->l->begins[r], row);
+        find_faces(p, ids, row, first, n_runs);
     }
     p->l->row_runs[p->all.end_row - p->all.first_row] = n_runs;
     for (int k = 0; k < TL_IDS_ROOM; k++) {

@@ -58,13 +58,13 @@ static void pull_pairs(const picture_pass *p, int64_t row)
         double g_near = 0.0, g_far = 0.0;
         e.steps = p->l->steps + n * i;
         if (p->l->edges.rule == TL_PAIR_STRAIGHT) {
-            pull_straight(p->view, &e, pair, p->l->of_points);
+            pull_straight(p->view, &e, pair, p->l->vertices);
             continue;
         }
         for (int64_t c = 0; c < n; c++)
             moves[c] = moves[n + c] = pull_column(&e, pair, &p->pairs[i].edge, c, &g_near, &g_far, 0);
         if (in_band(p->view, pair->near < pair->far ? pair->near : pair->far))
-            pull_edge(p->view, pair, &p->pairs[i].edge, g_near, g_far, p->l->of_points);
+            pull_edge(p->view, pair, &p->pairs[i].edge, g_near, g_far, p->l->vertices);
     }
 }
 
@@ -254,8 +254,9 @@ static tl_grad_colors colors_of(const picture_pass *p)
         .values = {.attr = l->attr, .n_attr = l->n_attr, .n_columns = l->n_columns, .out = as_picture(p)},
         .corners = p->view->tri,
         .faces = l->faces,
-        .vertices = l->of_points,
-        .attr = l->of_attr};
+        .vertices = l->vertices,
+        .attr = l->vertices,
+        .first_column = TL_FEW_COLUMNS};
 }
 
 TL_ONCE void pull_clamped_run(const picture_pass *p, int64_t r, int64_t row, int64_t n_pixels)
@@ -304,7 +305,12 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
 static void close_faces(const picture_pass *p)
 {
     const tl_grad_colors colors = colors_of(p);
-    close_colors(p->view, &colors, place_of_three(0) + THREE_SUMS, TL_SUMS_OF_FACE, p->column, p->row);
+    const closing_places places = {.moments = place_of_three(0) + THREE_SUMS,
+                                   .stride = TL_SUMS_OF_FACE,
+                                   .column = p->column,
+                                   .row = p->row,
+                                   .corners = p->corners};
+    close_colors(p->view, &colors, &places);
 }
 
 /* Rows drawn, finished, led back, one after the other, each in its place: what its pairs move waits until those of the

@@ -133,6 +133,8 @@ TL_INLINE double *sums_of(tl_grad_sums *sums, int64_t row)
         sums->rows[slot] = (int32_t)row;
         if (sums->n_columns == 4) /* without a call */
             memset(sums->sums + 4 * (int64_t)slot, 0, 4 * sizeof(double));
+        else if (sums->n_columns == 8)
+            memset(sums->sums + 8 * (int64_t)slot, 0, 8 * sizeof(double));
         else
             memset(sums->sums + slot * sums->n_columns, 0, (size_t)sums->n_columns * sizeof(double));
     }

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,17 @@ from topleft import rasterize as draw
 from topleft._core.base.arrays import as_checked_triangles, as_pair
 from topleft._core.gradients import tensors
 from topleft._core.gradients.pictures import AttributePictures
-from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond, halved_axes
+from topleft._core.gradients.tensors import (
+    EdgeRule,
+    PixelGrid,
+    TexelFilter,
+    TexelLook,
+    TexelsBeyond,
+    as_filter,
+    as_rule,
+    check_texture,
+    halved_axes,
+)
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption
 
@@ -250,33 +260,14 @@ def texture(
         For a wrong dtype or shape, an unknown mode, a mipmap filter without `uv_da` or `mip_level_bias`, or a side of a
         level that is odd and not 1.
     """
-    if filter_mode not in FILTERS:
-        raise ValueError(
-            f"filter_mode must be {', '.join(map(repr, FILTERS[:-1]))} or {FILTERS[-1]!r}, got {filter_mode!r}"
-        )
-    if boundary_mode not in get_args(BoundaryOption):
-        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
-    n_axes = 3 if boundary_mode == "cube" else 2
-    check("uv", uv, f"(B, H, W, {n_axes})", uv.ndim == 4 and uv.shape[3] == n_axes)
-    fits = tex.ndim == n_axes + 2 and len(tex) in (1, len(uv)) and 0 not in tex.shape[1:]
-    if n_axes == 3 and fits:
-        fits = tex.shape[1] == 6 and tex.shape[2] == tex.shape[3]
-    check("tex", tex, f"(1 or {len(uv)}, {'6, N, N' if n_axes == 3 else 'Ht, Wt'}, C)", fits)
-    of_pixels = uv.shape[:3]
-    for name, given, shape in (
-        ("uv_da", uv_da, (*of_pixels, 2 * n_axes)),
-        ("mip_level_bias", mip_level_bias, of_pixels),
-    ):
-        if given is not None:
-            check(name, given, str(shape), given.shape == shape)
+    how = as_filter(filter_mode, FILTERS, has_level=uv_da is not None or mip_level_bias is not None)
+    check_texture(check, tex, uv, uv_da, mip_level_bias, boundary_mode)
     levels, where = [tex], [uv]
-    if filter_mode.startswith("linear-mipmap"):
-        if uv_da is None and mip_level_bias is None:
-            raise ValueError(f"filter_mode={filter_mode!r} needs uv_da or mip_level_bias")
+    if how > TexelFilter.LINEAR:
         levels = halvings(tex, max_mip_level)
         where += [one for one in (uv_da, mip_level_bias) if one is not None]
     dtype = jnp.result_type(tex, *where)
-    modes = filter_mode, boundary_mode, len(where), uv_da is not None
+    modes = how, TexelsBeyond[boundary_mode.upper()], len(where), uv_da is not None
     return texels(modes, *(one.astype(dtype) for one in (*where, *levels)))
 
 
@@ -296,15 +287,14 @@ def halvings(tex: Array, max_mip_level: int | None) -> list[Array]:
 
 
 #: Filter, boundary, how many arrays say where to look, and whether footprints are among them.
-Modes = tuple[str, str, int, bool]
+Modes = tuple[TexelFilter, TexelsBeyond, int, bool]
 
 
 def look_of(modes: Modes, *given: Any) -> TexelLook:
     """Return what the engine looks up: `given` are uv, footprints, biases, and levels."""
-    filter_mode, boundary_mode, n, has_da = modes
+    how, beyond, n, has_da = modes
     where = list(given[:n]) if has_da or n == 1 else [given[0], None, given[1]]
-    beyond = TexelsBeyond[boundary_mode.upper()]
-    return TexelLook(given[n:], TexelFilter[filter_mode.upper().replace("-", "_")], beyond, *where)
+    return TexelLook(given[n:], how, beyond, *where)
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -363,19 +353,12 @@ def antialias(color: Array, rast: Array, pos: Array, tri: Array, *, edges: Edges
     fits = pos.ndim == 3 and pos.shape[2] == 4 and len(pos) in (1, len(color))
     check("pos", pos, f"(1, V, 4) or ({len(color)}, V, 4)", fits)
     dtype = jnp.result_type(color, rast, pos)
-    return smooth(rule_of(edges), color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)
+    return smooth(as_rule(edges), color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)
 
 
 def outline_of(grid: PixelGrid, pos: Any) -> tensors.Outline:
     """Return what the edges of triangles are."""
     return tensors.outline_of(grid, pos, tensors.halves_across(grid.tri))
-
-
-def rule_of(edges: str) -> EdgeRule:
-    """Return the rule of a word."""
-    if edges not in get_args(EdgesOption):
-        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
-    return EdgeRule[edges.replace("-", "_").upper()]
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -445,7 +428,7 @@ def render(pos: Array, tri: Array, attr: Array, resolution: Sequence[int], *, ed
     check("pos", pos, "(B, V, 4)", pos.ndim == 3 and pos.shape[2] == 4)
     rows, size = table_of(attr, len(pos)), as_pair("resolution", resolution)
     dtype = jnp.result_type(pos, rows)
-    return drawn((size, rule_of(edges)), pos.astype(dtype), tri, rows.astype(dtype))
+    return drawn((size, as_rule(edges)), pos.astype(dtype), tri, rows.astype(dtype))
 
 
 #: Height and width, and the rule of edges.

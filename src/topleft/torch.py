@@ -20,7 +20,7 @@ from typing import Any, get_args
 from topleft import DepthLayers, peel
 from topleft._core.base.arrays import as_pair
 from topleft._core.base.threads import parse_threads
-from topleft._core.gradients.tensors import EdgeRule, TexelFilter, TexelsBeyond, halved_axes
+from topleft._core.gradients.tensors import TexelFilter, TexelsBeyond, as_filter, as_rule, check_texture, halved_axes
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption, LossOption
 
@@ -36,7 +36,6 @@ from topleft._torch.checks import (
     as_diff_attrs,
     as_mip,
     check,
-    check_texture,
     check_tri,
     is_cube_map,
     is_tensor,
@@ -390,26 +389,18 @@ def texture(
     >>> texture(tex, torch.stack([u, u], -1).reshape(1, 1, 4, 2)).flatten()
     tensor([0., 2., 4., 2.])
     """
-    check_texture(tex, uv, uv_da, mip_level_bias, boundary_mode)
+    check_texture(check, tex, uv, uv_da, mip_level_bias, boundary_mode, (KINDS,))
     has_level = uv_da is not None or mip_level_bias is not None
     if filter_mode == "auto":
         filter_mode = "linear-mipmap-linear" if has_level else "linear"
-    if filter_mode not in ("nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"):
-        raise ValueError(
-            "filter_mode must be 'auto', 'nearest', 'linear', 'linear-mipmap-nearest' or 'linear-mipmap-linear', "
-            f"got {filter_mode!r}"
-        )
+    how = as_filter(filter_mode, get_args(FilterModeOption), has_level=has_level)
     made: Sequence[Tensor] = ()
-    if filter_mode not in ("nearest", "linear"):
-        if not has_level:
-            raise ValueError(f"filter_mode={filter_mode!r} needs uv_da or mip_level_bias")
+    if how > TexelFilter.LINEAR:
         is_cube = boundary_mode == "cube"
         made = texture_construct_mip(tex, max_mip_level, is_cube) if mip is None else as_mip(tex, mip, max_mip_level)
     at, footprint, bias, *levels = same_dtype(uv, uv_da if made else None, mip_level_bias if made else None, tex, *made)
-    how = TexelFilter[filter_mode.replace("-", "_").upper()] if made else TexelFilter.LINEAR
-    how = TexelFilter.NEAREST if filter_mode == "nearest" else how
-    beyond = TexelsBeyond[boundary_mode.upper()]
-    return look_up(levels, at, footprint, bias, int(how), int(beyond))
+    how = how if made else min(how, TexelFilter.LINEAR)
+    return look_up(levels, at, footprint, bias, int(how), int(TexelsBeyond[boundary_mode.upper()]))
 
 
 def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mode: bool = False) -> list[Tensor]:
@@ -537,7 +528,7 @@ def antialias(
     fits = is_tensor(pos) and pos.ndim in (2, 3) and pos.shape[-1] == 4 and len_of(pos) in (1, len(color))
     check("pos", pos, f"(V, 4), (1, V, 4) or ({len(color)}, V, 4)", fits)
     check_tri(tri)
-    rule = rule_of(edges)
+    rule = as_rule(edges)
     across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
     given, points_of, vertices = same_dtype(color, (rast, len(tri)), pos)
     mesh = vertices if vertices.ndim == 3 else vertices[None]
@@ -609,7 +600,7 @@ def render(
     height, width = as_pair("resolution", resolution)
     across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
     mesh, values = same_dtype(pos, attr if attr.ndim == 3 else attr[None])
-    options = int(rule_of(edges)), glctx.threads or 0
+    options = int(as_rule(edges)), glctx.threads or 0
     drawn: Tensor = draw_attributes(mesh, tri, values, across, height, width, *options)[0]
     return drawn
 
@@ -680,15 +671,8 @@ def photometric_loss(
         raise ValueError(f"loss must be 'l2', got {loss!r}")
     across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
     mesh, values, wished = same_dtype(pos, attr if attr.ndim == 3 else attr[None], target.detach())
-    found: Tensor = squares(mesh, tri, values, wished, across, int(rule_of(edges)), glctx.threads or 0)[0]
+    found: Tensor = squares(mesh, tri, values, wished, across, int(as_rule(edges)), glctx.threads or 0)[0]
     return found
-
-
-def rule_of(edges: str) -> EdgeRule:
-    """Return the rule of a word."""
-    if edges not in get_args(EdgesOption):
-        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {edges!r}")
-    return EdgeRule[edges.replace("-", "_").upper()]
 
 
 def checked_hash(topology_hash: Tensor, tri: Tensor) -> Tensor:

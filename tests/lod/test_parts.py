@@ -12,6 +12,7 @@ from topleft._apps.batch.workers import coarser_levels_of
 from topleft._meshes.lod import detail, simplify
 from topleft._meshes.lod.collapse import border_points, open_sides
 from topleft._meshes.lod.distance import welded
+from topleft._meshes.lod.parts import CutMesh
 
 SIDE = 72
 
@@ -210,10 +211,85 @@ def test_instance_in_parts_is_placed(painted):
     assert moved.triangle.max() >= len(painted.triangles)  # rows of parts of coarser levels
 
 
-def test_scene_of_several_has_whole_levels(ground):
-    scene = tl.Scene([ground, (ground, np.diag([1.0, 1, -1, 1]))])
-    frags = tl.rasterize_mesh(scene, ALONG, SIZE, tolerance=0.5)
-    assert np.array_equal(frags.triangle, tl.rasterize_mesh(scene, ALONG, SIZE).triangle)
+def among_balls(mesh, *, n_before=3):
+    """A scene of balls, some of which the ground hides, and the mesh among them, moved."""
+    ball, aside = tl.Mesh(*tl.scenes.icosphere(2)), np.eye(4)
+    aside[0, 3] = 0.01
+    places = np.tile(np.diag([0.02, 0.02, 0.02, 1.0]), (8, 1, 1))
+    places[:, :3, 3] = [(0.1 + 0.1 * i, 0.3 + 0.05 * i, 0.05 * (i % 3) - 0.04) for i in range(8)]
+    balls = [(ball, place) for place in places]
+    return tl.Scene([*balls[:n_before], (mesh, aside), *balls[n_before:]]), aside
+
+
+SCENE_OPTIONS = [
+    {}, {"threads": 3}, {"sampling": "msaa4"}, {"depth_test": "greater"}, {"depth_test": None}, {"method": "edge"},
+    {"subpixel_bits": 4}, {"subpixel_bits": "exact"}, {"origin": (20, 30), "viewport": (192, 128)},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("options", SCENE_OPTIONS, ids=str)
+@pytest.mark.parametrize("n_before", [0, 3, 8])
+def test_scene_in_parts_is_the_picture_of_their_mesh(ground, options, n_before):
+    scene, aside = among_balls(ground, n_before=n_before)
+    window = {name: options[name] for name in ("viewport", "origin") if name in options}
+    found = tl.choose_detail(ground, ALONG, SIZE, tolerance=0.5, transform=aside, **window)
+    assert found.n_parts > 1
+    balls = [levels_of_ball(one, window) for one in scene]
+    own = tl.rasterize_mesh(scene, ALONG, SIZE, tolerance=0.5, **options)
+    meshes = [found.mesh if one.mesh is ground else ball for one, ball in zip(scene, balls, strict=True)]
+    whole = tl.rasterize_mesh(scene.with_meshes(meshes), ALONG, SIZE, **options)
+    is_painted_last = options == {"depth_test": None} and n_before == 8
+    assert len(np.unique(own.instance)) > 4 or is_painted_last
+    assert np.array_equal(own.id, whole.id)
+    assert np.array_equal(own.samples_depth, whole.samples_depth)
+    assert np.array_equal(own.barycentric(), whole.barycentric(), equal_nan=True)
+
+
+def levels_of_ball(one, window):
+    if len(one.mesh.triangles) > 1000:
+        return one.mesh
+    return tl.choose_detail(one.mesh, ALONG, SIZE, tolerance=0.5, transform=one.transform, **window).mesh
+
+
+@pytest.mark.parametrize("options", [{}, {"shading": "flat"}, {"sampling": "msaa4"}, {"cull": "none"}], ids=str)
+def test_render_of_a_scene_in_parts_is_the_picture_of_their_mesh(painted, options):
+    scene, aside = among_balls(painted)
+    found = tl.choose_detail(painted, ALONG, SIZE, tolerance=0.5, transform=aside)
+    assert found.n_parts > 1
+    meshes = [found.mesh if one.mesh is painted else levels_of_ball(one, {}) for one in scene]
+    own = tl.render(scene, ALONG, SIZE, tolerance=0.5, **options)
+    assert np.array_equal(own, tl.render(scene.with_meshes(meshes), ALONG, SIZE, **options))
+
+
+@pytest.mark.parametrize("options", [{}, {"subpixel_bits": "exact"}], ids=str)
+def test_render_of_a_scene_with_holes_in_parts_is_the_picture_of_their_mesh(painted, options):
+    """Leaves with holes before a ground in parts."""
+    scene, aside = among_balls(painted)
+    leaf = tl.Material(texture=tl.Texture(np.indices((8, 8)).sum(axis=0)[:, :, None] % 2 * np.uint8([0, 0, 0, 255])
+                                          + np.uint8([9, 99, 9, 0])), alpha_mode="mask")  # fmt: skip
+    square = tl.Mesh([(0.2, 0.3, 0), (0.6, 0.3, 0), (0.6, 0.3, 0.2), (0.2, 0.3, 0.2)], [(0, 1, 2), (0, 2, 3)],
+                     uv=[(0, 0), (1, 0), (1, 1), (0, 1)], materials=(leaf,))  # fmt: skip
+    scene = tl.Scene([square, *scene])
+    found = tl.choose_detail(painted, ALONG, SIZE, tolerance=0.5, transform=aside)
+    meshes = [found.mesh if one.mesh is painted else levels_of_ball(one, {}) for one in scene]
+    meshes[0] = square
+    own = tl.render(scene, ALONG, SIZE, tolerance=0.5, **options)
+    assert np.array_equal(own, tl.render(scene.with_meshes(meshes), ALONG, SIZE, **options))
+
+
+def test_scene_of_the_same_mesh_twice_has_parts_of_each(ground, monkeypatch):
+    farther = np.eye(4)
+    farther[:3, 3] = 0, 1, -0.01
+    scene = tl.Scene([ground, (ground, farther)])
+    with monkeypatch.context() as patch:
+        patch.delattr(CutMesh, "drawn_triangles")  # clusters are drawn
+        patch.setattr(tl.Mesh, "drawn_triangles", None)
+        own = tl.rasterize_mesh(scene, ALONG, SIZE, tolerance=0.5)
+    meshes = [tl.choose_detail(ground, ALONG, SIZE, tolerance=0.5, transform=one.transform) for one in scene]
+    assert meshes[0].n_parts > 1
+    whole = tl.rasterize_mesh(scene.with_meshes([one.mesh for one in meshes]), ALONG, SIZE)
+    assert np.array_equal(own.triangle, whole.triangle)
+    assert np.array_equal(own.instance, whole.instance)
 
 
 def test_mesh_of_parts_can_be_pickled(ground):

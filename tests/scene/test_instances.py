@@ -77,7 +77,8 @@ def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, m
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("seed", range(40))
-def test_scene_is_drawn_as_its_instances_alone(isa, seed):
+def test_scene_is_drawn_as_its_instances_alone(isa, seed, monkeypatch):
+    monkeypatch.setattr(instances, "FIRST_ROUND", 2)
     rng = np.random.default_rng(seed)
     scene, camera = random_scene(rng), cases.random_camera(rng, lens=0)
     options = {
@@ -91,6 +92,43 @@ def test_scene_is_drawn_as_its_instances_alone(isa, seed):
         frags = tl.rasterize_mesh(scene, camera, cases.SIZE, cull=cull, **options)
     assert_same(np.asarray(frags.samples_id), ids)
     assert_same(np.asarray(frags.samples_depth), depth)
+
+
+def placed(x, y, z, sides=(1, 1, 1)):
+    matrix = np.diag([*sides, 1.0])
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def wall_before_balls():
+    """A wall with balls behind and before it, one beside it, some out of view, and a wall that reaches the eye.
+
+    A plane cuts that one, so that the scene is not drawn as one mesh.
+    """
+    wall, ball = (tl.Mesh(*tl.scenes.shape("cube")), tl.Mesh(*tl.scenes.icosphere(2)))
+    places = [(0, 0, -9 - i) for i in range(6)] + [(0, 0, 2), (5, 0, -9), (0, 50, 0), (0, 0, 90), (-70, 0, 0)]
+    walls = [(wall, placed(0, 0, 0, (1.5, 1.5, 0.1))), (wall, placed(2, 0, 8, (0.1, 9, 9)))]
+    return tl.Scene([*((ball, placed(*place)) for place in places), *walls])
+
+
+@pytest.mark.parametrize("depth_test", ["less", "greater", None])
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_instances_that_cannot_show_are_not_snapped(depth_test, sampling, monkeypatch):
+    monkeypatch.setattr(instances, "FIRST_ROUND", 2)
+    snapped = []
+    snap_all = instances.PlacedScene.snap_all
+    monkeypatch.setattr(instances.PlacedScene, "snap_all",
+                        lambda self, some: snapped.extend(some.tolist()) or snap_all(self, some))  # fmt: skip
+    camera, size = tl.Camera.look_at((0, 0, 8)), (64, 64)
+    options = {"sampling": sampling, "depth_test": depth_test}
+    frags = tl.rasterize_mesh(wall_before_balls(), camera, size, **options)
+    n_drawn = {"less": 4, "greater": 10, None: 13}[depth_test]
+    assert len(snapped) == n_drawn
+    monkeypatch.setattr(instances.PlacedScene, "shown", lambda self, some, *_, **__: some)
+    whole = tl.rasterize_mesh(wall_before_balls(), camera, size, **options)
+    assert len(snapped) == n_drawn + 13
+    assert_same(np.asarray(frags.samples_id), np.asarray(whole.samples_id))
+    assert_same(np.asarray(frags.samples_depth), np.asarray(whole.samples_depth))
 
 
 @pytest.mark.parametrize("seed", range(24))

@@ -15,7 +15,7 @@ class Added:
     def __init__(self, order):
         self.order, self.number = order, None
 
-    def add_to(self, out):
+    def add_to(self, outs):
         self.order.append(self.number)
 
 
@@ -33,8 +33,15 @@ def add_up(monkeypatch, threads, work):
 
     monkeypatch.setattr(Room, "make", make)
     monkeypatch.setattr(Room, "put_back", lambda *_: None)
-    found = Bands(1, 4, BAND_PX, threads).add_up(Room(BAND_PX, ()), work_on, [np.zeros((1, 0, 0))])
+    found = Bands(1, 4, 2 * BAND_PX, threads).add_up(Room(2 * BAND_PX, ()), work_on, [()])
     return order, found, len(made)
+
+
+@pytest.mark.parametrize(
+    ("width", "rows"), [(64, 1024), (256, 256), (512, 128), (600, 128), (1920, 68), (65536, 2), (65537, 1), (131072, 1)]
+)
+def test_bands_of_wide_pictures_have_twice_as_many_pixels_within_128_rows(width, rows):
+    assert Bands(1, 5000, width).all[0].end == rows
 
 
 def test_add_up_by_one_thread_uses_one_room(monkeypatch):
@@ -66,7 +73,7 @@ def test_add_up_with_an_error_keeps_no_memory():
         raise ValueError("of a band")
 
     with pytest.raises(ValueError, match="of a band"):
-        Bands(1, 2, 4, 1).add_up(room, work, [np.zeros((1, 3, 4))])
+        Bands(1, 2, 4, 1).add_up(room, work, [()])
     assert memory.SPARE.take(room) is None
 
 

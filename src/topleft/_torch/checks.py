@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, get_args
+from typing import Any
 
 import torch
 from torch import Tensor
-
-from topleft.typing import BoundaryOption
 
 #: The largest id that float32 counts up to; the bits of larger ones are counted on from there.
 LAST_EXACT_ID = 1 << 24
@@ -74,27 +72,6 @@ def with_ids(rast: Tensor, n_triangles: int, dtype: torch.dtype) -> Tensor:
     bits = rast[..., 3].detach().contiguous().view(torch.int32).double() - BITS_OF_LAST + LAST_EXACT_ID
     ids = torch.where(rast[..., 3] > LAST_EXACT_ID, bits, rast[..., 3].double())
     return torch.cat([rast[..., :3].to(dtype), ids[..., None]], -1)
-
-
-def check_texture(tex: Tensor, uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, boundary_mode: str) -> None:
-    """Check what `texture` is given."""
-    if boundary_mode not in get_args(BoundaryOption):
-        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
-    is_cube = boundary_mode == "cube"
-    n_axes = 3 if is_cube else 2
-    check("uv", uv, f"(B, H, W, {n_axes})", is_tensor(uv) and uv.ndim == 4 and uv.shape[3] == n_axes)
-    n_pictures = len(uv)
-    if is_cube:
-        wish = f"(1, 6, N, N, C) or ({n_pictures}, 6, N, N, C) with boundary_mode 'cube'"
-        fits = is_cube_map(tex) and len(tex) in (1, n_pictures)
-    else:
-        wish = f"(1, Ht, Wt, C) or ({n_pictures}, Ht, Wt, C)"
-        fits = is_tensor(tex) and tex.ndim == 4 and len(tex) in (1, n_pictures) and 0 not in tex.shape[1:]
-    check("tex", tex, wish, fits, KINDS)
-    of_uv_da = (*uv.shape[:3], 2 * n_axes)
-    for name, given, shape in (("uv_da", uv_da, of_uv_da), ("mip_level_bias", bias, tuple(uv.shape[:3]))):
-        if given is not None:
-            check(name, given, str(tuple(shape)), is_tensor(given) and tuple(given.shape) == tuple(shape))
 
 
 def as_mip(tex: Tensor, mip: Sequence[Tensor], max_mip_level: int | None) -> Sequence[Tensor]:

@@ -27,7 +27,7 @@ def threads_of(threads: int | None, n_px: int) -> int:
 
 def numpy_of(tensor: Tensor | None) -> Any:
     """Return the array that a tensor is, contiguous; None for None."""
-    return None if tensor is None else tensor.detach().resolve_neg().contiguous().numpy()
+    return None if tensor is None else np.ascontiguousarray(tensor.numpy(force=True))
 
 
 def triangles_of(tri: Tensor, n_vertices: int) -> NDArray[np.int32]:

@@ -204,17 +204,18 @@ cdef class GradientView:
     def picture(self, const int32_t[:, ::1] ids, attr: Array, mesh: tuple[Array, Array, Array],
                 codes: tuple[int, float], pixels: tuple[Array | None, Array | None, Array | None],
                 seen: tuple[Array, ...], int64_t n_faces, scratch: tuple[Array, Array, Array, Array],
-                sums: tuple[GradientSums, GradientSums, GradientSums], int64_t first, int64_t end) -> tuple[float, int]:
+                sums: tuple[GradientSums, GradientSums], int64_t first, int64_t end) -> tuple[float, int]:
         """Write rows of a picture of `attr` (V, K) float32, or add their gradients to sums.
 
         `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, `codes` the rule and the weight of squares.
         `pixels`, one of them: the picture; its gradients; another one, whose squared differences count. `seen` and the
         rest of `scratch` are those of ``tl_grad_picture``. `sums`: by triangle, HEAD_OF_FACE columns and SUMS_OF_FACE
-        for each three attributes; by vertex; by row of `attr`. Returns the sum of squares, and how many faces are seen.
+        for each three attributes; by vertex, four columns and those of attributes. Returns the sum of squares, and how
+        many faces are seen.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_picture l
-        cdef GradientSums faces = sums[0], points = sums[1], values = sums[2]
+        cdef GradientSums faces = sums[0], vertices = sums[1]
         cdef double found
         memset(&l, 0, sizeof(l))
         if first >= end or view.width == 0 or attr.shape[1] == 0:
@@ -232,7 +233,7 @@ cdef class GradientView:
         l.pairs, l.steps = <void *>first_of(seen[5]), <float *>first_of(seen[6])
         l.window, l.moves = <float *>first_of(scratch[1]), <double *>first_of(scratch[2])
         l.rast = <float *>first_of(scratch[3])
-        l.faces, l.of_points, l.of_attr = &faces.sums, &points.sums, &values.sums
+        l.faces, l.vertices = &faces.sums, &vertices.sums
         with nogil:
             found = K.grad_picture(&view, &l)
         return found, l.n_faces
@@ -252,20 +253,26 @@ cdef class GradientSums:
         self.sums.sums = &sums[0, 0] if sums.shape[0] and sums.shape[1] else NULL
         self.sums.n, self.sums.n_columns = 0, sums.shape[1]
 
-    def add_to(self, out: Array):
-        """Add the first K columns of the sums to the rows (N, K) that they belong to, and forget them."""
-        cdef int64_t i, c, n_columns = out.shape[1], n_sums = self.sums.n_columns
-        cdef void *rows = <void *>first_of(out)
-        cdef bint is_f64 = out.dtype == np.float64
-        cdef int64_t at
-        with nogil:
-            for i in range(self.sums.n):
-                at = self.sums.rows[i] * n_columns
-                for c in range(n_columns):
-                    if is_f64:
-                        (<double *>rows)[at + c] += self.sums.sums[i * n_sums + c]
-                    else:
-                        (<float *>rows)[at + c] = <float>((<float *>rows)[at + c] + self.sums.sums[i * n_sums + c])
+    def add_to(self, outs: tuple[Array, ...]):
+        """Add the sums to the rows (N, K) that they belong to, K columns to each of `outs`, and forget them."""
+        cdef int64_t i, c, n_rows, n_columns, at, first = 0, n_sums = self.sums.n_columns
+        cdef void *rows
+        cdef const double *sums
+        cdef bint is_f64
+        for out in outs:
+            n_rows, n_columns = out.shape
+            rows, is_f64 = <void *>first_of(out), out.dtype == np.float64
+            with nogil:
+                for i in range(self.sums.n):
+                    if self.sums.rows[i] >= n_rows:  # they are the others'
+                        continue
+                    at, sums = self.sums.rows[i] * n_columns, self.sums.sums + i * n_sums + first
+                    for c in range(n_columns):
+                        if is_f64:
+                            (<double *>rows)[at + c] += sums[c]
+                        else:
+                            (<float *>rows)[at + c] = <float>((<float *>rows)[at + c] + sums[c])
+            first += n_columns
         self.sums.n = 0
 
 

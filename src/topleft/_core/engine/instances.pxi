@@ -28,7 +28,7 @@ cdef class MeshList:
 
 
 cdef class PlacedMeshes:
-    """Instances of a list of meshes from `first` on, as many as there are matrices: `project` makes them ready to be drawn.
+    """Some instances of a list of meshes, by their numbers: `project` makes them ready to be drawn.
 
     `matrices`: clip from object of each. `culls`, `numbers`: the `tl_cull` of each, and the id of its triangle 0.
     `is_apart`: 1 where one is left out. `how`: that of a view. `room`: records of all vertices, uint8, or points
@@ -47,7 +47,7 @@ cdef class PlacedMeshes:
     cdef int64_t x_px, y_px
     cdef int subpixel_bits, test
 
-    def __init__(self, MeshList meshes, int64_t first, const double[:, :, ::1] matrices, const int32_t[::1] culls,
+    def __init__(self, MeshList meshes, const int64_t[::1] some, const double[:, :, ::1] matrices, const int32_t[::1] culls,
                  const int64_t[::1] numbers, const uint8_t[::1] is_apart, Viewport viewport,
                  how: tuple[int, int, int, int, int, int], room: Array, const int64_t[::1] firsts):
         cdef int64_t i, n = matrices.shape[0]
@@ -58,11 +58,10 @@ cdef class PlacedMeshes:
         self.source_room = np.empty(max(1, n) * sizeof(tl_source), np.uint8)
         self.mesh_room = np.empty(max(1, n) * sizeof(tl_snapped), np.uint8)
         self.sources, self.meshes = <tl_source *>&self.source_room[0], <tl_snapped *>&self.mesh_room[0]
-        memcpy(self.sources, meshes.sources + first, n * sizeof(tl_source))
-        memcpy(self.meshes, meshes.meshes + first, n * sizeof(tl_snapped))
         self.arrays = meshes, matrices, self.rounded, self.source_room, room
         self.x_px, self.y_px, self.subpixel_bits, _, method, self.test = how
         for i in range(n):
+            self.sources[i], self.meshes[i] = meshes.sources[some[i]], meshes.meshes[some[i]]
             self.sources[i].is_affine = set_matrix(&self.sources[i], &matrices[i, 0, 0], &self.rounded[i, 0])
             self.meshes[i].mesh.source, self.meshes[i].method = &self.sources[i], <tl_method>method
             self.meshes[i].cull, self.meshes[i].first_id = <tl_cull>culls[i], <int32_t>numbers[i]

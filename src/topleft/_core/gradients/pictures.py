@@ -5,7 +5,7 @@ float32 takes a few rows at a time. The picture leaves what it has seen, so that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -100,7 +100,7 @@ class AttributePictures:
         if not self.is_in_rows:
             return smooth(self.grid, self.rule, self.outline, self.pos, *self.parts()), []
         out = empty(self.grid.shape(self.attr.shape[2]), np.float32)
-        found = self.run([], lambda i: (out[i], None, None))
+        found = self.run((), lambda i: (out[i], None, None))
         return out, [(seen, n_faces) for _, seen, n_faces in found]
 
     def vjp(self, g_out: Array, seen: list[tuple[Seen, int]] | None = None) -> tuple[Array, Array]:
@@ -111,7 +111,7 @@ class AttributePictures:
             g_attr, g_rast, _ = values_vjp(self.grid, self.attr, rast, g_color)
             return points_vjp(self.grid, self.pos, rast, g_rast, None) + of_edges, g_attr
         g_pos, g_attr = np.zeros_like(self.pos), np.zeros_like(self.attr)
-        self.run([g_pos, g_attr], lambda i: (None, g_out[i], None), self.picture()[1] if seen is None else seen)
+        self.run((g_pos, g_attr), lambda i: (None, g_out[i], None), self.picture()[1] if seen is None else seen)
         return g_pos, g_attr
 
     def squares(self, target: Array) -> tuple[float, Array, Array]:
@@ -121,12 +121,12 @@ class AttributePictures:
             step = self.picture()[0] - target
             return float(np.square(step).sum()) / n, *self.vjp(step * (2 / n))
         g_pos, g_attr = np.zeros_like(self.pos), np.zeros_like(self.attr)
-        found = self.run([g_pos, g_attr], lambda i: (None, None, target[i]), weight=2 / n)
+        found = self.run((g_pos, g_attr), lambda i: (None, None, target[i]), weight=2 / n)
         return sum(one for one, _, _ in found) / n, g_pos, g_attr
 
     def run(
         self,
-        outs: Sequence[Array],
+        outs: tuple[Array, ...],
         pixels: Callable[[int], tuple[Array | None, Array | None, Array | None]],
         seen: list[tuple[Seen, int]] | None = None,
         weight: float = 0.0,
@@ -139,26 +139,25 @@ class AttributePictures:
         room = self.room(is_given=seen is not None)
 
         def work(band: Band, made: list[Any]) -> tuple[float, Seen, int]:
-            i, (points, rows, faces, *scratch) = band.picture, made
+            i, (vertices, faces, *scratch) = band.picture, made
             own, n_faces = seen[band.number] if seen else (Seen(*scratch[4:]), 0)
             of_pixels = pixels(i)
             found, n_faces = views[i].picture(
                 self.ids[i], of(self.attr, i), self.outline.of_picture(i), (int(self.rule), weight), of_pixels, own,
-                n_faces, tuple(scratch[:4]), (faces, points, rows), band.first, band.end,
+                n_faces, tuple(scratch[:4]), (faces, vertices), band.first, band.end,
             )  # fmt: skip
             n_rows = min(band.end + 1, self.grid.height) - max(band.first - 1, 0)
             is_picture = of_pixels[0] is not None and n > 0
             return found, own.copy(n_rows, n_faces) if is_picture else own, n_faces
 
-        return self.grid.bands.add_up(room, work, outs)
+        return self.grid.bands.add_up(room, work, [outs] if outs else [])
 
     def room(self, *, is_given: bool) -> Room:
         """Return what a band works on; with what it shows, unless that is given."""
         n, width, n_triangles = self.attr.shape[2], self.grid.width, len(self.grid.tri)
         n_px = self.grid.bands.n_px + 4 * width
         sums = (
-            Sums(self.pos.shape[1], 4, 9),
-            Sums(self.attr.shape[1], row_columns(n), 3),
+            Sums(max(self.pos.shape[1], self.attr.shape[1]), 4 + row_columns(n), 9),
             Sums(n_triangles, engine.HEAD_OF_FACE + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
         )
         scratch = (

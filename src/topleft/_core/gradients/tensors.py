@@ -12,20 +12,21 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import INT32_MAX
+from topleft._core.base.arrays import INT32_MAX, shown
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts
 from topleft._core.gradients.bands import Array, Band, Bands, Room, Sums
+from topleft.typing import BoundaryOption, EdgesOption
 
 
 class TexelFilter(IntEnum):
@@ -52,6 +53,13 @@ class EdgeRule(IntEnum):
     SILHOUETTE = 0
     AREA = 1
     STRAIGHT_THROUGH = 2
+
+
+def as_rule(edges: object) -> EdgeRule:
+    """Return the rule of a word."""
+    if not isinstance(edges, str) or edges not in get_args(EdgesOption):
+        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {shown(edges)}")
+    return EdgeRule[edges.replace("-", "_").upper()]
 
 
 @dataclass(frozen=True)
@@ -136,7 +144,7 @@ def points_vjp(grid: PixelGrid, pos: Array, rast: Array, g_rast: Array, g_db: Ar
         slopes = None if g_db is None else g_db[i]
         return views[i].points_vjp(rast[i], g_rast[i], slopes, sums[1], sums[0], band.first, band.end)
 
-    grid.refuse(grid.bands.add_up(room, work, [out]))
+    grid.refuse(grid.bands.add_up(room, work, [(out,)]))
     return out
 
 
@@ -180,7 +188,7 @@ def values_vjp(
         arrays = rast[i], db, g_out[i], da, g_rast[i], g
         return view.values(of(attr, i), columns, arrays, sums[0], band.first, band.end)
 
-    grid.refuse(grid.bands.add_up(Room(grid.bands.n_px, (Sums(attr.shape[1], attr.shape[2], 3),)), work, [g_attr]))
+    grid.refuse(grid.bands.add_up(Room(grid.bands.n_px, (Sums(attr.shape[1], attr.shape[2], 3),)), work, [(g_attr,)]))
     return g_attr, g_rast, g_db
 
 
@@ -208,8 +216,44 @@ def colors_vjp(
         i, (points, rows, faces) = band.picture, sums
         return views[i].colors_vjp(of(attr, i), corners, rast[i], g_out[i], (faces, points, rows), band.first, band.end)
 
-    grid.refuse(grid.bands.add_up(room, work, [g_pos, g_attr]))
+    grid.refuse(grid.bands.add_up(room, work, [(g_pos,), (g_attr,)]))
     return g_pos, g_attr
+
+
+def check_texture(
+    check: Callable[..., None], tex: Any, uv: Any, uv_da: Any, bias: Any, boundary_mode: str, more: Sequence[Any] = ()
+) -> None:
+    """Check how a texture (1 or B, ...) is looked up, and where: (B, H, W, ...).
+
+    `check` is given a name, what goes by it, the shape wished for, whether it has that; and for `tex` also `more`.
+    """
+    if boundary_mode not in get_args(BoundaryOption):
+        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
+    is_cube = boundary_mode == "cube"
+    n_axes = 3 if is_cube else 2
+    of_pixels, of_texels = (tuple(getattr(one, "shape", ())) for one in (uv, tex))
+    check("uv", uv, f"(B, H, W, {n_axes})", len(of_pixels) == 4 and of_pixels[3] == n_axes)
+    n, one = of_pixels[0], "6, N, N, C" if is_cube else "Ht, Wt, C"
+    fits = len(of_texels) == n_axes + 2 and of_texels[0] in (1, n) and 0 not in of_texels[1:]
+    if is_cube:
+        fits = fits and of_texels[1] == 6 and of_texels[2] == of_texels[3]
+    check("tex", tex, f"(1, {one}) or ({n}, {one})" + " with boundary_mode 'cube'" * is_cube, fits, *more)
+    of_pixels = of_pixels[:3]
+    for name, given, shape in (("uv_da", uv_da, (*of_pixels, 2 * n_axes)), ("mip_level_bias", bias, of_pixels)):
+        if given is not None:
+            check(name, given, str(shape), tuple(getattr(given, "shape", ())) == shape)
+
+
+def as_filter(filter_mode: object, words: Sequence[str], *, has_level: bool) -> TexelFilter:
+    """Return the filter of one of some words; a mipmap needs to know the level."""
+    if filter_mode not in words:
+        raise ValueError(
+            f"filter_mode must be {', '.join(map(repr, words[:-1]))} or {words[-1]!r}, got {shown(filter_mode)}"
+        )
+    found = TexelFilter[str(filter_mode).replace("-", "_").upper()]
+    if found > TexelFilter.LINEAR and not has_level:
+        raise ValueError(f"filter_mode={filter_mode!r} needs uv_da or mip_level_bias")
+    return found
 
 
 @dataclass(frozen=True)
@@ -303,7 +347,7 @@ def texels_vjp(
         view.texels_vjp(look.of_picture(i), codes, arrays, sums[0] if sums else None, band.first, band.end)
 
     room = Room(grid.bands.n_px, (of_texels,) if of_levels else ())
-    grid.bands.add_up(room, work, [g_texels] if of_levels else [])
+    grid.bands.add_up(room, work, [(g_texels,)] if of_levels else [])
     parts = np.split(g_texels, ends[:-1], axis=1) if of_levels else []
     g_levels = [part.reshape(level.shape) for part, level in zip(parts, look.levels, strict=of_levels)]
     return g_levels, g_uv, g_da, g_bias
@@ -373,7 +417,7 @@ def smooth_vjp(
         arrays = rast[i], color[i], g_out[i], g_color[i]
         views[i].edges(outline.of_picture(i), scratch, int(rule), arrays, sums, band.first, band.end)
 
-    grid.bands.add_up(room, work, [g_pos])
+    grid.bands.add_up(room, work, [(g_pos,)])
     return g_color, g_pos
 
 

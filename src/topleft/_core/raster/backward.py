@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, get_args
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import as_array, as_checked_triangles, as_real, as_size, shown
+from topleft._core.base.arrays import as_array, as_checked_triangles, as_real, as_size
 from topleft._core.base.texels import FILTER_CODES, WRAP_CODES, ValueLevels
 from topleft._core.base.threads import parse_threads, run_parts, threads_of_rows
 from topleft._core.gradients import tensors
-from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
+from topleft._core.gradients.tensors import PixelGrid, TexelFilter, TexelLook, TexelsBeyond, as_rule
 from topleft.typing import EdgesOption
 
 Floats = NDArray[np.float64]
@@ -245,13 +245,6 @@ def in_pixels(given: Given, vertices: Floats) -> Floats:
         pos[:, 0], pos[:, 1], pos[:, 3] = (w + x) * (width / 2), (w - y) * (height / 2), w
     pos[:, :2] -= np.multiply.outer(pos[:, 3], given.origin)
     return pos[None]
-
-
-def as_rule(edges: object) -> EdgeRule:
-    """Return the rule of a word."""
-    if not isinstance(edges, str) or edges not in get_args(EdgesOption):
-        raise ValueError(f"edges must be 'silhouette', 'area' or 'straight-through', got {shown(edges)}")
-    return EdgeRule[str(edges).replace("-", "_").upper()]
 
 
 def area_vjp(

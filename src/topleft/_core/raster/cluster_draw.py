@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ SURVEYED_OF_SAMPLES = 200
 SURVEYED_BEHIND = 200
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
+NO_TRIANGLES: NDArray[np.int32] = np.empty((0, 3), np.int32)
 
 
 class Survey(NamedTuple):
@@ -54,14 +55,49 @@ class Survey(NamedTuple):
     front: float
 
 
-class ClusteredMesh:
+class SeenBoxes:
+    """Boxes behind a view with a `transform`, round points of the type of `points`."""
+
+    def __init__(self, points: NDArray[Any], view: View, first_id: int = 0) -> None:
+        self._view, self._first_id, self._viewport = view, first_id, view.engine_viewport()
+        self._own, self._dtype = source_of(points, view), points.dtype
+        self._empty = self._snapped(self._own, NO_RECORDS, NO_TRIANGLES, None)
+
+    def seen(
+        self, sink: int, sample: tuple[int, int], rows: tuple[int, int] | None = None
+    ) -> tuple[engine.ClusterView, engine.SnappedMesh]:
+        """Return the view of boxes in some rows of the picture, or all, and a mesh as a sample sees it."""
+        empty = self._empty.at_sample(*sample)
+        first, end = rows or (0, self._view.size[1])
+        return self._seen(sink, first, end, empty), empty
+
+    def _seen(
+        self, sink: int, first: int = 0, end: int | None = None, empty: engine.SnappedMesh | None = None
+    ) -> engine.ClusterView:
+        """Return the view of clusters in rows [first, end) of the picture, or all; `empty`: of a sample."""
+        width, height = self._view.size
+        n_rows, how = (height if end is None else end) - first, (MARGIN_PX, STAGE_ERROR[self._dtype])
+        return engine.ClusterView(self._own, empty or self._empty, first, n_rows, width, *how, sink)
+
+    def _snapped(
+        self,
+        source: engine.Source,
+        records: NDArray[np.uint8],
+        triangles: NDArray[np.int32],
+        pieces: engine.Pieces | None,
+        is_used: NDArray[np.uint8] | None = None,
+    ) -> engine.SnappedMesh:
+        how, viewport = self._view.how, self._viewport
+        mesh = engine.SnappedMesh(source, records, None, triangles, pieces, how, viewport, is_used)
+        return mesh.numbered_from(self._first_id)
+
+
+class ClusteredMesh(SeenBoxes):
     """A mesh in clusters behind a view with a `transform`; triangle 0 is called `first_id` where it is drawn."""
 
     def __init__(self, clusters: Clusters, view: View, first_id: int = 0) -> None:
-        self.clusters, self._view, self._first_id = clusters, view, first_id
-        self._viewport = view.engine_viewport()
-        self._own = source_of(clusters.own_points, view)
-        self._empty = self._snapped(self._own, NO_RECORDS, clusters.triangles[:0], None)
+        super().__init__(clusters.own_points, view, first_id)
+        self.clusters = clusters
 
     def survey(self, n_most: int = SURVEYED, sample: tuple[int, int] = (0, 0)) -> Survey:
         """Return the visibility of the clusters at a sample, by about `n_most` of them, evenly spread over the mesh."""
@@ -139,14 +175,6 @@ class ClusteredMesh:
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
-    def seen(
-        self, sink: int, sample: tuple[int, int], rows: tuple[int, int] | None = None
-    ) -> tuple[engine.ClusterView, engine.SnappedMesh]:
-        """Return the view of boxes in some rows of the picture, or all, and the mesh as a sample sees it."""
-        empty = self._empty.at_sample(*sample)
-        first, end = rows or (0, self._view.size[1])
-        return self._seen(sink, first, end, empty), empty
-
     def count_drawn(self, sink: Sink) -> int:
         """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
         width, height = self._view.size
@@ -223,26 +251,6 @@ class ClusteredMesh:
                 n_cut += engine.list_cut(array, own, records, cut[n_cut:])
             pieces = engine.Pieces(source, records, own, self._viewport, np.unique(cut[:n_cut]))
         return self._snapped(source, records, own, pieces, is_used)
-
-    def _seen(
-        self, sink: int, first: int = 0, end: int | None = None, empty: engine.SnappedMesh | None = None
-    ) -> engine.ClusterView:
-        """Return the view of clusters in rows [first, end) of the picture, or all; `empty`: of a sample."""
-        width, height = self._view.size
-        n_rows, how = (height if end is None else end) - first, (MARGIN_PX, STAGE_ERROR[self.clusters.points.dtype])
-        return engine.ClusterView(self._own, empty or self._empty, first, n_rows, width, *how, sink)
-
-    def _snapped(
-        self,
-        source: engine.Source,
-        records: NDArray[np.uint8],
-        triangles: NDArray[np.int32],
-        pieces: engine.Pieces | None,
-        is_used: NDArray[np.uint8] | None = None,
-    ) -> engine.SnappedMesh:
-        how, viewport = self._view.how, self._viewport
-        mesh = engine.SnappedMesh(source, records, None, triangles, pieces, how, viewport, is_used)
-        return mesh.numbered_from(self._first_id)
 
 
 def draw_pass(

@@ -131,8 +131,8 @@ def choose_detail(
     each other, and their light, may differ by more.
 
     Of a mesh of 500,000 triangles or more each part has a level of its own where that leaves at most half of the
-    triangles. `rasterize_mesh` and `render` draw these parts where the mesh is the only one, in a scene, too, without
-    edges and without anything that shows through; otherwise one level is drawn, which all of the mesh allows.
+    triangles. `rasterize_mesh` and `render` draw these parts, in a scene those of each instance, without edges and
+    without anything that shows through; otherwise one level is drawn, which all of the mesh allows.
 
     It is the mesh itself where no bound holds: with a lens; where the mesh may reach the near or the far plane or the
     eye; where a side is culled, since turns of triangles are not bounded; where materials cut holes.
@@ -287,7 +287,6 @@ def detailed(
             levels = levels_of(one)
             found = screen.coarsest(matrices[at], levels, tolerance)[0].tolist()
             for i, level in zip(at.tolist(), found, strict=True):
-                meshes[i] = levels[level].mesh if level else one
-            if in_parts and (cut := screen.cut(matrices[0], levels, found[0], tolerance)) is not None:
-                meshes[0] = cut.mesh
+                cut = screen.cut(matrices[i], levels, level, tolerance) if in_parts else None
+                meshes[i] = cut.mesh if cut is not None else levels[level].mesh if level else one
     return scene.with_meshes(meshes)

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
-from topleft._core.raster.clusters import RECORD, Clusters, measure_clusters, sort_clusters
+from topleft._core.raster.clusters import RECORD, Clusters, box_of, measure_clusters, sort_clusters
 from topleft._meshes.model.mesh import Mesh, read_only, with_normals
 
 #: Triangles of a part of the mesh itself, about. Of hills of a million within half a pixel, seen from near, views
@@ -159,8 +159,10 @@ def sorted_part(source: Mesh, rows: npt.NDArray[Any]) -> dict[str, npt.NDArray[A
 class CutMesh(Mesh):
     """Parts of several levels that fit: all arrays are those of all parts, and what is drawn are the chosen ones.
 
-    Each verb that draws a mesh alone finds out here which: clusters where these may be drawn, else `drawn_triangles`.
+    Each verb that draws it finds out here which: clusters where these may be drawn, else `drawn_triangles`.
     """
+
+    is_in_parts = True
 
     def find_clusters(self) -> Clusters:
         """Those of the chosen parts, always: without them all parts would have to be looked at."""
@@ -220,7 +222,9 @@ class PartedMesh:
         self._order = np.arange(len(self._pool.corners), dtype=np.int32)
         defaults = {field.name: None for field in fields(Mesh)}
         look = {name: getattr(like, name) for name in ("materials", "crease", "color_interpolation")}
-        self._of_all = defaults | look | self._pool.arrays | {"known": {}}
+        points = self._pool.arrays["vertices"]
+        known = {"known": {}, "vertex_box": box_of(points), "is_finite": bool(np.isfinite(points).all())}
+        self._of_all = defaults | look | self._pool.arrays | known
 
     def choose(self, matrix: F64, viewport: tuple[int, int], window: F64, tolerance: float) -> tuple[I32, float]:
         """Return the coarsest parts that are sure to be within a tolerance, and the most pixels that they are off."""

@@ -93,8 +93,8 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     the seams where attributes jump or materials meet: nothing bleeds across and nothing cracks, but no level is coarser
     than its borders and seams. A mesh without normals has levels without, which crease at the same angle.
 
-    Levels of a mesh of 500,000 triangles or more are made of parts, whose sides stay in their level, too. Where such a
-    mesh is drawn alone, each part has the coarsest level that the view allows.
+    Levels of a mesh of 500,000 triangles or more are made of parts, whose sides stay in their level, too. `render` and
+    `rasterize_mesh` draw each part at the coarsest level that the view allows.
 
     Examples
     --------

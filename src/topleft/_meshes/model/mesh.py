@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -95,6 +95,9 @@ class Mesh:
     uv1: F32 | None = None
     crease: float = NO_CREASE
     color_interpolation: EncodingOption = "srgb"
+
+    is_in_parts: ClassVar[bool] = False
+    """Whether only some of the triangles are drawn, see `drawn_triangles`."""
 
     if TYPE_CHECKING:  # anything that NumPy reads may be given; the types above are kept
 

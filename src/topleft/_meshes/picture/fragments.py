@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
@@ -276,8 +276,9 @@ class SceneFragments(InstanceIds, Fragments):
             left, top, right, bottom = boxes[i].tolist()
             return local_part(ids[:, top:bottom, left:right], firsts[i], firsts[i + 1])
 
-        shown = np.flatnonzero(boxes[:, 2] > 0).tolist()
-        return tuple((i, self.placed.snap_part(i, partial(part, i)).at_sample(*sample), firsts[i]) for i in shown)
+        shown = np.flatnonzero(boxes[:, 2] > 0)
+        snapped = self.placed.snap_parts(shown, part)
+        return tuple((i, mesh.at_sample(*sample), firsts[i]) for i, mesh in zip(shown.tolist(), snapped, strict=True))
 
     def _at_sample(self, i: int) -> Self:
         """Return ids, depth and attributes at one sample of each pixel."""
@@ -302,12 +303,18 @@ class SceneFragments(InstanceIds, Fragments):
             yield VisiblePart(0, WHOLE, self._one, self.whole[0], None if bent is None else bent[0])
             return
         _, boxes = self._found
-        for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
+        shown, ids = np.flatnonzero(boxes[:, 2] > 0), self.drawn_planes[0][0]
+
+        def place(i: int) -> tuple[slice, slice]:
             left, top, right, bottom = boxes[i].tolist()
-            box = slice(top, bottom), slice(left, right)
-            first, end = self.placed.first_ids[i : i + 2].tolist()
-            own = local_part(self.drawn_planes[0][0][box], first, end)
-            scene = self.placed.snap_part(i, lambda own=own: own).at_sample(*self.positions[0]).moved(left, top)
+            return slice(top, bottom), slice(left, right)
+
+        def part(i: int) -> NDArray[np.int32]:
+            return local_part(ids[place(i)], *self.placed.first_ids[i : i + 2].tolist())
+
+        for i, snapped in zip(shown.tolist(), self.placed.snap_parts(shown, part), strict=True):
+            box, own = place(i), part(i)
+            scene = snapped.at_sample(*self.positions[0]).moved(box[1].start, box[0].start)
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
             frags.corners = self.placed.corners(i)

@@ -19,7 +19,7 @@ from topleft._core.base.memory import FRESH
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.cluster_draw import ClusteredMesh, equal_bands
+from topleft._core.raster.cluster_draw import ClusteredMesh, SeenBoxes, equal_bands
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.sampling import SamplePass, draw_sorted, draw_split, sample_positions
@@ -31,13 +31,16 @@ from topleft._meshes.model.mesh import trusted_mesh
 from topleft._meshes.picture.bend import BentMesh, bend
 from topleft._meshes.picture.fragments import Ids, MeshFragments, SceneFragments
 from topleft._meshes.picture.rounds import draw_placed, front_to_back, pays_in_clusters
-from topleft._meshes.scene.scene import Instance, Scene
+from topleft._meshes.scene.scene import Instance, Scene, unchecked_scene
 
 #: Snapped vertices that are held at a time: 16 bytes each.
 VERTICES_AT_ONCE = 1 << 20
 
 #: Triangles of a scene that are kept in one array, 12 bytes each.
 TRIANGLES_AT_ONCE = 1 << 21
+
+#: Instances that are drawn before others are tested against their depths; each later round has twice as many.
+FIRST_ROUND = 64
 
 #: Runs of instances that cull alike, each drawn as one mesh.
 MOST_JOINED = 8
@@ -93,6 +96,9 @@ class PlacedScene:
         Where the ids of each instance begin in these, and their end.
     bent : sequence of BentMesh, optional
         The parts that a lens makes of each instance.
+
+    `numbers`: the id of triangle 0 of each instance, of a scene that is a part of another; `pays_in_clusters`: whether
+    that is known.
     """
 
     def __init__(
@@ -103,11 +109,13 @@ class PlacedScene:
         with_depth: bool,
         may_cluster: bool = True,
         material: Material | None = None,
-        first_id: int = 0,
+        numbers: NDArray[np.int64] | None = None,
+        pays_in_clusters: bool = False,
         is_mesh: bool = False,
     ) -> None:
         self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
-        self._view, self._first_id, self._is_mesh = view, first_id, is_mesh
+        self._view, self._given_numbers, self._is_mesh = view, numbers, is_mesh
+        self._is_sure_to_pay = pays_in_clusters
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
@@ -164,26 +172,30 @@ class PlacedScene:
 
     def snap(self, i: int) -> engine.SnappedMesh:
         """Return an instance, snapped; in shared buffers it draws its own range of ids. Small scenes are kept."""
-        kept = self._kept.get(i)
-        if kept is None and self._all is not None:
-            kept = self._kept[i] = self._all.mesh(i) or self._snap_alone(i)
-        return self._snap(i, i + 1)[0] if kept is None else kept
+        return self.snap_all(np.array([i]))[0]
 
-    def _snap(self, first: int, end: int) -> list[engine.SnappedMesh]:
-        """Return instances [first, end) in the same way: in one call, except those that are snapped alone."""
-        placed = self._project(first, end)
-        found = [None if placed is None else placed.mesh(k) for k in range(end - first)]
-        snapped = [self._snap_alone(first + k) if mesh is None else mesh for k, mesh in enumerate(found)]
+    def snap_all(self, some: NDArray[np.intp]) -> list[engine.SnappedMesh]:
+        """Return some instances in the same way."""
+        snapped = [mesh or self._snap_alone(i) for i, mesh in zip(some.tolist(), self._snap(some), strict=True)]
         if self._n_kept < VERTICES_AT_ONCE:
-            firsts = self.scene.first_vertices
-            self._kept.update(zip(range(first, end), snapped, strict=True))
-            self._n_kept += int(firsts[end] - firsts[first])
+            self._kept.update(zip(some.tolist(), snapped, strict=True))
+            self._n_kept += int(self._vertex_counts[some].sum())
         return snapped
 
-    def _project(self, first: int, end: int) -> engine.PlacedMeshes | None:
-        """Return instances [first, end), but for those to be snapped alone; None: that is all of them."""
-        view, n = self._view, end - first
-        firsts = self.scene.first_vertices[first : end + 1] - self.scene.first_vertices[first]
+    def _snap(self, some: NDArray[np.intp]) -> list[engine.SnappedMesh | None]:
+        """Return some instances, all in one call; None for those that are to be snapped alone."""
+        numbers = some.tolist()
+        if self._all is not None:
+            return [self._kept.get(i) or self._all.mesh(i) for i in numbers]
+        if all(i in self._kept for i in numbers):
+            return [self._kept[i] for i in numbers]
+        placed = self._project(some)
+        return [None] * len(some) if placed is None else [placed.mesh(k) for k in range(len(some))]
+
+    def _project(self, some: NDArray[np.intp]) -> engine.PlacedMeshes | None:
+        """Return some instances, but for those to be snapped alone; None: that is all of them."""
+        view, n = self._view, len(some)
+        firsts = np.concatenate([[0], np.cumsum(self._vertex_counts[some])])
         n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
         is_sliced = n_threads <= n  # fewer instances than threads: each is the work of all of them
         if not (is_sliced and view.plan is None and view.grid_bits == view.subpixel_bits) or 0 in view.size:
@@ -191,23 +203,33 @@ class PlacedScene:
         points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
         shape = int(firsts[-1]) * engine.VERTEX_BYTES
         room = FRESH.empty("records", (shape,), np.uint8) if points is None else points
-        own, (culls, has_some_sides) = slice(first, end), self._sides
+        culls, is_apart = self._sides
+        if len(self._in_parts):  # of which all parts would be drawn
+            is_apart = is_apart.copy()
+            is_apart[self._in_parts] = True
         placed = engine.PlacedMeshes(
-            self.scene.mesh_list, first, self._clip_from_objects[own], culls[own], self._numbers[own],
-            has_some_sides[own].view(np.uint8), view.engine_viewport(), view.how, room, firsts,
+            self.scene.mesh_list, some.astype(np.int64, copy=False), self._clip_from_objects[some], culls[some],
+            self._numbers[some], is_apart[some].view(np.uint8), view.engine_viewport(), view.how, room, firsts,
         )  # fmt: skip
         run_parts(placed.project, n, n_threads)
         return placed
 
     @cached_property
+    def _vertex_counts(self) -> NDArray[np.int64]:
+        return np.diff(self.scene.first_vertices)
+
+    @cached_property
     def joined(self) -> list[engine.SnappedMesh]:
         """All instances as a few meshes, one for each run that culls alike; none of large scenes or clipped ones."""
         scene, culls = self.scene, self._sides[0]
-        starts = [0, *(np.flatnonzero(culls[1:] != culls[:-1]) + 1).tolist()]
+        is_end = culls[1:] != culls[:-1]
+        if self._given_numbers is not None:  # of one mesh they count on
+            is_end = is_end | (np.diff(self._given_numbers) != np.diff(scene.first_ids)[:-1])
+        starts = [0, *(np.flatnonzero(is_end) + 1).tolist()]
         is_small = scene.first_vertices[-1] <= VERTICES_AT_ONCE and 0 < scene.n_triangles <= TRIANGLES_AT_ONCE
         if not is_small or len(starts) > MOST_JOINED:
             return []
-        self._all = placed = self._project(0, len(scene))
+        self._all = placed = self._project(np.arange(len(scene)))
         if placed is None or placed.count_left_out():
             return []
         triangles, ends = scene.joined_triangles, pairwise(scene.first_ids[[*starts, len(scene)]].tolist())
@@ -224,8 +246,16 @@ class PlacedScene:
     @cached_property
     def _numbers(self) -> NDArray[np.int64]:
         """The id of triangle 0 of each instance."""
+        if self._given_numbers is not None:
+            return self._given_numbers
         has_ids = self._with_depth and self.scene.n_triangles <= INT32_MAX
-        return self.first_ids[:-1] + self._first_id if has_ids else np.zeros(len(self.scene), np.int64)
+        return self.first_ids[:-1] if has_ids else np.zeros(len(self.scene), np.int64)
+
+    @cached_property
+    def _in_parts(self) -> NDArray[np.intp]:
+        """The instances whose meshes are parts of several levels."""
+        found = [at for mesh, at in self.scene.meshes.values() if mesh.is_in_parts]
+        return np.sort(np.concatenate(found)) if found else np.empty(0, np.intp)
 
     @cached_property
     def _sides(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
@@ -260,12 +290,35 @@ class PlacedScene:
         mesh, view = self.scene[i].mesh, self.view_of(i)
         return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport, view.origin, view.zero_to_one)
 
-    def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> engine.SnappedMesh:
-        """Return an instance snapped; only the part with some triangles, if its mesh is drawn in clusters."""
-        is_snapped = self._all is not None or i in self._kept
-        if not is_snapped and self.scene[i].mesh.has_clusters and self._can_cluster(Sink.NEAREST):
-            return ClusteredMesh(*self.clustered(i)).part(triangles())
-        return self.snap(i)
+    def snap_parts(
+        self, some: NDArray[np.intp], triangles_of: Callable[[int], NDArray[np.int32]]
+    ) -> list[engine.SnappedMesh]:
+        """Return some instances snapped; of a large mesh in clusters the part with some triangles."""
+        is_snapped = self._all is not None
+        in_clusters = [not (is_snapped or i in self._kept) and self._is_clustered(i) for i in some.tolist()]
+        n_pixels = self._view.size[0] * self._view.size[1]
+        is_large = np.array(
+            [
+                of_clusters and not choices.pays_to_snap_all(n, n_pixels)
+                for of_clusters, n in zip(in_clusters, self._vertex_counts[some].tolist(), strict=True)
+            ],
+            np.bool_,
+        )
+        found = dict(zip(some[~is_large].tolist(), self._snap(some[~is_large]), strict=True))
+
+        def snapped(i: int, *, of_clusters: bool) -> engine.SnappedMesh:
+            whole = found.get(i)
+            if whole is not None:
+                return whole
+            return ClusteredMesh(*self.clustered(i)).part(triangles_of(i)) if of_clusters else self._snap_alone(i)
+
+        return [snapped(i, of_clusters=own) for i, own in zip(some.tolist(), in_clusters, strict=True)]
+
+    def _is_clustered(self, i: int) -> bool:
+        """Whether an instance has clusters that know its sides."""
+        mesh = self.scene[i].mesh
+        may_cluster = mesh.has_clusters and (self._may_cluster or mesh.is_in_parts)
+        return may_cluster and choices.can_cluster(self._view, Sink.NEAREST) and not bool(self._sides[1][i])
 
     def view_of(self, i: int) -> View:
         """How an instance is seen."""
@@ -281,7 +334,8 @@ class PlacedScene:
             back = CULL_CODES["front" if is_mirrored else "back"]
             single_sided = is_single if self.bent is None else is_single[self.bent[i].source], back
         cull = int(MIRRORED[cull]) if is_mirrored else cull
-        transform, static = self._clip_from_objects[i], one.mesh if self._may_cluster else None
+        transform = self._clip_from_objects[i]
+        static = one.mesh if self._may_cluster or one.mesh.is_in_parts else None
         return self._view.but(transform=transform, cull=cull, single_sided=single_sided, static=static)
 
     def _can_cluster(self, sink: Sink) -> bool:
@@ -295,36 +349,59 @@ class PlacedScene:
     def groups(self) -> Iterator[tuple[int, PlacedScene]]:
         """Yield the first id and the placed instances of each part of the scene that int32 can count from 1 on."""
         for first, group in self.scene.groups:
-            placed = PlacedScene(
-                self._drawn._replace(scene=group, whole=group), self._view, with_depth=self._with_depth,
-                may_cluster=self._may_cluster, material=self._material, first_id=1,
-            )  # fmt: skip
-            yield int(self.first_ids[first]), placed
+            yield int(self.first_ids[first]), self._placed(group, group.first_ids[:-1] + 1, pays_in_clusters=True)
+
+    def _placed(self, scene: Scene, numbers: NDArray[np.int64], *, pays_in_clusters: bool = False) -> PlacedScene:
+        """Return a part of the scene, seen in the same way, whose instances have triangles 0 of these numbers."""
+        return PlacedScene(
+            self._drawn._replace(scene=scene, whole=scene), self._view, with_depth=self._with_depth,
+            may_cluster=self._may_cluster or pays_in_clusters, material=self._material, numbers=numbers,
+            pays_in_clusters=pays_in_clusters or self._is_sure_to_pay,
+        )  # fmt: skip
+
+    def _some(self, at: NDArray[np.intp], *, pays_in_clusters: bool = False) -> PlacedScene:
+        """Return some instances by themselves, with the ids that they have among all."""
+        instances = [self.scene[i] for i in at.tolist()]
+        known = {"transforms": self.scene.transforms[at], "are_mirrored": self.scene.are_mirrored[at]}
+        return self._placed(unchecked_scene(instances, **known), self._numbers[at], pays_in_clusters=pays_in_clusters)
+
+    def _in_turn(self, sink: Sink) -> Iterator[PlacedScene]:
+        """Yield the scene; if it has meshes in parts, which clusters draw faster, these first where order allows it."""
+        at = self._in_parts
+        first = self._some(at, pays_in_clusters=True) if len(at) else self
+        if first is self or not first._can_cluster(sink):
+            yield self
+            return
+        yield first
+        if len(at) < len(self.scene):
+            yield self._some(np.delete(np.arange(len(self.scene)), at))
 
     def shown(
         self,
         some: NDArray[np.intp],
-        target: engine.Target,
-        at: tuple[int, int],
+        targets: Sequence[engine.Target],
+        positions: Sequence[tuple[int, int]],
         rows: tuple[int, int] | None = None,
         *,
         is_drawn: bool,
     ) -> NDArray[np.intp]:
-        """Return those of some instances whose boxes may show a sample in some rows, or in all.
+        """Return those of some instances whose boxes may show in a sample in some rows, or in all.
 
-        If `is_drawn`, before the target's depths; otherwise at least the first one, which clears the target.
+        If `is_drawn`, before the targets' depths; otherwise at least the first one, which clears the targets.
         """
-        may_show: NDArray[np.uint8] = np.ones(len(some), np.uint8)
-        for dtype in (np.float32, np.float64):
-            own = np.flatnonzero(self._is_float32[some] == (dtype == np.float32))
-            if not len(own):
-                continue
-            chosen = some[own]
-            seen, mesh = ClusteredMesh(*self.clustered(int(chosen[0]))).seen(target.sink, at, rows)
-            shown: NDArray[np.uint8] = np.empty(len(own), np.uint8)
-            matrices = self._clip_from_objects[chosen].astype(dtype).astype(np.float64)  # as the vertex stage has them
-            engine.find_shown(mesh, seen, self.scene.boxes[chosen], matrices, target, is_drawn, shown)
-            may_show[own] = shown
+        may_show: NDArray[np.uint8] = np.zeros(len(some), np.uint8)
+        for target, at in zip(targets, positions, strict=True):
+            for dtype in (np.float32, np.float64):
+                own = np.flatnonzero((may_show == 0) & (self._is_float32[some] == (dtype == np.float32)))
+                if not len(own):
+                    continue
+                chosen = some[own]
+                boxes = SeenBoxes(np.zeros((1, 3), dtype), self.view_of(int(chosen[0])))
+                seen, mesh = boxes.seen(target.sink, at, rows)
+                shown: NDArray[np.uint8] = np.empty(len(own), np.uint8)
+                matrices = self._clip_from_objects[chosen].astype(dtype).astype(np.float64)  # as vertices have them
+                engine.find_shown(mesh, seen, self.scene.boxes[chosen], matrices, target, is_drawn, shown)
+                may_show[own] = shown
         return some[:1] if not is_drawn and not may_show.any() else some[may_show != 0]
 
     def split_rows(self, some: NDArray[np.intp], height: int, n: int) -> list[int]:
@@ -358,18 +435,25 @@ class PlacedScene:
     def _is_float32(self) -> NDArray[np.bool_]:
         is_float32 = np.empty(len(self.scene), np.bool_)
         for mesh, at in self.scene.meshes.values():
-            is_float32[at] = mesh.clusters.points.dtype == np.float32
+            is_float32[at] = mesh.vertices.dtype == np.float32
         return is_float32
 
     def chunks(self) -> Iterator[list[engine.SnappedMesh]]:
         """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
-        first, firsts = 0, self.scene.first_vertices
-        while first < len(self.scene):
-            end = int(np.searchsorted(firsts, firsts[first] + VERTICES_AT_ONCE))
-            end = min(max(end, first + 1), len(self.scene))
-            is_kept = self._all is not None or len(self._kept) == len(self.scene)
-            yield [self.snap(i) for i in range(first, end)] if is_kept else self._snap(first, end)
-            first = end
+        return map(self.snap_all, self._ranges(np.arange(len(self.scene))))
+
+    def _ranges(self, order: NDArray[np.intp], n_most: float = np.inf) -> Iterator[NDArray[np.intp]]:
+        """Yield instances in this order, as many at a time as `VERTICES_AT_ONCE` and `n_most` allow.
+
+        Each time `n_most` doubles.
+        """
+        ends, first = np.cumsum(self._vertex_counts[order]), 0
+        while first < len(order):
+            before = ends[first - 1] if first else 0
+            end = min(int(np.searchsorted(ends, before + VERTICES_AT_ONCE, side="right")), first + n_most)
+            end = int(max(end, first + 1))
+            yield order[first:end]
+            first, n_most = end, 2 * n_most
 
     def meshes(self) -> Iterator[list[engine.SnappedMesh]]:
         """Yield what is drawn, in the order of ids: all instances joined, or else `chunks`."""
@@ -377,8 +461,7 @@ class PlacedScene:
 
     @cached_property
     def _pays_in_clusters(self) -> bool:
-        is_group = self._first_id > 0  # of a scene so large that clusters pay for it
-        return is_group or pays_in_clusters(self, self._clip_from_world, self._view)
+        return self._is_sure_to_pay or pays_in_clusters(self, self._clip_from_world, self._view)
 
     def _n_parts(self, height: int) -> int:
         """How many threads draw."""
@@ -388,7 +471,7 @@ class PlacedScene:
     def draw_split(self, sink: Sink, background: float) -> SceneFragments | None:
         """Draw several samples as those of a mesh are; None where that takes planes: of clusters, or of many meshes."""
         view = self._view.but(is_split=True)
-        is_clustered = self._can_cluster(sink) and self._pays_in_clusters
+        is_clustered = len(self._in_parts) > 0 or (self._can_cluster(sink) and self._pays_in_clusters)
         if is_clustered or len(self.joined) != 1 or not choices.can_split(view, self.scene.n_triangles):
             return None
         (width, height), positions = view.size, self.positions(view)
@@ -407,9 +490,16 @@ class PlacedScene:
 
         `is_first`: clear them before; otherwise their samples stay unless something lies before them.
         """
+        for k, part in enumerate(self._in_turn(Sink(targets[0].sink))):
+            part._draw(targets, positions, height, is_first=is_first and k == 0)
+
+    def _draw(
+        self, targets: list[engine.Target], positions: Sequence[tuple[int, int]], height: int, *, is_first: bool
+    ) -> None:
+        """The same, all instances in one way."""
         n_parts = self._n_parts(height)
         if self._can_cluster(Sink(targets[0].sink)) and self._pays_in_clusters:
-            order = front_to_back(self.scene, self._clip_from_world)
+            order = self._in_order(np.arange(len(self.scene)), Sink(targets[0].sink))
             if is_first and Sink(targets[0].sink) in (Sink.NEAREST, Sink.FARTHEST):
                 shape = engine.Target.bounds_shape(height, self._view.size[0])
                 for target in targets:
@@ -421,13 +511,51 @@ class PlacedScene:
             if draw_sorted(own, targets, (height, self._view.size[0])):
                 refuse_changed()
             return
-        n_left = len(self.joined) or len(self.scene)
-        for chunk in self.meshes():
-            n_left -= len(chunk)
-            for target, at in zip(targets, positions, strict=True):
-                scenes = [mesh.at_sample(*at) for mesh in chunk]
-                run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
+        if self.joined:
+            self._draw_meshes(self.joined, targets, positions, height, is_first=is_first)
+        else:
+            self._draw_rounds(targets, positions, height, is_first=is_first)
+
+    def _draw_rounds(
+        self, targets: list[engine.Target], positions: Sequence[tuple[int, int]], height: int, *, is_first: bool
+    ) -> None:
+        """Draw whole instances; where order does not matter those whose boxes may show, nearest first."""
+        sink, order = Sink(targets[0].sink), np.arange(len(self.scene))
+        may_leave_out = choices.can_cluster(self._view, sink)
+        may_hide = may_leave_out and sink in (Sink.NEAREST, Sink.FARTHEST)
+        if may_leave_out:
+            order = self.shown(order, targets, positions, is_drawn=False)
+        if may_hide:
+            order = self._in_order(order, sink)
+        n_left = len(order)
+        for some in self._ranges(order, FIRST_ROUND if may_hide else np.inf):
+            n_left -= len(some)
+            if may_hide and not is_first:
+                some = self.shown(some, targets, positions, is_drawn=True)
+            if len(some):
+                ends = {"is_first": is_first, "is_last": n_left == 0}
+                self._draw_meshes(self.snap_all(some), targets, positions, height, **ends)
             is_first = False
+
+    def _in_order(self, some: NDArray[np.intp], sink: Sink) -> NDArray[np.intp]:
+        """Return some instances in the order in which they hide each other, about."""
+        order = some[front_to_back(self.scene, self._clip_from_world, some)]
+        return order[::-1].copy() if sink is Sink.FARTHEST else order
+
+    def _draw_meshes(
+        self,
+        meshes: list[engine.SnappedMesh],
+        targets: list[engine.Target],
+        positions: Sequence[tuple[int, int]],
+        height: int,
+        *,
+        is_first: bool,
+        is_last: bool = True,
+    ) -> None:
+        """Draw some snapped meshes."""
+        for target, at in zip(targets, positions, strict=True):
+            scenes = [mesh.at_sample(*at) for mesh in meshes]
+            run_parts(rows_of(scenes, target, is_first=is_first, is_last=is_last), height, self._n_parts(height))
 
 
 def rows_of(

@@ -54,13 +54,14 @@ def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], 
     return pays
 
 
-def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the instances by the distance of the middle of their boxes: by w, or by z where all w are equal."""
+def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64], some: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the order of some instances by the distance of the middle of their boxes: by w, or z if w is constant."""
     boxes = np.empty((len(scene), 6))
     for mesh, at in scene.meshes.values():
         boxes[at] = mesh.vertex_box
     middles = 0.5 * (boxes[:, :3] + boxes[:, 3:])
-    middles = (scene.transforms[:, :3, :3] * middles[:, None]).sum(axis=2) + scene.transforms[:, :3, 3]
+    transforms = scene.transforms[some]
+    middles = (transforms[:, :3, :3] * middles[some][:, None]).sum(axis=2) + transforms[:, :3, 3]
     row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
     return np.argsort(engine.product(middles, row[:3]), kind="stable")
 
@@ -122,12 +123,12 @@ def draw_rounds(
     In rounds, each of which leaves out instances that lie outside, between samples, or behind those of earlier ones.
     """
     keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
-    order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
+    order = placed.shown(order, [target], [at], is_drawn=keeps_order and not is_first)
     n = ROUND * len(memories) if keeps_order else len(order)
     for first in range(0, len(order), n):
         some = order[first : first + n]
         if first:
-            some = placed.shown(some, target, at, is_drawn=True)
+            some = placed.shown(some, [target], [at], is_drawn=True)
         ends = {"is_first": is_first and first == 0, "is_last": first + n >= len(order)}
         if len(some) and not draw_round(placed, some, target, height, at, memories, **ends):
             return False
@@ -147,7 +148,7 @@ def draw_round(
     tops = placed.split_rows(some, height, min(height, len(memories)))
 
     def own(first: int, end: int) -> list[int]:
-        shown = some if len(tops) == 2 else placed.shown(some, target, at, (first, end), is_drawn=False)
+        shown = some if len(tops) == 2 else placed.shown(some, [target], [at], (first, end), is_drawn=False)
         return shown.tolist()
 
     return draw_clustered(memories, tops, own, lambda i: ClusteredMesh(*placed.clustered(i)), target, at, **ends)

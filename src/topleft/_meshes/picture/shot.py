@@ -52,11 +52,9 @@ class Shot:
     def within(self, tolerance: float, *, in_parts: bool = False, **options: Any) -> Shot:
         """Return the shot of the levels of detail that a tolerance in pixels allows; options as for `choose_detail`.
 
-        `in_parts`: a large mesh that is the only one may have parts of several levels; what is drawn is asked of the
-        view alone then.
+        `in_parts`: large meshes may have parts of several levels; what is drawn is asked of the view alone then.
         """
         if type(tolerance) is float and not tolerance:  # unless given
             return self
-        in_parts = in_parts and len(self.scene) == 1
         scene = detailed(self.scene, self.camera, self.size, tolerance, in_parts=in_parts, **options)
         return self if scene is self.scene else replace(self, scene=scene)
