@@ -196,7 +196,7 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     if (!vm_any(drawn))
         return;
     vm is_negative;
-    drawn = vm_and(drawn, find_faces(&c, s->snapped->cull, &is_negative));
+    drawn = vm_and(drawn, find_unculled(&c, s->snapped->cull, &is_negative));
     if (vm_any(drawn))
         push_edges(s, &c, drawn, is_negative);
 }

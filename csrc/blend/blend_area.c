@@ -130,7 +130,7 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     if (!vm_any(vm_or(drawn, single)))
         return;
     vm is_negative;
-    drawn = vm_and(drawn, find_faces(&c, snapped->cull, &is_negative));
+    drawn = vm_and(drawn, find_unculled(&c, snapped->cull, &is_negative));
     const vi rows = vi_add(n_rows, vi_set1(1));
     for (unsigned lanes = vm_bits(single); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);

@@ -159,7 +159,7 @@ TL_INLINE vm not_culled(tl_cull cull, vm positive, vm negative)
 }
 
 /* The same of extents up to 2^25 units: twice the area is exact in float64, at every step. */
-TL_INLINE vm find_faces(const lane_corners *c, tl_cull cull, vm *is_negative)
+TL_INLINE vm find_unculled(const lane_corners *c, tl_cull cull, vm *is_negative)
 {
     const vd x1 = vd_from_vi(vi_sub(c->x[1], c->x[0])), y1 = vd_from_vi(vi_sub(c->y[1], c->y[0]));
     const vd x2 = vd_from_vi(vi_sub(c->x[2], c->x[0])), y2 = vd_from_vi(vi_sub(c->y[2], c->y[0]));
