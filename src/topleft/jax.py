@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -59,12 +59,6 @@ def shape_of(dtype: Any, *shape: int) -> Any:
     return jax.ShapeDtypeStruct(shape, dtype)
 
 
-def like(*arrays: Array) -> Any:
-    """Return the same of arrays that results look like."""
-    found = tuple(shape_of(one.dtype, *one.shape) for one in arrays)
-    return found if len(found) > 1 else found[0]
-
-
 def grid_of(tri: Any, pixels: Any, n_vertices: int) -> PixelGrid:
     """Return the pictures (B, H, W, ...) of triangles."""
     b, h, w = pixels.shape[:3]
@@ -79,9 +73,45 @@ def check(name: str, array: Array, wish: str, fits: object) -> None:
         raise ValueError(f"{name} must have shape {wish}, got {array.shape}")
 
 
-def no_gradient(array: Array) -> Any:
-    """Return the gradient of integers, as JAX has it."""
-    return np.zeros(array.shape, jax.dtypes.float0)
+class Operation(NamedTuple):
+    """A call of the engine with arrays, by some options; and backward.
+
+    `run` returns results of the `shapes`, of which the first `n_out` are given out. `vjp` takes the arrays, the results
+    numbered in `kept` and the gradients of what was given out, and returns those of the arrays of floats.
+    """
+
+    shapes: Callable[..., tuple[Any, ...]]
+    run: Callable[..., tuple[Any, ...]]
+    vjp: Callable[..., tuple[Any, ...]]
+    n_out: int = 1
+    kept: tuple[int, ...] = ()
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0, 1))
+def operate(operation: Operation, options: Any, *given: Array) -> tuple[Array, ...]:
+    """Return what an operation gives out."""
+    return operate_forward(operation, options, *given)[0]
+
+
+def operate_forward(operation: Operation, options: Any, *given: Array) -> tuple[tuple[Array, ...], Any]:
+    """Return the same, and what backward takes."""
+    found = call(partial(operation.run, options), operation.shapes(options, *given), *given)
+    return found[: operation.n_out], (given, [found[i] for i in operation.kept])
+
+
+def operate_backward(operation: Operation, options: Any, kept: Any, g: tuple[Array, ...]) -> tuple[Any, ...]:
+    """Return the gradients of what an operation takes; integers have theirs as JAX wants it."""
+    given, results = kept
+    is_real = [jnp.issubdtype(one.dtype, jnp.floating) for one in given]
+    shapes = tuple(shape_of(one.dtype, *one.shape) for one, real in zip(given, is_real, strict=True) if real)
+    found = iter(call(partial(operation.vjp, options), shapes, *given, *results, *g))
+    return tuple(
+        next(found) if real else np.zeros(one.shape, jax.dtypes.float0)
+        for one, real in zip(given, is_real, strict=True)
+    )
+
+
+operate.defvjp(operate_forward, operate_backward)
 
 
 def rasterize(pos: Array, tri: Array, resolution: Sequence[int]) -> tuple[Array, Array]:
@@ -108,8 +138,8 @@ def rasterize(pos: Array, tri: Array, resolution: Sequence[int]) -> tuple[Array,
         For a wrong dtype or shape.
     """
     check("pos", pos, "(B, V, 4)", pos.ndim == 3 and pos.shape[2] == 4)
-    found: tuple[Array, Array] = points(as_pair("resolution", resolution), pos, tri)
-    return found
+    rast, rast_db = operate(POINTS, as_pair("resolution", resolution), pos, tri)
+    return rast, rast_db
 
 
 def ids_of(size: tuple[int, int], pos: Any, tri: Any) -> list[Any]:
@@ -117,34 +147,20 @@ def ids_of(size: tuple[int, int], pos: Any, tri: Any) -> list[Any]:
     return [draw(one, tri, size[::-1]).triangle for one in pos]
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
-def points(size: tuple[int, int], pos: Array, tri: Array) -> Any:
+def points(size: tuple[int, int], pos: Any, tri: Any) -> tuple[Any, Any]:
     """Return `rast` and `rast_db`."""
-
-    def run(pos: Any, tri: Any) -> Any:
-        grid = PixelGrid(as_checked_triangles(tri, pos.shape[1]), len(pos), *size)
-        ids = [(one, 0) for one in ids_of(size, pos, tri)]
-        return tensors.points(grid, pos, ids, is_flipped=True, with_db=True)
-
-    return call(run, (shape_of(pos.dtype, len(pos), *size, 4),) * 2, pos, tri)
+    grid = PixelGrid(as_checked_triangles(tri, pos.shape[1]), len(pos), *size)
+    return tensors.points(grid, pos, [(one, 0) for one in ids_of(size, pos, tri)], is_flipped=True, with_db=True)
 
 
-def points_forward(size: tuple[int, int], pos: Array, tri: Array) -> Any:
-    """Return the same, and what backward takes."""
-    rast, rast_db = points(size, pos, tri)
-    return (rast, rast_db), (pos, tri, rast)
+def points_vjp(_: tuple[int, int], pos: Any, tri: Any, rast: Any, g_rast: Any, g_db: Any) -> tuple[Any]:
+    """Return the gradient of `pos`."""
+    return (tensors.points_vjp(grid_of(tri, rast, pos.shape[1]), pos, rast, g_rast, g_db),)
 
 
-def points_backward(size: tuple[int, int], kept: Any, g: Any) -> Any:  # noqa: ARG001
-    """Return the gradients of `pos` and of `tri`."""
-
-    def run(pos: Any, tri: Any, rast: Any, g_rast: Any, g_db: Any) -> Any:
-        return tensors.points_vjp(grid_of(tri, rast, pos.shape[1]), pos, rast, g_rast, g_db)
-
-    return call(run, like(kept[0]), *kept, *g), no_gradient(kept[1])
-
-
-points.defvjp(points_forward, points_backward)
+POINTS = Operation(
+    lambda size, pos, _: (shape_of(pos.dtype, len(pos), *size, 4),) * 2, points, points_vjp, n_out=2, kept=(0,)
+)
 
 
 def interpolate(attr: Array, rast: Array, tri: Array, rast_db: Array | None = None) -> tuple[Array, Array]:
@@ -173,8 +189,8 @@ def interpolate(attr: Array, rast: Array, tri: Array, rast_db: Array | None = No
     rows = table_of(attr, len(rast))
     dtype = jnp.result_type(rows, rast)
     slopes = jnp.zeros((*rast.shape[:3], 0), dtype) if rast_db is None else rast_db.astype(dtype)
-    found: tuple[Array, Array] = values(rows.astype(dtype), rast.astype(dtype), tri, slopes)
-    return found
+    out, out_da = operate(VALUES, None, rows.astype(dtype), rast.astype(dtype), tri, slopes)
+    return out, out_da
 
 
 def table_of(attr: Array, n: int) -> Array:
@@ -184,40 +200,31 @@ def table_of(attr: Array, n: int) -> Array:
     return rows
 
 
-@partial(jax.custom_vjp)
-def values(attr: Array, rast: Array, tri: Array, rast_db: Array) -> Any:
+def slopes_of(attr: Any, rast_db: Any) -> tuple[Any, range]:
+    """Return the derivatives of the weights, None without columns, and of which attributes they are wanted."""
+    return (rast_db, range(attr.shape[2])) if rast_db.shape[3] else (None, range(0))
+
+
+def values_shapes(_: None, attr: Any, rast: Any, tri: Any, rast_db: Any) -> tuple[Any, Any]:  # noqa: ARG001
+    """Return the shapes of attributes, and of what they change by."""
+    n, of_pixels = attr.shape[2], rast.shape[:3]
+    return shape_of(attr.dtype, *of_pixels, n), shape_of(attr.dtype, *of_pixels, 2 * n * (rast_db.shape[3] > 0))
+
+
+def values(_: None, attr: Any, rast: Any, tri: Any, rast_db: Any) -> tuple[Any, Any]:
     """Return attributes, and what they change by."""
-    n, has_db = attr.shape[2], rast_db.shape[3] > 0
-
-    def run(attr: Any, rast: Any, tri: Any, rast_db: Any) -> Any:
-        grid = grid_of(tri, rast, attr.shape[1])
-        return tensors.values(grid, attr, rast, rast_db if has_db else None, range(n) if has_db else ())
-
-    shapes = shape_of(attr.dtype, *rast.shape[:3], n), shape_of(attr.dtype, *rast.shape[:3], 2 * n * has_db)
-    return call(run, shapes, attr, rast, tri, rast_db)
+    return tensors.values(grid_of(tri, rast, attr.shape[1]), attr, rast, *slopes_of(attr, rast_db))
 
 
-def values_forward(*given: Array) -> Any:
-    """Return the same, and what backward takes."""
-    return values(*given), given
+def values_vjp(_: None, attr: Any, rast: Any, tri: Any, rast_db: Any, g_out: Any, g_da: Any) -> tuple[Any, Any, Any]:
+    """Return the gradients of attributes, of `rast` and of `rast_db`."""
+    slopes, wanted = slopes_of(attr, rast_db)
+    given = g_out, slopes, g_da if wanted else None, wanted
+    g_attr, g_rast, g_db = tensors.values_vjp(grid_of(tri, rast, attr.shape[1]), attr, rast, *given)
+    return g_attr, g_rast, np.zeros_like(rast_db) if g_db is None else g_db
 
 
-def values_backward(kept: Any, g: Any) -> Any:
-    """Return the gradients of what `values` takes."""
-    attr, rast, tri, rast_db = kept
-    n, has_db = attr.shape[2], rast_db.shape[3] > 0
-
-    def run(attr: Any, rast: Any, tri: Any, rast_db: Any, g_out: Any, g_da: Any) -> Any:
-        grid = grid_of(tri, rast, attr.shape[1])
-        slopes = (rast_db, g_da, range(n)) if has_db else ()
-        g_attr, g_rast, g_db = tensors.values_vjp(grid, attr, rast, g_out, *slopes)
-        return g_attr, g_rast, np.zeros_like(rast_db) if g_db is None else g_db
-
-    g_attr, g_rast, g_db = call(run, like(attr, rast, rast_db), *kept, *g)
-    return g_attr, g_rast, no_gradient(tri), g_db
-
-
-values.defvjp(values_forward, values_backward)
+VALUES = Operation(values_shapes, values, values_vjp, n_out=2)
 
 
 def texture(
@@ -268,7 +275,7 @@ def texture(
         where += [one for one in (uv_da, mip_level_bias) if one is not None]
     dtype = jnp.result_type(tex, *where)
     modes = how, TexelsBeyond[boundary_mode.upper()], len(where), uv_da is not None
-    return texels(modes, *(one.astype(dtype) for one in (*where, *levels)))
+    return operate(TEXELS, modes, *(one.astype(dtype) for one in (*where, *levels)))[0]
 
 
 #: The words of `TexelFilter`.
@@ -297,29 +304,17 @@ def look_of(modes: Modes, *given: Any) -> TexelLook:
     return TexelLook(given[n:], how, beyond, *where)
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
-def texels(modes: Modes, *given: Array) -> Any:
-    """Return a texture at each pixel."""
-    shape = shape_of(given[0].dtype, *given[0].shape[:3], given[-1].shape[-1])
-    return call(lambda *given: tensors.texels(look_of(modes, *given)), shape, *given)
+def texels_vjp(modes: Modes, *given: Any) -> tuple[Any, ...]:
+    """Return the gradients of what a texture is looked up with: those of its pixels are the last of `given`."""
+    g_levels, *where = tensors.texels_vjp(look_of(modes, *given[:-1]), given[-1])
+    return *(one for one in where if one is not None), *g_levels
 
 
-def texels_forward(modes: Modes, *given: Array) -> Any:
-    """Return the same, and what backward takes."""
-    return texels(modes, *given), given
-
-
-def texels_backward(modes: Modes, kept: Any, g: Array) -> Any:
-    """Return the gradients of what `texels` takes."""
-
-    def run(*given: Any) -> Any:
-        g_levels, *where = tensors.texels_vjp(look_of(modes, *given[:-1]), given[-1])
-        return *(one for one in where if one is not None), *g_levels
-
-    return call(run, tuple(shape_of(one.dtype, *one.shape) for one in kept), *kept, g)
-
-
-texels.defvjp(texels_forward, texels_backward)
+TEXELS = Operation(
+    lambda _, *given: (shape_of(given[0].dtype, *given[0].shape[:3], given[-1].shape[-1]),),
+    lambda modes, *given: (tensors.texels(look_of(modes, *given)),),
+    texels_vjp,
+)
 
 
 def antialias(color: Array, rast: Array, pos: Array, tri: Array, *, edges: EdgesOption = "silhouette") -> Array:
@@ -353,7 +348,7 @@ def antialias(color: Array, rast: Array, pos: Array, tri: Array, *, edges: Edges
     fits = pos.ndim == 3 and pos.shape[2] == 4 and len(pos) in (1, len(color))
     check("pos", pos, f"(1, V, 4) or ({len(color)}, V, 4)", fits)
     dtype = jnp.result_type(color, rast, pos)
-    return smooth(as_rule(edges), color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)
+    return operate(SMOOTH, as_rule(edges), color.astype(dtype), rast.astype(dtype), pos.astype(dtype), tri)[0]
 
 
 def outline_of(grid: PixelGrid, pos: Any) -> tensors.Outline:
@@ -361,35 +356,20 @@ def outline_of(grid: PixelGrid, pos: Any) -> tensors.Outline:
     return tensors.outline_of(grid, pos, tensors.halves_across(grid.tri))
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
-def smooth(rule: EdgeRule, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
+def smooth(rule: EdgeRule, color: Any, rast: Any, pos: Any, tri: Any) -> tuple[Any]:
     """Return the picture with smooth silhouettes."""
-
-    def run(color: Any, rast: Any, pos: Any, tri: Any) -> Any:
-        grid = grid_of(tri, rast, pos.shape[1])
-        return tensors.smooth(grid, rule, outline_of(grid, pos), pos, rast, color)
-
-    return call(run, like(color), color, rast, pos, tri)
+    grid = grid_of(tri, rast, pos.shape[1])
+    return (tensors.smooth(grid, rule, outline_of(grid, pos), pos, rast, color),)
 
 
-def smooth_forward(rule: EdgeRule, color: Array, rast: Array, pos: Array, tri: Array) -> Any:
-    """Return the same, and what backward takes."""
-    return smooth(rule, color, rast, pos, tri), (color, rast, pos, tri)
+def smooth_vjp(rule: EdgeRule, color: Any, rast: Any, pos: Any, tri: Any, g: Any) -> tuple[Any, Any, Any]:
+    """Return the gradients of the picture, of `rast`, which are 0, and of the vertices."""
+    grid = grid_of(tri, rast, pos.shape[1])
+    g_color, g_pos = tensors.smooth_vjp(grid, rule, outline_of(grid, pos), pos, rast, color, g)
+    return g_color, np.zeros_like(rast), g_pos
 
 
-def smooth_backward(rule: EdgeRule, kept: Any, g: Array) -> Any:
-    """Return the gradients of what `smooth` takes."""
-    color, rast, pos, tri = kept
-
-    def run(color: Any, rast: Any, pos: Any, tri: Any, g: Any) -> Any:
-        grid = grid_of(tri, rast, pos.shape[1])
-        return tensors.smooth_vjp(grid, rule, outline_of(grid, pos), pos, rast, color, g)
-
-    g_color, g_pos = call(run, like(color, pos), *kept, g)
-    return g_color, jnp.zeros_like(rast), g_pos, no_gradient(tri)
-
-
-smooth.defvjp(smooth_forward, smooth_backward)
+SMOOTH = Operation(lambda _, color, *__: (shape_of(color.dtype, *color.shape),), smooth, smooth_vjp)
 
 
 def render(pos: Array, tri: Array, attr: Array, resolution: Sequence[int], *, edges: EdgesOption = "area") -> Array:
@@ -428,7 +408,7 @@ def render(pos: Array, tri: Array, attr: Array, resolution: Sequence[int], *, ed
     check("pos", pos, "(B, V, 4)", pos.ndim == 3 and pos.shape[2] == 4)
     rows, size = table_of(attr, len(pos)), as_pair("resolution", resolution)
     dtype = jnp.result_type(pos, rows)
-    return drawn((size, as_rule(edges)), pos.astype(dtype), tri, rows.astype(dtype))
+    return operate(DRAWN, (size, as_rule(edges)), pos.astype(dtype), tri, rows.astype(dtype))[0]
 
 
 #: Height and width, and the rule of edges.
@@ -441,32 +421,23 @@ def pictures_of(drawing: Drawing, pos: Any, tri: Any, attr: Any, ids: Any) -> At
     return AttributePictures(grid, drawing[1], outline_of(grid, pos), pos, ids, attr)
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
-def drawn(drawing: Drawing, pos: Array, tri: Array, attr: Array) -> Any:
-    """Return pictures of attributes with smooth silhouettes."""
-    return drawn_forward(drawing, pos, tri, attr)[0]
-
-
-def drawn_forward(drawing: Drawing, pos: Array, tri: Array, attr: Array) -> Any:
-    """Return the same, and what backward takes: the ids of pixels among it."""
+def drawn_shapes(drawing: Drawing, pos: Any, tri: Any, attr: Any) -> tuple[Any, Any]:  # noqa: ARG001
+    """Return the shapes of pictures, and of the ids of their pixels."""
     of_pixels = len(pos), *drawing[0]
-
-    def run(pos: Any, tri: Any, attr: Any) -> Any:
-        ids = np.concatenate(
-            [np.empty((0, *drawing[0]), np.int32), *(one[None] for one in ids_of(drawing[0], pos, tri))]
-        )
-        return pictures_of(drawing, pos, tri, attr, ids).picture()[0], ids
-
-    shapes = shape_of(pos.dtype, *of_pixels, attr.shape[2]), shape_of(np.int32, *of_pixels)
-    out, ids = call(run, shapes, pos, tri, attr)
-    return out, (pos, tri, attr, ids)
+    return shape_of(pos.dtype, *of_pixels, attr.shape[2]), shape_of(np.int32, *of_pixels)
 
 
-def drawn_backward(drawing: Drawing, kept: Any, g: Array) -> Any:
-    """Return the gradients of what `drawn` takes."""
-    pos, tri, attr, _ = kept
-    g_pos, g_attr = call(lambda *given: pictures_of(drawing, *given[:4]).vjp(given[4]), like(pos, attr), *kept, g)
-    return g_pos, no_gradient(tri), g_attr
+def drawn(drawing: Drawing, pos: Any, tri: Any, attr: Any) -> tuple[Any, Any]:
+    """Return pictures of attributes with smooth silhouettes, and the ids of their pixels."""
+    ids = np.empty((len(pos), *drawing[0]), np.int32)
+    for own, one in zip(ids, ids_of(drawing[0], pos, tri), strict=True):
+        own[...] = one
+    return pictures_of(drawing, pos, tri, attr, ids).picture()[0], ids
 
 
-drawn.defvjp(drawn_forward, drawn_backward)
+def drawn_vjp(drawing: Drawing, pos: Any, tri: Any, attr: Any, ids: Any, g: Any) -> tuple[Any, Any]:
+    """Return the gradients of the vertices and of the attributes."""
+    return pictures_of(drawing, pos, tri, attr, ids).vjp(g)
+
+
+DRAWN = Operation(drawn_shapes, drawn, drawn_vjp, kept=(1,))

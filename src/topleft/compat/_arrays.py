@@ -81,14 +81,8 @@ def srgb_bytes(light: Any) -> npt.NDArray[np.uint8]:
 def over(picture: U8, table: bytes, background: Any) -> U8:
     """A picture (H, W, 4) with other numbers for its colours, laid over a background as they stand.
 
-    Parameters
-    ----------
-    picture : (H, W, 4) uint8
-        Drawn over nothing: its alpha is the share that is covered.
-    table : bytes
-        The new number of each of 256.
-    background : (4,) or (H, W, 4) uint8
-        Its alpha counts as that of a colour: what is drawn is laid over it.
+    The alpha of the picture (H, W, 4) is the share that is covered; `table` has the new number of each of 256; the
+    alpha of the background, (4,) or (H, W, 4), counts as that of a colour: what is drawn is laid over it.
     """
     alpha = picture[..., 3]
     found = np.frombuffer(bytearray(np.ascontiguousarray(picture)).translate(table), np.uint8).reshape(picture.shape)
@@ -126,19 +120,8 @@ def detached(values: Any) -> npt.NDArray[Any]:
 def interpolated(values: Any, corners: npt.NDArray[Any], weights: Any, seen: npt.NDArray[np.intp]) -> Any:
     """Values of vertices at the pixels that show a face, 0 at others; of tensors with gradients.
 
-    Parameters
-    ----------
-    values : (V, C) tensor or array
-    corners : (N, 3) integers
-        The vertices of what each pixel shows that shows something.
-    weights : (P, 3) tensor or array
-        Of all pixels.
-    seen : (N,) intp
-        Which pixels show something.
-
-    Returns
-    -------
-    (P, C) tensor or array
+    `values`: (V, C); `corners`: (N, 3), the vertices of what each pixel shows that shows something; `weights`: (P, 3)
+    of all pixels; `seen`: (N,), which of them show something. Returns (P, C).
     """
     of = library_of(weights)
     rows, names = of.asarray(seen), of.asarray(corners.astype(np.int64))

@@ -263,16 +263,8 @@ class Model:
     ) -> npt.NDArray[np.uint8]:
         """The colours of some pixels, (N, 3).
 
-        Parameters
-        ----------
-        frags : Fragments
-        seen : (N,) intp
-            Which pixels, row by row.
-        light, eye : (3,)
-            Places, in the space of the object.
-        ambient : float
-        shading : str
-            "flat": with the normals of the triangles, turned to the eye.
+        `seen` names them, row by row; `light` and `eye` lie in the space of the object; shading "flat" is with the
+        normals of the triangles, turned to the eye.
         """
         values = frags.interpolate(self.per_vertex).reshape(-1, 9)[seen].T.copy()
         normal: Floats = values[3:6]

@@ -29,11 +29,6 @@ def header(is_big: bool) -> bytes:
     return struct.pack("<2sHHHQ", b"II", 43, 8, 0, 16) if is_big else struct.pack("<2sHI", b"II", 42, 8)
 
 
-def value_bytes(letter: str, values: Any) -> bytes:
-    """The numbers of a tag."""
-    return bytes(values) if letter == "s" else np.asarray(values).astype(f"<{NUMPY[letter]}").tobytes()
-
-
 def directory_bytes(tags: Tags, is_big: bool) -> int:
     """How many bytes a directory takes, with the values that do not fit into it."""
     entry, inline, ends = (20, 8, 16) if is_big else (12, 4, 6)
@@ -49,7 +44,7 @@ def directory(tags: Tags, at: int, following: int, is_big: bool) -> bytes:
     entries, outside = [], []
     outside_at = at + len(head) + entry * len(tags) + len(tail)
     for number, (letter, values) in tags.items():
-        content = value_bytes(letter, values)
+        content = bytes(values) if letter == "s" else np.asarray(values).astype(f"<{NUMPY[letter]}").tobytes()
         field = content.ljust(inline, b"\0")
         if len(content) > inline:
             field = struct.pack("<Q" if is_big else "<I", outside_at)

@@ -86,33 +86,3 @@ cdef class UnsnappedPoints:
         c.n_turns += counts.n_turns
         c.n_expansions += counts.n_expansions
         c.n_integers += counts.n_integers
-
-    cdef guess_seen(self, int64_t x_px, int64_t y_px, int64_t width, int64_t height):
-        """Return the same as `SnappedMesh.guess_seen`."""
-        cdef int64_t n = min(self.points.n_triangles, 128), i, n_seen = 0, last = self.points.n_points - 1
-        cdef const int32_t *given
-        cdef int32_t t[3]
-        cdef const double *a
-        cdef const double *b
-        cdef const double *c
-        cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, cols, rows, each
-        for i in range(n):
-            given = self.points.triangles + 3 * (i * self.points.n_triangles // n)
-            t[0], t[1], t[2] = given[0], given[1], given[2]
-            if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
-                return 0.0, 0.0, 0.0  # an error that draw finds
-            a = self.points.points + <int64_t>t[0] * self.points.stride
-            b = self.points.points + <int64_t>t[1] * self.points.stride
-            c = self.points.points + <int64_t>t[2] * self.points.stride
-            cols = min(max(a[0], b[0], c[0]), <double>(x_px + width)) - max(min(a[0], b[0], c[0]), <double>x_px)
-            rows = min(max(a[1], b[1], c[1]), <double>(y_px + height)) - max(min(a[1], b[1], c[1]), <double>y_px)
-            if not (cols > 0 and rows > 0):
-                continue
-            n_seen += 1
-            n_rows += rows
-            area = 0.5 * abs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-            total += area if area < cols * rows else cols * rows
-        if not n or not n_pixels:
-            return 0.0, 0.0, 0.0
-        each = self.points.n_triangles / <double>n
-        return n_seen * each, total * each / n_pixels, n_rows * each

@@ -8,13 +8,6 @@ cdef inline tl_slice no_slice() noexcept nogil:
     return slice
 
 
-cdef inline tl_exact_counts no_counts() noexcept nogil:
-    """Nothing that was decided."""
-    cdef tl_exact_counts counts
-    memset(&counts, 0, sizeof(counts))
-    return counts
-
-
 cdef class SnappedMesh:
     """Snapped vertices and triangles, ready to be drawn or resolved; keeps its arrays alive."""
 
@@ -109,7 +102,7 @@ cdef class SnappedMesh:
             return self
         inv_w = empty((max(1, self.snapped.mesh.n_vertices),), np.float64)
         with nogil:
-            K.inverse_w(source, 0, self.snapped.mesh.n_vertices, &inv_w[0])
+            K.inverse_ws(source, 0, self.snapped.mesh.n_vertices, &inv_w[0])
         other = self.copy()
         other.snapped.mesh.inv_w = &inv_w[0]
         other.arrays = (self.arrays, inv_w)
@@ -142,41 +135,46 @@ cdef class SnappedMesh:
         From the boxes and areas of up to 128 of them; one with a vertex that is wide or outside of a clip plane counts as
         if it covered the picture.
         """
-        if self.exact is not None:
-            return self.exact.guess_seen(self.x_px, self.y_px, width, height)
         cdef const tl_vertex *v = self.snapped.mesh.vertices
-        cdef const tl_vertex *a
-        cdef const tl_vertex *b
-        cdef const tl_vertex *c
-        cdef int64_t n = min(self.snapped.n_triangles, 128), i, n_seen = 0, last = self.snapped.mesh.n_vertices - 1
+        cdef const int32_t *t = self.snapped.triangles
         cdef const int32_t *given
-        cdef int32_t t[3]
-        cdef double unit = 2.0**self.subpixel_bits, area, total = 0, n_rows = 0, n_pixels = <double>width * height
-        cdef double left = self.x_px * unit, top = self.y_px * unit, cols, rows, each
-        cdef double right = (self.x_px + width) * unit, bottom = (self.y_px + height) * unit
+        cdef const double *points = NULL
+        cdef int64_t n_triangles = self.snapped.n_triangles, last = self.snapped.mesh.n_vertices - 1, n, i, k, n_seen = 0, stride = 0
+        cdef double left = self.x_px, top = self.y_px, right = left + width, bottom = top + height, cols, rows
+        cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, each, unit = 2.0**-self.subpixel_bits
+        cdef double x[3]
+        cdef double y[3]
+        cdef bint is_wide
+        cdef int32_t at
+        if self.exact is not None:
+            t, n_triangles, last = self.exact.points.triangles, self.exact.points.n_triangles, self.exact.points.n_points - 1
+            points, stride = self.exact.points.points, self.exact.points.stride
+        n = min(n_triangles, 128)
         for i in range(n):
-            given = self.snapped.triangles + 3 * (i * self.snapped.n_triangles // n)
-            t[0], t[1], t[2] = given[0], given[1], given[2]
-            if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
-                return 0.0, 0.0, 0.0  # an error that draw finds
-            a, b, c = &v[t[0]], &v[t[1]], &v[t[2]]
-            cols = min(<double>max(a.x_fx, b.x_fx, c.x_fx), right) - max(<double>min(a.x_fx, b.x_fx, c.x_fx), left)
-            rows = min(<double>max(a.y_fx, b.y_fx, c.y_fx), bottom) - max(<double>min(a.y_fx, b.y_fx, c.y_fx), top)
-            if a.x_fx == TL_SPECIAL or b.x_fx == TL_SPECIAL or c.x_fx == TL_SPECIAL:
+            given, is_wide = t + 3 * (i * n_triangles // n), False
+            for k in range(3):
+                at = given[k]  # read once: another thread may write it
+                if not 0 <= at <= last:
+                    return 0.0, 0.0, 0.0  # an error that draw finds
+                if points != NULL:
+                    x[k], y[k] = points[at * stride], points[at * stride + 1]
+                else:
+                    x[k], y[k] = v[at].x_fx * unit, v[at].y_fx * unit
+                    is_wide = is_wide or v[at].x_fx == TL_SPECIAL
+            cols = min(max(x[0], x[1], x[2]), right) - max(min(x[0], x[1], x[2]), left)
+            rows = min(max(y[0], y[1], y[2]), bottom) - max(min(y[0], y[1], y[2]), top)
+            if is_wide:
                 n_seen += 1
                 total += n_pixels
                 n_rows += height
-                continue
-            if cols <= 0 or rows <= 0:
-                continue
-            n_seen += 1
-            n_rows += rows / unit
-            area = (<double>b.x_fx - a.x_fx) * (<double>c.y_fx - a.y_fx)
-            area -= (<double>b.y_fx - a.y_fx) * (<double>c.x_fx - a.x_fx)
-            total += min(0.5 * abs(area), cols * rows) / (unit * unit)
+            elif cols > 0 and rows > 0:
+                n_seen += 1
+                n_rows += rows
+                area = 0.5 * abs((x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0]))
+                total += area if area < cols * rows else cols * rows
         if not n or not n_pixels:
             return 0.0, 0.0, 0.0
-        each = self.snapped.n_triangles / <double>n
+        each = n_triangles / <double>n
         return n_seen * each, total * each / n_pixels, n_rows * each
 
     def guess_scatter(self, int64_t n_rows) -> float:
@@ -230,18 +228,22 @@ cdef class SnappedMesh:
 
         Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
         """
+        cdef tl_slice slice = no_slice()
+        slice.end, slice.is_first, slice.is_last = self.snapped.n_triangles, is_first, is_last
+        return self.draw_rows(target, first_row, n_rows, &slice)
+
+    cdef int64_t draw_rows(self, Target target, int64_t first_row, int64_t n_rows, tl_slice *slice) except? -2:
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
-        cdef tl_slice slice = no_slice()
-        cdef tl_exact_counts counts = no_counts()
+        cdef tl_exact_counts counts
         cdef int64_t bad_row
-        slice.first, slice.end, slice.is_first, slice.is_last = 0, self.snapped.n_triangles, is_first, is_last
+        memset(&counts, 0, sizeof(counts))
         slice.counts = &counts
         if n_rows == target.height and (n_rows * target.width + 64) * self.snapped.n_triangles < HELD_DRAWN_PX:
-            bad_row = K.draw(&self.snapped, &window, &rows, &slice)
+            bad_row = K.draw_mesh(&self.snapped, &window, &rows, slice)
         else:
             with nogil:
-                bad_row = K.draw(&self.snapped, &window, &rows, &slice)
+                bad_row = K.draw_mesh(&self.snapped, &window, &rows, slice)
         self.note(&counts)
         raise_if_given_up()
         return bad_row
@@ -252,31 +254,19 @@ cdef class SnappedMesh:
 
         Triangles that reach other rows are listed in `outside`; returns the first bad row or -1, and their number.
         """
-        cdef tl_target rows = target.rows(first_row)
-        cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
+        cdef tl_window picture = self.window(0, target.height, target.width)
         cdef tl_slice slice = no_slice()
-        cdef tl_exact_counts counts = no_counts()
         cdef int64_t bad_row
-        slice.outside, slice.picture, slice.counts = &outside[0], &picture, &counts
-        slice.first, slice.end, slice.is_first, slice.is_last = first, first + outside.shape[0] - 16, True, False
-        with nogil:
-            bad_row = K.draw(&self.snapped, &window, &rows, &slice)
-        self.note(&counts)
-        raise_if_given_up()
+        slice.outside, slice.picture = &outside[0], &picture
+        slice.first, slice.end, slice.is_first = first, first + outside.shape[0] - 16, True
+        bad_row = self.draw_rows(target, first_row, n_rows, &slice)
         return bad_row, slice.n_outside
 
     def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
         """Draw the listed triangles over the rows."""
-        cdef tl_target rows = target.rows(first_row)
-        cdef tl_window window = self.window(first_row, n_rows, target.width)
         cdef tl_slice slice = no_slice()
-        cdef tl_exact_counts counts = no_counts()
-        slice.ids, slice.counts = &ids[0] if ids.shape[0] else NULL, &counts
-        slice.first, slice.end, slice.is_first, slice.is_last = 0, ids.shape[0], False, is_last
-        with nogil:
-            K.draw(&self.snapped, &window, &rows, &slice)
-        self.note(&counts)
-        raise_if_given_up()
+        slice.ids, slice.end, slice.is_last = &ids[0] if ids.shape[0] else NULL, ids.shape[0], is_last
+        self.draw_rows(target, first_row, n_rows, &slice)
 
     def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide,
                   bint is_clamped, Bins bins=None) -> int:
@@ -478,7 +468,7 @@ def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t
             window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
             if room is None:
                 with nogil:
-                    K.draw(&mesh.snapped, &window, &rows, &slice)
+                    K.draw_mesh(&mesh.snapped, &window, &rows, &slice)
                 continue
             laid.col0, laid.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
             laid.n_rows, laid.stride = window.height, (laid.n_cols + 15) & ~<int64_t>15
@@ -488,7 +478,7 @@ def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t
             farthest = -INFINITY if rows.sink == TL_SINK_FARTHEST else INFINITY
             with nogil:
                 if laid.n_cols:
-                    K.draw(&mesh.snapped, &window, &near, &slice)
+                    K.draw_mesh(&mesh.snapped, &window, &near, &slice)
                 laid.drawn, laid.blank = &room[0, 0], 0 if rows.sink == TL_SINK_COUNT else -1
                 K.lay_rows(&laid, <int32_t *>rows.pixels, target.width)
                 if rows.depth != NULL:
@@ -563,12 +553,12 @@ def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1
         found.col0, found.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
         found.stride = other.stride_px = (found.n_cols + 15) & ~<int64_t>15
         with nogil:
-            K.draw(&seen[0], &window, &rows, &slice)
+            K.draw_mesh(&seen[0], &window, &rows, &slice)
             window.x_px += found.col0
             window.width = found.n_cols
             for k in range(1, n_samples if found.n_cols else 0):
                 other.pixels, other.depth = &ids[k - 1, 0], &depth[k - 1, 0]
-                K.draw(&seen[k], &window, &other, &slice)
+                K.draw_mesh(&seen[k], &window, &other, &slice)
             at = K.split_pixels(&found, &split.split, at)
         raise_if_given_up()
 
@@ -605,7 +595,7 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
             slice.is_first, slice.is_last = is_first and i == 0, i == n - 1
             window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
             with nogil:
-                bad_row = K.draw(&mesh.snapped, &window, &target, &slice)
+                bad_row = K.draw_mesh(&mesh.snapped, &window, &target, &slice)
             raise_if_given_up()
             if bad_row >= 0:
                 return bad_row

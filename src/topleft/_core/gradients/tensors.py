@@ -441,16 +441,20 @@ def find_halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
     Column i is the edge opposite to corner i. Of three or more triangles at an edge each looks at the next; there, and
     where two triangles are wound differently, it is -2 less that.
     """
-    ends = np.sort(np.stack([np.roll(tri, -1, 1), np.roll(tri, -2, 1)], -1).reshape(-1, 2).astype(np.int64), axis=1)
-    key = ends[:, 0] << 32 | ends[:, 1]
+    start, end = tri[:, [1, 2, 0]].ravel(), tri[:, [2, 0, 1]].ravel()
+    key = np.minimum(start, end).astype(np.int64) << 32 | np.maximum(start, end)
     order = np.argsort(key, kind="stable")
-    sorted_key = key[order]
-    starts = np.flatnonzero(np.concatenate([[True], sorted_key[1:] != sorted_key[:-1]])) if len(key) else key
-    sizes = np.diff(np.append(starts, len(key)))
-    following = np.arange(1, len(key) + 1)
-    following[starts + sizes - 1] = np.where(sizes > 1, starts, -1)
-    first = np.roll(tri, -1, 1).reshape(-1)[order]
-    is_odd = (np.repeat(sizes, sizes) > 2) | (first == first[following])
+    starts = start[order]
+    is_last = np.ones(len(key), np.bool_)  # of the half-edges at an edge
+    is_last[:-1] = np.diff(key[order]) != 0
+    is_first = np.roll(is_last, 1)
+    following = np.roll(order, -1)
+    following[is_last] = order[is_first]
+    is_odd = starts == start[following]
+    if (is_middle := ~(is_first | is_last)).any():
+        edge = np.cumsum(is_first) - 1
+        is_odd |= np.bincount(edge[is_middle], minlength=len(key))[edge] > 0
     found = np.empty(len(key), np.int32)
-    found[order] = np.where(following < 0, -1, np.where(is_odd, -2 - order[following], order[following]))
+    found[order] = np.where(is_odd, -2 - following, following)
+    found[order[is_first & is_last]] = -1
     return found.reshape(tri.shape)

@@ -49,29 +49,10 @@ class Deflate(Protocol):
 def encode(image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None, compressor: str = "auto") -> bytes:
     r"""Return the bytes of a PNG file.
 
-    Parameters
-    ----------
-    image : (H, W), (H, W, 2), (H, W, 3) or (H, W, 4) uint8, or (H, W) uint16
-        Grey, grey and alpha, RGB, RGBA; 16-bit grey. Any layout.
-    text : mapping of str to str, optional
-        Notes to go with it: keywords of 1 to 79 characters, and their text, in Latin-1.
-    compressor : {"auto", "isal", "zlib"}
-        "auto" takes `isal` where it is installed. The pixels are the same; the bytes of the file are not.
+    `image`: (H, W), (H, W, 2), (H, W, 3) or (H, W, 4) uint8, grey to RGBA, or (H, W) uint16, of any layout; `text`:
+    keywords of 1 to 79 characters, and notes in Latin-1. The `compressor` "auto" takes `isal` where it is installed:
+    1.4 ms for 512 x 512 pixels RGBA and not 6, of the same pixels and other bytes. Every row is filtered by "up".
 
-    Returns
-    -------
-    bytes
-        Every row is filtered by "up"; about 1.4 ms (isal) or 6 ms (zlib) for 512 x 512 pixels RGBA.
-
-    Raises
-    ------
-    ImageError
-        If PNG cannot hold the array or the text.
-    ValueError
-        If there is no such compressor.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> encode(np.zeros((2, 2), np.uint8))[:8]
     b'\x89PNG\r\n\x1a\n'
@@ -82,11 +63,7 @@ def encode(image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None, co
 def pieces(
     image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None, compressor: str = "auto"
 ) -> Iterator[bytes]:
-    """Yield the bytes of a PNG file piece by piece, so that a large picture is not copied as a whole.
-
-    Parameters, errors
-        As in `encode`.
-    """
+    """Yield the bytes of `encode` piece by piece, so that a large picture is not copied as a whole."""
     image = np.asarray(image)
     kinds = COLOR_TYPES if image.dtype == np.uint8 else {(): 0} if image.dtype == np.uint16 else {}
     if image.ndim < 2 or image.shape[2:] not in kinds:

@@ -55,26 +55,9 @@ def creased_normals(
 ) -> tuple[F64, CornerNormals | None]:
     """Normals of vertices, and of corners where edges bend by more than an angle.
 
-    Parameters
-    ----------
-    vertices : (V, 3) float
-    triangles : (T, 3) int32, counter-clockwise seen from outside
-    crease_deg : float
-        Degrees, 0 to 180.
-    places : (first, group), optional
-        The result of `coincident` for the vertices: those of a group count as one. Unless given all are distinct.
-    threads : int, optional
-        Never changes a bit.
+    `places`: the result of `coincident` for the vertices, of which those of a group count as one. Returns the normals
+    (V, 3) over all triangles at each vertex, and those of corners, None where no vertex has different ones.
 
-    Returns
-    -------
-    of_vertices : (V, 3) float64
-        Over all triangles at the vertex, as `angle_weighted_normals`.
-    of_corners : CornerNormals or None
-        None where no vertex has corners with different normals.
-
-    Notes
-    -----
     Two corners of a vertex belong together when their triangles share a side at that vertex and the angle between their
     normals is at most the crease angle, or 1/16 degree more; so do corners that a chain of such pairs joins. A corner's
     normal is that of `angle_weighted_normals`, over the corners that belong together. Sides are told by their vertices,
@@ -120,33 +103,11 @@ def creased_normals(
 def angle_weighted_normals(vertices: FloatArray, triangles: I32, *, threads: int | None = None) -> F64:
     """Unit normals (V, 3) float64 of a mesh: the faces round a vertex count by the angle they have there.
 
-    Parameters
-    ----------
-    vertices : (V, 3) float
-    triangles : (T, 3) int32, counter-clockwise seen from outside
-    threads : int, optional
-        Never changes a bit.
-
-    Returns
-    -------
-    (V, 3) float64
-        (0, 0, 0) where no face with an area meets the vertex, or where the faces cancel.
-
-    Raises
-    ------
-    IndexError
-        If a triangle names a vertex that does not exist.
-
-    Notes
-    -----
-    The weight makes the normal independent of how a flat face is cut into triangles, which weights of one a
-    triangle, or of its area, do not. Angles are within 2**-50 of their value, relative, where the sides are exact in
-    float64; sums are in the order of the faces. Any scale will do: sides are measured by their longest.
-
-    References
-    ----------
-    G. Thurmer and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics Tools 3(1),
-    1998.
+    (0, 0, 0) where no face with an area meets the vertex, or where the faces cancel. The weight makes the normal
+    independent of how a flat face is cut into triangles, which weights of one a triangle, or of its area, do not
+    (G. Thurmer and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics Tools 3(1),
+    1998). Angles are within 2**-50 of their value, relative, where the sides are exact in float64; sums are in the
+    order of the faces. Any scale will do: sides are measured by their longest.
     """
     points, corners = _contiguous(vertices), as_frozen(np.ascontiguousarray(triangles, np.int32))
     source, out = engine.Source(points), np.empty((len(points), 3))

@@ -225,10 +225,6 @@ class WindowedRaster:
         x, y = column * w, row * h
         return (x, y), (min(w, width - x), min(h, height - y))
 
-    def n_triangles_of(self, row: int, column: int) -> int:
-        """How many triangles may touch a window."""
-        return int(self.index.counts[row, column])
-
     def draw_window(self, row: int, column: int, *, threads: int | None = None, out: Array | None = None) -> Array:
         """Return the pixels of a window, in a fresh array or in `out`."""
         origin, size = self.place(row, column)
@@ -262,7 +258,7 @@ class WindowedRaster:
             memory = spare.pop() if reuse else None
             out = None if memory is None else memory[: width * height].reshape(height, width, *shape[1:])
             pixels = self.draw_window(row, column, threads=own_threads, out=out)
-            return Window(row, column, x, y, pixels, self.n_triangles_of(row, column)), memory
+            return Window(row, column, x, y, pixels, int(self.index.counts[row, column])), memory
 
         self.index  # noqa: B018  (made once, here, on all threads)
         places = itertools.product(range(self.tiling.n_rows), range(self.tiling.n_columns))
