@@ -551,7 +551,14 @@ typedef struct {
 #include "grad.h"
 #include "polygons.h"
 #include "shading.h"
+
+/* The table of an instruction set: the kernels of kernels.h. */
+typedef struct tl_kernels {
+    const char *isa;
+#define TL_KERNEL(result, name, ...) result (*name)(__VA_ARGS__);
 #include "kernels.h"
+} tl_kernels;
+
 #include "meshlets.h"
 
 #endif

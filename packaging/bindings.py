@@ -3,8 +3,8 @@
 contract.pxi   the types, constants and functions of the headers in csrc, as Cython declares them
 kernels.pyi    the types of the compiled module, from the signatures in `kernels.pyx` and what it includes
 
-Headers may hold structs and enums with a `typedef`, enums without a name, functions, and macros that are numbers;
-anything else is an error. A signature of Cython says all that a stub does: `-> int` what comes back, else None;
+Headers may hold structs and enums with a `typedef`, enums without a name, functions, kernels (`TL_KERNEL`), and macros
+that are numbers; all else is an error. A signature of Cython says all that a stub does: `-> int` what comes back;
 `: Array` the type of a Python object; `or None` that an argument may be None; `#: Array` that of an attribute.
 """
 
@@ -66,6 +66,7 @@ def contract() -> str:
     while n_bodies:  # the innermost first
         text, n_bodies = re.subn(r"\) ?\{[^{}]*\}", ");", text)
     text = re.sub(r"(?<!typedef )\bstruct (?=\w+ \*)", "", text)
+    text = re.sub(r"TL_KERNEL\(([^,]+), (\w+), ([^()]*)\)", r"\1(*\2)(\3);", text)
     structs = []
     for found in DECLARATION.finditer(text):
         if found["members"]:

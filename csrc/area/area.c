@@ -178,40 +178,25 @@ TL_INLINE void push_edges(area_state *s, const lane_corners *c, vm drawn, vm tur
 TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm live)
 {
     const area_plane *p = &s->plane;
-    const vi max_extent = vi_set1(s->max_extent);
     if (has_bad_index(corners, vi_set1((int32_t)(s->snapped->mesh.n_vertices - 1)))) {
         s->bad_row = i;
         return;
     }
     lane_corners c;
-    const tl_vertex *vertices = s->snapped->mesh.vertices;
-    for (int k = 0; k < 3; k++)
-        load_vertices(vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
-    const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
-    const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
-    /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
-    vm single =
-        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
-    single = vm_and(live, vm_or(single, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    load_in_order(s->snapped, corners, &c);
+    const lane_extents e = extents_of(&c);
+    const vm single = vm_and(live, is_single(&e, vi_set1(s->max_extent), TL_SPECIAL));
     for (unsigned lanes = vm_bits(single); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
         push_alone(s, slice_id(s->slice, i + __builtin_ctz(lanes)));
-    const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
+    const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), e.y_min), vi_gt(e.y_max, vi_set1(p->top_fx)));
     /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing
      * there */
-    const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), x_min), vi_gt(x_max, vi_set1(p->left_fx)));
+    const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), e.x_min), vi_gt(e.x_max, vi_set1(p->left_fx)));
     vm drawn = vm_and(vm_and_not(live, single), vm_and(meets_rows, meets_cols));
     if (!vm_any(drawn))
         return;
-    /* twice the area: differences of at most 2^25, so every step is exact in float64 */
-    const vd x1 = vd_from_vi(vi_sub(c.x[1], c.x[0])), y1 = vd_from_vi(vi_sub(c.y[1], c.y[0]));
-    const vd x2 = vd_from_vi(vi_sub(c.x[2], c.x[0])), y2 = vd_from_vi(vi_sub(c.y[2], c.y[0]));
-    const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
-    const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
-    const tl_cull cull = s->snapped->cull;
-    const vm either = cull == TL_CULL_BACK    ? is_negative
-                      : cull == TL_CULL_FRONT ? is_positive
-                                              : vm_or(is_positive, is_negative);
-    drawn = vm_and(drawn, either);
+    vm is_negative;
+    drawn = vm_and(drawn, find_unculled(&c, s->snapped->cull, &is_negative));
     if (vm_any(drawn))
         push_edges(s, &c, drawn, is_negative);
 }

@@ -111,18 +111,15 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
         return;
     }
     lane_corners c;
-    for (int k = 0; k < 3; k++)
-        load_vertices(snapped->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
-    const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
-    const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
-    const vi col = vi_shift_right(x_min, bits), row = vi_shift_right(y_min, bits);
-    const vi last_col = vi_shift_right(x_max, bits), last_row = vi_shift_right(y_max, bits);
+    load_in_order(snapped, corners, &c);
+    const lane_extents e = extents_of(&c);
+    const vi col = vi_shift_right(e.x_min, bits), row = vi_shift_right(e.y_min, bits);
+    const vi last_col = vi_shift_right(e.x_max, bits), last_row = vi_shift_right(e.y_max, bits);
     const vi n_cols = vi_sub(last_col, col), n_rows = vi_sub(last_row, row); /* less one */
-    /* the cell right of the last column holds the rest of its area.  A special vertex has x = INT32_MIN. */
-    vm single =
-        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    /* the cell right of the last column holds the rest of its area */
+    vm single = is_too_large(&e, max_extent);
     single = vm_or(single, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));
-    const vm is_special = vi_eq(x_min, vi_set1(TL_SPECIAL));
+    const vm is_special = vi_eq(e.x_min, vi_set1(TL_SPECIAL));
     const vi right = vi_set1((int32_t)min64(window->x_px + window->width, INT32_MAX));
     const vi bottom = vi_set1((int32_t)min64(window->y_px + window->height, INT32_MAX));
     const vm meets_cols = vm_and(vi_gt(right, col), vi_gt(last_col, vi_set1((int32_t)window->x_px - 1)));
@@ -132,15 +129,8 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     single = vm_and(live, vm_or(is_special, vm_and(single, meets)));
     if (!vm_any(vm_or(drawn, single)))
         return;
-    /* twice the area: differences below 2^21, so every step is exact in float64 */
-    const vd x1 = vd_from_vi(vi_sub(c.x[1], c.x[0])), y1 = vd_from_vi(vi_sub(c.y[1], c.y[0]));
-    const vd x2 = vd_from_vi(vi_sub(c.x[2], c.x[0])), y2 = vd_from_vi(vi_sub(c.y[2], c.y[0]));
-    const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
-    const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
-    const tl_cull cull = snapped->cull;
-    drawn = vm_and(drawn, cull == TL_CULL_BACK    ? is_negative
-                          : cull == TL_CULL_FRONT ? is_positive
-                                                  : vm_or(is_positive, is_negative));
+    vm is_negative;
+    drawn = vm_and(drawn, find_unculled(&c, snapped->cull, &is_negative));
     const vi rows = vi_add(n_rows, vi_set1(1));
     for (unsigned lanes = vm_bits(single); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);

@@ -299,6 +299,20 @@ static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, co
     }
 }
 
+/* Whether a cluster in its box cannot show, and why: TL_VISIBILITY_OUTSIDE or CULLED, else FRONT.  `within` is that of
+ * what holds it. */
+TL_INLINE tl_visibility visibility_of(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box,
+                                      unsigned within)
+{
+    if (is_outside(box, v, &within))
+        return TL_VISIBILITY_OUTSIDE;
+    if ((within & TL_IN_DEPTH) != TL_IN_DEPTH)
+        return TL_VISIBILITY_FRONT;
+    return is_between_samples(box, v)                             ? TL_VISIBILITY_OUTSIDE
+           : v->cull != TL_CULL_NONE && is_turned_away(c, v, box) ? TL_VISIBILITY_CULLED
+                                                                  : TL_VISIBILITY_FRONT;
+}
+
 /* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a
  * target of depths, without groups of them that it hides.  `room` has 8 bytes for each cluster.  Returns how
  * many. */
@@ -319,11 +333,7 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
         for (int64_t i = first; i < end; i++) {
             const tl_cluster *c = mesh->clusters + i;
             const seen_box own = place_box(c->low, c->high, v->matrix);
-            unsigned within = within_group;
-            if (is_outside(&own, v, &within))
-                continue;
-            if ((within & TL_IN_DEPTH) == TL_IN_DEPTH &&
-                (is_between_samples(&own, v) || (v->cull != TL_CULL_NONE && is_turned_away(c, v, &own))))
+            if (visibility_of(c, v, &own, within_group) != TL_VISIBILITY_FRONT)
                 continue;
             const int32_t number = (int32_t)i;
             found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number,
@@ -342,13 +352,9 @@ static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, 
     for (int64_t i = 0; i < mesh->n_clusters; i += step) {
         const tl_cluster *c = mesh->clusters + i;
         const seen_box box = place_box(c->low, c->high, v->matrix);
-        unsigned within = 0;
-        if (is_outside(&box, v, &within) || ((within & TL_IN_DEPTH) == TL_IN_DEPTH && is_between_samples(&box, v)))
-            n_of[TL_VISIBILITY_OUTSIDE]++;
-        else if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &box))
-            n_of[TL_VISIBILITY_CULLED]++;
-        else
-            n_of[c->cone_cos > 0.0 && shows_back(c, v, &box) ? TL_VISIBILITY_BACK : TL_VISIBILITY_FRONT]++;
+        const tl_visibility seen = visibility_of(c, v, &box, 0);
+        const int is_back = seen == TL_VISIBILITY_FRONT && c->cone_cos > 0.0 && shows_back(c, v, &box);
+        n_of[is_back ? TL_VISIBILITY_BACK : seen]++;
     }
 }
 
@@ -362,10 +368,7 @@ static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, 
     for (int64_t i = 0; i < mesh->n_clusters; i += step) {
         const tl_cluster *c = mesh->clusters + i;
         const seen_box box = place_box(c->low, c->high, v->matrix);
-        unsigned within = 0;
-        if (is_outside(&box, v, &within) ||
-            ((within & TL_IN_DEPTH) == TL_IN_DEPTH &&
-             (is_between_samples(&box, v) || (v->cull != TL_CULL_NONE && is_turned_away(c, v, &box)))))
+        if (visibility_of(c, v, &box, 0) != TL_VISIBILITY_FRONT)
             continue;
         n++;
         *n_hidden += is_cluster_hidden(c, v, window, target);

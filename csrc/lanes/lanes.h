@@ -39,9 +39,9 @@
  *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8; the sign of 0 may be either
  *   vd_or(a, b)             the bits of both: 0 where both are
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
- *   vi_load_records(base, scale, i, c)    16 bytes at base + scale * i[k], as columns
+ *   vi_load_records(base, scale, i, c)    16 bytes at base + scale * i[k], as columns; i are unsigned
  *   vf_load_pairs(base, i, c)    8 bytes at base + 8 * i[k], as columns
- *   vi_load_rows(base, i, c)    16 bytes at base + 8 * i[k], as columns; i are unsigned
+ *   vi_load_rows(base, i, c)    the same at base + 8 * i[k]
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
  *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1
@@ -69,18 +69,42 @@
 #include "lanes/lanes_scalar.h"
 #endif
 
-/* Where memory cannot be masked, a masked load takes a branch a lane. */
-TL_INLINE vi vi_load_some(vm m, const int32_t *p, int has_room)
-{
-    return TL_LANES == 4 && has_room ? vi_load(p) : vi_load_masked(m, p);
-}
-TL_INLINE vf vf_load_some(vm m, const float *p, int has_room)
-{
-    return TL_LANES == 4 && has_room ? vf_load(p) : vf_load_masked(m, p);
-}
+/* Where memory cannot be masked, a masked load takes a branch a lane; and a masked store of AVX2 costs AMD's cores more
+ * than five times a load, a blend and a store. */
+#define TL_LOADS_WHOLE (TL_LANES == 4)
+#define TL_STORES_WHOLE (TL_LANES == 4 || TL_LANES == 8)
+#define TL_SOME(V, M, NUMBER)                                                    \
+    TL_INLINE V V##_load_some(M m, const NUMBER *p, int has_room)                \
+    {                                                                            \
+        return TL_LOADS_WHOLE && has_room ? V##_load(p) : V##_load_masked(m, p); \
+    }                                                                            \
+    TL_INLINE void V##_store_some(NUMBER *p, M m, V a, int has_room)             \
+    {                                                                            \
+        if (TL_STORES_WHOLE && has_room)                                         \
+            V##_store(p, V##_select(m, a, V##_load(p)));                         \
+        else                                                                     \
+            V##_store_masked(p, m, a);                                           \
+    }
+TL_SOME(vi, vm, int32_t)
+TL_SOME(vf, vm, float)
 #if TL_HALF_LANES
 TL_INLINE hi hi_load_some(hm m, const int32_t *p, int has_room) { return (void)has_room, hi_load_masked(m, p); }
 TL_INLINE hf hf_load_some(hm m, const float *p, int has_room) { return (void)has_room, hf_load_masked(m, p); }
+TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room) { (void)has_room, hi_store_masked(p, m, a); }
+TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room) { (void)has_room, hf_store_masked(p, m, a); }
+#endif
+
+TL_INLINE vi vi_low_half(vi a) { return vi_and(a, vi_set1(0xffff)); }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+{
+    load_vertices_by(3, v, first, x, y, z);
+}
+#if TL_LANES != 16
+TL_INLINE vd vd_off_256th(vd a)
+{
+    const vd shift = vd_set1(0x1.8p44); /* next to it are the multiples of 2^-8 */
+    return vd_sub(a, vd_sub(vd_add(a, shift), shift));
+}
 #endif
 
 /* Stores lanes that are then read one by one.  Compilers that see both take them out of the vector, one shuffle each,

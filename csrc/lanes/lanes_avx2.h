@@ -37,15 +37,6 @@ TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm256_blendv_epi8(b, a, m); }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm256_maskload_epi32(p, m); }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm256_maskstore_epi32(p, m, a); }
 
-/* a masked store costs AMD's cores more than five times a load, a blend and a store */
-TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
-{
-    if (has_room)
-        vi_store(p, vi_select(m, a, vi_load(p)));
-    else
-        vi_store_masked(p, m, a);
-}
-
 TL_INLINE vi vi_prefix_sum(vi a)
 {
     a = _mm256_add_epi32(a, _mm256_slli_si256(a, 4));
@@ -135,10 +126,6 @@ TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_
 TL_INLINE vi vi_floor(vf a) { return _mm256_cvtps_epi32(_mm256_floor_ps(a)); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm256_maskload_ps(p, m); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm256_maskstore_ps(p, m, a); }
-TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
-{
-    vi_store_some((int32_t *)p, m, _mm256_castps_si256(a), has_room);
-}
 TL_INLINE vm vf_lt(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
 TL_INLINE vm vf_ge(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_GE_OQ)); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_EQ_OQ)); }
@@ -157,15 +144,28 @@ TL_INLINE vd vd_abs(vd a)
     return (vd){_mm256_andnot_pd(sign, a.lo), _mm256_andnot_pd(sign, a.hi)};
 }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm256_floor_pd(a.lo), _mm256_floor_pd(a.hi)}; }
-TL_INLINE vi vi_low_bits(vd a)
+/* The even and the odd numbers of the 16 that two vectors hold; and back. */
+TL_INLINE vi evens_of(vd a)
 {
-    const __m256 lo = _mm256_castpd_ps(a.lo), hi = _mm256_castpd_ps(a.hi);
-    const __m256i packed = _mm256_castps_si256(_mm256_shuffle_ps(lo, hi, 0x88)); /* 0 1 4 5 2 3 6 7 */
-    return _mm256_permute4x64_epi64(packed, 0xd8);
+    const __m256 packed = _mm256_shuffle_ps(_mm256_castpd_ps(a.lo), _mm256_castpd_ps(a.hi), 0x88); /* 0 1 4 5 2 3 6 7 */
+    return _mm256_permute4x64_epi64(_mm256_castps_si256(packed), 0xd8);
+}
+TL_INLINE vi odds_of(vd a)
+{
+    const __m256 packed = _mm256_shuffle_ps(_mm256_castpd_ps(a.lo), _mm256_castpd_ps(a.hi), 0xdd);
+    return _mm256_permute4x64_epi64(_mm256_castps_si256(packed), 0xd8);
+}
+TL_INLINE wd front_pairs(wd a, wd b) { return _mm256_permute2f128_pd(a, b, 0x20); }
+TL_INLINE wd back_pairs(wd a, wd b) { return _mm256_permute2f128_pd(a, b, 0x31); }
+TL_INLINE vd interleave(vi even, vi odd)
+{
+    const wd a = _mm256_castsi256_pd(_mm256_unpacklo_epi32(even, odd));
+    const wd b = _mm256_castsi256_pd(_mm256_unpackhi_epi32(even, odd));
+    return (vd){front_pairs(a, b), back_pairs(a, b)};
 }
 TL_INLINE vm vd_ge(vd a, vd b)
 {
-    return vi_low_bits((vd){_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ), _mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ)});
+    return evens_of((vd){_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ), _mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ)});
 }
 TL_INLINE vd vd_from_vf(vf a)
 {
@@ -183,71 +183,32 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
 }
 TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
 
-/* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
 typedef struct {
-    __m256d even, odd;
+    wd even, odd;
 } vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
-TL_INLINE __m256i load_quarter(int step, const tl_vertex *v, const int32_t *first)
-{
-    const __m128i *a = (const __m128i *)v;
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])),
-                                   _mm_loadu_si128(a + first[4 * step]), 1);
-}
-TL_INLINE vd vd_from_vz(vz z)
-{
-    return (vd){_mm256_permute2f128_pd(z.even, z.odd, 0x20), _mm256_permute2f128_pd(z.even, z.odd, 0x31)};
-}
+TL_INLINE vd vd_from_vz(vz z) { return (vd){front_pairs(z.even, z.odd), back_pairs(z.even, z.odd)}; }
+TL_INLINE vi join_quarters(const __m128i *a) { return _mm256_inserti128_si256(_mm256_castsi128_si256(a[0]), a[1], 1); }
+TL_INLINE wd join_pairs(const __m128d *a) { return _mm256_insertf128_pd(_mm256_castpd128_pd256(a[0]), a[1], 1); }
 
-/* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
-TL_INLINE __m256 rows_f32(const float *p, int stride)
-{
-    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p)), _mm_loadu_ps(p + 4 * stride), 1);
-}
-TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
-{
-    const __m256 a = rows_f32(p, stride), b = rows_f32(p + stride, stride), c = rows_f32(p + 2 * stride, stride),
-                 d = rows_f32(p + 3 * stride, stride);
-    const __m256d ab = _mm256_castps_pd(_mm256_unpacklo_ps(a, b)), cd = _mm256_castps_pd(_mm256_unpacklo_ps(c, d));
-    const __m256d ab2 = _mm256_castps_pd(_mm256_unpackhi_ps(a, b)), cd2 = _mm256_castps_pd(_mm256_unpackhi_ps(c, d));
-    columns[0] = _mm256_castpd_ps(_mm256_unpacklo_pd(ab, cd));
-    columns[1] = _mm256_castpd_ps(_mm256_unpackhi_pd(ab, cd));
-    columns[2] = _mm256_castpd_ps(_mm256_unpacklo_pd(ab2, cd2));
-    columns[3] = _mm256_castpd_ps(_mm256_unpackhi_pd(ab2, cd2));
-}
-/* Turns four rows of four into columns, or back. */
-TL_INLINE void transpose_four(const __m256d *row, __m256d *c)
-{
-    const __m256d even[2] = {_mm256_unpacklo_pd(row[0], row[1]), _mm256_unpackhi_pd(row[0], row[1])};
-    const __m256d odd[2] = {_mm256_unpacklo_pd(row[2], row[3]), _mm256_unpackhi_pd(row[2], row[3])};
-    for (int k = 0; k < 2; k++) {
-        c[k] = _mm256_permute2f128_pd(even[k], odd[k], 0x20);
-        c[k + 2] = _mm256_permute2f128_pd(even[k], odd[k], 0x31);
-    }
-}
-TL_INLINE void half_columns_f64(const double *p, int stride, __m256d *columns)
-{
-    const __m256d rows[4] = {_mm256_loadu_pd(p), _mm256_loadu_pd(p + stride), _mm256_loadu_pd(p + 2 * stride),
-                             _mm256_loadu_pd(p + 3 * stride)};
-    transpose_four(rows, columns);
-}
+/* Four numbers of a row: other lanes hold two, TL_LANES / 4 rows apart; and back. */
+TL_INLINE wd load_rows_f64(const double *p, const double *other) { return (void)other, _mm256_loadu_pd(p); }
+TL_INLINE void store_rows_f64(double *p, double *other, wd row) { (void)other, _mm256_storeu_pd(p, row); }
 
-TL_INLINE void store_four(tl_vertex *v, __m128i x, __m128i y, __m256d z)
+TL_INLINE void store_four(tl_vertex *v, wd xy, wd z)
 {
-    const __m256i xy = _mm256_or_si256(_mm256_cvtepu32_epi64(x), _mm256_slli_epi64(_mm256_cvtepu32_epi64(y), 32));
-    const __m256i even = _mm256_unpacklo_epi64(xy, _mm256_castpd_si256(z));
-    const __m256i odd = _mm256_unpackhi_epi64(xy, _mm256_castpd_si256(z));
-    _mm256_storeu_si256((__m256i *)v, _mm256_permute2x128_si256(even, odd, 0x20));
-    _mm256_storeu_si256((__m256i *)(v + 2), _mm256_permute2x128_si256(even, odd, 0x31));
+    const wd even = _mm256_unpacklo_pd(xy, z), odd = _mm256_unpackhi_pd(xy, z);
+    _mm256_storeu_pd((double *)v, front_pairs(even, odd));
+    _mm256_storeu_pd((double *)(v + 2), back_pairs(even, odd));
 }
 TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
 {
-    store_four(v, _mm256_castsi256_si128(x), _mm256_castsi256_si128(y), z.lo);
-    store_four(v + 4, _mm256_extracti128_si256(x, 1), _mm256_extracti128_si256(y, 1), z.hi);
+    const vd xy = interleave(x, y);
+    store_four(v, xy.lo, z.lo);
+    store_four(v + 4, xy.hi, z.hi);
 }
 
 TL_INLINE vf vf_min_size(vf a, vf b) { return _mm256_min_ps(a, _mm256_andnot_ps(_mm256_set1_ps(-0.0f), b)); }
 TL_INLINE vf vf_of_bits(vi a) { return _mm256_castsi256_ps(a); }
-TL_INLINE vi vi_low_half(vi a) { return _mm256_blend_epi16(a, _mm256_setzero_si256(), 0xaa); }
 TL_INLINE vi vi_high_half(vi a) { return _mm256_srli_epi32(a, 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i)
 {
@@ -279,36 +240,6 @@ TL_INLINE vi vi_prefix_count(unsigned bits)
     return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)(_pdep_u64(bits, ones) * ones)));
 }
 
-TL_INLINE __m256i load_part_of_records(const char *base, int scale, const int32_t *i)
-{
-    const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale));
-    const __m128i b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
-}
-TL_INLINE __m256i load_part_of_rows(const char *base, const int32_t *i)
-{
-    const __m128i a = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[0]));
-    const __m128i b = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[4]));
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
-}
-TL_INLINE __m256i load_four_pairs(const char *base, const int32_t *i)
-{
-    __m128i two[2];
-    for (int k = 0; k < 2; k++) {
-        const __m128i a = _mm_loadl_epi64((const __m128i *)(base + (int64_t)i[2 * k] * 8));
-        two[k] =
-            _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(a), (const double *)(base + (int64_t)i[2 * k + 1] * 8)));
-    }
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(two[0]), two[1], 1);
-}
-TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
-{
-    const vf a = _mm256_castsi256_ps(load_four_pairs(base, i)), b = _mm256_castsi256_ps(load_four_pairs(base, i + 4));
-    const __m256d first = _mm256_castps_pd(_mm256_shuffle_ps(a, b, 0x88));
-    const __m256d second = _mm256_castps_pd(_mm256_shuffle_ps(a, b, 0xdd));
-    c[0] = _mm256_castpd_ps(_mm256_permute4x64_pd(first, 0xd8)); /* 0 1 4 5 2 3 6 7 */
-    c[1] = _mm256_castpd_ps(_mm256_permute4x64_pd(second, 0xd8));
-}
 /* Writes the fourth column over that of TL_LANES rows of four. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
@@ -318,13 +249,7 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
                          _mm256_blend_ps(_mm256_loadu_ps(rows + 8 * k), _mm256_permutevar8x32_ps(fourth, at), 0x88));
     }
 }
-/* Pixels of two and of three numbers, one after the other. */
-TL_INLINE void vf_store_pairs(float *p, const vf *c)
-{
-    const vf low = _mm256_unpacklo_ps(c[0], c[1]), high = _mm256_unpackhi_ps(c[0], c[1]);
-    _mm256_storeu_ps(p, _mm256_permute2f128_ps(low, high, 0x20));
-    _mm256_storeu_ps(p + 8, _mm256_permute2f128_ps(low, high, 0x31));
-}
+/* Pixels of three numbers, one after the other. */
 TL_INLINE void vf_store_triples(float *p, const vf *c)
 {
     static const int32_t from[24] = {0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 5, 5, 5, 6, 6, 6, 7, 7, 7};
@@ -337,81 +262,8 @@ TL_INLINE void vf_store_triples(float *p, const vf *c)
     _mm256_storeu_ps(p + 8, _mm256_blend_ps(_mm256_blend_ps(turned[1][0], turned[1][1], 0x24), turned[1][2], 0x49));
     _mm256_storeu_ps(p + 16, _mm256_blend_ps(_mm256_blend_ps(turned[2][0], turned[2][1], 0x49), turned[2][2], 0x92));
 }
-/* Four doubles at base + 8 * stride * i[k], as columns. */
-TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c)
-{
-    __m256d half[2][4];
-    for (int part = 0; part < 2; part++) {
-        __m256d row[4];
-        for (int k = 0; k < 4; k++)
-            row[k] = _mm256_loadu_pd(base + (int64_t)i[4 * part + k] * stride);
-        transpose_four(row, half[part]);
-    }
-    for (int k = 0; k < 4; k++)
-        c[k] = (vd){half[0][k], half[1][k]};
-}
-
-/* Pairs, and rows of three, at base + 8 * stride * first[3 * lane]. */
-TL_INLINE __m256d load_two_pairs(const double *base, int stride, const int32_t *first)
-{
-    return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(base + (int64_t)first[0] * stride)),
-                                _mm_loadu_pd(base + (int64_t)first[6] * stride), 1);
-}
-TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *first, vd *x, vd *y)
-{
-    const __m256d even = load_two_pairs(base, stride, first), odd = load_two_pairs(base, stride, first + 3);
-    const __m256d even2 = load_two_pairs(base, stride, first + 12), odd2 = load_two_pairs(base, stride, first + 15);
-    *x = (vd){_mm256_unpacklo_pd(even, odd), _mm256_unpacklo_pd(even2, odd2)};
-    *y = (vd){_mm256_unpackhi_pd(even, odd), _mm256_unpackhi_pd(even2, odd2)};
-}
-TL_INLINE __m128d load_two_thirds(const double *base, const int32_t *first)
-{
-    return _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[0] * 3 + 2), base + (int64_t)first[3] * 3 + 2);
-}
-TL_INLINE __m256d load_four_thirds(const double *base, const int32_t *first)
-{
-    return _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_thirds(base, first)), load_two_thirds(base, first + 6),
-                                1);
-}
-/* Two loads a row: a masked one of 32 bytes takes longer. */
-TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
-{
-    vd_load_pairs(base, 3, first, x, y);
-    *z = (vd){load_four_thirds(base, first), load_four_thirds(base, first + 12)};
-}
-TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, vd *y, vd *z, vi *a, vi *b)
-{
-    __m256d half[2][4];
-    for (int part = 0; part < 2; part++) {
-        __m256d row[4];
-        for (int k = 0; k < 4; k++)
-            row[k] = _mm256_loadu_pd(base + (int64_t)first[12 * part + 3 * k] * 4);
-        transpose_four(row, half[part]);
-    }
-    *x = (vd){half[0][0], half[1][0]}, *y = (vd){half[0][1], half[1][1]}, *z = (vd){half[0][2], half[1][2]};
-    const __m256 low = _mm256_castpd_ps(half[0][3]), high = _mm256_castpd_ps(half[1][3]);
-    *a = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0x88)), 0xd8);
-    *b = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0xdd)), 0xd8);
-}
-TL_INLINE void vd_store_quads(double *p, int64_t stride, const vd *c)
-{
-    for (int part = 0; part < 2; part++) {
-        __m256d half[4], row[4];
-        for (int k = 0; k < 4; k++)
-            half[k] = part ? c[k].hi : c[k].lo;
-        transpose_four(half, row);
-        for (int k = 0; k < 4; k++)
-            _mm256_storeu_pd(p + (4 * part + k) * stride, row[k]);
-    }
-}
-TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
-{
-    const __m256i even = _mm256_unpacklo_epi32(a, b), odd = _mm256_unpackhi_epi32(a, b);
-    const vd ab = {_mm256_castsi256_pd(_mm256_permute2x128_si256(even, odd, 0x20)),
-                   _mm256_castsi256_pd(_mm256_permute2x128_si256(even, odd, 0x31))};
-    vd_store_quads(p, 4, (const vd[]){x, y, z, ab});
-}
 TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
+
 #include "lanes/lanes_x86.h"
 
 /* a less the nearest integer */
@@ -424,10 +276,20 @@ TL_INLINE vd vd_off_integer(vd a)
     enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
     return vd_sub(a, (vd){_mm256_round_pd(a.lo, nearest), _mm256_round_pd(a.hi, nearest)});
 }
-TL_INLINE vd vd_off_256th(vd a)
+TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns) { columns_of_rows_f32(p, stride, columns); }
+TL_INLINE __m256d load_four_thirds(const double *base, const int32_t *first)
 {
-    const vd shift = vd_set1(0x1.8p44); /* next to it are the multiples of 2^-8 */
-    return vd_sub(a, vd_sub(vd_add(a, shift), shift));
+    __m128d third[2];
+    for (int k = 0; k < 2; k++)
+        third[k] =
+            _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[6 * k] * 3 + 2), base + (int64_t)first[6 * k + 3] * 3 + 2);
+    return join_pairs(third);
+}
+/* Two loads a row: a masked one of 32 bytes takes longer. */
+TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
+{
+    vd_load_pairs(base, 3, first, x, y);
+    *z = (vd){load_four_thirds(base, first), load_four_thirds(base, first + 12)};
 }
 
 #endif

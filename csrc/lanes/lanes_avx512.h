@@ -34,12 +34,6 @@ TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm512_mask_mov_epi32(b, m, a)
 TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, a)); }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm512_maskz_loadu_epi32(m, p); }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm512_mask_storeu_epi32(p, m, a); }
-TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
-{
-    (void)has_room;
-    vi_store_masked(p, m, a);
-}
-
 TL_INLINE vi vi_prefix_sum(vi a)
 {
     const vi zero = _mm512_setzero_si512();
@@ -90,11 +84,6 @@ TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm512_mask_storeu_ps(p, m, a); }
-TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
-{
-    (void)has_room;
-    vf_store_masked(p, m, a);
-}
 TL_INLINE vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE vm vf_ge(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
@@ -117,10 +106,23 @@ TL_INLINE vd vd_from_vf(vf a)
 {
     return (vd){_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps(a, 1))};
 }
-TL_INLINE vi vi_low_bits(vd a)
+/* The even and the odd numbers of the 32 that two vectors hold; and back. */
+TL_INLINE vi evens_of(vd a)
 {
-    const __m256i lo = _mm512_cvtepi64_epi32(_mm512_castpd_si512(a.lo));
-    return _mm512_inserti64x4(_mm512_castsi256_si512(lo), _mm512_cvtepi64_epi32(_mm512_castpd_si512(a.hi)), 1);
+    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    return _mm512_permutex2var_epi32(_mm512_castpd_si512(a.lo), even, _mm512_castpd_si512(a.hi));
+}
+TL_INLINE vi odds_of(vd a)
+{
+    const vi odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+    return _mm512_permutex2var_epi32(_mm512_castpd_si512(a.lo), odd, _mm512_castpd_si512(a.hi));
+}
+TL_INLINE vd interleave(vi even, vi odd)
+{
+    const vi low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    const vi high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    return (vd){_mm512_castsi512_pd(_mm512_permutex2var_epi32(even, low, odd)),
+                _mm512_castsi512_pd(_mm512_permutex2var_epi32(even, high, odd))};
 }
 TL_INLINE vi vi_round(vd a)
 {
@@ -132,91 +134,53 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
 }
 TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
 
-/* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
 typedef struct {
-    __m512d even, odd;
+    wd even, odd;
 } vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
-TL_INLINE __m512i load_quarter(int step, const tl_vertex *v, const int32_t *first)
-{
-    const __m128i *a = (const __m128i *)v;
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])),
-                                                _mm_loadu_si128(a + first[4 * step]), 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[8 * step])),
-                                                 _mm_loadu_si128(a + first[12 * step]), 1);
-    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
-}
 TL_INLINE vd vd_from_vz(vz z)
 {
     const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
     const __m512i high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
     return (vd){_mm512_permutex2var_pd(z.even, low, z.odd), _mm512_permutex2var_pd(z.even, high, z.odd)};
 }
-
-/* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
-TL_INLINE __m512 rows_f32(const float *p, int stride)
+TL_INLINE vi join_quarters(const __m128i *a)
 {
-    const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p)), _mm_loadu_ps(p + 4 * stride), 1);
-    const __m256 high =
-        _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p + 8 * stride)), _mm_loadu_ps(p + 12 * stride), 1);
-    return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
-}
-TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
-{
-    if (stride == 3) { /* three whole loads, two permutations a column; there is no fourth number */
-        const __m512 a = _mm512_loadu_ps(p), b = _mm512_loadu_ps(p + 16), c = _mm512_loadu_ps(p + 32);
-        const __m512i x0 = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
-        const __m512i x1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
-        const __m512i y0 = _mm512_setr_epi32(1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
-        const __m512i y1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
-        const __m512i z0 = _mm512_setr_epi32(2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
-        const __m512i z1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
-        columns[0] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, x0, b), x1, c);
-        columns[1] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, y0, b), y1, c);
-        columns[2] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, z0, b), z1, c);
-        columns[3] = _mm512_setzero_ps();
-        return;
-    }
-    const __m512 a = rows_f32(p, stride), b = rows_f32(p + stride, stride), c = rows_f32(p + 2 * stride, stride),
-                 d = rows_f32(p + 3 * stride, stride);
-    const __m512d ab = _mm512_castps_pd(_mm512_unpacklo_ps(a, b)), cd = _mm512_castps_pd(_mm512_unpacklo_ps(c, d));
-    const __m512d ab2 = _mm512_castps_pd(_mm512_unpackhi_ps(a, b)), cd2 = _mm512_castps_pd(_mm512_unpackhi_ps(c, d));
-    columns[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab, cd));
-    columns[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab, cd));
-    columns[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab2, cd2));
-    columns[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab2, cd2));
-}
-/* rows k and k + 4 */
-TL_INLINE __m512d rows_f64(const double *p, int stride)
-{
-    return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p)), _mm256_loadu_pd(p + 4 * stride), 1);
-}
-TL_INLINE void half_columns_f64(const double *p, int stride, __m512d *columns)
-{
-    const __m512d a = rows_f64(p, stride), b = rows_f64(p + stride, stride), c = rows_f64(p + 2 * stride, stride),
-                  d = rows_f64(p + 3 * stride, stride);
-    const __m512d x = _mm512_unpacklo_pd(a, b), y = _mm512_unpackhi_pd(a, b); /* x: x0 x1 z0 z1 x4 x5 z4 z5 */
-    const __m512d x2 = _mm512_unpacklo_pd(c, d), y2 = _mm512_unpackhi_pd(c, d);
-    const __m512i front = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
-    const __m512i back = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-    columns[0] = _mm512_permutex2var_pd(x, front, x2);
-    columns[1] = _mm512_permutex2var_pd(y, front, y2);
-    columns[2] = _mm512_permutex2var_pd(x, back, x2);
-    columns[3] = _mm512_permutex2var_pd(y, back, y2);
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a[0]), a[1], 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(a[2]), a[3], 1);
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
 
-TL_INLINE void store_eight(tl_vertex *v, __m512i xy, __m512d z)
+/* Four numbers of each of two rows, which stand TL_LANES / 4 rows apart; and back. */
+TL_INLINE wd load_rows_f64(const double *p, const double *other)
+{
+    return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p)), _mm256_loadu_pd(other), 1);
+}
+TL_INLINE void store_rows_f64(double *p, double *other, wd rows)
+{
+    _mm256_storeu_pd(p, _mm512_castpd512_pd256(rows));
+    _mm256_storeu_pd(other, _mm512_extractf64x4_pd(rows, 1));
+}
+TL_INLINE wd front_pairs(wd a, wd b)
+{
+    return _mm512_permutex2var_pd(a, _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), b);
+}
+TL_INLINE wd back_pairs(wd a, wd b)
+{
+    return _mm512_permutex2var_pd(a, _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15), b);
+}
+
+TL_INLINE void store_eight(tl_vertex *v, wd xy, wd z)
 {
     const __m512i front = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11);
     const __m512i back = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
-    _mm512_storeu_si512(v, _mm512_permutex2var_epi64(xy, front, _mm512_castpd_si512(z)));
-    _mm512_storeu_si512(v + 4, _mm512_permutex2var_epi64(xy, back, _mm512_castpd_si512(z)));
+    _mm512_storeu_pd(v, _mm512_permutex2var_pd(xy, front, z));
+    _mm512_storeu_pd(v + 4, _mm512_permutex2var_pd(xy, back, z));
 }
 TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
 {
-    const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
-    const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
-    store_eight(v, _mm512_permutex2var_epi32(x, low, y), z.lo);
-    store_eight(v + 8, _mm512_permutex2var_epi32(x, high, y), z.hi);
+    const vd xy = interleave(x, y);
+    store_eight(v, xy.lo, z.lo);
+    store_eight(v + 8, xy.hi, z.hi);
 }
 
 /* Half vectors: a 64-byte load or store at any column crosses a cache line, one of 32 bytes every other time. */
@@ -232,18 +196,8 @@ TL_INLINE hi hi_add(hi a, hi b) { return _mm256_add_epi32(a, b); }
 TL_INLINE hi hi_max(hi a, hi b) { return _mm256_max_epi32(a, b); }
 TL_INLINE hi hi_load_masked(hm m, const int32_t *p) { return _mm256_maskz_loadu_epi32(m, p); }
 TL_INLINE void hi_store_masked(int32_t *p, hm m, hi a) { _mm256_mask_storeu_epi32(p, m, a); }
-TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room)
-{
-    (void)has_room;
-    hi_store_masked(p, m, a);
-}
 TL_INLINE hf hf_load_masked(hm m, const float *p) { return _mm256_maskz_loadu_ps(m, p); }
 TL_INLINE void hf_store_masked(float *p, hm m, hf a) { _mm256_mask_storeu_ps(p, m, a); }
-TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room)
-{
-    (void)has_room;
-    hf_store_masked(p, m, a);
-}
 TL_INLINE hm hf_lt(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE hm hf_eq(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
 TL_INLINE hi hi_lower(vi a) { return _mm512_castsi512_si256(a); }
@@ -256,7 +210,6 @@ TL_INLINE hf hf_sum_depth(double row, hd col)
 
 TL_INLINE vf vf_min_size(vf a, vf b) { return _mm512_range_ps(a, b, 10); } /* the lesser, without its sign */
 TL_INLINE vf vf_of_bits(vi a) { return _mm512_castsi512_ps(a); }
-TL_INLINE vi vi_low_half(vi a) { return _mm512_and_si512(a, _mm512_set1_epi32(0xffff)); }
 TL_INLINE vi vi_high_half(vi a) { return _mm512_srli_epi32(a, 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(table)); }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(table)); }
@@ -282,45 +235,6 @@ TL_INLINE vi vi_prefix_count(unsigned bits)
     return _mm512_cvtepu8_epi32(_mm_set_epi64x((long long)high, (long long)low));
 }
 
-TL_INLINE __m512i load_part_of_records(const char *base, int scale, const int32_t *i)
-{
-    const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale));
-    const __m128i b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
-    const __m128i c = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[8] * scale));
-    const __m128i d = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[12] * scale));
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
-    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
-}
-TL_INLINE vi load_part_of_rows(const char *base, const int32_t *i)
-{
-    const __m128i a = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[0]));
-    const __m128i b = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[4]));
-    const __m128i c = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[8]));
-    const __m128i d = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[12]));
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
-    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
-}
-TL_INLINE vi load_eight_pairs(const char *base, const int32_t *i)
-{
-    __m128i two[4];
-    for (int k = 0; k < 4; k++) {
-        const __m128i a = _mm_loadl_epi64((const __m128i *)(base + (int64_t)i[2 * k] * 8));
-        two[k] =
-            _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(a), (const double *)(base + (int64_t)i[2 * k + 1] * 8)));
-    }
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(two[0]), two[1], 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(two[2]), two[3], 1);
-    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
-}
-TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
-{
-    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-    const vi a = load_eight_pairs(base, i), b = load_eight_pairs(base, i + 8);
-    c[0] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(a, even, b));
-    c[1] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(a, _mm512_add_epi32(even, _mm512_set1_epi32(1)), b));
-}
 /* Writes the fourth column over that of TL_LANES rows of four. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
@@ -330,13 +244,7 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
         _mm512_storeu_ps(out + 16 * k, _mm512_mask_permutexvar_ps(_mm512_loadu_ps(rows + 16 * k), 0x8888, at, fourth));
     }
 }
-/* Pixels of two and of three numbers, one after the other. */
-TL_INLINE void vf_store_pairs(float *p, const vf *c)
-{
-    const vi low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
-    _mm512_storeu_ps(p, _mm512_permutex2var_ps(c[0], low, c[1]));
-    _mm512_storeu_ps(p + 16, _mm512_permutex2var_ps(c[0], _mm512_add_epi32(low, _mm512_set1_epi32(8)), c[1]));
-}
+/* Pixels of three numbers, one after the other. */
 TL_INLINE void vf_store_triples(float *p, const vf *c)
 {
     static const int32_t from[48] = {0,  16, 0,  1,  17, 1,  2,  18, 2,  3,  19, 3,  4,  20, 4,  5,
@@ -349,135 +257,15 @@ TL_INLINE void vf_store_triples(float *p, const vf *c)
                          _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(c[0], at, c[1]), is_third[k], at, c[2]));
     }
 }
-/* Four doubles at base + 8 * stride * i[k], as columns. */
-TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c)
-{
-    __m512d half[2][4];
-    for (int part = 0; part < 2; part++) {
-        __m512d row[4];
-        for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
-            const double *a = base + (int64_t)i[8 * part + k] * stride,
-                         *b = base + (int64_t)i[8 * part + k + 4] * stride;
-            row[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1);
-        }
-        const __m512d even[2] = {_mm512_unpacklo_pd(row[0], row[1]), _mm512_unpackhi_pd(row[0], row[1])};
-        const __m512d odd[2] = {_mm512_unpacklo_pd(row[2], row[3]), _mm512_unpackhi_pd(row[2], row[3])};
-        const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
-        const __m512i high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-        for (int k = 0; k < 2; k++) {
-            half[part][k] = _mm512_permutex2var_pd(even[k], low, odd[k]);
-            half[part][k + 2] = _mm512_permutex2var_pd(even[k], high, odd[k]);
-        }
-    }
-    for (int k = 0; k < 4; k++)
-        c[k] = (vd){half[0][k], half[1][k]};
-}
-
-/* Eight rows of three doubles at base + 24 * first[3 * lane], as columns. */
-TL_INLINE void load_eight_triples(const double *base, const int32_t *first, __m512d *c)
-{
-    __m512d row[4];
-    for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
-        const double *a = base + (int64_t)first[3 * k] * 3, *b = base + (int64_t)first[3 * k + 12] * 3;
-        row[k] =
-            _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_maskz_loadu_pd(7, a)), _mm256_maskz_loadu_pd(7, b), 1);
-    }
-    const __m512d even = _mm512_unpacklo_pd(row[0], row[1]), odd = _mm512_unpacklo_pd(row[2], row[3]);
-    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13),
-                  high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-    c[0] = _mm512_permutex2var_pd(even, low, odd);
-    c[1] = _mm512_permutex2var_pd(_mm512_unpackhi_pd(row[0], row[1]), low, _mm512_unpackhi_pd(row[2], row[3]));
-    c[2] = _mm512_permutex2var_pd(even, high, odd);
-}
-TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
-{
-    __m512d front[3], back[3];
-    load_eight_triples(base, first, front);
-    load_eight_triples(base, first + 24, back);
-    *x = (vd){front[0], back[0]}, *y = (vd){front[1], back[1]}, *z = (vd){front[2], back[2]};
-}
-
-/* Eight rows of 32 bytes, as columns. */
-TL_INLINE void load_eight_places(const double *base, const int32_t *first, __m512d *c)
-{
-    __m512d row[4];
-    for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
-        const double *a = base + (int64_t)first[3 * k] * 4, *b = base + (int64_t)first[3 * k + 12] * 4;
-        row[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1);
-    }
-    const __m512d even[2] = {_mm512_unpacklo_pd(row[0], row[1]), _mm512_unpackhi_pd(row[0], row[1])};
-    const __m512d odd[2] = {_mm512_unpacklo_pd(row[2], row[3]), _mm512_unpackhi_pd(row[2], row[3])};
-    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
-    const __m512i high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-    for (int k = 0; k < 2; k++) {
-        c[k] = _mm512_permutex2var_pd(even[k], low, odd[k]);
-        c[k + 2] = _mm512_permutex2var_pd(even[k], high, odd[k]);
-    }
-}
-TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, vd *y, vd *z, vi *a, vi *b)
-{
-    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-    __m512d front[4], back[4];
-    load_eight_places(base, first, front);
-    load_eight_places(base, first + 24, back);
-    *x = (vd){front[0], back[0]}, *y = (vd){front[1], back[1]}, *z = (vd){front[2], back[2]};
-    const __m512i low = _mm512_castpd_si512(front[3]), high = _mm512_castpd_si512(back[3]);
-    *a = _mm512_permutex2var_epi32(low, even, high);
-    *b = _mm512_permutex2var_epi32(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high);
-}
-TL_INLINE void vd_store_quads(double *p, int64_t stride, const vd *c)
-{
-    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
-    const __m512i high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
-    for (int part = 0; part < 2; part++, p += 8 * stride) {
-        __m512d a[4];
-        for (int k = 0; k < 4; k++)
-            a[k] = part ? c[k].hi : c[k].lo;
-        const __m512d left[2] = {_mm512_unpacklo_pd(a[0], a[1]),
-                                 _mm512_unpackhi_pd(a[0], a[1])}; /* of even, odd rows */
-        const __m512d right[2] = {_mm512_unpacklo_pd(a[2], a[3]), _mm512_unpackhi_pd(a[2], a[3])};
-        for (int k = 0; k < 2; k++) {
-            const __m512d front = _mm512_permutex2var_pd(left[k], low, right[k]);
-            const __m512d back = _mm512_permutex2var_pd(left[k], high, right[k]);
-            _mm256_storeu_pd(p + k * stride, _mm512_castpd512_pd256(front));
-            _mm256_storeu_pd(p + (k + 2) * stride, _mm512_extractf64x4_pd(front, 1));
-            _mm256_storeu_pd(p + (k + 4) * stride, _mm512_castpd512_pd256(back));
-            _mm256_storeu_pd(p + (k + 6) * stride, _mm512_extractf64x4_pd(back, 1));
-        }
-    }
-}
-TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
-{
-    const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
-    const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
-    const vd ab = {_mm512_castsi512_pd(_mm512_permutex2var_epi32(a, low, b)),
-                   _mm512_castsi512_pd(_mm512_permutex2var_epi32(a, high, b))};
-    vd_store_quads(p, 4, (const vd[]){x, y, z, ab});
-}
-
-/* Pairs at base + 8 * stride * first[3 * lane]. */
-TL_INLINE __m256d load_two_pairs(const double *base, int stride, const int32_t *first)
-{
-    return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(base + (int64_t)first[0] * stride)),
-                                _mm_loadu_pd(base + (int64_t)first[6] * stride), 1);
-}
-TL_INLINE __m512d load_every_other_pair(const double *base, int stride, const int32_t *first)
-{
-    return _mm512_insertf64x4(_mm512_castpd256_pd512(load_two_pairs(base, stride, first)),
-                              load_two_pairs(base, stride, first + 12), 1);
-}
-TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *first, vd *x, vd *y)
-{
-    const __m512d even = load_every_other_pair(base, stride, first);
-    const __m512d odd = load_every_other_pair(base, stride, first + 3);
-    const __m512d even2 = load_every_other_pair(base, stride, first + 24);
-    const __m512d odd2 = load_every_other_pair(base, stride, first + 27);
-    *x = (vd){_mm512_unpacklo_pd(even, odd), _mm512_unpacklo_pd(even2, odd2)};
-    *y = (vd){_mm512_unpackhi_pd(even, odd), _mm512_unpackhi_pd(even2, odd2)};
-}
 TL_INLINE __m256i ceil_eight(__m512d a)
 {
     return _mm512_cvt_roundpd_epi32(a, _MM_FROUND_TO_POS_INF | _MM_FROUND_NO_EXC);
+}
+TL_INLINE wd join_pairs(const __m128d *a)
+{
+    const __m256d low = _mm256_insertf128_pd(_mm256_castpd128_pd256(a[0]), a[1], 1);
+    const __m256d high = _mm256_insertf128_pd(_mm256_castpd128_pd256(a[2]), a[3], 1);
+    return _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1);
 }
 TL_INLINE vi vi_ceil(vd a) { return _mm512_inserti64x4(_mm512_castsi256_si512(ceil_eight(a.lo)), ceil_eight(a.hi), 1); }
 /* a less the nearest integer */
@@ -494,5 +282,43 @@ TL_INLINE vd vd_off_256th(vd a)
 }
 
 #include "lanes/lanes_x86.h"
+
+/* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
+TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
+{
+    if (stride != 3) {
+        columns_of_rows_f32(p, stride, columns);
+        return;
+    }
+    /* three whole loads, two permutations a column; there is no fourth number */
+    const __m512 a = _mm512_loadu_ps(p), b = _mm512_loadu_ps(p + 16), c = _mm512_loadu_ps(p + 32);
+    const __m512i x0 = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+    const __m512i x1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+    const __m512i y0 = _mm512_setr_epi32(1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+    const __m512i y1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+    const __m512i z0 = _mm512_setr_epi32(2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+    const __m512i z1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+    columns[0] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, x0, b), x1, c);
+    columns[1] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, y0, b), y1, c);
+    columns[2] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, z0, b), z1, c);
+    columns[3] = _mm512_setzero_ps();
+}
+TL_INLINE void load_eight_triples(const double *base, const int32_t *first, wd *c)
+{
+    wd row[4];
+    for (int k = 0; k < 4; k++) {
+        const __m256d low = _mm256_maskz_loadu_pd(7, base + (int64_t)first[3 * k] * 3);
+        row[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(low),
+                                    _mm256_maskz_loadu_pd(7, base + (int64_t)first[3 * k + 12] * 3), 1);
+    }
+    transpose_rows(row, c);
+}
+TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
+{
+    wd front[4], back[4];
+    load_eight_triples(base, first, front);
+    load_eight_triples(base, first + 24, back);
+    *x = (vd){front[0], back[0]}, *y = (vd){front[1], back[1]}, *z = (vd){front[2], back[2]};
+}
 
 #endif

@@ -84,21 +84,12 @@ TL_INLINE vm vi_gt(vi a, vi b) { return a > b; }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return (uint32_t)a > (uint32_t)b; }
 TL_INLINE vm vi_eq(vi a, vi b) { return a == b; }
 TL_INLINE vi vi_select(vm m, vi a, vi b) { return m ? a : b; }
-TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
-{
-    (void)m;
-    *p = a;
-}
+TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { (void)m, *p = a; }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return m ? vi_load(p) : 0; }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a)
 {
     if (m)
         vi_store(p, a);
-}
-TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
-{
-    (void)has_room;
-    vi_store_masked(p, m, a);
 }
 
 /* Four int32. */
@@ -125,11 +116,7 @@ TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
 }
 TL_INLINE vi vi_prefix_sum(vi a) { return a; }
 TL_INLINE vi vi_last(vi a) { return a; }
-TL_INLINE vi vi_shift_in(vi a, vi before)
-{
-    (void)a;
-    return before;
-}
+TL_INLINE vi vi_shift_in(vi a, vi before) { return (void)a, before; }
 TL_INLINE vf vf_from_unsigned(vi a) { return (float)(uint32_t)a; }
 TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return m ? p[i] : 0; }
 
@@ -178,22 +165,13 @@ TL_INLINE vf vf_from_vi(vi a) { return (float)a; }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
 TL_INLINE void vf_store(float *p, vf a) { *p = a; }
 TL_INLINE vi vi_floor(vf a) { return fabsf(a) < 0x1p31f ? (vi)floorf(a) : INT32_MIN; }
-TL_INLINE vi vi_nearest(vf a) { return fabsf(a) < 0x1p31f ? (vi)rintf(a) : INT32_MIN; }
-TL_INLINE vf vf_last_of(vf a, int n)
-{
-    (void)n;
-    return a;
-}
+TL_INLINE vi vi_nearest(vf a) { return fabsf(a) < 0x1p31f ? (vi)lrintf(a) : INT32_MIN; }
+TL_INLINE vf vf_last_of(vf a, int n) { return (void)n, a; }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return m ? *p : 0.0f; }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a)
 {
     if (m)
         *p = a;
-}
-TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
-{
-    (void)has_room;
-    vf_store_masked(p, m, a);
 }
 TL_INLINE vm vf_lt(vf a, vf b) { return a < b; }
 TL_INLINE vm vf_ge(vf a, vf b) { return a >= b; }
@@ -249,10 +227,6 @@ TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *fir
     *y = a.y_fx;
     *z = a.z;
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
-{
-    load_vertices_by(3, v, first, x, y, z);
-}
 TL_INLINE vd vd_from_vz(vz z) { return z; }
 
 /* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
@@ -276,22 +250,16 @@ TL_INLINE vf vf_fma(vf a, vf b, vf c) { return fmaf(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return a < b ? a : b; } /* b when one is NaN */
 TL_INLINE vf vf_max(vf a, vf b) { return a > b ? a : b; }
 TL_INLINE vf vf_min_size(vf a, vf b) { return vf_min(a, fabsf(b)); }
-TL_INLINE vi vi_rint(vf a) { return fabsf(a) < 0x1p31f ? (vi)lrintf(a) : INT32_MIN; }
 TL_INLINE vf vf_of_bits(vi a)
 {
     vf b;
     memcpy(&b, &a, 4);
     return b;
 }
-TL_INLINE vi vi_low_half(vi a) { return a & 0xffff; }
 TL_INLINE vi vi_high_half(vi a) { return (vi)((uint32_t)a >> 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return table[i & 15]; }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return table[i & 15]; }
-TL_INLINE vf vf_pick(const float *p, vi i)
-{
-    (void)i;
-    return *p;
-}
+TL_INLINE vf vf_pick(const float *p, vi i) { return (void)i, *p; }
 TL_INLINE vd vd_load(const double *p) { return *p; }
 TL_INLINE vd vd_sqrt(vd a) { return sqrt(a); }
 TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
@@ -302,16 +270,8 @@ TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
     memcpy(&a, &b, 8);
     return a;
 }
-TL_INLINE vd vd_pick(const double *p, vi i)
-{
-    (void)i;
-    return *p;
-}
-TL_INLINE vi vi_pick(const int32_t *p, vi i)
-{
-    (void)i;
-    return *p;
-}
+TL_INLINE vd vd_pick(const double *p, vi i) { return (void)i, *p; }
+TL_INLINE vi vi_pick(const int32_t *p, vi i) { return (void)i, *p; }
 TL_INLINE vi vi_prefix_count(unsigned bits) { return (vi)(bits & 1); }
 TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
 {
@@ -372,7 +332,6 @@ TL_INLINE void vd_store_places(double *row, vd x, vd y, vd z, vi a, vi b)
 TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p31 ? (vi)((uint32_t)(vi)a + ((double)(vi)a < a)) : INT32_MIN; }
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a) { return a - rintf(a); }
-TL_INLINE vd vd_off_256th(vd a) { return a - ((a + 0x1.8p44) - 0x1.8p44); }
 TL_INLINE vd vd_or(vd a, vd b)
 {
     uint64_t bits_a, bits_b;

@@ -153,7 +153,7 @@ TL_INLINE vi vi_in_range_64(vd a, int64x2_t lo, int64x2_t hi)
     return (vi)vbslq_s32(in, b, vdupq_n_s32(INT32_MIN));
 }
 TL_INLINE vi vi_floor(vf a) { return vi_in_range(a, vcvtmq_s32_f32((float32x4_t)a)); }
-TL_INLINE vi vi_rint(vf a) { return vi_in_range(a, vcvtnq_s32_f32((float32x4_t)a)); }
+TL_INLINE vi vi_nearest(vf a) { return vi_in_range(a, vcvtnq_s32_f32((float32x4_t)a)); }
 TL_INLINE vi vi_round(vd a)
 {
     return vi_in_range_64(a, vcvtnq_s64_f64((float64x2_t)a.lo), vcvtnq_s64_f64((float64x2_t)a.hi));
@@ -217,7 +217,7 @@ TL_INLINE vi vi_in_range(vf a)
     return vi_select((vm)in, (vi)wasm_i32x4_trunc_sat_f32x4((v128_t)a), vi_set1(INT32_MIN));
 }
 TL_INLINE vi vi_floor(vf a) { return vi_in_range((vf)wasm_f32x4_floor((v128_t)a)); }
-TL_INLINE vi vi_rint(vf a) { return vi_in_range(vf_nearest(a)); }
+TL_INLINE vi vi_nearest(vf a) { return vi_in_range(vf_nearest(a)); }
 /* The bits of 0x1.8p52 + n, |n| < 2^31, are 0x43380000 << 32, and n as 64 bits, added. */
 TL_INLINE vi vi_round(vd a)
 {
@@ -268,7 +268,7 @@ TL_INLINE vd vd_from_vf(vf a)
 }
 TL_INLINE vf vf_from_vd(vd a) { return (vf)_mm_movelh_ps(_mm_cvtpd_ps((__m128d)a.lo), _mm_cvtpd_ps((__m128d)a.hi)); }
 TL_INLINE vi vi_floor(vf a) { return (vi)_mm_cvtps_epi32(_mm_floor_ps((__m128)a)); }
-TL_INLINE vi vi_rint(vf a) { return (vi)_mm_cvtps_epi32((__m128)a); }
+TL_INLINE vi vi_nearest(vf a) { return (vi)_mm_cvtps_epi32((__m128)a); }
 TL_INLINE vi vi_round(vd a)
 {
     return (vi)_mm_unpacklo_epi64(_mm_cvtpd_epi32((__m128d)a.lo), _mm_cvtpd_epi32((__m128d)a.hi));
@@ -278,9 +278,7 @@ TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){(v2d)_mm_ceil_pd((__m128d)a.lo
 
 /* ---- numbers and masks ------------------------------------------------------------------------------------------- */
 
-TL_INLINE vi vi_nearest(vf a) { return vi_rint(a); }
 TL_INLINE vi vi_upper_bytes(vi a) { return (vi)((v8u)a >> 8); }
-TL_INLINE vi vi_low_half(vi a) { return a & 0xffff; }
 TL_INLINE vi vi_high_half(vi a) { return (vi)((v4u)a >> 16); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return (vf)vi_select(m, (vi)a, (vi)b); }
 TL_INLINE vm vm_first(int64_t n) { return (vm)(vi_set1(n > 4 ? 4 : (int)n) > vi_iota()); }
@@ -315,16 +313,8 @@ TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a)
             memcpy(p + k, &one, sizeof one);
     }
 }
-TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
-{
-    if (has_room)
-        vi_store(p, vi_select(m, a, vi_load(p)));
-    else
-        vi_store_masked(p, m, a);
-}
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return (vf)vi_load_masked(m, (const int32_t *)p); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { vi_store_masked((int32_t *)p, m, (vi)a); }
-TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { vi_store_some((int32_t *)p, m, (vi)a, has_room); }
 TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
 {
     const unsigned bits = vm_bits(m);
@@ -505,11 +495,6 @@ TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
 }
 TL_INLINE vd vd_or(vd a, vd b) { return (vd){(v2d)((v2l)a.lo | (v2l)b.lo), (v2d)((v2l)a.hi | (v2l)b.hi)}; }
 TL_INLINE vd vd_off_integer(vd a) { return (vd){a.lo - v2d_nearest(a.lo), a.hi - v2d_nearest(a.hi)}; }
-TL_INLINE vd vd_off_256th(vd a)
-{
-    const vd shift = vd_set1(0x1.8p44); /* next to it are the multiples of 2^-8 */
-    return vd_sub(a, vd_sub(vd_add(a, shift), shift));
-}
 
 #ifndef TL_ON_NEON
 /* The double nearest to a product, which float64 holds, and a sum, but odd where it is not exact: rounded once more, to
@@ -569,10 +554,6 @@ TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *fir
     *y = (vi)high_two(ab, cd);
     *z = (vz){high_two((v2d)a, (v2d)b), high_two((v2d)c, (v2d)d)};
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
-{
-    load_vertices_by(3, v, first, x, y, z);
-}
 TL_INLINE vd vd_from_vz(vz z) { return z; }
 TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
 {
@@ -611,16 +592,10 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
 {
     vi rows[4];
     for (int k = 0; k < 4; k++)
-        rows[k] = *(const vi_there *)((const char *)base + (int64_t)i[k] * scale);
+        rows[k] = *(const vi_there *)((const char *)base + (uint64_t)(uint32_t)i[k] * (uint64_t)scale);
     transpose_quads(rows, c);
 }
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
-{
-    vi rows[4];
-    for (int k = 0; k < 4; k++)
-        rows[k] = *(const vi_there *)((const char *)base + 8 * (uint64_t)(uint32_t)i[k]);
-    transpose_quads(rows, c);
-}
+TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c) { vi_load_records(base, 8, i, c); }
 TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
 {
     double pair[4];

@@ -71,6 +71,7 @@ TL_INLINE vf vf_div(vf a, vf b) { return TL_MM(div_ps)(a, b); }
 TL_INLINE vf vf_sqrt(vf a) { return TL_MM(sqrt_ps)(a); }
 TL_INLINE vf vf_from_vi(vi a) { return TL_MM(cvtepi32_ps)(a); }
 TL_INLINE void vf_store(float *p, vf a) { TL_MM(storeu_ps)(p, a); }
+TL_INLINE vi vi_low_bits(vd a) { return evens_of(a); }
 TL_INLINE vi vi_nearest(vf a) { return TL_MM(cvtps_epi32)(a); }
 TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? TL_MM(permute_ps)(a, 0xff) : TL_MM(movehdup_ps)(a); }
 TL_INLINE vi vi_bits_of_vf(vf a) { return TL_SI(castps)(a); }
@@ -98,49 +99,150 @@ TL_INLINE void vd_quotients(const vd *a, vd b, vd *q, int are_f32)
 }
 TL_INLINE vd vd_min(vd a, vd b) { return (vd){TL_MM(min_pd)(a.lo, b.lo), TL_MM(min_pd)(a.hi, b.hi)}; }
 TL_INLINE vd vd_max(vd a, vd b) { return (vd){TL_MM(max_pd)(a.lo, b.lo), TL_MM(max_pd)(a.hi, b.hi)}; }
+
+/* Rows of memory as columns: plain loads of rows and transposes in registers, for hardware gathers are three times as
+ * slow.  Indices are unsigned. */
+
+/* 16 bytes at base + scale * i[step * lane], of every fourth lane. */
+TL_INLINE vi load_quarter(const void *base, int scale, int step, const int32_t *i)
+{
+    __m128i rows[TL_LANES / 4];
+    for (int k = 0; k < TL_LANES / 4; k++)
+        rows[k] = _mm_loadu_si128(
+            (const __m128i *)((const char *)base + (uint64_t)(uint32_t)i[4 * step * k] * (uint64_t)scale));
+    return join_quarters(rows);
+}
+TL_INLINE void load_four_quarters(const void *base, int scale, int step, const int32_t *i, vi *rows)
+{
+    for (int k = 0; k < 4; k++)
+        rows[k] = load_quarter(base, scale, step, i + step * k);
+}
 TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
-    const vi a = load_quarter(step, v, first), b = load_quarter(step, v, first + step);
-    const vi c = load_quarter(step, v, first + 2 * step), d = load_quarter(step, v, first + 3 * step);
-    const vi ab = TL_MM(unpacklo_epi32)(a, b), cd = TL_MM(unpacklo_epi32)(c, d);
+    vi row[4];
+    load_four_quarters(v, sizeof *v, step, first, row);
+    const vi ab = TL_MM(unpacklo_epi32)(row[0], row[1]), cd = TL_MM(unpacklo_epi32)(row[2], row[3]);
     *x = TL_MM(unpacklo_epi64)(ab, cd);
     *y = TL_MM(unpackhi_epi64)(ab, cd);
-    z->even = TL_FROM_SI(pd)(TL_MM(unpackhi_epi64)(a, b));
-    z->odd = TL_FROM_SI(pd)(TL_MM(unpackhi_epi64)(c, d));
+    z->even = TL_FROM_SI(pd)(TL_MM(unpackhi_epi64)(row[0], row[1]));
+    z->odd = TL_FROM_SI(pd)(TL_MM(unpackhi_epi64)(row[2], row[3]));
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
 {
-    load_vertices_by(3, v, first, x, y, z);
+    vi rows[4];
+    load_four_quarters(base, scale, 1, i, rows);
+    transpose_quads(rows, c);
+}
+TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c) { vi_load_records(base, 8, i, c); }
+TL_INLINE void columns_of_rows_f32(const float *p, int stride, vf *columns)
+{
+    vi rows[4], c[4];
+    for (int k = 0; k < 4; k++) {
+        __m128i quarters[TL_LANES / 4];
+        for (int j = 0; j < TL_LANES / 4; j++)
+            quarters[j] = _mm_loadu_si128((const __m128i *)(p + (k + 4 * j) * stride));
+        rows[k] = join_quarters(quarters);
+    }
+    transpose_quads(rows, c);
+    for (int k = 0; k < 4; k++)
+        columns[k] = vf_of_bits(c[k]);
+}
+#define TL_ROWS_APART (TL_LANES / 2 - 4) /* of the rows that load_rows_f64 takes */
+/* TL_LANES / 2 rows of four as columns, or back. */
+TL_INLINE void transpose_rows(const wd *row, wd *c)
+{
+    for (int k = 0; k < 2; k++) {
+        const wd even = k ? TL_MM(unpackhi_pd)(row[0], row[1]) : TL_MM(unpacklo_pd)(row[0], row[1]);
+        const wd odd = k ? TL_MM(unpackhi_pd)(row[2], row[3]) : TL_MM(unpacklo_pd)(row[2], row[3]);
+        c[k] = front_pairs(even, odd);
+        c[k + 2] = back_pairs(even, odd);
+    }
+}
+TL_INLINE void vd_load_records_by(int step, const double *base, int64_t stride, const int32_t *i, vd *c)
+{
+    wd half[2][4];
+    for (int part = 0; part < 2; part++, i += step * TL_LANES / 2) {
+        wd row[4];
+        for (int k = 0; k < 4; k++)
+            row[k] = load_rows_f64(base + i[step * k] * stride, base + i[step * (k + TL_ROWS_APART)] * stride);
+        transpose_rows(row, half[part]);
+    }
+    for (int k = 0; k < 4; k++)
+        c[k] = (vd){half[0][k], half[1][k]};
+}
+TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c)
+{
+    vd_load_records_by(1, base, stride, i, c);
+}
+TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, vd *y, vd *z, vi *a, vi *b)
+{
+    vd c[4];
+    vd_load_records_by(3, base, 4, first, c);
+    *x = c[0], *y = c[1], *z = c[2], *a = evens_of(c[3]), *b = odds_of(c[3]);
 }
 TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
 {
-    wd low[4], high[4];
-    half_columns_f64(p, stride, low);
-    half_columns_f64(p + TL_LANES / 2 * stride, stride, high);
-    for (int k = 0; k < 4; k++)
-        columns[k] = (vd){low[k], high[k]};
+    static const int32_t rows[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    vd_load_records_by(1, p, stride, rows, columns);
+}
+TL_INLINE void vd_store_quads(double *p, int64_t stride, const vd *c)
+{
+    for (int part = 0; part < 2; part++, p += TL_LANES / 2 * stride) {
+        wd half[4], row[4];
+        for (int k = 0; k < 4; k++)
+            half[k] = part ? c[k].hi : c[k].lo;
+        transpose_rows(half, row);
+        for (int k = 0; k < 4; k++)
+            store_rows_f64(p + k * stride, p + (k + TL_ROWS_APART) * stride, row[k]);
+    }
+}
+TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
+{
+    vd_store_quads(p, 4, (const vd[]){x, y, z, interleave(a, b)});
+}
+/* Pairs of doubles at base + 8 * stride * first[3 * lane], of every other lane. */
+TL_INLINE wd load_every_other_pair(const double *base, int stride, const int32_t *first)
+{
+    __m128d pairs[TL_LANES / 4];
+    for (int k = 0; k < TL_LANES / 4; k++)
+        pairs[k] = _mm_loadu_pd(base + (int64_t)first[6 * k] * stride);
+    return join_pairs(pairs);
+}
+TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *first, vd *x, vd *y)
+{
+    const int32_t *const back = first + 3 * TL_LANES / 2;
+    const wd even = load_every_other_pair(base, stride, first), odd = load_every_other_pair(base, stride, first + 3);
+    const wd even2 = load_every_other_pair(base, stride, back), odd2 = load_every_other_pair(base, stride, back + 3);
+    *x = (vd){TL_MM(unpacklo_pd)(even, odd), TL_MM(unpacklo_pd)(even2, odd2)};
+    *y = (vd){TL_MM(unpackhi_pd)(even, odd), TL_MM(unpackhi_pd)(even2, odd2)};
+}
+/* Pairs of float32 at base + 8 * i[lane]; and of TL_LANES pixels, one after the other. */
+TL_INLINE wd load_half_pairs(const char *base, const int32_t *i)
+{
+    __m128d pairs[TL_LANES / 4];
+    for (int k = 0; k < TL_LANES / 4; k++)
+        pairs[k] = _mm_loadh_pd(_mm_load_sd((const double *)(base + (int64_t)i[2 * k] * 8)),
+                                (const double *)(base + (int64_t)i[2 * k + 1] * 8));
+    return join_pairs(pairs);
+}
+TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
+{
+    const vd pairs = {load_half_pairs(base, i), load_half_pairs(base, i + TL_LANES / 2)};
+    c[0] = vf_of_bits(evens_of(pairs)), c[1] = vf_of_bits(odds_of(pairs));
+}
+TL_INLINE void vf_store_pairs(float *p, const vf *c)
+{
+    const vd pairs = interleave(vi_bits_of_vf(c[0]), vi_bits_of_vf(c[1]));
+    TL_MM(storeu_pd)((double *)p, pairs.lo), TL_MM(storeu_pd)((double *)p + TL_LANES / 2, pairs.hi);
 }
 /* For shading. */
 TL_INLINE vf vf_load(const float *p) { return TL_MM(loadu_ps)(p); }
 TL_INLINE vf vf_fma(vf a, vf b, vf c) { return TL_MM(fmadd_ps)(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return TL_MM(min_ps)(a, b); }
 TL_INLINE vf vf_max(vf a, vf b) { return TL_MM(max_ps)(a, b); }
-TL_INLINE vi vi_rint(vf a) { return TL_MM(cvtps_epi32)(a); }
 TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
 {
     return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)};
-}
-TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
-{
-    const vi rows[4] = {load_part_of_records(base, scale, i), load_part_of_records(base, scale, i + 1),
-                        load_part_of_records(base, scale, i + 2), load_part_of_records(base, scale, i + 3)};
-    transpose_quads(rows, c);
-}
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
-{
-    const vi rows[4] = {load_part_of_rows(base, i), load_part_of_rows(base, i + 1), load_part_of_rows(base, i + 2),
-                        load_part_of_rows(base, i + 3)};
-    transpose_quads(rows, c);
 }
 TL_INLINE vd vd_or(vd a, vd b) { return (vd){TL_MM(or_pd)(a.lo, b.lo), TL_MM(or_pd)(a.hi, b.hi)}; }
 

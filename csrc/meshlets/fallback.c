@@ -67,7 +67,7 @@ static __attribute__((noinline)) void draw_fallback(meshlet_batch *s, const tl_m
     window.y_px += s->row0, window.height = s->row1 - s->row0;
     target.pixels = (int32_t *)target.pixels + first, target.depth += first, target.bounds = NULL;
     tl_slice slice = {.end = n};
-    pass->kernels->draw(&snapped, &window, &target, &slice);
+    pass->kernels->draw_mesh(&snapped, &window, &target, &slice);
 }
 
 #endif

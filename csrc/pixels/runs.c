@@ -15,6 +15,7 @@
 
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "shading.h"
 #include "topleft.h"
@@ -129,25 +130,29 @@ TL_ONCE void find_runs(shade_runs *s, const int32_t *ids, int n, int64_t column)
         list_runs(s, ids, n, column, 0);
 }
 
+/* Three numbers of 32 bits at rows + 3 * i[lane], as columns c[1] to c[3]. */
+TL_INLINE void load_triples(const void *rows, const int32_t *i, vi *c)
+{
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(i), vi_set1(0)))) { /* 16 bytes, from the number before the row on */
+        vi_load_records((const char *)rows - 4, 12, i, c);
+        return;
+    }
+    int32_t own[3][TL_MAX_LANES];
+    for (int lane = 0; lane < TL_LANES; lane++)
+        for (int k = 0; k < 3; k++)
+            memcpy(&own[k][lane], (const char *)rows + 12 * (int64_t)i[lane] + 4 * k, 4);
+    for (int k = 0; k < 3; k++)
+        c[k + 1] = vi_load(own[k]);
+}
+
 /* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have.
  * Returns the runs that needed none of that. */
 TL_INLINE vm run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
 {
-    const int32_t *ids = s->ints[RUN_ID] + slot;
     const vi last = vi_set1((int32_t)s->snapped->mesh.n_vertices - 1), zero = vi_set1(0);
     vi c[4];
     vm is_there = vm_all();
-    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), zero))) {
-        /* 16 bytes, from the number before the triangle on */
-        vi_load_records((const char *)s->snapped->triangles - 4, 12, ids, c);
-    } else {
-        int32_t own[3][TL_MAX_LANES];
-        for (int lane = 0; lane < TL_LANES; lane++)
-            for (int k = 0; k < 3; k++)
-                own[k][lane] = s->snapped->triangles[3 * (int64_t)ids[lane] + k];
-        for (int k = 0; k < 3; k++)
-            c[k + 1] = vi_load(own[k]);
-    }
+    load_triples(s->snapped->triangles, s->ints[RUN_ID] + slot, c);
     for (int k = 0; k < 3; k++) {
         const vi corner = vi_max(vi_min(c[k + 1], last), zero);
         is_there = vm_and(is_there, vi_eq(corner, c[k + 1]));
@@ -220,62 +225,45 @@ TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
 /* The rows of the normals of TL_LANES triangles with corner normals. */
 TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][TL_MAX_LANES])
 {
-    const int32_t *ids = s->ints[RUN_ID] + slot, *of_corner = s->shading->normal_of_corner;
-    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), vi_set1(0)))) { /* 16 bytes, as in run_corners */
-        vi c[4];
-        vi_load_records((const char *)of_corner - 4, 12, ids, c);
-        for (int k = 0; k < 3; k++)
-            vi_spill(rows[k], c[k + 1]);
-        return;
-    }
-    for (int lane = 0; lane < TL_LANES; lane++)
-        for (int k = 0; k < 3; k++)
-            rows[k][lane] = of_corner[3 * (int64_t)ids[lane] + k];
+    vi c[4];
+    load_triples(s->shading->normal_of_corner, s->ints[RUN_ID] + slot, c);
+    for (int k = 0; k < 3; k++)
+        vi_spill(rows[k], c[k + 1]);
 }
 
-/* The positions (x, y, z) of TL_LANES vertices, of rows of three float32 or float64. */
+/* The positions (x, y, z) of TL_LANES vertices, of rows of three float32. */
+TL_INLINE void load_positions_f32(const float *positions, const int32_t *vertices, vf *p)
+{
+    vi bits[4];
+    load_triples(positions, vertices, bits);
+    for (int axis = 0; axis < 3; axis++)
+        p[axis] = vf_of_bits(bits[axis + 1]);
+}
+
+/* The same of float32 or float64, as float64. */
 TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *vertices, vd *p)
 {
-    const double *p64 = positions;
-    const float *p32 = positions;
-    if (TL_LANES > 1 &&
-        !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* four numbers, from the one before the row on */
-        vd row[4];
-        vi bits[4];
-        if (is_f64)
-            vd_load_records(p64 - 1, 3, vertices, row);
-        else
-            vi_load_records((const char *)p32 - 4, 12, vertices, bits);
+    if (!is_f64) {
+        vf own[3];
+        load_positions_f32(positions, vertices, own);
         for (int axis = 0; axis < 3; axis++)
-            p[axis] = is_f64 ? row[axis + 1] : vd_from_vf(vf_of_bits(bits[axis + 1]));
+            p[axis] = vd_from_vf(own[axis]);
+        return;
+    }
+    const double *rows = positions;
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* as in load_triples */
+        vd row[4];
+        vd_load_records(rows - 1, 3, vertices, row);
+        for (int axis = 0; axis < 3; axis++)
+            p[axis] = row[axis + 1];
         return;
     }
     double lanes[3][TL_MAX_LANES];
     for (int lane = 0; lane < TL_LANES; lane++)
-        for (int axis = 0; axis < 3; axis++) {
-            const int64_t at = 3 * (int64_t)vertices[lane] + axis;
-            lanes[axis][lane] = is_f64 ? p64[at] : (double)p32[at];
-        }
+        for (int axis = 0; axis < 3; axis++)
+            lanes[axis][lane] = rows[3 * (int64_t)vertices[lane] + axis];
     for (int axis = 0; axis < 3; axis++)
         p[axis] = vd_load(lanes[axis]);
-}
-
-/* The same of float32, as they are. */
-TL_INLINE void load_positions_f32(const float *positions, const int32_t *vertices, vf *p)
-{
-    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) {
-        vi bits[4];
-        vi_load_records((const char *)positions - 4, 12, vertices, bits);
-        for (int axis = 0; axis < 3; axis++)
-            p[axis] = vf_of_bits(bits[axis + 1]);
-        return;
-    }
-    float lanes[3][TL_MAX_LANES];
-    for (int lane = 0; lane < TL_LANES; lane++)
-        for (int axis = 0; axis < 3; axis++)
-            lanes[axis][lane] = positions[3 * (int64_t)vertices[lane] + axis];
-    for (int axis = 0; axis < 3; axis++)
-        p[axis] = vf_load(lanes[axis]);
 }
 
 /* 1/w of TL_LANES vertices, as set_inverse_w has it; the source has a matrix. */

@@ -295,15 +295,12 @@ typedef struct {
 TL_INLINE void load_values(weighed_span *r, const vertex_values *values, int first, int n_channels)
 {
     shade_runs *s = &r->runs;
-    const vi zero = vi_set1(0);
     for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES)
         for (int k = 0; k < 3; k++) {
             const int32_t *corners = r->corners[k] + slot;
             vi c[4];
-            if (TL_LANES > 1 && n_channels == 3 && values->n_values == 3 && !values->per_corner &&
-                !vm_any(vi_eq(vi_load(corners), zero))) {
-                /* 16 bytes, from the number before the row on */
-                vi_load_records((const char *)values->rows - 4, 12, corners, c);
+            if (n_channels == 3 && values->n_values == 3 && !values->per_corner) {
+                load_triples(values->rows, corners, c);
                 for (int channel = 0; channel < 3; channel++)
                     vf_store(s->floats[3 * channel + k] + slot, vf_of_bits(c[channel + 1]));
                 continue;

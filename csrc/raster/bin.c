@@ -71,27 +71,21 @@ static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, 
 TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, vm live, tl_bins *bins)
 {
     const int bits = b->window->subpixel_bits;
-    const tl_cull cull = b->snapped->cull;
-    const vi zero = vi_set1(0), max_extent = vi_set1(b->max_extent);
+    const vi zero = vi_set1(0);
     if (has_bad_index(corners, vi_set1((int32_t)(b->snapped->mesh.n_vertices - 1))))
         return 0;
     lane_corners c;
-    for (int k = 0; k < 3; k++)
-        load_vertices(b->snapped->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
-    const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
-    const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
-    vm single =
-        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
-    single = vm_and(live, vm_or(single, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    load_in_order(b->snapped, corners, &c);
+    const lane_extents e = extents_of(&c);
+    const vm single = vm_and(live, is_single(&e, vi_set1(b->max_extent), TL_SPECIAL));
     for (unsigned lanes = vm_bits(single); lanes; lanes &= lanes - 1)
         bin_alone(b, i + __builtin_ctz(lanes), bins);
     const vi area = area_lanes(&c);
-    const vm positive = vi_gt(area, zero), negative = vi_gt(zero, area);
-    const vm turned = cull == TL_CULL_BACK ? negative : cull == TL_CULL_FRONT ? positive : vm_or(positive, negative);
-    const vi col0 = vi_max(vi_shift_right(vi_add(x_min, vi_set1(b->low_fx)), bits), vi_set1(b->left));
-    const vi col1 = vi_min(vi_shift_right(vi_add(x_max, vi_set1(b->high_fx)), bits), vi_set1(b->right));
-    const vi row0 = vi_max(vi_shift_right(vi_add(y_min, vi_set1(b->low_fx)), bits), vi_set1(b->top));
-    const vi row1 = vi_min(vi_shift_right(vi_add(y_max, vi_set1(b->high_fx)), bits), vi_set1(b->bottom));
+    const vm turned = not_culled(b->snapped->cull, vi_gt(area, zero), vi_gt(zero, area));
+    const vi col0 = vi_max(vi_shift_right(vi_add(e.x_min, vi_set1(b->low_fx)), bits), vi_set1(b->left));
+    const vi col1 = vi_min(vi_shift_right(vi_add(e.x_max, vi_set1(b->high_fx)), bits), vi_set1(b->right));
+    const vi row0 = vi_max(vi_shift_right(vi_add(e.y_min, vi_set1(b->low_fx)), bits), vi_set1(b->top));
+    const vi row1 = vi_min(vi_shift_right(vi_add(e.y_max, vi_set1(b->high_fx)), bits), vi_set1(b->bottom));
     const vm seen = vm_and(vm_and(vm_and_not(live, single), turned), vm_and(vi_gt(col1, col0), vi_gt(row1, row0)));
     const vi first = vi_sub(row0, vi_set1(b->top)), last = vi_sub(vi_sub(row1, vi_set1(1)), vi_set1(b->top));
     vi_compress(bins->ids + bins->n, seen, vi_add(vi_set1((int32_t)i), vi_iota()));

@@ -76,8 +76,8 @@ TL_INLINE void list_outside(const walk_state *s, const lane_batch *b, vi id)
 TL_INLINE vi shorter_side(const walk_state *s, const lane_batch *b)
 {
     const int bits = s->window->subpixel_bits;
-    const vi first = extent_pixels(b->x_min, s->limits.round.first, bits);
-    const vi end = extent_pixels(b->x_max, s->limits.round.end, bits);
+    const vi first = extent_pixels(b->extents.x_min, s->limits.round.first, bits);
+    const vi end = extent_pixels(b->extents.x_max, s->limits.round.end, bits);
     return vi_min(vi_sub(end, first), vi_sub(b->bottom, b->top));
 }
 
@@ -92,7 +92,8 @@ TL_INLINE void take_out(const walk_state *s, tl_geometry g, tl_sink sink, lane_b
     if (g == TL_FLOAT) {
         drop_turned(s, b);
     } else if (sink_has_depth(sink_of(s->target, sink))) {
-        const vi size = vi_mul(vi_sub(b->x_max, b->x_min), vi_sub(b->y_max, b->y_min)), one = vi_set1(1);
+        const vi size = vi_mul(vi_sub(b->extents.x_max, b->extents.x_min), vi_sub(b->extents.y_max, b->extents.y_min)),
+                 one = vi_set1(1);
         const vi box = vi_shift_right(vi_sub(size, one), TL_SLIVER_BITS);
         /* box > area * 2^12, as setup_plane */
         const vm sliver = vm_and(b->drawn, vi_gt(box, vi_sub(b->absolute, one)));
@@ -114,27 +115,18 @@ TL_INLINE void draw_each_single(walk_state *s, tl_geometry g, tl_sink sink, vm s
             draw_one_fixed(s->snapped, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
 }
 
-TL_INLINE void flush_queue_small(walk_state *s, tl_geometry g, tl_sink sink)
-{
-    if (sink == TL_SINK_SAMPLES)
-        flush_small_of_samples(s);
-    else
-        TL_WALK_CALL(flush_small, s, g, sink)
-}
-TL_INLINE void flush_queue_middle(walk_state *s, tl_geometry g, tl_sink sink)
-{
-    if (sink == TL_SINK_SAMPLES)
-        flush_middle_of_samples(s);
-    else
-        TL_WALK_CALL(flush_middle, s, g, sink)
-}
-TL_INLINE void flush_queue_rows(walk_state *s, tl_geometry g, tl_sink sink)
-{
-    if (sink == TL_SINK_SAMPLES)
-        flush_rows_of_samples(s);
-    else
-        TL_WALK_CALL(flush_rows, s, g, sink)
-}
+/* Draws the triangles of a queue. */
+#define TL_FLUSH_QUEUE(kind)                                                      \
+    TL_INLINE void flush_queue_##kind(walk_state *s, tl_geometry g, tl_sink sink) \
+    {                                                                             \
+        if (sink == TL_SINK_SAMPLES)                                              \
+            flush_##kind##_of_samples(s);                                         \
+        else                                                                      \
+            TL_WALK_CALL(flush_##kind, s, g, sink)                                \
+    }
+TL_FLUSH_QUEUE(small)
+TL_FLUSH_QUEUE(middle)
+TL_FLUSH_QUEUE(rows)
 
 /* The triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
 enum { BOX_TINY, BOX_SMALL, BOX_MIDDLE, BOX_ROWS, N_BOXES };

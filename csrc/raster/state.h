@@ -75,6 +75,10 @@ typedef struct {
     vz z[3];
 } lane_corners;
 
+typedef struct {
+    vi x_min, x_max, y_min, y_max;
+} lane_extents;
+
 /* TL_LANES triangles with positive area; corners doubled and relative to the first sample of their boxes. */
 typedef struct {
     vi x[3], y[3];
@@ -114,7 +118,7 @@ typedef struct {
     vm drawn;                    /* the others that are to be drawn */
     /* TL_FIXED */
     lane_corners c;
-    vi x_min, x_max, y_min, y_max;
+    lane_extents extents;
     vi area, absolute; /* twice the area; positive where the side that is drawn shows */
     /* TL_FLOAT */
     lane_exact t;
@@ -122,6 +126,47 @@ typedef struct {
     int is_placed;       /* boxes are those of the places: none has more than 4x4 samples */
     vf xy;               /* as the head of triangles_float.c has it */
 } lane_batch;
+
+/* The vertices of TL_LANES triangles, which follow each other. */
+TL_INLINE void load_in_order(const tl_snapped *snapped, const int32_t *corners, lane_corners *c)
+{
+    for (int k = 0; k < 3; k++)
+        load_vertices(snapped->mesh.vertices, corners + k, &c->x[k], &c->y[k], &c->z[k]);
+}
+
+TL_INLINE lane_extents extents_of(const lane_corners *c)
+{
+    return (lane_extents){vi_min(vi_min(c->x[0], c->x[1]), c->x[2]), vi_max(vi_max(c->x[0], c->x[1]), c->x[2]),
+                          vi_min(vi_min(c->y[0], c->y[1]), c->y[2]), vi_max(vi_max(c->y[0], c->y[1]), c->y[2])};
+}
+
+/* Triangles that are too large for lanes; and these and special ones.  A special vertex has x = INT32_MIN, or
+ * `special_x` where that is moved: its triangle is too wide, or special throughout. */
+TL_INLINE vm is_too_large(const lane_extents *e, vi max_extent)
+{
+    return vm_or(vi_gt_unsigned(vi_sub(e->x_max, e->x_min), max_extent),
+                 vi_gt_unsigned(vi_sub(e->y_max, e->y_min), max_extent));
+}
+TL_INLINE vm is_single(const lane_extents *e, vi max_extent, int32_t special_x)
+{
+    return vm_or(is_too_large(e, max_extent), vi_eq(e->x_min, vi_set1(special_x)));
+}
+
+/* Triangles that are not turned away, of those with areas above 0 and below 0. */
+TL_INLINE vm not_culled(tl_cull cull, vm positive, vm negative)
+{
+    return cull == TL_CULL_BACK ? negative : cull == TL_CULL_FRONT ? positive : vm_or(positive, negative);
+}
+
+/* The same of extents up to 2^25 units: twice the area is exact in float64, at every step. */
+TL_INLINE vm find_unculled(const lane_corners *c, tl_cull cull, vm *is_negative)
+{
+    const vd x1 = vd_from_vi(vi_sub(c->x[1], c->x[0])), y1 = vd_from_vi(vi_sub(c->y[1], c->y[0]));
+    const vd x2 = vd_from_vi(vi_sub(c->x[2], c->x[0])), y2 = vd_from_vi(vi_sub(c->y[2], c->y[0]));
+    const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
+    *is_negative = vd_ge(vd_set1(-1.0), area);
+    return not_culled(cull, vd_ge(area, vd_set1(1.0)), *is_negative);
+}
 
 /* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
 TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)

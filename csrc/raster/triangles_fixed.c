@@ -49,14 +49,9 @@ TL_INLINE void load_fixed_batch(const walk_state *s, const int32_t *corners, vm 
     const batch_limits *limits = &s->limits;
     const vi zero = vi_set1(0), max_extent = vi_set1(limits->max_extent);
     load_corners(s, corners, &b->c);
-    const lane_corners *c = &b->c;
-    b->x_min = vi_min(vi_min(c->x[0], c->x[1]), c->x[2]), b->x_max = vi_max(vi_max(c->x[0], c->x[1]), c->x[2]);
-    b->y_min = vi_min(vi_min(c->y[0], c->y[1]), c->y[2]), b->y_max = vi_max(vi_max(c->y[0], c->y[1]), c->y[2]);
-    /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
-    const vm too_wide = vi_gt_unsigned(vi_sub(b->x_max, b->x_min), max_extent);
-    const vm too_tall = vi_gt_unsigned(vi_sub(b->y_max, b->y_min), max_extent);
-    b->single = vm_and(live, vm_or(vm_or(too_wide, too_tall), vi_eq(b->x_min, vi_set1(limits->special_x))));
-    b->area = area_lanes(c);
+    b->extents = extents_of(&b->c);
+    b->single = vm_and(live, is_single(&b->extents, max_extent, limits->special_x));
+    b->area = area_lanes(&b->c);
     b->absolute = s->snapped->cull == TL_CULL_NONE ? vi_max(b->area, vi_sub(zero, b->area)) : b->area;
     b->drawn = vm_and_not(vm_and(live, vi_gt(b->absolute, zero)), b->single);
 }
@@ -65,9 +60,10 @@ TL_INLINE void find_fixed_boxes(const walk_state *s, lane_batch *b)
 {
     const extent_rounding round = s->limits.round;
     const int bits = s->window->subpixel_bits;
-    b->top = extent_pixels(b->y_min, round.first, bits);
-    b->bottom = extent_pixels(b->y_max, round.end, bits);
-    cut_boxes(s, extent_pixels(b->x_min, round.first, bits), extent_pixels(b->x_max, round.end, bits), b);
+    b->top = extent_pixels(b->extents.y_min, round.first, bits);
+    b->bottom = extent_pixels(b->extents.y_max, round.end, bits);
+    cut_boxes(s, extent_pixels(b->extents.x_min, round.first, bits), extent_pixels(b->extents.x_max, round.end, bits),
+              b);
 }
 
 TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_sink sink)

@@ -91,15 +91,21 @@ TL_INLINE void color_back(const shaded_lanes *p, const tl_material *m, vf *rgb)
         rgb[c] = vf_select(is_back, vf_set1(m->back_color[c]), rgb[c]);
 }
 
+/* The colour of a material and of vertices. */
+TL_INLINE void start_base(const shaded_lanes *p, const tl_material *m, vf *rgb)
+{
+    for (int c = 0; c < 3; c++) {
+        rgb[c] = vf_set1(m->color[c]);
+        if (p->s->needs_colors)
+            rgb[c] = vf_mul(rgb[c], p->color[c]);
+    }
+}
+
 /* The colour that light meets, and the opacity of the surface. */
 static void find_base(shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *rgb)
 {
     vf texel[4], opacity = vf_set1(m->color[3]);
-    for (int c = 0; c < 3; c++)
-        rgb[c] = vf_set1(m->color[c]);
-    if (p->s->needs_colors)
-        for (int c = 0; c < 3; c++)
-            rgb[c] = vf_mul(rgb[c], p->color[c]);
+    start_base(p, m, rgb);
     if (p->s->needs_alpha)
         opacity = vf_mul(opacity, p->alpha);
     if (m->texture) {

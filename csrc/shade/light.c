@@ -29,7 +29,7 @@ TL_INLINE void normalize3(vf *a)
 TL_INLINE vf vf_exp2(vf a)
 {
     const vf low = vf_max(a, vf_set1(-127.0f));
-    const vi whole = vi_rint(low);
+    const vi whole = vi_nearest(low);
     const vf t = vf_sub(low, vf_from_vi(whole));
     vf sum = vf_set1(0x1.5c08dc00p-10f);
     sum = vf_fma(sum, t, vf_set1(0x1.3d0c5200p-7f));

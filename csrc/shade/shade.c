@@ -22,7 +22,7 @@
 
 TL_INLINE vi encode_light(const tl_shading *shading, const vf *rgba)
 {
-    const vi opacity = shading->wants_opacity ? vi_rint(vf_mul(vf_set1(255.0f), rgba[3])) : vi_set1(255);
+    const vi opacity = shading->wants_opacity ? vi_nearest(vf_mul(vf_set1(255.0f), rgba[3])) : vi_set1(255);
     return to_word(to_byte(shading->show, rgba[0]), to_byte(shading->show, rgba[1]), to_byte(shading->show, rgba[2]),
                    opacity);
 }
@@ -82,35 +82,6 @@ TL_INLINE void shade_runs_of(const shade_runs *s, int n, int64_t column, int64_t
     }
 }
 
-/* The picture of a visibility buffer; rows of window->width. */
-static void shade(const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
-                  const float *depth, uint8_t *pixels)
-{
-    shade_runs s;
-    span_list list;
-    int32_t background;
-    memcpy(&background, scene->instances->shading->background_bytes, 4);
-    start_runs(&s, window, scene->view);
-    start_list(&list, scene);
-    for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
-        tl_count_work(window, TL_SHADE_PX * window->width);
-        for (int64_t column = 0; column < window->width; column += TL_SPAN) {
-            const int64_t at = row * window->width + column;
-            const int n = (int)min64(TL_SPAN, window->width - column);
-            int32_t *own = (int32_t *)pixels + at;
-            start_span(own, background, n, ids + at, row + 1 < window->height ? window->width : 0);
-            list_instances(&list, ids + at, n);
-            for (int k = 0; k < list.n; k++) {
-                const int first = list.parts[k].first, n_own = list.parts[k].end - first;
-                set_part(&s, &list, k, at_fx);
-                find_runs(&s, ids + at + first, n_own, column + first);
-                set_runs(&s, row);
-                shade_runs_of(&s, n_own, column + first, row, depth + at + first, own + first);
-            }
-        }
-    }
-}
-
 /* The unit normals of n pixels of a span from `column` on, with their runs set: a plane an axis. */
 TL_INLINE void find_unit_normals(const shade_runs *s, int n, int64_t column, float (*planes)[TL_SPAN_ROOM], int first)
 {
@@ -133,12 +104,24 @@ TL_INLINE void find_unit_normals(const shade_runs *s, int n, int64_t column, flo
     }
 }
 
-static void shade_normals(const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids,
-                          float *restrict out)
+/* Stores the normals of n pixels. */
+TL_INLINE void store_normals(const float (*planes)[TL_SPAN_ROOM], int n, float *restrict out)
+{
+    for (int x = 0; x < n; x += TL_LANES) {
+        const vf normal[3] = {vf_load(planes[0] + x), vf_load(planes[1] + x), vf_load(planes[2] + x)};
+        store_channels(out + 3 * x, 3, (int)min64(n - x, TL_LANES), normal, 3);
+    }
+}
+
+/* The picture of a visibility buffer, or its normals; rows of window->width. */
+static void shade_buffer(const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx,
+                         const int32_t *ids, const float *depth, uint8_t *pixels, float *restrict normals)
 {
     shade_runs s;
     span_list list;
+    int32_t background;
     float planes[3][TL_SPAN_ROOM];
+    memcpy(&background, scene->instances->shading->background_bytes, 4);
     start_runs(&s, window, scene->view);
     start_list(&list, scene);
     for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
@@ -146,21 +129,36 @@ static void shade_normals(const tl_shaded_scene *scene, const tl_window *window,
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = (int)min64(TL_SPAN, window->width - column);
-            memset(planes, 0, sizeof planes);
+            int32_t *const own = normals ? NULL : (int32_t *)pixels + at;
+            if (normals)
+                memset(planes, 0, sizeof planes);
+            else
+                start_span(own, background, n, ids + at, row + 1 < window->height ? window->width : 0);
             list_instances(&list, ids + at, n);
             for (int k = 0; k < list.n; k++) {
                 const int first = list.parts[k].first, n_own = list.parts[k].end - first;
-                set_part(&s, &list, k, NULL);
+                set_part(&s, &list, k, at_fx);
                 find_runs(&s, ids + at + first, n_own, column + first);
                 set_runs(&s, row);
-                find_unit_normals(&s, n_own, column + first, planes, first);
+                if (normals)
+                    find_unit_normals(&s, n_own, column + first, planes, first);
+                else
+                    shade_runs_of(&s, n_own, column + first, row, depth + at + first, own + first);
             }
-            for (int x = 0; x < n; x += TL_LANES) {
-                const vf normal[3] = {vf_load(planes[0] + x), vf_load(planes[1] + x), vf_load(planes[2] + x)};
-                store_channels(out + 3 * (at + x), 3, (int)min64(n - x, TL_LANES), normal, 3);
-            }
+            if (normals)
+                store_normals((const float (*)[TL_SPAN_ROOM])planes, n, normals + 3 * at);
         }
     }
+}
+
+static void shade(const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
+                  const float *depth, uint8_t *pixels)
+{
+    shade_buffer(scene, window, at_fx, ids, depth, pixels, NULL);
+}
+static void shade_normals(const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, float *out)
+{
+    shade_buffer(scene, window, NULL, ids, NULL, NULL, out);
 }
 
 #endif

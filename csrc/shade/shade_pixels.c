@@ -144,7 +144,7 @@ TL_INLINE void set_colors(shaded_lanes *p)
             p->color[c] = vf_max(value, vf_set1(0.0f));
             continue;
         }
-        const vi level = vi_max(vi_min(vi_rint(value), vi_set1(255)), vi_set1(0));
+        const vi level = vi_max(vi_min(vi_nearest(value), vi_set1(255)), vi_set1(0));
         p->color[c] = vf_of_bits(vi_gather(vm_all(), (const int32_t *)p->s->shading->decode, level));
     }
 }
@@ -178,11 +178,7 @@ TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, laid_textur
         shade_full(p, m, laid, rgb);
         return;
     }
-    for (int c = 0; c < 3; c++)
-        rgb[c] = vf_set1(m->color[c]);
-    if (p->s->needs_colors)
-        for (int c = 0; c < 3; c++)
-            rgb[c] = vf_mul(rgb[c], p->color[c]);
+    start_base(p, m, rgb);
     if (m->texture) {
         vf texel[4];
         sample_laid(m->texture, p->uv[0], p->uv[1], p->du, p->dv, laid, texel, 3);

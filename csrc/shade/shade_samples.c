@@ -105,7 +105,7 @@ TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, in
         byte[c] = to_byte(shading->show, vf_div(vf_fma(behind, vf_set1(ground[c]), mean), opacity));
     }
     memcpy(&background, shading->background_bytes, 4);
-    const vi word = to_word(byte[0], byte[1], byte[2], vi_rint(vf_mul(vf_set1(255.0f), opacity)));
+    const vi word = to_word(byte[0], byte[1], byte[2], vi_nearest(vf_mul(vf_set1(255.0f), opacity)));
     return vi_select(vf_lt(vf_set1(0.0f), share), word, vi_set1(background));
 }
 

@@ -48,12 +48,12 @@ TL_INLINE vf srgb_root(vf a, vf *scale)
 TL_INLINE vi encode_srgb(vf light)
 {
     const vf steps = vf_mul(vf_max(light, vf_set1(0.0f)), vf_set1(TL_LIGHT_STEPS));
-    const vf whole = vf_from_vi(vi_rint(vf_min(steps, vf_set1(TL_LIGHT_STEPS - 1.0f))));
+    const vf whole = vf_from_vi(vi_nearest(vf_min(steps, vf_set1(TL_LIGHT_STEPS - 1.0f))));
     vf scale;
     const vf root = srgb_root(whole, &scale);
     const vf curve = vf_fma(root, scale, vf_set1(-SRGB_OFFSET));
     const vf line = vf_mul(whole, vf_set1(SRGB_SLOPE / TL_LIGHT_STEPS));
-    return vi_rint(vf_select(vf_lt(whole, vf_set1(SRGB_LINE_END)), line, curve));
+    return vi_nearest(vf_select(vf_lt(whole, vf_set1(SRGB_LINE_END)), line, curve));
 }
 
 /* Values of 0 to 255 as they are, light encoded. */
@@ -61,7 +61,7 @@ TL_INLINE vi to_byte(tl_show show, vf a)
 {
     if (show != TL_SHOW_NORMALS)
         return encode_srgb(a);
-    return vi_max(vi_min(vi_rint(a), vi_set1(255)), vi_set1(0));
+    return vi_max(vi_min(vi_nearest(a), vi_set1(255)), vi_set1(0));
 }
 
 TL_INLINE vi to_word(vi r, vi g, vi b, vi a)
@@ -146,7 +146,7 @@ TL_INLINE vi grey_word(const shade_runs *s, vf steps)
     for (int c = 0; c < 3; c++) {
         const vf line = vf_mul(steps, vf_set1(s->grey_line[c]));
         const vf bent = vf_fma(curve, vf_set1(s->grey_root[c]), vf_set1(-SRGB_OFFSET));
-        byte[c] = vi_rint(vf_min(vf_select(vf_lt(line, line_end), line, bent), last));
+        byte[c] = vi_nearest(vf_min(vf_select(vf_lt(line, line_end), line, bent), last));
     }
     return to_word(byte[0], byte[1], byte[2], vi_set1(255));
 }

@@ -189,7 +189,6 @@ static void test_floats(void)
     MASKS("float: equal", vf_eq(AF, BF));
     INTS("float: down to int", vi_floor(BF));
     INTS("float: nearest int", vi_nearest(BF));
-    INTS("float: nearest int of light", vi_rint(BF));
     FLOATS("float: off integer", vf_add(vf_off_integer(vf_min(vf_mul(BF, BF), vf_set1(0x1p60f))), vf_set1(0.0f)));
     FLOAT_BITS("bits", vf_of_bits(vi_xor(vi_bits_of_vf(AF), BI)));
     FLOAT_BITS("float: of sixteen", vf_lookup(c_f, BI));

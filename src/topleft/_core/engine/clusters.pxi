@@ -185,6 +185,6 @@ cdef class Clustered:
         clusters.list, clusters.room, clusters.may_be_hidden = &room[0], &room[self.mesh.n_clusters], may_be_hidden
         slice.clusters, slice.outside, slice.is_first, slice.is_last = &clusters, &others[0], is_first, is_last
         with nogil:
-            K.draw(&mesh.snapped, &window, &rows, &slice)
+            K.draw_mesh(&mesh.snapped, &window, &rows, &slice)
         raise_if_given_up()
         return slice.n_outside, clusters.n_seen, clusters.n_drawn

@@ -172,7 +172,7 @@ cdef class GradientView:
         o.part, o.n_parts = part, n_parts
         with nogil:
             if has_sides:
-                K.grad_outline(&self.view, &o)
+                K.mark_silhouettes(&self.view, &o)
             else:
                 K.grad_sides(&self.view, &o)
 

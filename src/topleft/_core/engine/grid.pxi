@@ -28,7 +28,7 @@ def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, 
     target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, bits.shape[1], &peeled
     slice.end = mesh.snapped.n_triangles
     with nogil:
-        bad_row = K.draw(&mesh.snapped, &window, &target, &slice)
+        bad_row = K.draw_mesh(&mesh.snapped, &window, &target, &slice)
     raise_if_given_up()
     return bad_row
 

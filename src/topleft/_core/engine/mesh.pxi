@@ -182,7 +182,7 @@ cdef class Tree:
         cdef double largest = 0.0
         if first < end:
             with nogil:
-                largest = K.find_nearest(&self.tree, &points[0, 0], first, end, &triangle[0], out)
+                largest = K.nearest_of_points(&self.tree, &points[0, 0], first, end, &triangle[0], out)
         return largest
 
     def find_reach(self, const double[:, ::1] points, const int32_t[:, ::1] triangles,

@@ -83,7 +83,7 @@ def fill_bands(meshes: Sequence[SnappedMesh], int32_t[:, ::1] labels, uint64_t[:
                     memcpy(&flat[row * n_row_bytes], &ground_row[0], n_row_bytes)
             for k in range(n_samples):
                 target.pixels = &labels[k, 0]
-                K.draw(&seen[k], &window, &target, &slice)
+                K.draw_mesh(&seen[k], &window, &target, &slice)
             palette.mean(&labels[0, 0], sample_bits, labels.shape[1], n_rows * width, &flat[0], first_row * width)
     raise_if_given_up()
 

@@ -416,7 +416,7 @@ cdef class ShadedScene:
     cdef bint draw_waiting(self, WaitingMesh mesh, const tl_window *window, const tl_target *rows, uint8_t *pixels) noexcept nogil:
         cdef tl_slice slice = no_slice()
         slice.end, slice.is_first, slice.is_last = mesh.snapped.n_triangles, True, True
-        if not mesh.project() or K.draw(&mesh.snapped, window, rows, &slice) >= 0:
+        if not mesh.project() or K.draw_mesh(&mesh.snapped, window, rows, &slice) >= 0:
             return False
         K.shade(&self.scene, window, NULL, <const int32_t *>rows.pixels, rows.depth, pixels)
         return True

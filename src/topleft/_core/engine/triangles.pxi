@@ -102,7 +102,7 @@ cdef class SnappedMesh:
             return self
         inv_w = empty((max(1, self.snapped.mesh.n_vertices),), np.float64)
         with nogil:
-            K.inverse_w(source, 0, self.snapped.mesh.n_vertices, &inv_w[0])
+            K.inverse_ws(source, 0, self.snapped.mesh.n_vertices, &inv_w[0])
         other = self.copy()
         other.snapped.mesh.inv_w = &inv_w[0]
         other.arrays = (self.arrays, inv_w)
@@ -138,16 +138,17 @@ cdef class SnappedMesh:
         cdef const tl_vertex *v = self.snapped.mesh.vertices
         cdef const int32_t *t = self.snapped.triangles
         cdef const int32_t *given
-        cdef const double *point
-        cdef int64_t n_triangles = self.snapped.n_triangles, last = self.snapped.mesh.n_vertices - 1, n, i, n_seen = 0
+        cdef const double *points = NULL
+        cdef int64_t n_triangles = self.snapped.n_triangles, last = self.snapped.mesh.n_vertices - 1, n, i, k, n_seen = 0, stride = 0
         cdef double left = self.x_px, top = self.y_px, right = left + width, bottom = top + height, cols, rows
-        cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, unit = 2.0**self.subpixel_bits, each
+        cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, each, unit = 2.0**-self.subpixel_bits
         cdef double x[3]
         cdef double y[3]
         cdef bint is_wide
         cdef int32_t at
         if self.exact is not None:
             t, n_triangles, last = self.exact.points.triangles, self.exact.points.n_triangles, self.exact.points.n_points - 1
+            points, stride = self.exact.points.points, self.exact.points.stride
         n = min(n_triangles, 128)
         for i in range(n):
             given, is_wide = t + 3 * (i * n_triangles // n), False
@@ -155,11 +156,10 @@ cdef class SnappedMesh:
                 at = given[k]  # read once: another thread may write it
                 if not 0 <= at <= last:
                     return 0.0, 0.0, 0.0  # an error that draw finds
-                if self.exact is not None:
-                    point = self.exact.points.points + <int64_t>at * self.exact.points.stride
-                    x[k], y[k] = point[0], point[1]
+                if points != NULL:
+                    x[k], y[k] = points[at * stride], points[at * stride + 1]
                 else:
-                    x[k], y[k] = v[at].x_fx / unit, v[at].y_fx / unit
+                    x[k], y[k] = v[at].x_fx * unit, v[at].y_fx * unit
                     is_wide = is_wide or v[at].x_fx == TL_SPECIAL
             cols = min(max(x[0], x[1], x[2]), right) - max(min(x[0], x[1], x[2]), left)
             rows = min(max(y[0], y[1], y[2]), bottom) - max(min(y[0], y[1], y[2]), top)
@@ -240,10 +240,10 @@ cdef class SnappedMesh:
         memset(&counts, 0, sizeof(counts))
         slice.counts = &counts
         if n_rows == target.height and (n_rows * target.width + 64) * self.snapped.n_triangles < HELD_DRAWN_PX:
-            bad_row = K.draw(&self.snapped, &window, &rows, slice)
+            bad_row = K.draw_mesh(&self.snapped, &window, &rows, slice)
         else:
             with nogil:
-                bad_row = K.draw(&self.snapped, &window, &rows, slice)
+                bad_row = K.draw_mesh(&self.snapped, &window, &rows, slice)
         self.note(&counts)
         raise_if_given_up()
         return bad_row
@@ -468,7 +468,7 @@ def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t
             window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
             if room is None:
                 with nogil:
-                    K.draw(&mesh.snapped, &window, &rows, &slice)
+                    K.draw_mesh(&mesh.snapped, &window, &rows, &slice)
                 continue
             laid.col0, laid.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
             laid.n_rows, laid.stride = window.height, (laid.n_cols + 15) & ~<int64_t>15
@@ -478,7 +478,7 @@ def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t
             farthest = -INFINITY if rows.sink == TL_SINK_FARTHEST else INFINITY
             with nogil:
                 if laid.n_cols:
-                    K.draw(&mesh.snapped, &window, &near, &slice)
+                    K.draw_mesh(&mesh.snapped, &window, &near, &slice)
                 laid.drawn, laid.blank = &room[0, 0], 0 if rows.sink == TL_SINK_COUNT else -1
                 K.lay_rows(&laid, <int32_t *>rows.pixels, target.width)
                 if rows.depth != NULL:
@@ -553,12 +553,12 @@ def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1
         found.col0, found.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
         found.stride = other.stride_px = (found.n_cols + 15) & ~<int64_t>15
         with nogil:
-            K.draw(&seen[0], &window, &rows, &slice)
+            K.draw_mesh(&seen[0], &window, &rows, &slice)
             window.x_px += found.col0
             window.width = found.n_cols
             for k in range(1, n_samples if found.n_cols else 0):
                 other.pixels, other.depth = &ids[k - 1, 0], &depth[k - 1, 0]
-                K.draw(&seen[k], &window, &other, &slice)
+                K.draw_mesh(&seen[k], &window, &other, &slice)
             at = K.split_pixels(&found, &split.split, at)
         raise_if_given_up()
 
@@ -595,7 +595,7 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
             slice.is_first, slice.is_last = is_first and i == 0, i == n - 1
             window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
             with nogil:
-                bad_row = K.draw(&mesh.snapped, &window, &target, &slice)
+                bad_row = K.draw_mesh(&mesh.snapped, &window, &target, &slice)
             raise_if_given_up()
             if bad_row >= 0:
                 return bad_row

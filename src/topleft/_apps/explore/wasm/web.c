@@ -123,7 +123,7 @@ WEB_EXPORT(web_draw) int web_draw(int sink, int x, int y, void *pixels, float *d
         seen.mesh.sample_y_fx = y * (1 << (window->subpixel_bits - 4));
     tl_exact_counts counts = {0};
     tl_slice slice = {.end = seen.n_triangles, .is_first = 1, .is_last = 1, .counts = &counts};
-    K.draw(&seen, window, &target, &slice);
+    K.draw_mesh(&seen, window, &target, &slice);
     used = before;
     return 0;
 }
@@ -494,7 +494,7 @@ WEB_EXPORT(web_render) int web_render(const web_look *look, int sample_bits, con
                                   .stride_px = window->width,
                                   .bounds = bounds};
         tl_slice slice = {.end = seen.n_triangles, .is_first = 1, .is_last = 1};
-        K.draw(&seen, window, &target, &slice);
+        K.draw_mesh(&seen, window, &target, &slice);
     }
     tl_shading shading;
     tl_material material;
