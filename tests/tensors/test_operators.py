@@ -353,6 +353,18 @@ def test_drawing_in_one_has_the_same_bits_with_any_number_of_threads(in_one, thr
 
 
 @IN_ONE
+@pytest.mark.parametrize("more", [(0, 3), (3, 0)])
+def test_drawing_in_one_with_rows_of_no_triangle_leaves_their_gradients_0(in_one, more):
+    pos, tri, colours = sphere()
+    target = torch.rand(1, 40, 50, 3, generator=torch.Generator().manual_seed(1))
+    _, g_pos, g_attr = in_one(pos, tri, colours, target)
+    longer = torch.cat([pos, pos[:, : more[0]]], 1), tri, torch.cat([colours, colours[: more[1]]])
+    _, more_pos, more_attr = in_one(*longer, target)
+    for one, other, n in ((g_pos[0], more_pos[0], more[0]), (g_attr, more_attr, more[1])):
+        assert torch.equal(other, torch.cat([one, torch.zeros_like(one[:n])]))
+
+
+@IN_ONE
 @pytest.mark.parametrize("edges", EDGES)
 def test_drawing_in_one_of_triangles_behind_the_eye_and_slivers_has_the_gradients_of_its_parts(in_one, edges):
     pos = torch.tensor([[[-1.0, -1, 0, 1], [3, -1, 0, -1], [-1, 3, 0, 1], [0, 0, 0.5, 1], [0.9, 0.001, 0.5, 1]]])

@@ -95,6 +95,8 @@ def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int, n_threads:
     calling thread takes all of them where there are no threads, or no longer any, as while Python ends.
     """
     n_parts = max(1, min(n_parts, n))
+    if n_parts == 1:  # of small pictures: lists of parts would take a tenth of the call
+        return [work(0, n)]
     n_threads = n_parts if n_threads is None else min(n_threads, n_parts)
     parts = list(pairwise(n * i // n_parts for i in range(n_parts + 1)))
     if n_threads == 1:
