@@ -131,17 +131,17 @@ def levels_beside_whole() -> Scenes:
 
 
 TERRAINS = (1_000_000, 4_000_000, 10_000_000)  # triangles
-TREES = 500
+TREES = 4_000_000, 500  # triangles of the terrain, and how many stand on it
 
 
 def parts_beside_whole() -> Scenes:
     """Views of terrains that begin at the camera, within half a pixel beside without; levels are made before.
 
-    Then those of the second one among trees.
+    Then those of one among trees.
     """
     import topleft as tl
 
-    for n, n_trees in (*((n, 0) for n in TERRAINS), (TERRAINS[1], TREES)):
+    for n, n_trees in (*((n, 0) for n in TERRAINS), TREES):
         mesh = tl.Mesh(*terrain_arrays(n))
         subject, name = (among_trees(mesh, n_trees), f" with {n_trees} trees") if n_trees else (mesh, "")
         top = float(mesh.vertices[:, 1].max())
