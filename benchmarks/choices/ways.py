@@ -6,7 +6,7 @@ A way forces a choice by `choices.forced`, or by an option that the verbs have.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -84,42 +84,6 @@ def of_arithmetic(scene: Scene) -> Ways:
     ]
 
 
-def of_clip(scene: Scene) -> Ways:
-    """The search for cut triangles, where no vertex is outside of a plane."""
-    if "transform" not in scene.options or scene.kind == "clip-crossing" or scene.sampling != "center":
-        return []
-    return other_than(scene, "must_cut", {True: "searched", False: "left out"})
-
-
-def of_divide(scene: Scene) -> Ways:
-    """The divide by w, where it is 1."""
-    if scene.kind != "orthographic" or scene.sampling != "center":
-        return []
-    return other_than(scene, "is_affine", {True: "left out", False: "divided"})
-
-
-def of_depth(scene: Scene) -> Ways:
-    """Ids alone, where every vertex lies at one depth."""
-    is_flat = scene.kind == "flat z" or len(scene.arrays[0]) == 3
-    if not is_flat or scene.verb != "rasterize" or scene.sampling != "center" or not scene.has_depth:
-        return []
-    return other_than(scene, "pays_without_depth", {True: "ids alone", False: "compared"})
-
-
-def of_direct(scene: Scene) -> Ways:
-    """Colours stored as triangles come, or labels first."""
-    if scene.verb != "fill" or scene.sampling != "center":
-        return []
-    return other_than(scene, "is_direct", {True: "as they come", False: "labels first"})
-
-
-def of_planes(scene: Scene) -> Ways:
-    """Samples of ids in bands of rows, set up once, or a whole picture for each."""
-    if scene.verb not in ("rasterize", "fill") or scene.sampling not in MSAA:
-        return []
-    return other_than(scene, "can_slice", {True: "bands", False: "a picture each"})
-
-
 def of_bands(scene: Scene) -> Ways:
     """Bytes of a band of rows in which several samples are drawn."""
     if scene.sampling not in MSAA or scene.verb not in ("rasterize", "fill"):
@@ -127,13 +91,6 @@ def of_bands(scene: Scene) -> Ways:
     name = "plane_bytes" if scene.verb == "rasterize" else "label_bytes"
     sizes = {f"{kib} KiB": kib << 10 for kib in (128, 256, 1024, 4096)}
     return forcing(scene, name, sizes)
-
-
-def of_sorting(scene: Scene) -> Ways:
-    """Triangles sorted into bands of rows, one band after the other, or drawn as they come."""
-    if scene.sampling != "center" or scene.verb not in ("rasterize", "overdraw"):
-        return []
-    return other_than(scene, "pays_to_sort", {True: "sorted", False: "as they come"})
 
 
 def of_blended_bands(scene: Scene) -> Ways:
@@ -160,34 +117,57 @@ def of_threads(scene: Scene) -> Ways:
     return [Way(names[found], chosen, two), Way(names[3 - found], drawing(scene, threads=3 - found))]
 
 
-def of_shares(scene: Scene) -> Ways:
-    """Two threads: shares of the triangles or bands of rows."""
-    if scene.sampling != "center" or scene.verb == "fill":
-        return []
-    return other_than(scene, "is_sliced", {True: "shares", False: "bands"}, threads=2)
+#: Choices of yes or no: the function that decides, what it says with yes and with no, and the number of threads.
+SWITCHES: dict[str, tuple[str, str, str, int]] = {
+    "clip": ("must_cut", "searched", "left out", 1),  # cut triangles, where no vertex is outside of a plane
+    "divide": ("is_affine", "left out", "divided", 1),  # by w, where it is 1
+    "depth test": ("pays_without_depth", "ids alone", "compared", 1),  # where every vertex lies at one depth
+    "colours": ("is_direct", "as they come", "labels first", 1),
+    "planes": ("can_slice", "bands", "a picture each", 1),  # samples of ids
+    "sorting": ("pays_to_sort", "sorted", "as they come", 1),  # into bands of rows
+    "shares": ("is_sliced", "shares", "bands", 2),  # of two threads
+    "threads of arrays": ("pays_to_share", "both", "one", 2),  # which read vertices and indices
+}
 
 
-def of_array_threads(scene: Scene) -> Ways:
-    """Two threads that draw: vertices and indices by both of them or by one."""
-    if scene.verb != "coverage" or scene.sampling != "center":
-        return []
-    return other_than(scene, "pays_to_share", {True: "both", False: "one"}, threads=2)
+def is_switched(choice: str, scene: Scene) -> bool:
+    """Whether a scene asks for a choice of `SWITCHES`."""
+    is_center, verb = scene.sampling == "center", scene.verb
+    if choice == "planes":
+        return verb in ("rasterize", "fill") and scene.sampling in MSAA
+    asks = {
+        "clip": "transform" in scene.options and scene.kind != "clip-crossing",
+        "divide": scene.kind == "orthographic",
+        "depth test": (scene.kind == "flat z" or len(scene.arrays[0]) == 3) and verb == "rasterize" and scene.has_depth,
+        "colours": verb == "fill",
+        "sorting": verb in ("rasterize", "overdraw"),
+        "shares": verb != "fill",
+        "threads of arrays": verb == "coverage",
+    }
+    return is_center and asks[choice]
+
+
+def of_switch(choice: str, scene: Scene) -> Ways:
+    """Both answers to yes or no."""
+    name, yes, no, threads = SWITCHES[choice]
+    options = {"threads": threads} if threads > 1 else {}
+    return other_than(scene, name, {True: yes, False: no}, **options) if is_switched(choice, scene) else []
 
 
 CHOICES: Mapping[str, Callable[[Scene], Ways]] = {
     "method": of_method,
     "arithmetic": of_arithmetic,
-    "clip": of_clip,
-    "divide": of_divide,
-    "depth test": of_depth,
-    "colours": of_direct,
-    "planes": of_planes,
+    "clip": partial(of_switch, "clip"),
+    "divide": partial(of_switch, "divide"),
+    "depth test": partial(of_switch, "depth test"),
+    "colours": partial(of_switch, "colours"),
+    "planes": partial(of_switch, "planes"),
     "band size": of_bands,
-    "sorting": of_sorting,
+    "sorting": partial(of_switch, "sorting"),
     "bands of colours": of_blended_bands,
     "threads": of_threads,
-    "shares": of_shares,
-    "threads of arrays": of_array_threads,
+    "shares": partial(of_switch, "shares"),
+    "threads of arrays": partial(of_switch, "threads of arrays"),
 }
 """By name: the ways to draw a scene."""
 
