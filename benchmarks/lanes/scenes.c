@@ -134,7 +134,7 @@ static void draw(const tl_snapped *s, tl_target g)
 {
     tl_slice slice = {.end = s->n_triangles, .is_first = 1, .is_last = 1};
     g.stride_px = W;
-    if (k->draw(s, &WINDOW, &g, &slice) >= 0)
+    if (k->draw_mesh(s, &WINDOW, &g, &slice) >= 0)
         exit(3);
 }
 static mesh the_mesh;

@@ -88,7 +88,7 @@ static void draw(const tl_snapped *scene, const tl_window *window, tl_target tar
     target.depth = with_depth ? depth : NULL, target.stride_px = WIDTH;
     target.covered = is_mask || is_share ? covered : NULL;
     char row[64];
-    if (k->draw(scene, window, &target, &slice) >= 0)
+    if (k->draw_mesh(scene, window, &target, &slice) >= 0)
         exit(3);
     snprintf(row, sizeof row, "%s%s", what, with_depth ? " ids" : "");
     tell(name, row, target.pixels, is_mask ? N_PX : 4 * N_PX);
@@ -124,7 +124,7 @@ static void draw_values(const tl_snapped *scene, const tl_window *window, const 
 {
     const tl_slice whole = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
     tl_slice slice = whole;
-    k->draw(scene, window, &(tl_target){.sink = TL_SINK_NEAREST, .pixels = ids, .depth = depth, .stride_px = WIDTH},
+    k->draw_mesh(scene, window, &(tl_target){.sink = TL_SINK_NEAREST, .pixels = ids, .depth = depth, .stride_px = WIDTH},
             &slice);
     k->barycentric(scene, window, ids, floats);
     tell(name, "barycentric", floats, 12 * N_PX);
