@@ -338,12 +338,15 @@ static void clear(const tl_window *window, const tl_target *target)
     }
     if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES)
         return;
+    /* rows without a gap are one: long fills get lines without reading them */
+    const int is_whole = target->stride_px == window->width;
+    const int64_t n_rows = is_whole ? 1 : window->height, n = is_whole ? window->width * window->height : window->width;
     /* a plane after the other: in turns, row by row, they took 1.07 to 1.5 times as long on Sapphire Rapids */
-    for (int64_t row = 0; row < window->height; row++)
+    for (int64_t row = 0; row < n_rows; row++)
         memset((int32_t *)target->pixels + row * target->stride_px, target->sink == TL_SINK_COUNT ? 0 : 0xff,
-               (size_t)window->width * sizeof(int32_t));
-    for (int64_t row = 0; sink_has_depth(target->sink) && row < window->height; row++)
-        clear_depth(target->depth + row * target->stride_px, window->width, farthest);
+               (size_t)n * sizeof(int32_t));
+    for (int64_t row = 0; sink_has_depth(target->sink) && row < n_rows; row++)
+        clear_depth(target->depth + row * target->stride_px, n, farthest);
     if (target->bounds)
         clear_depth(target->bounds, tl_segments(target->stride_px) * window->height, farthest);
 }

@@ -75,13 +75,17 @@ TL_INLINE int sink_has_depth(tl_sink sink)
 }
 
 /* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors
- * and, where there are such, for half vectors. */
+ * and, where there are such, for half vectors.  Ids that are only stored are asked for at once: stores leave in order,
+ * and one after the other would wait for memory.  AVX-512, 200,000 triangles of 8 px in any order: 16 -> 12.6 ms, a
+ * mesh of 100,000 3.5 -> 3.1.  The stores of other lanes load them. */
 #define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                              \
     TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)       \
     {                                                                                                \
         int32_t *ids = (int32_t *)target->pixels + at;                                               \
         const int has_room = at + TL_LANES <= target->n_samples;                                     \
         M wins;                                                                                      \
+        if (TL_LANES == 16)                                                                          \
+            __builtin_prefetch(ids, 1);                                                              \
         if (sink == TL_SINK_PAINT) {                                                                 \
             wins = P##m_and(m, P##i_gt(id, P##i_load_some(m, ids, has_room)));                       \
         } else {                                                                                     \
