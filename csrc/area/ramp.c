@@ -145,14 +145,15 @@ TL_ONCE void flush_quads(area_plane *plane)
         for (int k = 0; k < 4; k++)
             plane->wide_cells[plane->at[i] + k] +=
                 plane->quads[4 * (i - i % TL_LANES + vi_quad_slot(i % TL_LANES)) + k];
-    for (int i = 0; plane->cells && i < n; i += TL_LANES)
+    for (int i = 0; plane->cells && i < n; i += TL_LANES) {
+        const int32_t *const at = plane->at + i, *const quads = plane->quads + 4 * i;
         for (int lane = 0; lane < TL_LANES; lane++) {
-            const int32_t *quad = plane->quads + 4 * (i + vi_quad_slot(lane));
-            int32_t *p = plane->cells + plane->at[i + lane];
-            const v4 sum = v4_add(v4_load(p), v4_load(quad));
+            int32_t *p = plane->cells + at[lane];
+            const v4 sum = v4_add(v4_load(p), v4_load(quads + 4 * vi_quad_slot(lane)));
             v4_store(p, sum);
             seen = v4_or(seen, sum);
         }
+    }
     plane->seen = seen;
 }
 
@@ -160,10 +161,11 @@ TL_ONCE void flush_quads(area_plane *plane)
 TL_INLINE void add_quads(area_plane *plane, vi at, const vi *columns)
 {
     const int n = plane->n_waiting;
-    vi_store(plane->at + n, at);
+    int32_t *const places = plane->at + n; /* with at[n + lane] gcc adds and widens for each lane */
+    vi_store(places, at);
     vi_store_quads(plane->quads + 4 * n, columns);
     for (int lane = 0; plane->cells && lane < TL_LANES; lane++)
-        __builtin_prefetch(plane->cells + plane->at[n + lane], 1);
+        __builtin_prefetch(plane->cells + places[lane], 1);
     plane->n_waiting = n + TL_LANES;
     if (n + TL_LANES == TL_WAITING_QUADS)
         flush_quads(plane);
