@@ -7,7 +7,7 @@ import topleft as tl
 from topleft._core.base import arrays, threads
 from topleft._core.base.memory import FreshMemory
 from topleft._core.raster import classic
-from topleft._core.raster.rasterize import canvas_of
+from topleft._core.raster.rasterize import Canvas
 from topleft.methods import CLASSICS, load_kernel
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
@@ -85,7 +85,7 @@ def test_unaligned_array_comes_to_the_kernels_aligned(coerce, values):
 
 def test_unaligned_out_is_filled_through_an_aligned_canvas():
     ids, depth = unaligned(np.zeros((4, 4), np.int32)), unaligned(np.zeros((4, 4), np.float32))
-    with canvas_of(FreshMemory(), "triangle", ids, (4, 4), np.int32) as (result, canvas):
+    with Canvas.of(FreshMemory(), "triangle", ids, (4, 4), np.int32) as (result, canvas):
         assert canvas.flags.aligned
     frags = tl.rasterize(SQUARE, LEFT, SIZE, out=(ids, depth))
     assert result is frags.triangle is ids

@@ -22,7 +22,7 @@ from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.polygons.draw import add_shares, draw_labels, draw_mask
 from topleft._core.polygons.prepared import Frame, Prepared, prepare
 from topleft._core.polygons.rings import RingSet, as_rings
-from topleft._core.raster.rasterize import Canvas, canvas_of
+from topleft._core.raster.rasterize import Canvas
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, sample_positions
 from topleft.typing import RuleOption, SamplingOption
 
@@ -149,11 +149,11 @@ def polygons(
         prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
         warn_if_apart(prepared, given, size)
         if how in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER):
-            mask = Canvas.of(FRESH, "mask", out, shape, np.bool_)  # without a context: that is 2 us of 40
-            if mask.canvas.size:
-                draw_binary(prepared, mask.canvas.view(np.uint8), how, is_nonzero=is_nonzero, assume_valid=assume_valid)
-            return mask.drawn()
-        with canvas_of(FRESH, "share", out, shape, np.float32) as (result, canvas):
+            with Canvas.of(FRESH, "mask", out, shape, np.bool_) as (mask, canvas):
+                if canvas.size:
+                    draw_binary(prepared, canvas.view(np.uint8), how, is_nonzero=is_nonzero, assume_valid=assume_valid)
+            return mask
+        with Canvas.of(FRESH, "share", out, shape, np.float32) as (result, canvas):
             if not canvas.size:
                 pass
             elif how is Sampling.AREA:
@@ -167,7 +167,7 @@ def polygons(
     paint = as_paint(apart_from(out, "values", values), background, len(found), how)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     warn_if_apart(prepared, given, size)
-    with canvas_of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
+    with Canvas.of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
         if canvas.size:
             paint_values(prepared, canvas, paint, how, is_nonzero=is_nonzero, assume_valid=assume_valid)
     return result

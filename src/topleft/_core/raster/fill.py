@@ -20,7 +20,7 @@ from topleft._core.base.options import Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.classic import fill_classic
-from topleft._core.raster.rasterize import canvas_of, draw, draw_all_samples
+from topleft._core.raster.rasterize import Canvas, draw, draw_all_samples
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, SamplePass, draw_means, sample_positions
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
@@ -134,7 +134,7 @@ def draw_fill(
     is_flat = colors_are_flat(len(palette), snapped, style.per)
     shape = (*view.size[::-1], *palette.shape[1:])
     ground = as_background(style.background, palette)
-    with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
+    with Canvas.of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         painting = Painting(memory, snapped, view, palette, canvas, transfer, is_flat, ground)
@@ -199,7 +199,7 @@ def draw_labels(
     if 0 in view.size or not snapped.n_triangles:
         ids[...] = -1
     shape = (*ids.shape, *own.shape[1:])
-    with canvas_of(memory, "fill", out, shape, dtype.type, keep=style.background is None) as (result, canvas):
+    with Canvas.of(memory, "fill", out, shape, dtype.type, keep=style.background is None) as (result, canvas):
         if out is not None and style.background is None:
             canvas[ids >= 0] = own[ids[ids >= 0]]
         else:

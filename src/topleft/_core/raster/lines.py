@@ -17,7 +17,7 @@ from topleft._core.base.memory import Memory
 from topleft._core.base.options import parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.rasterize import canvas_of
+from topleft._core.raster.rasterize import Canvas
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
 from topleft.typing import DepthTestOption
@@ -70,7 +70,7 @@ def draw_wireframe(
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=depth is not None, out=out)
     edges = list_edges(memory, snapped)
     dtype = np.float32 if antialias else np.bool_
-    with canvas_of(memory, "wireframe", out, (height, width), dtype) as (result, canvas):
+    with Canvas.of(memory, "wireframe", out, (height, width), dtype) as (result, canvas):
         flat = engine.as_bytes(canvas)
 
         def draw_rows(first: int, end: int) -> None:

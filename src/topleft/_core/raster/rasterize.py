@@ -5,8 +5,6 @@ Each verb checks its arguments, snaps the mesh (read, transform, snap, clip), ch
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
@@ -98,32 +96,35 @@ def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height:
     return list(bad_rows)
 
 
-@contextmanager
-def canvas_of(
-    memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type, *, keep: bool = False
-) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
-    """Give the array to return and a contiguous aligned one to draw into; afterwards both are the same picture.
-
-    `keep`: pixels of `out` stay where nothing is drawn.
-    """
-    pair = result, canvas = Canvas.of(memory, name, out, shape, dtype)
-    if keep and canvas is not result:
-        canvas[...] = result
-    yield pair
-    pair.drawn()
-
-
 class Canvas(NamedTuple):
-    """An array to return, and a contiguous aligned one to draw into: the same wherever that one is."""
+    """An array to return, and a contiguous aligned one to draw into: the same wherever that one is.
+
+    As a context it gives both, and at its end both are the same picture.
+    """
 
     result: NDArray[Any]
     canvas: NDArray[Any]
 
     @classmethod
-    def of(cls, memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type) -> Canvas:
-        """Take the caller's array, if there is one, or memory of that name."""
+    def of(
+        cls, memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type, *, keep: bool = False
+    ) -> Canvas:
+        """Take the caller's array, if there is one, or memory of that name.
+
+        `keep`: pixels of `out` stay where nothing is drawn.
+        """
         result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-        return cls(result, result if result.flags.carray else empty(shape, dtype))
+        canvas = result if result.flags.carray else empty(shape, dtype)
+        if keep and canvas is not result:
+            canvas[...] = result
+        return cls(result, canvas)
+
+    def __enter__(self) -> Canvas:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            self.drawn()
 
     def drawn(self) -> NDArray[Any]:
         """Return the picture, where it is to be."""
@@ -136,7 +137,7 @@ def draw_area(
     memory: Memory, name: str, snapped: Snapped, view: View, out: object, *, is_clamped: bool
 ) -> NDArray[np.float32]:
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
-    with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
+    with Canvas.of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
         drawing = choices.drawing(view, snapped, Sink.COUNT)
         half_px = max(1, 1 << view.grid_bits >> 1) if drawing.in_bands else None
         if sum_areas(memory, snapped.mesh, canvas, drawing.n_threads, is_clamped=is_clamped, half_px=half_px):
@@ -161,10 +162,10 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     if view.sampling.n_samples > 1 and view.is_exact:
         return draw_share_of_masks(memory, snapped, view, out)
     if view.sampling.n_samples > 1:
-        with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
+        with Canvas.of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
             draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), canvas)
         return result
-    with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
+    with Canvas.of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
         draw(memory, snapped, view, choices.drawing(view, snapped, Sink.MASK), canvas)
     return result
 
@@ -173,7 +174,7 @@ def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: objec
     """Return the share of samples that triangles cover, from a mask of each sample."""
     n, shape = view.sampling.n_samples, view.size[::-1]
     mask: NDArray[np.bool_] = memory.empty("sample mask", shape, np.bool_)
-    with canvas_of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
+    with Canvas.of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
         canvas[...] = 0.0
         for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
             seen = replace(snapped, mesh=snapped.mesh.at_sample(*at))
@@ -206,7 +207,7 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
         return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
     if view.sampling.n_samples > 1:
         return draw_sample_counts(memory, snapped, view, out)
-    with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
+    with Canvas.of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
         draw(memory, snapped, view, choices.drawing(view, snapped, Sink.COUNT), canvas)
     return result
 
@@ -281,7 +282,7 @@ def draw_fragments(
 
 def draw_labels(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids of triangles at depth 0; depth is written on first access."""
-    with canvas_of(memory, "triangle", options.ids_out, view.size[::-1], np.int32) as (ids, canvas):
+    with Canvas.of(memory, "triangle", options.ids_out, view.size[::-1], np.int32) as (ids, canvas):
         draw(memory, snapped, view, drawing, canvas)
     return Fragments(ids, options.background, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 

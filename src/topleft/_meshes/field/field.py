@@ -23,7 +23,7 @@ from topleft._core.base.memory import SCRATCH
 from topleft._core.base.options import Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.rasterize import canvas_of, draw
+from topleft._core.raster.rasterize import Canvas, draw
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.scene.adapt import as_polygons
@@ -131,7 +131,7 @@ def field(
     dtype = dtype_of_field(array.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
     empty = nodata_of(nodata, dtype)
     own = array if not is_of_faces or polygons.faces is None else array[polygons.faces]
-    with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
+    with Canvas.of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
         draw_field(canvas, points_px, triangles, own, view, empty, is_of_faces=is_of_faces)
     return result
 
@@ -201,7 +201,7 @@ def height_map(
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     points_px, heights = grid.to_pixels(points), points[:, 2].astype(np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
-    with canvas_of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
+    with Canvas.of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
         draw_heights(canvas, points_px, triangles, heights, view, range_of(heights, triangles), surface, grid.nodata)
     return result
 

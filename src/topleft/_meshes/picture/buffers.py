@@ -20,7 +20,7 @@ from topleft._core.base.threads import count_threads
 from topleft._core.raster import choices
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.peel import DepthLayers, check_peel, draw_layers_of, peel_meshes
-from topleft._core.raster.rasterize import FragmentOptions, canvas_of, draw_coverage, draw_fragments, refuse_many
+from topleft._core.raster.rasterize import Canvas, FragmentOptions, draw_coverage, draw_fragments, refuse_many
 from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import View, ViewOptions
@@ -176,7 +176,7 @@ def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
     width, height = view.size
     n = view.sampling.n_samples
     is_share = n > 1 or view.sampling is Sampling.AREA
-    with canvas_of(FRESH, "coverage", out, (height, width), np.float32 if is_share else np.bool_) as (result, canvas):
+    with Canvas.of(FRESH, "coverage", out, (height, width), np.float32 if is_share else np.bool_) as (result, canvas):
         if not (width and height):
             pass
         elif view.sampling is Sampling.AREA:

@@ -22,7 +22,7 @@ from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.options import Sampling, parse, parse_sampling
-from topleft._core.raster.rasterize import FragmentOptions, canvas_of, draw_fragments
+from topleft._core.raster.rasterize import Canvas, FragmentOptions, draw_fragments
 from topleft._core.raster.verbs import coverage, fill, overdraw
 from topleft._core.raster.view import View
 from topleft._meshes.field.field import draw_field, draw_heights, dtype_of_field, is_per_face, nodata_of
@@ -222,7 +222,7 @@ class LabelsPainter(FragmentsPainter):
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
-        with canvas_of(FRESH, "labels", out, size[::-1], np.int32) as (result, ids):
+        with Canvas.of(FRESH, "labels", out, size[::-1], np.int32) as (result, ids):
             self.draw_into(payload, origin, size, threads, (ids, None))
         return result
 
@@ -334,7 +334,7 @@ class FieldPainter(Painter):
         points = self.grid.to_pixels(payload.corners.reshape(-1, self.n_components))
         view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
         own, values = rows(len(payload.triangles)), payload.values
-        with canvas_of(FRESH, "field", out, size[::-1], self.dtype) as (result, canvas):
+        with Canvas.of(FRESH, "field", out, size[::-1], self.dtype) as (result, canvas):
             draw_field(canvas, points, own, values, view, self.empty, is_of_faces=self.is_of_faces)
         return result
 
@@ -373,7 +373,7 @@ class HeightPainter(Painter):
         points, heights = self.grid.to_pixels(flat), np.ascontiguousarray(flat[:, 2], np.float64)
         view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
         own, ends, nodata = rows(len(payload.triangles)), (self.low, self.high), self.grid.nodata
-        with canvas_of(FRESH, "field", out, size[::-1], np.float64) as (result, canvas):
+        with Canvas.of(FRESH, "field", out, size[::-1], np.float64) as (result, canvas):
             draw_heights(canvas, points, own, heights, view, ends, self.surface, nodata)
         return result
 
