@@ -89,6 +89,18 @@ def test_shapely_in_each_form():
         tl.polygons([shapely.Point(1, 1)], SIZE)
 
 
+@pytest.mark.parametrize("dtype", ["i2", "i4", "f4", "f8"])
+@pytest.mark.parametrize("background", [0, 5])
+def test_values_of_the_other_byte_order_are_those_of_the_own(dtype, background):
+    values = np.array([1, 300], dtype)
+    own, other = (
+        tl.polygons([[SQUARE, HOLE], [OTHER]], SIZE, values=given, background=background)
+        for given in (values, values.astype(values.dtype.newbyteorder()))
+    )
+    assert other.dtype == own.dtype
+    assert np.array_equal(other, own)
+
+
 @pytest.mark.parametrize(
     "dtype", [bool, np.uint8, np.int8, np.uint16, np.int32, np.uint32, np.float32, np.int64, float]
 )
