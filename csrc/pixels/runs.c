@@ -559,26 +559,26 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     }
 }
 
-/* Where a row begins: the sample of its column 0. */
+/* The sample of column 0 of a row. */
 typedef struct {
     vi x_fx, y_fx;
     int bits;
-} row_start;
+} run_origin;
 
-TL_INLINE row_start start_of_row(const shade_runs *s, int64_t row)
+TL_INLINE run_origin origin_of_runs(const shade_runs *s, int64_t row)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
     const int bits = s->window->subpixel_bits;
     const int32_t half = (1 << bits) >> 1;
-    return (row_start){vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx),
-                       vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx), bits};
+    return (run_origin){vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx),
+                        vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx), bits};
 }
 
 /* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: a sum that wraps on the way
  * comes back at the pixel.  Returns the runs that need others; their sum is the area. */
-TL_INLINE vm find_edges(shade_runs *s, int slot, const row_start *start, vi *x, vi *y, vf *col_step, vf *row_step)
+TL_INLINE vm find_edges(shade_runs *s, int slot, const run_origin *origin, vi *x, vi *y, vf *col_step, vf *row_step)
 {
-    const int bits = start->bits;
+    const int bits = origin->bits;
     vm is_special = bits == 0 ? vm_all() : vm_first(0);
     for (int k = 0; k < 3; k++)
         is_special = vm_or(is_special, vi_eq(x[k], vi_set1(TL_SPECIAL)));
@@ -586,7 +586,7 @@ TL_INLINE vm find_edges(shade_runs *s, int slot, const row_start *start, vi *x, 
     const vf height = vf_from_vi(vi_sub(vi_max(y[0], vi_max(y[1], y[2])), vi_min(y[0], vi_min(y[1], y[2]))));
     is_special = vm_or(is_special, vf_ge(vf_mul(width, height), vf_set1(TL_INT32_BOX)));
     for (int k = 0; k < 3; k++)
-        x[k] = vi_sub(x[k], start->x_fx), y[k] = vi_sub(y[k], start->y_fx);
+        x[k] = vi_sub(x[k], origin->x_fx), y[k] = vi_sub(y[k], origin->y_fx);
     vi sum = vi_set1(0);
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
@@ -696,8 +696,8 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
         vz z;
         load_vertices_by(1, set->vertices, r->corners[k], &x[k], &y[k], &z);
     }
-    const row_start start = start_of_row(s, row);
-    const vm is_special = find_edges(s, slot, &start, x, y, r->col_step, r->row_step);
+    const run_origin origin = origin_of_runs(s, row);
+    const vm is_special = find_edges(s, slot, &origin, x, y, r->col_step, r->row_step);
     r->area = vf_from_vi(vi_load(s->ints[RUN_SUM] + slot));
     return is_special;
 }
@@ -833,7 +833,7 @@ TL_INLINE float largest_lane(vf a)
 TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
 {
     const int end = TL_LANES + s->n_runs;
-    const row_start start = start_of_row(s, row);
+    const run_origin origin = origin_of_runs(s, row);
     vm is_special = vm_first(0);
     vf most = vf_set1(0.0f);
     keep_corners(s, fetches, 1);
@@ -856,7 +856,7 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
         load_plain_corner(s, slot, 0, x, y);
         load_plain_corner(s, slot, 1, x, y);
         load_plain_corner(s, slot, 2, x, y);
-        is_special = vm_or(is_special, find_edges(s, slot, &start, x, y, col_step, row_step));
+        is_special = vm_or(is_special, find_edges(s, slot, &origin, x, y, col_step, row_step));
     }
     if (vm_any(is_special))
         return 0;
