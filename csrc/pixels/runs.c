@@ -147,16 +147,15 @@ TL_INLINE void load_triples(const void *rows, const int32_t *i, vi *c)
 
 /* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have.
  * Returns the runs that needed none of that. */
-TL_INLINE vm run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
+TL_INLINE vm run_corners(const shade_runs *s, int slot, vi *corners)
 {
     const vi last = vi_set1((int32_t)s->snapped->mesh.n_vertices - 1), zero = vi_set1(0);
     vi c[4];
     vm is_there = vm_all();
     load_triples(s->snapped->triangles, s->ints[RUN_ID] + slot, c);
     for (int k = 0; k < 3; k++) {
-        const vi corner = vi_max(vi_min(c[k + 1], last), zero);
-        is_there = vm_and(is_there, vi_eq(corner, c[k + 1]));
-        vi_spill(corners[k], corner);
+        corners[k] = vi_max(vi_min(c[k + 1], last), zero);
+        is_there = vm_and(is_there, vi_eq(corners[k], c[k + 1]));
     }
     return is_there;
 }
@@ -756,13 +755,13 @@ TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
     if (fetches)
         fetch_triangles(s, TL_LANES, (int)min64(end, TL_LANES + 2 * TL_FETCH_RUNS));
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        _Alignas(64) int32_t corners[3][TL_MAX_LANES];
         const int ahead = slot + 2 * TL_FETCH_RUNS;
+        vi corners[3];
         if (fetches)
             fetch_triangles(s, ahead, (int)min64(end, ahead + TL_LANES));
         run_corners(s, slot, corners);
         for (int k = 0; k < 3; k++)
-            vi_store(s->corners[k] + slot, vi_shift_left(vi_load(corners[k]), shift));
+            vi_store(s->corners[k] + slot, vi_shift_left(corners[k], shift));
     }
 }
 
@@ -787,6 +786,14 @@ TL_INLINE void set_any_runs(shade_runs *s, int64_t row, int fetches)
             set_special(s, slot, __builtin_ctz(rest), row, &r);
         set_attributes(s, slot, &r);
     }
+}
+
+/* Corner k of TL_LANES runs.  Compilers leave a loop over three of them rolled, and x and y in memory. */
+TL_INLINE void load_plain_corner(const shade_runs *s, int slot, int k, vi *x, vi *y)
+{
+    vi c[4];
+    vi_load_rows(s->snapped->mesh.vertices, s->corners[k] + slot, c);
+    x[k] = c[0], y[k] = c[1];
 }
 
 /* Normal and q of corner k of TL_LANES runs. */
@@ -833,11 +840,9 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
             is_special = vm_or(is_special, find_exact_edges(s, slot, row, x_px, y_px, col_step, row_step, &area));
             continue;
         }
-        for (int k = 0; k < 3; k++) {
-            vi c[4];
-            vi_load_rows(s->snapped->mesh.vertices, s->corners[k] + slot, c);
-            x[k] = c[0], y[k] = c[1];
-        }
+        load_plain_corner(s, slot, 0, x, y);
+        load_plain_corner(s, slot, 1, x, y);
+        load_plain_corner(s, slot, 2, x, y);
         is_special = vm_or(is_special, find_edges(s, slot, row, x, y, col_step, row_step));
     }
     if (vm_any(is_special))

@@ -255,9 +255,11 @@ class Overlap:
             raster = raster.read(1, masked=True)
         numbers = [nodata, *numbers_without_data(raster)]
         is_masked = np.ma.getmask(raster) if isinstance(raster, np.ma.MaskedArray) else np.ma.nomask
-        array = as_array("raster", raster)
+        array = as_array("raster", raster.data if is_masked is not np.ma.nomask else raster)
         if array.shape != self.size[::-1]:
             raise ValueError(f"raster must have shape {self.size[::-1]}, got {array.shape}")
+        if array.dtype.kind not in "biuf":
+            raise TypeError(f"raster must be real numbers, got dtype {array.dtype}")
         self._check_pixels()
         given = array.reshape(-1)[self.pixels]
         values = given.astype(np.float64)
