@@ -25,7 +25,7 @@ def is_cube_map(tex: object) -> bool:
 
 def len_of(tensor: Tensor) -> int:
     """Return the number of pictures of (B, N, K), 1 for (N, K)."""
-    return len(tensor) if tensor.ndim == 3 else 1
+    return tensor.shape[0] if tensor.ndim == 3 else 1
 
 
 #: What tensors may hold, and the words for it; those of attributes, textures and colours come in half precision, too.
