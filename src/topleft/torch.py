@@ -549,7 +549,7 @@ def render(
 ) -> Tensor:
     """Return pictures of a mesh for a loss of your own: `rasterize`, `interpolate` and `antialias` in one.
 
-    It takes 0.55 to 0.75 of the time of the functions one after the other, and keeps the ids of pixels, their runs and
+    It takes 0.5 to 0.75 of the time of the functions one after the other, and keeps the ids of pixels, their runs and
     edges instead of pictures. Its gradients differ from theirs by rounding, below 1e-6 of the largest.
 
     Parameters
