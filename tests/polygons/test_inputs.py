@@ -241,6 +241,9 @@ def test_bad_triangles_of_a_table_are_named():
         tl.overlap(SQUARE, SIZE, triangles=[[0, 1, 2], [0, 1, 4]])
     with pytest.raises(ValueError, match=re.escape("raster must have shape (5, 8), got (2, 2)")):
         tl.overlap([[SQUARE]], SIZE).means(np.zeros((2, 2)))
+    for given in (np.full((5, 8), "1.5"), np.full((5, 8), 1j)):
+        with pytest.raises(TypeError, match="raster must be real numbers, got dtype"):
+            tl.overlap([[SQUARE]], SIZE).means(given)
     with pytest.raises(ValueError, match=re.escape("values must have shape (1,), a number for each polygon, got (2,)")):
         tl.overlap([[SQUARE]], SIZE).spread([1, 2])
 
