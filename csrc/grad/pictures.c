@@ -158,7 +158,23 @@ TL_INLINE void draw_three(const double *face, int64_t first, int n, int64_t n_co
     }
 }
 
-TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
+/* The next row to be finished, of the picture, its gradients or the other one; rows that are kept where it is none. */
+TL_INLINE const float *row_ahead(const picture_pass *p, int64_t row)
+{
+    const tl_grad_picture *l = p->l;
+    const float *numbers = l->target ? l->target : l->g_out ? l->g_out : l->out;
+    return row < p->view->first_row || row >= p->view->end_row ? p->rows
+                                                               : numbers + row * p->view->width * l->n_columns;
+}
+
+/* Fetches some pixels of the row ahead into the cache, while others are computed. */
+TL_INLINE void fetch_ahead(const float *ahead, int64_t column, int64_t n_pixels, int64_t n_columns)
+{
+    for (int64_t i = n_columns * column; i < n_columns * (column + n_pixels); i += 16)
+        __builtin_prefetch(ahead + i);
+}
+
+TL_INLINE void draw_row(const picture_pass *p, int64_t row, const float *ahead, int64_t n_columns)
 {
     const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width, n = width * n_columns;
     const int64_t n_of_face = p->l->faces->n_columns;
@@ -168,6 +184,7 @@ TL_INLINE void draw_row(const picture_pass *p, int64_t row, int64_t n_columns)
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
         const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
         float *to = colors + n_columns * column;
+        fetch_ahead(ahead, column, n_pixels, n_columns);
         if (faces[r] < 0) {
             memset(to, 0, (size_t)(n_columns * n_pixels) * sizeof *to);
             continue;
@@ -203,7 +220,6 @@ static double compare_row(const picture_pass *p, int64_t row)
     const int64_t n = p->view->width * p->l->n_columns;
     float *restrict out = p->rows + (row - p->base) * n;
     const float *restrict target = p->l->target + row * n;
-    const int64_t ahead = row + 1 < p->view->height ? n : 0;
     const vf scale = vf_set1((float)p->l->scale);
     vqd sum = vqd_set1(0.0);
     double sums[4];
@@ -214,10 +230,8 @@ static double compare_row(const picture_pass *p, int64_t row)
         int64_t i = first;
         for (int k = 0; k < COMPARED / TL_LANES; k++)
             squares[k] = vf_set1(0.0f);
-        for (; i + COMPARED <= end; i += COMPARED) {
+        for (; i + COMPARED <= end; i += COMPARED)
             compare_some(out + i, target + i, scale, squares);
-            __builtin_prefetch(target + i + ahead), __builtin_prefetch(target + i + ahead + 16);
-        }
         if (i < end) {
             const size_t size = (size_t)(end - i) * sizeof(float);
             memcpy(last[0], out + i, size), memcpy(last[1], target + i, size);
@@ -267,8 +281,8 @@ TL_ONCE void pull_clamped_run(const picture_pass *p, int64_t r, int64_t row, int
     pull_clamped(p->view, &colors, &run);
 }
 
-/* Adds the gradients of a row to the sums of its faces. */
-TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
+/* Adds the gradients of a row to the sums of its faces.  `ahead` may be NULL. */
+TL_INLINE void pull_row(const picture_pass *p, int64_t row, const float *ahead, int64_t n_columns)
 {
     const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width;
     const int64_t n_of_face = p->l->faces->n_columns;
@@ -277,6 +291,8 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, int64_t n_columns)
     double *numbers = p->l->faces->sums;
     for (int64_t r = p->l->row_runs[row - p->all.first_row]; r < end; r++) {
         const int64_t column = begins[r], n_pixels = (r + 1 < end ? begins[r + 1] : width) - column;
+        if (ahead)
+            fetch_ahead(ahead, column, n_pixels, n_columns);
         if (faces[r] < 0)
             continue;
         if (faces[r] & 1) {
@@ -328,8 +344,9 @@ TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
             memcpy(p->rows, p->rows + (TL_ROWS_KEPT - ROWS_WAITING) * n, (size_t)(ROWS_WAITING * n) * sizeof(float));
             p->base = row - ROWS_WAITING;
         }
+        const float *ahead = row_ahead(p, row - 1);
         if (row < end && has_picture) {
-            draw_row(p, row, n_columns);
+            draw_row(p, row, ahead, n_columns);
             find_steps(p, row);
         }
         if (row > first && row <= end && has_picture)
@@ -343,7 +360,7 @@ TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
         if (is_back && row - 3 >= view->first_row && row - 3 < taken_end)
             move_between(p, row - 3, 1);
         if (is_back && row - ROWS_WAITING >= view->first_row)
-            pull_row(p, row - ROWS_WAITING, n_columns);
+            pull_row(p, row - ROWS_WAITING, has_picture ? 0 : ahead, n_columns);
     }
     return sum;
 }

@@ -107,9 +107,11 @@ TL_INLINE vd vd_max(vd a, vd b) { return (vd){TL_MM(max_pd)(a.lo, b.lo), TL_MM(m
 TL_INLINE vi load_quarter(const void *base, int scale, int step, const int32_t *i)
 {
     __m128i rows[TL_LANES / 4];
-    for (int k = 0; k < TL_LANES / 4; k++)
-        rows[k] = _mm_loadu_si128(
-            (const __m128i *)((const char *)base + (uint64_t)(uint32_t)i[4 * step * k] * (uint64_t)scale));
+    for (int k = 0; k < TL_LANES / 4; k++) {
+        uint64_t at = (uint32_t)i[4 * step * k];
+        __asm__("" : "+r"(at)); /* or GCC loads it into a vector and takes it from there */
+        rows[k] = _mm_loadu_si128((const __m128i *)((const char *)base + at * (uint64_t)scale));
+    }
     return join_quarters(rows);
 }
 TL_INLINE void load_four_quarters(const void *base, int scale, int step, const int32_t *i, vi *rows)
@@ -133,7 +135,11 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
     load_four_quarters(base, scale, 1, i, rows);
     transpose_quads(rows, c);
 }
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c) { vi_load_records(base, 8, i, c); }
+TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
+{
+    __asm__("" : "+r"(i)); /* or GCC keeps the address of each lane's index, in more registers than there are */
+    vi_load_records(base, 8, i, c);
+}
 TL_INLINE void columns_of_rows_f32(const float *p, int stride, vf *columns)
 {
     vi rows[4], c[4];

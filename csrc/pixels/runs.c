@@ -147,16 +147,15 @@ TL_INLINE void load_triples(const void *rows, const int32_t *i, vi *c)
 
 /* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have.
  * Returns the runs that needed none of that. */
-TL_INLINE vm run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
+TL_INLINE vm run_corners(const shade_runs *s, int slot, vi *corners)
 {
     const vi last = vi_set1((int32_t)s->snapped->mesh.n_vertices - 1), zero = vi_set1(0);
     vi c[4];
     vm is_there = vm_all();
     load_triples(s->snapped->triangles, s->ints[RUN_ID] + slot, c);
     for (int k = 0; k < 3; k++) {
-        const vi corner = vi_max(vi_min(c[k + 1], last), zero);
-        is_there = vm_and(is_there, vi_eq(corner, c[k + 1]));
-        vi_spill(corners[k], corner);
+        corners[k] = vi_max(vi_min(c[k + 1], last), zero);
+        is_there = vm_and(is_there, vi_eq(corners[k], c[k + 1]));
     }
     return is_there;
 }
@@ -560,15 +559,26 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     }
 }
 
-/* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: a sum that wraps on the way
- * comes back at the pixel.  Returns the runs that need others; their sum is the area. */
-TL_INLINE vm find_edges(shade_runs *s, int slot, int64_t row, vi *x, vi *y, vf *col_step, vf *row_step)
+/* The sample of column 0 of a row. */
+typedef struct {
+    vi x_fx, y_fx;
+    int bits;
+} run_origin;
+
+TL_INLINE run_origin origin_of_runs(const shade_runs *s, int64_t row)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
     const int bits = s->window->subpixel_bits;
     const int32_t half = (1 << bits) >> 1;
-    const vi px = vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx);
-    const vi py = vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx);
+    return (run_origin){vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx),
+                        vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx), bits};
+}
+
+/* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: a sum that wraps on the way
+ * comes back at the pixel.  Returns the runs that need others; their sum is the area. */
+TL_INLINE vm find_edges(shade_runs *s, int slot, const run_origin *origin, vi *x, vi *y, vf *col_step, vf *row_step)
+{
+    const int bits = origin->bits;
     vm is_special = bits == 0 ? vm_all() : vm_first(0);
     for (int k = 0; k < 3; k++)
         is_special = vm_or(is_special, vi_eq(x[k], vi_set1(TL_SPECIAL)));
@@ -576,7 +586,7 @@ TL_INLINE vm find_edges(shade_runs *s, int slot, int64_t row, vi *x, vi *y, vf *
     const vf height = vf_from_vi(vi_sub(vi_max(y[0], vi_max(y[1], y[2])), vi_min(y[0], vi_min(y[1], y[2]))));
     is_special = vm_or(is_special, vf_ge(vf_mul(width, height), vf_set1(TL_INT32_BOX)));
     for (int k = 0; k < 3; k++)
-        x[k] = vi_sub(x[k], px), y[k] = vi_sub(y[k], py);
+        x[k] = vi_sub(x[k], origin->x_fx), y[k] = vi_sub(y[k], origin->y_fx);
     vi sum = vi_set1(0);
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
@@ -686,7 +696,8 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
         vz z;
         load_vertices_by(1, set->vertices, r->corners[k], &x[k], &y[k], &z);
     }
-    const vm is_special = find_edges(s, slot, row, x, y, r->col_step, r->row_step);
+    const run_origin origin = origin_of_runs(s, row);
+    const vm is_special = find_edges(s, slot, &origin, x, y, r->col_step, r->row_step);
     r->area = vf_from_vi(vi_load(s->ints[RUN_SUM] + slot));
     return is_special;
 }
@@ -756,13 +767,13 @@ TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
     if (fetches)
         fetch_triangles(s, TL_LANES, (int)min64(end, TL_LANES + 2 * TL_FETCH_RUNS));
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        _Alignas(64) int32_t corners[3][TL_MAX_LANES];
         const int ahead = slot + 2 * TL_FETCH_RUNS;
+        vi corners[3];
         if (fetches)
             fetch_triangles(s, ahead, (int)min64(end, ahead + TL_LANES));
         run_corners(s, slot, corners);
         for (int k = 0; k < 3; k++)
-            vi_store(s->corners[k] + slot, vi_shift_left(vi_load(corners[k]), shift));
+            vi_store(s->corners[k] + slot, vi_shift_left(corners[k], shift));
     }
 }
 
@@ -787,6 +798,14 @@ TL_INLINE void set_any_runs(shade_runs *s, int64_t row, int fetches)
             set_special(s, slot, __builtin_ctz(rest), row, &r);
         set_attributes(s, slot, &r);
     }
+}
+
+/* Corner k of TL_LANES runs.  Compilers leave a loop over three of them rolled, and x and y in memory. */
+TL_INLINE void load_plain_corner(const shade_runs *s, int slot, int k, vi *x, vi *y)
+{
+    vi c[4];
+    vi_load_rows(s->snapped->mesh.vertices, s->corners[k] + slot, c);
+    x[k] = c[0], y[k] = c[1];
 }
 
 /* Normal and q of corner k of TL_LANES runs. */
@@ -814,6 +833,7 @@ TL_INLINE float largest_lane(vf a)
 TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
 {
     const int end = TL_LANES + s->n_runs;
+    const run_origin origin = origin_of_runs(s, row);
     vm is_special = vm_first(0);
     vf most = vf_set1(0.0f);
     keep_corners(s, fetches, 1);
@@ -833,12 +853,10 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
             is_special = vm_or(is_special, find_exact_edges(s, slot, row, x_px, y_px, col_step, row_step, &area));
             continue;
         }
-        for (int k = 0; k < 3; k++) {
-            vi c[4];
-            vi_load_rows(s->snapped->mesh.vertices, s->corners[k] + slot, c);
-            x[k] = c[0], y[k] = c[1];
-        }
-        is_special = vm_or(is_special, find_edges(s, slot, row, x, y, col_step, row_step));
+        load_plain_corner(s, slot, 0, x, y);
+        load_plain_corner(s, slot, 1, x, y);
+        load_plain_corner(s, slot, 2, x, y);
+        is_special = vm_or(is_special, find_edges(s, slot, &origin, x, y, col_step, row_step));
     }
     if (vm_any(is_special))
         return 0;

@@ -118,17 +118,18 @@ TL_INLINE void load_run_corners(weighed_span *r)
     shade_runs *s = &r->runs;
     const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        int32_t corners[3][TL_MAX_LANES];
+        vi corners[3];
         if (fetches)
             fetch_triangles(s, slot + TL_FETCH_RUNS, (int)min64(end, slot + TL_FETCH_RUNS + TL_LANES));
         const vm is_there = run_corners(s, slot, corners);
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_select(is_there, vi_set1(0), vi_set1(TL_ALONE)));
         for (int k = 0; k < 3; k++) {
-            vi_store(r->corners[k] + slot, vi_load(corners[k]));
+            int32_t *const own = r->corners[k] + slot;
+            vi_spill(own, corners[k]);
             for (int lane = 0; fetches && lane < TL_LANES; lane++)
-                fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), corners[k][lane]);
+                fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), own[lane]);
             if (r->has_w)
-                load_inverse_w(&s->snapped->mesh, corners[k], r->q[k] + slot);
+                load_inverse_w(&s->snapped->mesh, own, r->q[k] + slot);
         }
     }
 }

@@ -418,7 +418,7 @@ Drawing = tuple[tuple[int, int], EdgeRule]
 def pictures_of(drawing: Drawing, pos: Any, tri: Any, attr: Any, ids: Any) -> AttributePictures:
     """Return what the engine draws of a mesh, and leads back."""
     grid = grid_of(tri, ids, min(pos.shape[1], attr.shape[1]))
-    return AttributePictures(grid, drawing[1], outline_of(grid, pos), pos, ids, attr)
+    return AttributePictures(grid, drawing[1], tensors.halves_across(grid.tri), pos, ids, attr)
 
 
 def drawn_shapes(drawing: Drawing, pos: Any, tri: Any, attr: Any) -> tuple[Any, Any]:  # noqa: ARG001

@@ -549,7 +549,7 @@ def render(
 ) -> Tensor:
     """Return pictures of a mesh for a loss of your own: `rasterize`, `interpolate` and `antialias` in one.
 
-    It takes 0.55 to 0.75 of the time of the functions one after the other, and keeps the ids of pixels, their runs and
+    It takes 0.5 to 0.75 of the time of the functions one after the other, and keeps the ids of pixels, their runs and
     edges instead of pictures. Its gradients differ from theirs by rounding, below 1e-6 of the largest.
 
     Parameters
@@ -595,8 +595,8 @@ def render(
     tensor([1.0000, 1.0000, 0.5000, 0.0000])
     """
     check_mesh(glctx, pos, tri, None)
-    is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, len(pos))
-    check("attr", attr, f"(V, K), with 1 or {len(pos)} before", is_table)
+    is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, pos.shape[0])
+    check("attr", attr, f"(V, K), with 1 or {pos.shape[0]} before", is_table)
     height, width = as_pair("resolution", resolution)
     across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
     mesh, values = same_dtype(pos, attr if attr.ndim == 3 else attr[None])
@@ -662,11 +662,10 @@ def photometric_loss(
     1.0
     """
     check_mesh(glctx, pos, tri, None)
-    check("target", target, "(B, H, W, K)", is_tensor(target) and target.ndim == 4 and len(target) == len(pos))
-    fits = (
-        is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, len(pos)) and attr.shape[-1] == target.shape[3]
-    )
-    check("attr", attr, f"(V, {target.shape[3]}), with 1 or {len(pos)} before", fits)
+    check("target", target, "(B, H, W, K)", is_tensor(target) and target.ndim == 4 and target.shape[0] == pos.shape[0])
+    is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, pos.shape[0])
+    fits = is_table and attr.shape[-1] == target.shape[3]
+    check("attr", attr, f"(V, {target.shape[3]}), with 1 or {pos.shape[0]} before", fits)
     if loss not in get_args(LossOption):
         raise ValueError(f"loss must be 'l2', got {loss!r}")
     across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)

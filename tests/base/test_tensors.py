@@ -129,3 +129,39 @@ def test_list_of_tensors_elsewhere_is_refused_by_device():
 
     with pytest.raises(TypeError, match=r"vertices must lie in the memory of the CPU, got a \S*Cupy on CUDA device 0"):
         tl.coverage([Cupy(SQUARE, 2)], HALVES, (4, 4))
+
+
+def masked(array, *where):
+    given = np.ma.array(array)
+    given[where] = np.ma.masked
+    return given
+
+
+def test_masked_values_of_a_field_leave_their_triangles_out():
+    assert np.array_equal(
+        tl.field((SQUARE, HALVES), masked([1.0, 2, 3, 1e20], 3), (4, 4)),
+        tl.field((SQUARE, HALVES), [1, 2, 3, np.nan], (4, 4)),
+        equal_nan=True,
+    )
+
+
+def test_masked_heights_are_no_ground():
+    seen = tl.viewshed(masked(np.full((5, 5), -9999.0), slice(1, 5)), (2.5, 0.5))
+    assert np.array_equal(np.isnan(seen.above).all(axis=1), np.arange(5) > 0)
+
+
+def test_masked_vertices_count_where_triangles_use_them():
+    assert tl.coverage(masked(SQUARE, 3), HALVES[:1], (4, 4)).sum() == 10
+    with pytest.raises(ValueError, match=r"must be finite where a triangle uses them, got \[nan, nan\] in row 3"):
+        tl.coverage(masked(SQUARE, 3), HALVES, (4, 4))
+
+
+def test_masked_integers_are_refused():
+    with pytest.raises(ValueError, match="triangles must not be masked, having no NaN, got int64 with 3 masked"):
+        tl.coverage(SQUARE, masked(HALVES, 1), (4, 4))
+
+
+def test_masked_array_without_masked_entries_is_an_array():
+    assert np.array_equal(
+        tl.coverage(SQUARE, np.ma.array(HALVES, mask=np.zeros((2, 3))), (4, 4)), tl.coverage(SQUARE, HALVES, (4, 4))
+    )

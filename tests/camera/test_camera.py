@@ -134,6 +134,23 @@ def test_framing_sphere_fills_the_frame_without_touching_it(ortho, size):
     assert 0 <= depth.min() < depth.max() <= 1
 
 
+@pytest.mark.parametrize("kind", [np.int8, np.uint8, np.float16, np.float32])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda n: Camera.perspective(np.eye(4), near=n(1), far=n(100), fov_y_deg=n(50)),
+        lambda n: Camera.orthographic(np.eye(4), near=n(30), far=n(100), height=n(3)),
+        lambda n: Camera.off_center(np.eye(4), left=n(1), right=n(100), bottom=n(1), top=n(9), near=n(30), far=n(70)),
+        lambda n: Camera.from_intrinsics(np.diag([9, 9, 1]), np.eye(4), SIZE, near=n(100)),
+        lambda n: Camera.framing([(0, 0, 0), (1, 1, 1)], aspect=n(3), fov_y_deg=n(50)),
+    ],
+)
+def test_camera_of_numbers_of_few_bits_is_that_of_floats(make, kind):
+    camera, expected = make(kind), make(float)
+    assert np.array_equal(camera.projection, expected.projection)
+    assert np.array_equal(camera.view, expected.view)
+
+
 def test_framing_looks_only_at_vertices_in_use():
     vertices, triangles = scenes.shape("cube")
     lonely = Mesh(np.vstack([vertices, [[1e6, 0, np.nan]]]), triangles)

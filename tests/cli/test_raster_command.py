@@ -129,7 +129,7 @@ def test_interrupted_command_resumes(tmp_path, pair, capsys):
     assert main(["raster", pair, "-o", str(out), *arguments, "--resume", "--threads", "1"]) == 0
     assert " 1 windows drawn, " in capsys.readouterr().out
     assert main(["raster", pair, "-o", str(out), *arguments]) == 2
-    assert "exists: resume=True" in capsys.readouterr().err
+    assert "exists: --resume goes on with it, if it is of this raster; --overwrite " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["a.zarr", "a.tif", "a.dzi"])

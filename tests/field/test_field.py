@@ -93,6 +93,14 @@ def test_to_pixels_of_centimetres_at_utm_is_exact_to_a_billionth_of_a_pixel():
         assert abs(float(Fraction(float(found[1])) - (1000 - y))) < 1e-9
 
 
+@pytest.mark.parametrize("y", ["up", "down"])
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.longdouble])
+def test_to_pixels_of_points_of_any_width_is_that_of_float64(dtype, y):
+    grid = Grid((1000, 1000), (0.1, 2000.3, 0.1, 2000.3), y=y)
+    points = np.random.default_rng(1).uniform(0, 2000, (50, 2)).astype(dtype)
+    assert np.array_equal(grid.to_pixels(points), grid.to_pixels(points.astype(np.float64)))
+
+
 def test_field_values_that_are_nan_stay_in_their_triangles():
     found = tl.field((SQUARE, HALVES), [0.0, np.nan, 1, 2], (40, 30), y="down")
     ids = tl.rasterize(np.array(SQUARE) * 10, HALVES, (40, 30)).triangle
@@ -304,6 +312,14 @@ def test_field_of_words_is_refused():
 def test_field_with_an_index_outside_is_refused():
     with pytest.raises(IndexError, match=r"triangles must hold indices in \[0, 4\)"):
         tl.field((SQUARE, [[0, 1, 4]]), [1] * 4, (4, 3), extent=(0, 1, 0, 1))
+
+
+@pytest.mark.parametrize("triangles", [[[0.0, 1.0, 2.0]], [[True, False, True]]])
+def test_grid_around_triangles_that_are_no_integers_is_refused(triangles):
+    with pytest.raises(TypeError, match="triangles must be integers, got dtype"):
+        tl.field((SQUARE, triangles), [1] * 4, (4, 3))
+    with pytest.raises(TypeError, match="triangles must be integers, got dtype"):
+        Grid.around((SQUARE, triangles), size=(4, 3))
 
 
 def test_field_of_float32_values_of_the_other_byte_order_is_float32():

@@ -99,6 +99,14 @@ def test_save_image_png_keeps_16_bits_and_text(tmp_path):
         assert np.array_equal(np.asarray(image), array)
 
 
+@pytest.mark.parametrize(("dtype", "suffix"), [("u2", ".png"), ("u2", ".tif"), ("i4", ".tif"), ("f4", ".tif")])
+def test_save_image_of_the_other_byte_order_is_that_of_the_own(tmp_path, dtype, suffix):
+    image, path = np.arange(258, 264, dtype=dtype).reshape(2, 3), tmp_path / f"x{suffix}"
+    images.save_image(path, image.astype(image.dtype.newbyteorder()))
+    with Image.open(path) as found:
+        assert np.array_equal(np.asarray(found), image)
+
+
 def test_save_image_text_goes_into_png_only(tmp_path):
     with pytest.raises(ImageError, match=r"text goes into \.png only"):
         images.save_image(tmp_path / "a.jpg", PICTURE, text={"scale": "2"})

@@ -180,6 +180,18 @@ def test_batch_picks_a_level_for_each_view():
         assert np.array_equal(picture, tl.render(detail.mesh, camera, SIZE))
 
 
+def test_scene_in_levels_makes_few_instances(monkeypatch):
+    ball, places = tl.Mesh(*tl.scenes.icosphere(3)), np.tile(np.eye(4), (300, 1, 1))
+    places[:, :3, 3] = np.indices((20, 15, 1)).reshape(3, -1).T * 3
+    scene = tl.Scene([(ball, place) for place in places])
+    camera = tl.Camera.framing(scene)
+    made = []
+    monkeypatch.setattr(tl.Scene, "_made", lambda self, i, make=tl.Scene._made: made.append(i) or make(self, i))
+    frags = tl.rasterize_mesh(scene, camera, SIZE, tolerance=0.5)
+    assert len(np.unique(frags.instance)) > 200
+    assert len(made) < 30  # some are surveyed
+
+
 def test_plan_of_a_mesh_tells_its_level():
     found = tl.plan(BLOB, FAR, SIZE, tolerance=0.5)
     level = tl.choose_detail(BLOB, FAR, SIZE, tolerance=0.5)

@@ -89,6 +89,18 @@ def test_shapely_in_each_form():
         tl.polygons([shapely.Point(1, 1)], SIZE)
 
 
+@pytest.mark.parametrize("dtype", ["i2", "i4", "f4", "f8"])
+@pytest.mark.parametrize("background", [0, 5])
+def test_values_of_the_other_byte_order_are_those_of_the_own(dtype, background):
+    values = np.array([1, 300], dtype)
+    own, other = (
+        tl.polygons([[SQUARE, HOLE], [OTHER]], SIZE, values=given, background=background)
+        for given in (values, values.astype(values.dtype.newbyteorder()))
+    )
+    assert other.dtype == own.dtype
+    assert np.array_equal(other, own)
+
+
 @pytest.mark.parametrize(
     "dtype", [bool, np.uint8, np.int8, np.uint16, np.int32, np.uint32, np.float32, np.int64, float]
 )
@@ -229,6 +241,9 @@ def test_bad_triangles_of_a_table_are_named():
         tl.overlap(SQUARE, SIZE, triangles=[[0, 1, 2], [0, 1, 4]])
     with pytest.raises(ValueError, match=re.escape("raster must have shape (5, 8), got (2, 2)")):
         tl.overlap([[SQUARE]], SIZE).means(np.zeros((2, 2)))
+    for given in (np.full((5, 8), "1.5"), np.full((5, 8), 1j)):
+        with pytest.raises(TypeError, match="raster must be real numbers, got dtype"):
+            tl.overlap([[SQUARE]], SIZE).means(given)
     with pytest.raises(ValueError, match=re.escape("values must have shape (1,), a number for each polygon, got (2,)")):
         tl.overlap([[SQUARE]], SIZE).spread([1, 2])
 

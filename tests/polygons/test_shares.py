@@ -352,6 +352,22 @@ def test_no_data_that_a_raster_names_itself_does_not_count():
         table.means(Dataset())
 
 
+@pytest.mark.parametrize("dims", [("x", "y"), ("lon", "lat"), ("band", "Easting", "Northing")])
+def test_raster_with_columns_first_is_refused(dims):
+    class Raster:
+        def __array__(self, dtype=None, copy=None):
+            return np.ones((2, 2))
+
+    raster, table = Raster(), tl.overlap([[square(0, 0, 2, 1)]], (2, 2))
+    raster.dims = dims
+    with pytest.raises(
+        ValueError, match=rf"raster must have its rows along {dims[-1]}, got dimensions .*: transpose it"
+    ):
+        table.means(raster)
+    raster.dims = dims[::-1]
+    assert table.means(raster).tolist() == [1]
+
+
 @pytest.mark.parametrize("nodata", ["x", [1, 2], 1j])
 def test_no_data_that_is_no_number_is_refused(nodata):
     with pytest.raises(TypeError, match="nodata must be a number"):

@@ -159,6 +159,19 @@ def test_as_mesh_of_anything_with_vertices(name):
     assert np.array_equal(tl.render(theirs, size=SIZE), tl.render(Mesh(VERTICES, TRIANGLES), size=SIZE))
 
 
+def test_pair_of_other_arrays_is_framed_as_a_mesh():
+    vertices, triangles = np.eye(3), [[0, 1, 2]]
+    expected = Camera.framing((vertices, triangles)).view
+    assert np.array_equal(Camera.framing((memoryview(vertices), triangles)).view, expected)
+
+
+def test_pair_without_triangles_is_a_mesh():
+    empty = np.eye(3), np.empty((0, 3), int)
+    assert tl.Scene([(empty, np.eye(4))]).n_triangles == 0
+    with pytest.raises(ValueError, match="the mesh has no triangles"):
+        Camera.framing(empty)
+
+
 def test_rasterize_mesh_takes_a_pair():
     frags = tl.rasterize_mesh((VERTICES, TRIANGLES), size=SIZE)
     assert np.array_equal(frags.triangle, tl.rasterize_mesh(Mesh(VERTICES, TRIANGLES), size=SIZE).triangle)

@@ -221,6 +221,11 @@ def test_bytes_of_a_texture_are_refused_with_what_to_write():
         dr.texture(torch.zeros(1, 2, 2, 3, dtype=torch.uint8), torch.zeros(1, 1, 1, 2))
 
 
+def test_bytes_of_triangles_are_refused_without_advice_for_colours():
+    with pytest.raises(TypeError, match=r"tri must be int32 or int64, got torch\.uint8$"):
+        dr.rasterize(CTX, sphere()[0], torch.zeros(1, 3, dtype=torch.uint8), (20, 20))
+
+
 def test_triangles_behind_the_eye_and_without_area_get_finite_gradients():
     pos = torch.tensor(
         [[[-1.0, -1, 0, 1], [3, -1, 0, -1], [-1, 3, 0, 1], [0, 0, 0, 1], [0.5, 0.5, 0, 1], [1, 1, 0, 1]]]

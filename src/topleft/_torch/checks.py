@@ -25,7 +25,7 @@ def is_cube_map(tex: object) -> bool:
 
 def len_of(tensor: Tensor) -> int:
     """Return the number of pictures of (B, N, K), 1 for (N, K)."""
-    return len(tensor) if tensor.ndim == 3 else 1
+    return tensor.shape[0] if tensor.ndim == 3 else 1
 
 
 #: What tensors may hold, and the words for it; those of attributes, textures and colours come in half precision, too.
@@ -41,7 +41,7 @@ def check(name: str, value: object, wish: str, has_shape: object, kinds: tuple[t
     if value.device.type != "cpu":
         raise TypeError(f"{name} must be on the CPU, got device {str(value.device)!r}: pass {name}.cpu()")
     if value.dtype not in kinds[0]:
-        hint = f": pass {name}.float() / 255" if value.dtype == torch.uint8 else ""
+        hint = f": pass {name}.float() / 255" if value.dtype == torch.uint8 and kinds is KINDS else ""
         raise TypeError(f"{name} must be {kinds[1]}, got {value.dtype}{hint}")
     if not has_shape:
         raise ValueError(f"{name} must have shape {wish}, got {tuple(value.shape)}")

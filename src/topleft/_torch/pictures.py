@@ -13,7 +13,6 @@ import torch
 from torch import Tensor
 
 from topleft import rasterize as draw
-from topleft._core.gradients import tensors
 from topleft._core.gradients.pictures import AttributePictures, Seen
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid
 from topleft._torch.operators import joined, like, numpy_of, once, operator, threads_of, triangles_of
@@ -44,18 +43,17 @@ def kept_seen(pictures: AttributePictures) -> list[tuple[Seen, int]] | None:
 def grid_of_mesh(pos: Tensor, tri: Tensor, attr: Tensor, size: tuple[int, int], threads: int) -> PixelGrid:
     """Return the pictures (B, H, W) of a mesh, whose triangles have rows in `pos` and `attr`."""
     triangles = triangles_of(tri, min(pos.shape[1], attr.shape[1]))
-    return PixelGrid(triangles, len(pos), *size, threads_of(threads, len(pos) * size[0] * size[1]))
+    return PixelGrid(triangles, pos.shape[0], *size, threads_of(threads, pos.shape[0] * size[0] * size[1]))
 
 
 def draw_pictures(
     pos: Tensor, tri: Tensor, attr: Tensor, across: Tensor, size: tuple[int, int], rule: int, threads: int
 ) -> AttributePictures:
-    """Draw which triangles show, row 0 on top, and find their outlines; `size` is height and width."""
+    """Draw which triangles show, row 0 on top; `size` is height and width."""
     grid, vertices = grid_of_mesh(pos, tri, attr, size, threads), numpy_of(pos)
     n = threads_of(threads, size[0] * size[1])
     ids = joined([draw(one, grid.tri, size[::-1], threads=n).triangle for one in vertices], size)
-    outline = tensors.outline_of(grid, vertices, numpy_of(across.to(torch.int32)))
-    return AttributePictures(grid, EdgeRule(rule), outline, vertices, ids, numpy_of(attr))
+    return AttributePictures(grid, EdgeRule(rule), numpy_of(across.to(torch.int32)), vertices, ids, numpy_of(attr))
 
 
 @operator(
@@ -79,44 +77,34 @@ def squares(
 
 @operator(
     "(Tensor pos, Tensor tri, Tensor attr, Tensor across, int height, int width, int rule, int threads)"
-    " -> (Tensor, Tensor, Tensor, Tensor)",
+    " -> (Tensor, Tensor)",
     lambda pos, tri, attr, across, height, width, rule, threads: (  # noqa: ARG005
         pos.new_empty((len(pos), height, width, attr.shape[2])),
         pos.new_empty((len(pos), height, width), dtype=torch.int32),
-        pos.new_empty((*pos.shape[:2], 2), dtype=torch.float64),
-        tri.new_empty((len(pos), len(tri)), dtype=torch.int32),
     ),
 )
 def draw_attributes(
     pos: Tensor, tri: Tensor, attr: Tensor, across: Tensor, height: int, width: int, rule: int, threads: int
-) -> tuple[Tensor, ...]:
-    """Return pictures of attributes with smooth silhouettes; their ids, and what `outline` returns."""
+) -> tuple[Tensor, Tensor]:
+    """Return pictures of attributes with smooth silhouettes, and their ids."""
     pictures = draw_pictures(pos, tri, attr, across, (height, width), rule, threads)
     drawn, seen = pictures.picture()
     keep_seen(pictures, seen)
-    outline = pictures.outline
-    return tuple(map(torch.from_numpy, (drawn, pictures.ids, outline.places, outline.edges)))
+    return torch.from_numpy(drawn), torch.from_numpy(pictures.ids)
 
 
 @operator(
-    "(Tensor pos, Tensor tri, Tensor attr, Tensor ids, Tensor[] outline, int rule, int threads, Tensor g_out)"
+    "(Tensor pos, Tensor tri, Tensor attr, Tensor ids, Tensor across, int rule, int threads, Tensor g_out)"
     " -> (Tensor, Tensor)",
-    lambda pos, tri, attr, ids, outline, rule, threads, g_out: (like(pos, pos), like(attr, attr)),  # noqa: ARG005
+    lambda pos, tri, attr, ids, across, rule, threads, g_out: (like(pos, pos), like(attr, attr)),  # noqa: ARG005
 )
 def draw_attributes_vjp(
-    pos: Tensor,
-    tri: Tensor,
-    attr: Tensor,
-    ids: Tensor,
-    outline: Sequence[Tensor],
-    rule: int,
-    threads: int,
-    g_out: Tensor,
+    pos: Tensor, tri: Tensor, attr: Tensor, ids: Tensor, across: Tensor, rule: int, threads: int, g_out: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Return the gradients of `pos` and `attr`."""
-    edges = tensors.Outline(*map(numpy_of, outline))
     grid = grid_of_mesh(pos, tri, attr, (ids.shape[1], ids.shape[2]), threads)
-    pictures = AttributePictures(grid, EdgeRule(rule), edges, numpy_of(pos), numpy_of(ids), numpy_of(attr))
+    arrays = (numpy_of(one) for one in (across.to(torch.int32), pos, ids, attr))
+    pictures = AttributePictures(grid, EdgeRule(rule), *arrays)
     g_pos, g_attr = pictures.vjp(numpy_of(g_out), kept_seen(pictures))
     return torch.from_numpy(g_pos), torch.from_numpy(g_attr)
 
@@ -137,14 +125,16 @@ def pull_squares(ctx: Any, g_loss: Tensor, *_: Any) -> tuple[Any, ...]:
 def keep_pictures(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:
     """Keep what `draw_attributes_vjp` takes."""
     pos, tri, attr, across, _, _, ctx.rule, ctx.threads = inputs
-    ctx.mark_non_differentiable(*output[1:])
-    ctx.save_for_backward(pos, tri, attr, output[1], across.to(torch.int32), *output[2:])
+    ctx.set_materialize_grads(False)
+    ctx.mark_non_differentiable(output[1])
+    ctx.save_for_backward(pos, tri, attr, output[1], across)
 
 
-def pull_pictures(ctx: Any, g_out: Tensor, *_: Any) -> tuple[Any, ...]:
+def pull_pictures(ctx: Any, g_out: Tensor | None, _: None) -> tuple[Any, ...]:
     """Return the gradients of what `draw_attributes` takes."""
-    pos, tri, attr, ids, *outline = ctx.saved_tensors
-    g_pos, g_attr = draw_attributes_vjp(pos, tri, attr, ids, outline, ctx.rule, ctx.threads, g_out)
+    if g_out is None:
+        return (None,) * 8
+    g_pos, g_attr = draw_attributes_vjp(*ctx.saved_tensors, ctx.rule, ctx.threads, g_out)
     return g_pos, None, g_attr, None, None, None, None, None
 
 

@@ -222,7 +222,6 @@ class JobRunner:
     def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
         layers = check_layers(job.layers)
-        path = None if job.destination is None else location_of(job.destination)
         files = job.files  # before any work: raises for an unknown format
         for file in files:
             if isinstance(file, Path) and not file.parent.is_dir():
@@ -239,16 +238,16 @@ class JobRunner:
                 picture = render_transparent(scene, camera, size, **options)
             else:
                 picture = render(scene, camera, size, rasterizer=rasterizer, **options)
-            if path is None:
+            if job.destination is None:
                 return picture
             save_image(files[0], picture, background=_opaque(options))
             return None
         gbuffer = gbuffer_of(scene, camera, size, rasterizer=rasterizer, **options)
         arrays = draw_layers(layers, gbuffer)
-        if path is None:
+        if job.destination is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
         matrix = None if gbuffer.shot.camera.lens is not None else gbuffer.shot.camera.clip_from_world(size)
-        save_layers(path, arrays, matrix=matrix, background=_opaque(options))
+        save_layers(job.destination, arrays, matrix=matrix, background=_opaque(options))
         return None
 
     def _scene(self, scene: Any, scale: float) -> Any:

@@ -6,6 +6,7 @@ Input: messages, results of jobs. Output: lines, a file.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -42,12 +43,12 @@ def complain_of_lacks(lines: Sequence[str], *, is_each_told: bool = False) -> No
 
 
 def one_line(error: BaseException) -> str:
-    """The error in one line."""
+    """The error in one line, with the options of a shell where it names those of Python."""
     if isinstance(error, MemoryError):
         return "not enough memory for a mesh or picture of this size"
     if isinstance(error, OSError) and error.strerror:
         return f"{error.strerror}: {error.filename!r}" if error.filename else error.strerror
-    told = " ".join(str(error).split())
+    told = re.sub(r"\b([a-z]+)=True\b", r"--\1", " ".join(str(error).split()))
     return told if isinstance(error, TOLD) else f"{type(error).__name__}: {told}"
 
 

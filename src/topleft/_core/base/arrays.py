@@ -27,9 +27,11 @@ DEVICES = {2: "CUDA device", 4: "OpenCL device", 7: "Vulkan device", 8: "Metal d
 
 
 def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
-    """Return `values` as a NumPy array, aligned for the kernels, without a copy where it can."""
+    """Return `values` as a NumPy array, aligned for the kernels, without a copy where it can; masked floats are NaN."""
     if not isinstance(values, np.ndarray) and (hasattr(values, "__dlpack__") or hasattr(values, "__array__")):
         values = array_of_tensor(name, values)
+    if hasattr(values, "filled"):
+        values = without_masked(name, values)
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -42,6 +44,18 @@ def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
             array_of_tensor(name, first)
         raise TypeError(f"{name} must be array_like, got {shown(values)} ({error})") from None
     return as_aligned(array)
+
+
+def without_masked(name: str, values: Any) -> NDArray[Any]:
+    """Return a masked array with NaN where it is masked; one that has no NaN must not be masked anywhere."""
+    if not np.ma.is_masked(values):
+        return np.ma.getdata(values)
+    if values.dtype.kind != "f":
+        raise ValueError(
+            f"{name} must not be masked, having no NaN, got {values.dtype} with {values.mask.sum()} masked"
+        )
+    filled: NDArray[Any] = values.filled(np.nan)
+    return filled
 
 
 def as_aligned(array: NDArray[Any]) -> NDArray[Any]:

@@ -167,6 +167,15 @@ def _crs_of_coordinates(array: Any) -> str | None:
     return f"EPSG:{code[1]}" if code else text
 
 
+def check_rows_along_y(raster: Any) -> None:
+    """Raise a `ValueError` for a raster of xarray whose names of dimensions put x before y."""
+    names = getattr(raster, "dims", ())
+    dims = [str(name).casefold() for name in names] if isinstance(names, tuple) else []
+    x, y = (next((i for i, name in enumerate(dims) if name in known), None) for known in DIMENSIONS)
+    if x is not None and y is not None and x < y:
+        raise ValueError(f"raster must have its rows along {names[y]}, got dimensions {names}: transpose it")
+
+
 def numbers_without_data(raster: Any) -> list[float]:
     """Return the numbers that stand for no data in a raster of xarray."""
     said = getattr(raster, "attrs", None)

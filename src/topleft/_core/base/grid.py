@@ -259,7 +259,8 @@ class Grid:
         x_min, x_max, y_min, y_max = self.extent
         pixels = np.empty((len(points), 2))
         np.multiply(np.subtract(points[:, 0], x_min, dtype=np.float64), width / (x_max - x_min), out=pixels[:, 0])
-        from_top = np.asarray(points[:, 1], np.float64) - y_min if self.y == "down" else y_max - points[:, 1]
+        ends = (points[:, 1], y_min) if self.y == "down" else (y_max, points[:, 1])
+        from_top = np.subtract(*ends, dtype=np.float64)  # points may be float16 or float32
         np.multiply(from_top, height / (y_max - y_min), out=pixels[:, 1])
         return pixels
 

@@ -30,7 +30,7 @@ def is_url(value: object) -> bool:
 
 def location_of(value: str | os.PathLike[str]) -> Path | RemotePath:
     """Return where a file is: a path, or a location that fsspec reaches by a URL."""
-    if isinstance(value, RemotePath):
+    if isinstance(value, RemotePath | Path):
         return value
     text = os.fspath(value)
     if not is_url(text):

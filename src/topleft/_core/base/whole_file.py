@@ -28,7 +28,8 @@ def write_whole(path: Location, write: Callable[[IO[bytes]], object]) -> None:
         return
     if path.is_dir():
         raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder")
-    temporary = path.with_name(f".{path.name[:100]}.{os.urandom(4).hex()}.part")
+    folder, name = os.path.split(path)
+    temporary = os.path.join(folder, f".{name[:100]}.{os.urandom(4).hex()}.part")
     try:
         with open(temporary, "xb") as file:
             write(file)
@@ -64,6 +65,6 @@ def remove_stale_parts(paths: Iterable[Path]) -> None:
                     left.unlink()
 
 
-def _remove(temporary: Path) -> None:
+def _remove(temporary: str) -> None:
     with suppress(OSError):  # it was never made
-        temporary.unlink()
+        os.unlink(temporary)

@@ -13,10 +13,13 @@ FACE_ROWS = TL_FACE_ROWS
 
 cdef const void *first_of(array: object):
     """Return where the numbers of a contiguous array begin, NULL for None; the caller holds the array."""
+    cdef Py_buffer held
     if array is None:
         return NULL
-    cdef const uint8_t[::1] flat = as_bytes(array)
-    return data(flat)
+    PyObject_GetBuffer(array, &held, PyBUF_SIMPLE)
+    cdef const void *first = held.buf if held.len else NULL
+    PyBuffer_Release(&held)
+    return first
 
 
 cdef tl_grad_texture looked_up(levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...]):
@@ -201,13 +204,14 @@ cdef class GradientView:
         with nogil:
             K.grad_edges(&view, &e, &sums.sums)
 
-    def picture(self, const int32_t[:, ::1] ids, attr: Array, mesh: tuple[Array, Array, Array],
+    def picture(self, const int32_t[:, ::1] ids, attr: Array, mesh: tuple[Array | None, ...],
                 codes: tuple[int, float], pixels: tuple[Array | None, Array | None, Array | None],
-                seen: tuple[Array, ...], int64_t n_faces, scratch: tuple[Array, Array, Array, Array],
+                seen: tuple[Array, ...], int64_t n_faces, scratch: list[Array],
                 sums: tuple[GradientSums, GradientSums], int64_t first, int64_t end) -> tuple[float, int]:
         """Write rows of a picture of `attr` (V, K) float32, or add their gradients to sums.
 
-        `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, `codes` the rule and the weight of squares.
+        `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, the former None for what was seen before;
+        `codes`: the rule and the weight of squares.
         `pixels`, one of them: the picture; its gradients; another one, whose squared differences count. `seen` and the
         rest of `scratch` are those of ``tl_grad_picture``. `sums`: by triangle, HEAD_OF_FACE columns and SUMS_OF_FACE
         for each three attributes; by vertex, four columns and those of attributes. Returns the sum of squares, and how

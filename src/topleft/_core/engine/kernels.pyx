@@ -4,7 +4,7 @@
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
 from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
-from cpython.buffer cimport PyBUF_STRIDED_RO, PyBuffer_Release, PyObject_GetBuffer
+from cpython.buffer cimport PyBUF_SIMPLE, PyBUF_STRIDED_RO, PyBuffer_Release, PyObject_GetBuffer
 from libc.math cimport INFINITY, NAN, frexp, isinf, isnan, ldexp, rint, sqrt
 from libc.string cimport memcpy, memset
 

@@ -83,15 +83,21 @@ def bytes_of(room: Room) -> int:
     return sums + sum(math.prod(shape) * np.dtype(dtype).itemsize for shape, dtype in room.arrays)
 
 
+@lru_cache(16)
+def bands_of(n_pictures: int, height: int, width: int) -> tuple[Sequence[Band], int]:
+    """Return the bands of some pictures of one size, and the pixels of the largest."""
+    most = BAND_PX // max(1, width)
+    rows = max(1, most, min(BAND_ROWS, 2 * most))
+    firsts = [(picture, first) for picture in range(n_pictures if width else 0) for first in range(0, height, rows)]
+    bands = [Band(picture, first, min(first + rows, height), i) for i, (picture, first) in enumerate(firsts)]
+    return bands, min(rows, height) * width
+
+
 class Bands:
     """The bands of some pictures of one size."""
 
     def __init__(self, n_pictures: int, height: int, width: int, threads: int | None = None) -> None:
-        most = BAND_PX // max(1, width)
-        rows = max(1, most, min(BAND_ROWS, 2 * most))
-        firsts = [(picture, first) for picture in range(n_pictures if width else 0) for first in range(0, height, rows)]
-        self.all = [Band(picture, first, min(first + rows, height), i) for i, (picture, first) in enumerate(firsts)]
-        self.n_px = min(rows, height) * width
+        self.all, self.n_px = bands_of(n_pictures, height, width)
         n_px = n_pictures * height * width
         n_threads = parse_threads(threads) or min(available_threads(), max(1, n_px // MIN_PX_PER_THREAD))
         self.threads = max(1, min(n_threads, len(self.all)))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from topleft._core.gradients.tensors import (
     Outline,
     PixelGrid,
     of,
+    outline_of,
     points,
     points_vjp,
     row_columns,
@@ -75,15 +77,21 @@ class Seen(NamedTuple):
 class AttributePictures:
     """Pictures of attributes with smooth silhouettes.
 
-    `ids` (B, H, W): row 0 is on top. `pos` (B or 1, V, 4), `attr` (B or 1, V, K).
+    `ids` (B, H, W): row 0 is on top. `pos` (B or 1, V, 4), `attr` (B or 1, V, K). `across` (T, 3) is that of
+    `halves_across`.
     """
 
     grid: PixelGrid
     rule: EdgeRule
-    outline: Outline
+    across: NDArray[np.int32]
     pos: Array
     ids: NDArray[np.int32]
     attr: Array
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The silhouette edges; backward of what the picture has seen needs none."""
+        return outline_of(self.grid, self.pos, self.across)
 
     @property
     def is_in_rows(self) -> bool:
@@ -110,7 +118,7 @@ class AttributePictures:
             g_color, of_edges = smooth_vjp(self.grid, self.rule, self.outline, self.pos, rast, color, g_out)
             g_attr, g_rast, _ = values_vjp(self.grid, self.attr, rast, g_color)
             return points_vjp(self.grid, self.pos, rast, g_rast, None) + of_edges, g_attr
-        g_pos, g_attr = np.zeros_like(self.pos), np.zeros_like(self.attr)
+        g_pos, g_attr = (np.zeros(one.shape, one.dtype) for one in (self.pos, self.attr))
         self.run((g_pos, g_attr), lambda i: (None, g_out[i], None), self.picture()[1] if seen is None else seen)
         return g_pos, g_attr
 
@@ -120,7 +128,7 @@ class AttributePictures:
         if not self.is_in_rows:
             step = self.picture()[0] - target
             return float(np.square(step).sum()) / n, *self.vjp(step * (2 / n))
-        g_pos, g_attr = np.zeros_like(self.pos), np.zeros_like(self.attr)
+        g_pos, g_attr = (np.zeros(one.shape, one.dtype) for one in (self.pos, self.attr))
         found = self.run((g_pos, g_attr), lambda i: (None, None, target[i]), weight=2 / n)
         return sum(one for one, _, _ in found) / n, g_pos, g_attr
 
@@ -136,35 +144,39 @@ class AttributePictures:
         `seen` where `pixels` are gradients; it is kept where they are a picture.
         """
         n, views = self.attr.shape[2], self.grid.views(self.pos)
-        room = self.room(is_given=seen is not None)
+        outline = None if seen else self.outline
+        n_rows = max(self.pos.shape[1], self.attr.shape[1])
+        room = room_of(n, n_rows, len(self.grid.tri), self.grid.width, self.grid.bands.n_px, is_given=seen is not None)
 
         def work(band: Band, made: list[Any]) -> tuple[float, Seen, int]:
             i, (vertices, faces, *scratch) = band.picture, made
             own, n_faces = seen[band.number] if seen else (Seen(*scratch[4:]), 0)
+            mesh = outline.of_picture(i) if outline else (None,) * 3
             of_pixels = pixels(i)
             found, n_faces = views[i].picture(
-                self.ids[i], of(self.attr, i), self.outline.of_picture(i), (int(self.rule), weight), of_pixels, own,
-                n_faces, tuple(scratch[:4]), (faces, vertices), band.first, band.end,
+                self.ids[i], of(self.attr, i), mesh, (int(self.rule), weight), of_pixels, own, n_faces, scratch[:4],
+                (faces, vertices), band.first, band.end,
             )  # fmt: skip
-            n_rows = min(band.end + 1, self.grid.height) - max(band.first - 1, 0)
-            is_picture = of_pixels[0] is not None and n > 0
-            return found, own.copy(n_rows, n_faces) if is_picture else own, n_faces
+            if of_pixels[0] is None or not n:
+                return found, own, n_faces
+            return found, own.copy(min(band.end + 1, self.grid.height) - max(band.first - 1, 0), n_faces), n_faces
 
         return self.grid.bands.add_up(room, work, [outs] if outs else [])
 
-    def room(self, *, is_given: bool) -> Room:
-        """Return what a band works on; with what it shows, unless that is given."""
-        n, width, n_triangles = self.attr.shape[2], self.grid.width, len(self.grid.tri)
-        n_px = self.grid.bands.n_px + 4 * width
-        sums = (
-            Sums(max(self.pos.shape[1], self.attr.shape[1]), 4 + row_columns(n), 9),
-            Sums(n_triangles, engine.HEAD_OF_FACE + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
-        )
-        scratch = (
-            scratch_of(self.grid),
-            ((engine.ROWS_KEPT * width * n + engine.IDS_ROOM,), np.float32),
-            ((16 * width * n,), np.float64),
-            ((4 * width,), np.float32),
-        )
-        shown = () if is_given else Seen.room(n_px // max(1, width), n_px, n_triangles, n)
-        return Room(n_px, sums, scratch + shown)
+
+@lru_cache(64)
+def room_of(n: int, n_rows: int, n_triangles: int, width: int, n_px: int, *, is_given: bool) -> Room:
+    """Return what a band of n attributes works on; with what it shows, unless that is given."""
+    n_px += 4 * width
+    sums = (
+        Sums(n_rows, 4 + row_columns(n), 9),
+        Sums(n_triangles, engine.HEAD_OF_FACE + engine.SUMS_OF_FACE * ((n + 2) // 3), 1),
+    )
+    scratch = (
+        scratch_of(width),
+        ((engine.ROWS_KEPT * width * n + engine.IDS_ROOM,), np.float32),
+        ((16 * width * n,), np.float64),
+        ((4 * width,), np.float32),
+    )
+    shown = () if is_given else Seen.room(n_px // max(1, width), n_px, n_triangles, n)
+    return Room(n_px, sums, scratch + shown)

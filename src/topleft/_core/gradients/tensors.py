@@ -387,9 +387,9 @@ def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outlin
     return Outline(across, places, edges)
 
 
-def scratch_of(grid: PixelGrid) -> tuple[tuple[int, int], type[np.int32]]:
+def scratch_of(width: int) -> tuple[tuple[int, int], type[np.int32]]:
     """Return shape and dtype of the ids of rows that the search for edges works on."""
-    return (3, grid.width + engine.IDS_ROOM), np.int32
+    return (3, width + engine.IDS_ROOM), np.int32
 
 
 def smooth(grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, rast: Array, color: Array) -> Array:
@@ -397,7 +397,7 @@ def smooth(grid: PixelGrid, rule: EdgeRule, outline: Outline, pos: Array, rast: 
     out, views = empty(color.shape, color.dtype), grid.views(pos)
 
     def work(band: Band) -> None:
-        i, scratch = band.picture, empty(*scratch_of(grid))
+        i, scratch = band.picture, empty(*scratch_of(grid.width))
         arrays = rast[i], color[i], out[i]
         views[i].edges(outline.of_picture(i), scratch, int(rule), arrays, None, band.first, band.end)
 
@@ -410,7 +410,7 @@ def smooth_vjp(
 ) -> tuple[Array, Array]:
     """Return the gradients of the colours and of `pos`."""
     g_color, g_pos = empty(color.shape, color.dtype), np.zeros(pos.shape, pos.dtype)
-    views, room = grid.views(pos), Room(grid.bands.n_px, (Sums(pos.shape[1], 4, 6),), (scratch_of(grid),))
+    views, room = grid.views(pos), Room(grid.bands.n_px, (Sums(pos.shape[1], 4, 6),), (scratch_of(grid.width),))
 
     def work(band: Band, made: list[Any]) -> None:
         i, (sums, scratch) = band.picture, made

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, shown
 from topleft._core.base.defaults import MAX_CROSSINGS
-from topleft._core.base.georeference import numbers_without_data
+from topleft._core.base.georeference import check_rows_along_y, numbers_without_data
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
 from topleft._core.base.options import parse
@@ -253,11 +253,14 @@ class Overlap:
             if raster.count != 1:
                 raise ValueError(f"raster must have one band, got {raster.count}: pass raster.read(1, masked=True)")
             raster = raster.read(1, masked=True)
+        check_rows_along_y(raster)
         numbers = [nodata, *numbers_without_data(raster)]
         is_masked = np.ma.getmask(raster) if isinstance(raster, np.ma.MaskedArray) else np.ma.nomask
-        array = as_array("raster", raster)
+        array = as_array("raster", raster.data if is_masked is not np.ma.nomask else raster)
         if array.shape != self.size[::-1]:
             raise ValueError(f"raster must have shape {self.size[::-1]}, got {array.shape}")
+        if array.dtype.kind not in "biuf":
+            raise TypeError(f"raster must be real numbers, got dtype {array.dtype}")
         self._check_pixels()
         given = array.reshape(-1)[self.pixels]
         values = given.astype(np.float64)

@@ -277,6 +277,7 @@ def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
         table = as_array("values", values)
         if table.dtype.kind not in "biuf":
             raise TypeError(f"values must be real numbers, got dtype {table.dtype}")
+        table = table.astype(table.dtype.newbyteorder("="), copy=False)  # rows are written as bytes
         if table.ndim == 0:
             table = np.full(n, table)
         if table.ndim > 2 or len(table) != n:

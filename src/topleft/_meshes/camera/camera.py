@@ -32,10 +32,10 @@ from topleft._meshes.camera.calibration import Calibration, of_colmap, of_nerfst
 from topleft._meshes.camera.lens import FLIP, Lens, lens_of_opencv
 from topleft._meshes.camera.matrices import (
     as_framed,
+    as_planes,
+    as_positive,
     box_corners,
     box_matrix,
-    check_planes,
-    check_positive,
     ends_to_frame,
     framing_matrices,
     frustum_matrix,
@@ -103,7 +103,7 @@ class Camera:
             matrix.flags.writeable = False
             object.__setattr__(self, name, matrix)
         if self.aspect is not None:
-            check_positive("aspect", self.aspect)
+            object.__setattr__(self, "aspect", as_positive("aspect", self.aspect))
         if not (self.lens is None or hasattr(self.lens, "bend")):
             raise TypeError(f"lens must be an OpenCVLens, a FisheyeLens or None, got {shown(self.lens)}")
         if self.lens is not None and not np.array_equal(self.projection[3], [0, 0, -1, 0]):
@@ -662,9 +662,8 @@ class Camera:
 def planes_for(away: float, near: float | None, far: float | None) -> tuple[float, float]:
     """The planes given, or default ones for a camera at this distance from the world's origin."""
     near = 1e-3 * (away or 1.0) if near is None else near
-    far = max(1e3 * max(away or 1.0, 1.0), 1e3 * near) if far is None else far
-    check_planes(near, far)
-    return near, far
+    far = max(1e3 * max(away or 1.0, 1.0), 1e3 * as_number("near", near)) if far is None else far
+    return as_planes(near, far)
 
 
 def pixels_of(points_eye: F64, projection: F64, size: tuple[int, int]) -> F64:

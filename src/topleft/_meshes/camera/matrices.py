@@ -220,8 +220,7 @@ def sine_of_tangent(value: float) -> float:
 
 def perspective_matrix(fov_y_deg: float, near: float, far: float) -> F64:
     """Clip from eye (4, 4) float64 for a square picture; see `Camera.perspective`."""
-    check_fov(fov_y_deg)
-    check_planes(near, far)
+    fov_y_deg, (near, far) = as_fov(fov_y_deg), as_planes(near, far)
     scale = 1 / tangent(fov_y_deg / 2)
     matrix = np.diag([scale, scale, (far + near) / (near - far), 0])
     matrix[2, 3] = 2 * far * near / (near - far)
@@ -231,9 +230,7 @@ def perspective_matrix(fov_y_deg: float, near: float, far: float) -> F64:
 
 def orthographic_matrix(height: float, near: float, far: float) -> F64:
     """Clip from eye (4, 4) float64 for a square picture; see `Camera.orthographic`."""
-    check_positive("height", height)
-    if not -math.inf < as_number("near", near) < as_number("far", far) < math.inf:
-        raise ValueError(f"near and far must be finite and near < far, got {near} and {far}")
+    height, (near, far) = as_positive("height", height), as_planes(near, far, least=-math.inf)
     matrix = np.diag([2 / height, 2 / height, 2 / (near - far), 1])
     matrix[2, 3] = (far + near) / (near - far)
     return matrix
@@ -241,8 +238,8 @@ def orthographic_matrix(height: float, near: float, far: float) -> F64:
 
 def frustum_matrix(left: float, right: float, bottom: float, top: float, near: float, far: float) -> F64:
     """Clip from eye (4, 4) float64 for a window of the plane at `near`; see `Camera.off_center`."""
-    check_window(left, right, bottom, top)
-    check_planes(near, far)
+    left, right, bottom, top = as_window(left, right, bottom, top)
+    near, far = as_planes(near, far)
     matrix = perspective_matrix(90, near, far)
     matrix[0, 0], matrix[0, 2] = 2 * near / (right - left), (right + left) / (right - left)
     matrix[1, 1], matrix[1, 2] = 2 * near / (top - bottom), (top + bottom) / (top - bottom)
@@ -251,7 +248,7 @@ def frustum_matrix(left: float, right: float, bottom: float, top: float, near: f
 
 def box_matrix(left: float, right: float, bottom: float, top: float, near: float, far: float) -> F64:
     """Clip from eye (4, 4) float64 for a box without perspective; see `Camera.off_center`."""
-    check_window(left, right, bottom, top)
+    left, right, bottom, top = as_window(left, right, bottom, top)
     matrix = orthographic_matrix(1, near, far)
     matrix[0, 0], matrix[0, 3] = 2 / (right - left), -(right + left) / (right - left)
     matrix[1, 1], matrix[1, 3] = 2 / (top - bottom), -(top + bottom) / (top - bottom)
@@ -274,8 +271,7 @@ def framing_matrices(
     """
     azimuth_deg, elevation_deg, fov_y_deg = angles
     center, radius = bounding_sphere(ends)
-    check_fov(fov_y_deg)
-    check_positive("aspect", aspect)
+    fov_y_deg, aspect = as_fov(fov_y_deg), as_positive("aspect", aspect)
     tan_y = tangent(fov_y_deg / 2)
     # The sphere touches the pyramid of view at sin, not tan, of the half angle.
     distance = radius * FRAMING_MARGIN / sine_of_tangent(tan_y * min(1.0, aspect))
@@ -302,26 +298,32 @@ def framing_matrices(
     return view, perspective_matrix(fov_y_deg, near, far)
 
 
-def check_positive(name: str, value: float) -> None:
-    """Raise a `ValueError` unless the number is finite and above 0."""
-    if not 0 < as_number(name, value) < math.inf:
+def as_positive(name: str, value: float) -> float:
+    """The number as a float; a `ValueError` unless it is finite and above 0."""
+    if not 0 < (number := as_number(name, value)) < math.inf:
         raise ValueError(f"{name} must be positive, got {value}")
+    return number
 
 
-def check_fov(fov_y_deg: float) -> None:
-    """Raise a `ValueError` unless the field of view is one."""
-    if not 0 < as_number("fov_y_deg", fov_y_deg) < 180:
+def as_fov(fov_y_deg: float) -> float:
+    """The field of view as a float; a `ValueError` unless it is one."""
+    if not 0 < (degrees := as_number("fov_y_deg", fov_y_deg)) < 180:
         raise ValueError(f"fov_y_deg must lie between 0 and 180, got {fov_y_deg}")
+    return degrees
 
 
-def check_planes(near: float, far: float) -> None:
-    """Raise a `ValueError` unless 0 < near < far, finite."""
-    if not 0 < as_number("near", near) < as_number("far", far) < math.inf:
-        raise ValueError(f"near and far must be finite and 0 < near < far, got {near} and {far}")
+def as_planes(near: float, far: float, *, least: float = 0.0) -> tuple[float, float]:
+    """Both distances as floats, which do not wrap round; a `ValueError` unless least < near < far, finite."""
+    planes = as_number("near", near), as_number("far", far)
+    if not least < planes[0] < planes[1] < math.inf:
+        wish = "0 < near < far" if least == 0 else "near < far"
+        raise ValueError(f"near and far must be finite and {wish}, got {near} and {far}")
+    return planes
 
 
-def check_window(left: float, right: float, bottom: float, top: float) -> None:
-    """Raise a `ValueError` unless the four sides are finite and in order."""
-    numbers = {"left": left, "right": right, "bottom": bottom, "top": top}
-    if not all(math.isfinite(as_number(*one)) for one in numbers.items()) or left >= right or bottom >= top:
+def as_window(left: float, right: float, bottom: float, top: float) -> tuple[float, float, float, float]:
+    """The four sides as floats; a `ValueError` unless they are finite and in order."""
+    sides = as_number("left", left), as_number("right", right), as_number("bottom", bottom), as_number("top", top)
+    if not (-math.inf < sides[0] < sides[1] < math.inf and -math.inf < sides[2] < sides[3] < math.inf):
         raise ValueError(f"left < right and bottom < top must be finite, got {left} and {right}, {bottom} and {top}")
+    return sides

@@ -122,8 +122,8 @@ def field(
     if array.dtype.kind not in "fiub":
         raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
     is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(PerOption, "per", per))
-    grid = grid_of(size, pixel_size, extent, y, partial(extent_of, polygons))
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
+    grid = grid_of(size, pixel_size, extent, y, partial(extent_of, points, triangles))
     points_px = grid.to_pixels(points)
     size = _window_of(grid, origin) if window is None else window
     view = View.parse(size, {"subpixel_bits": subpixel_bits, "threads": threads, "origin": origin})
@@ -197,8 +197,8 @@ def height_map(
     if points.shape[1] != 3:
         raise ValueError(f"a height map needs points of shape (V, 3), got {points.shape}")
     size, pixel_size = (spacing, None) if isinstance(spacing, Grid) else (None, spacing)
-    grid = grid_of(size, pixel_size, extent, y, partial(extent_of, polygons))
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
+    grid = grid_of(size, pixel_size, extent, y, partial(extent_of, points, triangles))
     points_px, heights = grid.to_pixels(points), points[:, 2].astype(np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
     with Canvas.of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
@@ -255,14 +255,16 @@ def grid_of(size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption, b
 def extent_around(mesh: MeshLike, extent: ExtentLike | None) -> ExtentLike:
     """The extent, or the box round a mesh where none is given."""
     polygons = as_polygons(mesh)
-    return extent_of(polygons) if extent is None else extent
+    if extent is not None:
+        return extent
+    points = _plane_points(polygons)
+    return extent_of(points, as_checked_triangles(polygons.triangles, len(points)))
 
 
-def extent_of(polygons: Polygons) -> Extent:
+def extent_of(points: npt.NDArray[Any], corners: I32) -> Extent:
     """The box round the points that triangles use."""
-    if not len(polygons.triangles):
+    if not len(corners):
         raise ValueError("a mesh without triangles has no extent")
-    points, corners = np.asarray(polygons.points), np.asarray(polygons.triangles)
     x, y = points[:, 0][corners], points[:, 1][corners]  # by column: NumPy is slow along short rows
     return float(x.min()), float(x.max()), float(y.min()), float(y.max())
 

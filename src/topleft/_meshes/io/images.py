@@ -112,6 +112,7 @@ def save_image(
         return
     if picture.dtype == np.bool_:
         picture = np.where(picture, np.uint8(255), np.uint8(0))
+    picture = picture.astype(picture.dtype.newbyteorder("="), copy=False)
     _check_holds(place, picture)
     if suffix == ".png":
         write_whole(place, lambda file: file.writelines(png.pieces(picture, text=text)))

@@ -41,6 +41,8 @@ def layer_paths(destination: Location, names: Sequence[str]) -> dict[str, Locati
         raise ImageError(f"cannot write {text!r}: format {destination.suffix!r} is none of {known}")
     if destination.suffix.lower() != ".npz" and "{layer}" not in text and len(names) > 1:
         raise ImageError(f"{len(names)} layers need {{layer}} in the name, or .npz, got {text!r}")
+    if "{layer}" not in text:
+        return dict.fromkeys(names, destination)
     return {name: location_of(text.replace("{layer}", name)) for name in names}
 
 

@@ -90,7 +90,7 @@ def _filtered_bands(image: npt.NDArray[Any]) -> Iterator[npt.NDArray[np.uint8]]:
     """Rows (N, 1 + bytes of a row) uint8 by bands: the filter's number, then the difference to the row above."""
     height = len(image)
     row_bytes = image[0].size * image.itemsize
-    n_rows = min(height, max(1, BAND_BYTES // (1 + row_bytes)))
+    n_rows = min(height, max(1, BAND_BYTES // row_bytes))
     band = np.empty((n_rows, 1 + row_bytes), np.uint8)
     band[:, 0] = FILTER_UP
     for first in range(0, height, n_rows):

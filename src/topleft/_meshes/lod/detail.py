@@ -209,14 +209,18 @@ class ScreenError(NamedTuple):
 
     def cut(self, matrix: F64, levels: Levels, level: int, tolerance: float) -> ChosenParts | None:
         """The mesh put together from parts that are sure to be within a tolerance, if a level is much finer."""
-        n = len(levels[level].mesh.triangles)
-        if n < LEAST_PARTED or levels.parted is None:
+        parted = levels.parted if may_cut(levels, level) else None
+        if parted is None:
             return None
-        parted = levels.parted
         chosen, bound_px = parted.choose(matrix, self.viewport, self.window, tolerance)
-        if parted.n_triangles(chosen) > MOST_CUT * n:
+        if parted.n_triangles(chosen) > MOST_CUT * len(levels[level].mesh.triangles):
             return None
         return ChosenParts(parted.mesh(chosen), parted.levels(chosen), parted.bound(chosen), bound_px)
+
+
+def may_cut(levels: Levels, level: int) -> bool:
+    """Whether the mesh is in parts, and a level so fine that some of them may take its place."""
+    return levels.parts is not None and len(levels[level].mesh.triangles) >= LEAST_PARTED
 
 
 class ChosenParts(NamedTuple):
@@ -281,12 +285,22 @@ def detailed(
         return scene  # see `why_whole`
     screen = screen_error_of(camera, size, options.get("viewport"), options.get("origin", (0, 0)))
     matrices = scene.clip_from_objects(screen.clip_from_world)
-    meshes = [instance.mesh for instance in scene]
+    chosen: dict[int, tuple[int, Mesh]] = {}
+    of_instance: NDArray[np.int64] = np.empty(len(scene), np.int64)
+
+    def use(mesh: Mesh, at: NDArray[np.intp] | int) -> None:
+        of_instance[at] = chosen.setdefault(id(mesh), (len(chosen), mesh))[0]
+
     for one, material, at in scene.looks(options.get("material")):
-        if not why_whole(one, camera, tolerance, options.get("cull"), material):
-            levels = levels_of(one)
-            found = screen.coarsest(matrices[at], levels, tolerance)[0].tolist()
-            for i, level in zip(at.tolist(), found, strict=True):
-                cut = screen.cut(matrices[i], levels, level, tolerance) if in_parts else None
-                meshes[i] = cut.mesh if cut is not None else levels[level].mesh if level else one
-    return scene.with_meshes(meshes)
+        if why_whole(one, camera, tolerance, options.get("cull"), material):
+            use(one, at)
+            continue
+        levels = levels_of(one)
+        found = screen.coarsest(matrices[at], levels, tolerance)[0]
+        for level in sorted(set(found.tolist())):
+            own = at[found == level]
+            use(levels[level].mesh if level else one, own)
+            for i in own.tolist() if in_parts and may_cut(levels, level) else ():
+                if (cut := screen.cut(matrices[i], levels, level, tolerance)) is not None:
+                    use(cut.mesh, i)
+    return scene.with_meshes([mesh for _, mesh in chosen.values()], of_instance)

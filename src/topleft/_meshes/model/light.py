@@ -158,8 +158,11 @@ class Fog:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "color", as_color("color", self.color, 3))
-        if not -math.inf < as_number("near", self.near) < as_number("far", self.far) < math.inf:
+        near, far = as_number("near", self.near), as_number("far", self.far)
+        if not -math.inf < near < far < math.inf:
             raise ValueError(f"near and far must be finite and near < far, got {self.near} and {self.far}")
+        object.__setattr__(self, "near", near)
+        object.__setattr__(self, "far", far)
 
 
 def as_not_negative(name: str, value: float) -> float:

@@ -124,8 +124,15 @@ def is_mesh_like(subject: object) -> bool:
     if isinstance(subject, str | os.PathLike):
         return True
     if isinstance(subject, tuple) and len(subject) == 2:  # (vertices, triangles), not two points
-        return all(hasattr(part, "__len__") and len(part) > 0 and hasattr(part[0], "__len__") for part in subject)
+        return all(_has_rows(part) for part in subject)
     return _is_scene(subject) or any(hasattr(subject, name) for name in ("triangles", "faces", "cells"))
+
+
+def _has_rows(part: Any) -> bool:
+    """Whether an array, a table or a list is of rows; an empty array may be, of an empty list nobody knows."""
+    if isinstance(getattr(part, "ndim", None), int):
+        return bool(part.ndim == 2)
+    return hasattr(part, "__len__") and len(part) > 0 and hasattr(part[0], "__len__")
 
 
 def _is_scene(subject: object) -> bool:

@@ -7,7 +7,7 @@ that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property, partial
 from html import escape
@@ -109,16 +109,10 @@ class Instance:
         name = "" if self.name is None else f", name={self.name!r}"
         return f"Instance({self.mesh!r}, at=({place}){name})"
 
-    def with_mesh(self, mesh: Mesh) -> Instance:
-        """Return another mesh in the same place, which has been checked."""
+    def but(self, **changes: Any) -> Instance:
+        """Return the instance with other values, which have been checked."""
         instance = object.__new__(Instance)
-        vars(instance).update(vars(self), mesh=mesh)
-        return instance
-
-    def at(self, transform: F64, *, is_mirrored: bool) -> Instance:
-        """Return the same mesh by another matrix, which has been checked."""
-        instance = object.__new__(Instance)
-        vars(instance).update(vars(self), transform=transform, is_mirrored=is_mirrored)
+        vars(instance).update(vars(self), **changes)
         return instance
 
     @cached_property
@@ -128,7 +122,7 @@ class Instance:
 
 
 IN_PLACE = Instance(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)))
-"""An empty mesh in place, which `with_mesh` copies."""
+"""An empty mesh in place, which `but` copies."""
 vars(IN_PLACE)["is_mirrored"] = False  # as copies know
 
 
@@ -173,9 +167,14 @@ class Scene:
 
     @cached_property  # type: ignore[no-redef]
     def instances(self) -> tuple[Instance, ...]:
-        """The instances; those of a scene that `with_transforms` has made are made when they are needed."""
-        parts = zip(vars(self)["_like"].instances, self.transforms, self.are_mirrored.tolist(), strict=True)
-        return tuple(one.at(matrix, is_mirrored=is_mirrored) for one, matrix, is_mirrored in parts)
+        """The instances; those of a scene that was made like another are made when all are needed."""
+        return tuple(map(self._made, range(len(self))))
+
+    def _made(self, i: int) -> Instance:
+        """Return an instance of a scene that was made like another."""
+        meshes, of_instance = self._numbered
+        own = {"transform": self.transforms[i], "is_mirrored": bool(self.are_mirrored[i])}
+        return vars(self)["_like"].instances[i].but(mesh=meshes[of_instance[i]], **own)
 
     def __getstate__(self) -> dict[str, object]:
         """The state for another process, which finds out the rest itself."""
@@ -198,7 +197,8 @@ class Scene:
         return iter(self.instances)
 
     def __getitem__(self, i: int) -> Instance:
-        return self.instances[i]
+        is_kept = "instances" in vars(self) or isinstance(i, slice)
+        return self.instances[i] if is_kept else self._made(i)
 
     def __repr__(self) -> str:
         n, n_meshes = len(self), len(self.meshes)
@@ -210,8 +210,7 @@ class Scene:
         """Where the vertices of each instance begin when all are counted, and the number of all: (N + 1,) int64."""
         found = self.known.get("first vertices")
         if found is None:
-            counts = [len(instance.mesh.vertices) for instance in self.instances]
-            found = self.known["first vertices"] = np.cumsum([0, *counts], dtype=np.int64)
+            found = self.known["first vertices"] = self._firsts(lambda mesh: len(mesh.vertices))
         return found
 
     @property
@@ -219,7 +218,8 @@ class Scene:
         """The triangles of all instances, by vertices as `first_vertices` counts them: (T, 3) int32."""
         found = self.known.get("joined triangles")
         if found is None:
-            found = np.concatenate([instance.mesh.triangles for instance in self.instances])
+            meshes, of_instance = self._numbered
+            found = np.concatenate([meshes[k].triangles for k in of_instance.tolist()])
             found += np.repeat(self.first_vertices[:-1].astype(np.int32), np.diff(self.first_ids))[:, None]
             self.known["joined triangles"] = found
         return found
@@ -229,11 +229,9 @@ class Scene:
         """The different meshes, and which of them each instance has, (N,)."""
         found = self.known.get("mesh list")
         if found is None:
-            of_instance: npt.NDArray[np.int64] = np.empty(len(self), np.int64)
-            for k, (_, at) in enumerate(self.meshes.values()):
-                of_instance[at] = k
-            meshes = engine.MeshList([(mesh.vertices, mesh.triangles) for mesh, _ in self.meshes.values()])
-            found = self.known["mesh list"] = meshes, of_instance
+            meshes, of_instance = self._numbered
+            listed = engine.MeshList([(mesh.vertices, mesh.triangles) for mesh in meshes])
+            found = self.known["mesh list"] = listed, of_instance
         return found
 
     @cached_property
@@ -254,9 +252,16 @@ class Scene:
     @cached_property
     def first_ids(self) -> npt.NDArray[np.int64]:
         """Where the triangles of each instance begin when all are counted, and the number of all: (N + 1,) int64."""
-        first_ids = np.cumsum([0, *(len(instance.mesh.triangles) for instance in self.instances)], dtype=np.int64)
+        first_ids = self._firsts(lambda mesh: len(mesh.triangles))
         first_ids.flags.writeable = False
         return first_ids
+
+    def _firsts(self, count: Callable[[Mesh], int]) -> npt.NDArray[np.int64]:
+        """Return where something of each instance begins that a mesh has so often, and the number of all: (N + 1,)."""
+        counts: npt.NDArray[np.int64] = np.zeros(1 + sum(len(at) for _, at in self.meshes.values()), np.int64)
+        for mesh, at in self.meshes.values():
+            counts[1 + at] = count(mesh)
+        return np.cumsum(counts)
 
     @cached_property
     def transforms(self) -> F64:
@@ -283,19 +288,32 @@ class Scene:
         return {key: (self.instances[at[0]].mesh, np.array(at, np.intp)) for key, at in found.items()}
 
     @cached_property
+    def _numbered(self) -> tuple[list[Mesh], npt.NDArray[np.int64]]:
+        """The different meshes, and which of them each instance has, (N,)."""
+        of_instance: npt.NDArray[np.int64] = np.empty(len(self), np.int64)
+        for k, (_, at) in enumerate(self.meshes.values()):
+            of_instance[at] = k
+        return [mesh for mesh, _ in self.meshes.values()], of_instance
+
+    @cached_property
     def known(self) -> dict[Any, Any]:
         """What has been found out of meshes and materials, wherever they stand: `with_transforms` keeps it."""
         return {}
 
     def looks(self, material: Material | None) -> list[tuple[Mesh, Material | None, npt.NDArray[np.intp]]]:
         """The different meshes, each with this material or that of its instances, and which instances these are."""
-        if material is not None or all(one.material is None for one in self.instances):
+        if material is not None or vars(self).get("_like", self).has_no_materials:
             return [(mesh, material, at) for mesh, at in self.meshes.values()]
         found: dict[tuple[int, int], list[int]] = {}
         for i, one in enumerate(self.instances):
             found.setdefault((id(one.mesh), id(one.material)), []).append(i)
         firsts = [(self.instances[at[0]], at) for at in found.values()]
         return [(one.mesh, one.material, np.array(at, np.intp)) for one, at in firsts]
+
+    @cached_property
+    def has_no_materials(self) -> bool:
+        """Whether no instance has a material of its own."""
+        return all(one.material is None for one in self.instances)
 
     @cached_property
     def boxes(self) -> F64:
@@ -358,16 +376,23 @@ class Scene:
             for k, matrix in enumerate(placed):
                 check_regular(f"transforms[{k}]", matrix)
             mirrored = np.array([engine.determinant(matrix[:3, :3]) < 0 for matrix in placed], np.uint8)
-        scene = object.__new__(Scene)
-        like = vars(self).get("_like", self)
         kept = {"first_ids": self.first_ids, "meshes": self.meshes, "boxes": self.boxes, "backoff": self.backoff}
-        vars(scene).update(kept, _like=like, known=self.known, transforms=placed, are_mirrored=mirrored.view(np.bool_))
-        return scene
+        own = {"known": self.known, "_numbered": self._numbered}
+        return self._but(transforms=placed, are_mirrored=mirrored.view(np.bool_), **kept, **own)
 
-    def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
-        """Return the scene with other meshes, which stand where these do."""
-        instances = [one.with_mesh(mesh) for one, mesh in zip(self.instances, meshes, strict=True)]
-        return unchecked_scene(instances, transforms=self.transforms, are_mirrored=self.are_mirrored)
+    def with_meshes(self, meshes: Sequence[Mesh], of_instance: npt.NDArray[np.int64]) -> Scene:
+        """Return the scene with other meshes, all different; `of_instance` (N,): which of them each instance has."""
+        known = {"transforms": self.transforms, "are_mirrored": self.are_mirrored, "backoff": self.backoff}
+        if len(self) == 1:
+            return unchecked_scene([self[0].but(mesh=meshes[of_instance[0]])], **known)
+        places = ((mesh, np.flatnonzero(of_instance == k)) for k, mesh in enumerate(meshes))
+        return self._but(meshes={id(mesh): (mesh, at) for mesh, at in places if len(at)}, **known)
+
+    def _but(self, **values: object) -> Scene:
+        """Return a scene like this one, of which these values are known, others than those of its instances."""
+        scene = object.__new__(Scene)
+        vars(scene).update(values, _like=vars(self).get("_like", self))
+        return scene
 
     @property
     def bounds(self) -> F64:
@@ -459,7 +484,7 @@ def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
 
 def scene_of(subject: Mesh | Scene) -> Scene:
     """The scene, or that of a mesh alone."""
-    return subject if isinstance(subject, Scene) else unchecked_scene([IN_PLACE.with_mesh(subject)])
+    return subject if isinstance(subject, Scene) else unchecked_scene([IN_PLACE.but(mesh=subject)])
 
 
 def unchecked_scene(instances: Sequence[Instance], **known: object) -> Scene:
@@ -483,5 +508,5 @@ def collapsed(scene: Scene, masks: Sequence[npt.NDArray[np.bool_] | None], *, ke
                 made[key] = Mesh(mesh.vertices[mesh.triangles[:1, 0]], np.zeros_like(mesh.triangles))
             else:
                 made[key] = trusted_mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
-        instances.append(instance.with_mesh(made[key]))
+        instances.append(instance.but(mesh=made[key]))
     return Scene(instances)
