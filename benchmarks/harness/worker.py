@@ -94,7 +94,7 @@ def make_ready(order: dict[str, Any]) -> tuple[Drawing, dict[str, Any]]:
     if order["peer"] == OURS:
         import topleft as tl
 
-        facts["isa"] = tl.build_info()["isa"]
+        facts |= {"isa": tl.build_info()["isa"], "version": tl.__version__}
     return drawing, facts
 
 

@@ -97,6 +97,7 @@ def test_off_without_faces_becomes_points(load):
         (f"OFF\n4 1 0\n{SQUARE}4 0 1 2\n", "a face has fewer corners than it says"),
         (f"OFF\n4 1 0\n{SQUARE}3 0 1 x\n", "a number of it is none"),
         (f"OFF\n4 1 0\n{SQUARE}3 0 1 9\n", "a face names vertex 9 of 4"),
+        (f"OFF\n4 1 0\n{SQUARE}3 0 1 2.5\n", "a corner of a face is 2.5, which is no index"),
         ("OFF\n999999999999 1 0\n0 0 0\n", "more than the 4194304 of max_vertices"),
     ],
 )

@@ -50,6 +50,12 @@ def test_ply_text_rows_with_fewer_numbers_than_the_header_says_are_refused(load)
         load("element vertex 4\n" + XYZ + FACES.format(2), SQUARE + "4 0 1 2\n3 0 1 2\n")
 
 
+@pytest.mark.parametrize("rows", ["3 0 1 2.5\n3 0 2 3\n", "4 0 1 2 3\n3 0 1 2.5\n", "3 0 1 2\n3 0 1 nan\n"])
+def test_ply_text_corners_that_are_no_indices_are_refused(load, rows):
+    with pytest.raises(MeshError, match=r"a corner of a face is (2\.5|nan), which is no index"):
+        load("element vertex 4\n" + XYZ + FACES.format(2), SQUARE + rows)
+
+
 def test_ply_strips_turn_one_way_and_end_at_minus_one(load):
     strips = "element tristrips 1\nproperty list int int vertex_indices\n"
     mesh = load("element vertex 4\n" + XYZ + strips, SQUARE + "9 0 1 3 2 -1 1 2 0 -1\n")

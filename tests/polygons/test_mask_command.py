@@ -204,6 +204,13 @@ def test_images_of_one_id_are_refused(files, run):
     assert (status, "1 ids of images stand more than once" in lines[0]) == (2, True)
 
 
+def test_annotation_of_an_image_that_is_not_there_is_refused(files, run):
+    content = {**COCO, "annotations": [{**COCO["annotations"][0], "id": 7, "image_id": 99}]}
+    files.joinpath("lost.json").write_text(json.dumps(content))
+    status, lines = run("mask", "lost.json", "-o", "{name}.png")
+    assert (status, "annotation 7 is of image 99, which is not there" in lines[0]) == (2, True)
+
+
 @pytest.mark.parametrize("name", ["..", "a/..", "../../x.jpg", "/", "a\0b"])
 def test_images_outside_of_a_folder_are_refused(files, run, name):
     images(files, name)

@@ -237,7 +237,7 @@ class _Numbers:
             block = values[self._at : self._at + n * (k + 1)]
             if len(block) == n * (k + 1) and (block[:: k + 1] == k).all():
                 self._at += n * (k + 1)
-                lists = _cast(block.reshape(n, k + 1)[:, 1:].ravel(), element.properties[0].dtype)
+                lists = _listed(block.reshape(n, k + 1)[:, 1:].ravel(), element.properties[0].dtype)
                 return {element.properties[0].name: _List(lists, np.full(n, k))}
         at = self._at
         for _ in range(n):
@@ -257,8 +257,9 @@ class _Numbers:
         made: Rows = {}
         for i, own in enumerate(element.properties):
             first, many = np.array(starts[i], np.int64), np.array(lengths[i], np.int64)
-            picked = _cast(values[_ranges(first, many)], own.dtype)
-            made[own.name] = picked if own.count_dtype is None else _List(picked, many)
+            picked = values[_ranges(first, many)]
+            is_list = own.count_dtype is not None
+            made[own.name] = _List(_listed(picked, own.dtype), many) if is_list else _cast(picked, own.dtype)
         return made
 
 
@@ -268,6 +269,11 @@ def _cast(values: Array, dtype: np.dtype[Any]) -> Array:
         limits = np.iinfo(dtype)
         values = np.nan_to_num(values).clip(limits.min, limits.max)
     return values.astype(dtype)
+
+
+def _listed(values: Array, dtype: np.dtype[Any]) -> Array:
+    """The entries of lists of a text; those that shall be integers, which are corners of faces, as they stand."""
+    return values if dtype.kind in "iu" else values.astype(dtype)
 
 
 def _length(value: float) -> int:

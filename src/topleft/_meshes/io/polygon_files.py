@@ -134,8 +134,10 @@ def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPictur
     names = {category["id"]: category.get("name") for category in content.get("categories", [])}
     found: dict[Any, list[Any]] = {key: [] for key in images}
     for annotation in content["annotations"]:
+        if (image_id := annotation["image_id"]) not in found:
+            raise ContentError(f"annotation {annotation.get('id')!r} is of image {image_id!r}, which is not there")
         if has_crowds or not annotation.get("iscrowd"):
-            found[annotation["image_id"]].append(annotation)
+            found[image_id].append(annotation)
     pictures = []
     for key, image in images.items():
         file_name = str(image.get("file_name") or key)

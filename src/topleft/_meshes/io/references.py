@@ -223,7 +223,9 @@ def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]
 
 
 def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """The values as int64; any number for those beyond its range."""
+    """The values as int64; any number for those beyond its range; fractions are refused."""
+    if values.dtype.kind == "f" and not (is_whole := np.trunc(values) == values).all():
+        raise MeshError(f"a corner of a face is {values[~is_whole][0]:g}, which is no index")
     with np.errstate(invalid="ignore"):
         return values.astype(np.int64)
 
