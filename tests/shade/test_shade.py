@@ -165,6 +165,14 @@ def test_shade_material_of_each_triangle():
     assert_same(got[:, 0], rows[frags.triangle[frags.mask]].astype(np.uint8))
 
 
+def test_fog_of_numbers_of_few_bits_is_that_of_floats():
+    def picture(fog):
+        knot = tl.Mesh(KNOT.vertices, KNOT.triangles)  # its own: equal looks are kept with a mesh
+        return tl.render(knot, tl.Camera.framing(knot), SIZE, fog=fog)
+
+    assert np.array_equal(picture(tl.Fog(np.int8(-100), np.int8(100))), picture(tl.Fog(-100.0, 100.0)))
+
+
 def test_shade_triangles_across_the_near_plane_and_huge_ones_keep_their_attributes():
     # A floor from behind the eye to far away: one triangle is cut, and is larger than int32 edge functions allow.
     floor = tl.Mesh([[-50, 0, 9], [50, 0, 9], [0, 0, -200]], [[0, 1, 2]], uv=[[-50, 9], [50, 9], [0, -200]])
