@@ -69,9 +69,9 @@
 #include "lanes/lanes_scalar.h"
 #endif
 
-/* Where memory cannot be masked, a masked load takes a branch a lane; and a masked store of AVX2 costs AMD's cores more
- * than five times a load, a blend and a store. */
-#define TL_LOADS_WHOLE (TL_LANES == 4)
+/* Where memory cannot be masked, a masked load takes a branch a lane.  One of AVX2 waits for its mask, and a masked
+ * store of AVX2 costs AMD's cores more than five times a load, a blend and a store. */
+#define TL_LOADS_WHOLE (TL_LANES == 4 || TL_LANES == 8)
 #define TL_STORES_WHOLE (TL_LANES == 4 || TL_LANES == 8)
 #define TL_SOME(V, M, NUMBER)                                                    \
     TL_INLINE V V##_load_some(M m, const NUMBER *p, int has_room)                \
