@@ -354,7 +354,7 @@ static void clear(const tl_window *window, const tl_target *target)
 /* The pieces of listed triangles. */
 static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t n_whole, const tl_slice *slice)
 {
-    const tl_exact_pieces *pieces = s->snapped->mesh.exact->pieces;
+    const tl_pieces *pieces = s->snapped->mesh.exact->pieces;
     for (int64_t i = slice->first; i < slice->end; i++) {
         int64_t k = first_piece(pieces->source, pieces->n_pieces, slice->ids[i]);
         for (; k < pieces->n_pieces && pieces->source[k] == slice->ids[i]; k++) {

@@ -229,35 +229,51 @@ cdef class Pieces:
     cdef tl_pieces pieces
     cdef readonly object arrays  #: tuple[Any, ...] | None
 
-    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, Viewport viewport,
+    def __init__(self, Source source, vertices: Array, const int32_t[:, ::1] triangles, Viewport viewport,
                  const int32_t[::1] ids=None):
-        """`ids`: the triangles that may be cut, ascending; unless given, all of them."""
+        """`vertices`: records, or points (V, PLACED) that are not snapped.
+
+        `ids`: the triangles that may be cut, ascending; unless given, all of them.
+        """
         cdef tl_pieces *p = &self.pieces
+        cdef tl_projected projected
+        cdef const uint8_t[::1] raw = as_bytes(vertices)
         cdef int64_t n = triangles.shape[0] if ids is None else ids.shape[0]
         cdef const int32_t *listed = &ids[0] if ids is not None and n else NULL
-        cdef uint8_t[::1] vertices
+        cdef bint is_snapped = vertices.dtype != np.float64
+        cdef uint8_t[::1] records
         cdef int64_t[:, ::1] wide
+        cdef double[:, ::1] points, weights
         cdef double[::1] inv_w
-        cdef double[:, ::1] weights
         cdef int32_t[:, ::1] corners
         cdef int32_t[::1] owners
-        p.vertices = NULL
-        p.n_vertices = p.n_pieces = 0
+        memset(&projected, 0, sizeof(projected))
+        memset(p, 0, sizeof(self.pieces))
         if n == 0:
             return
+        if is_snapped:
+            projected.records = <tl_vertex *>&raw[0]
+        else:
+            projected.points = <double *>&raw[0]
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &viewport.view, p)
+            K.clip(&source.source, &projected, &triangles[0, 0], listed, n, &viewport.view, p)
         if p.n_pieces == 0:
             return
-        vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
+        records = wide = points = None
+        if is_snapped:
+            records, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
+            p.vertices, p.wide = <tl_vertex *>&records[0], <tl_wide *>&wide[0, 0]
+        else:
+            points = np.empty((p.n_vertices, 3))
+            p.points = &points[0, 0]
         inv_w, weights = np.empty(p.n_vertices), np.empty((p.n_vertices, 3))
         corners, owners = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
-        self.arrays = tuple(map(np.asarray, (vertices, wide, inv_w, weights, corners, owners)))
-        p.vertices, p.wide = <tl_vertex *>&vertices[0], <tl_wide *>&wide[0, 0]
+        first = tuple(map(np.asarray, (records, wide))) if is_snapped else (np.asarray(points), None)
+        self.arrays = first + tuple(map(np.asarray, (inv_w, weights, corners, owners)))
         p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
         p.triangles, p.source = &corners[0, 0], &owners[0]
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &viewport.view, p)
+            K.clip(&source.source, &projected, &triangles[0, 0], listed, n, &viewport.view, p)
 
     def __len__(self) -> int:
         return self.pieces.n_pieces

@@ -233,7 +233,7 @@ def project_mesh(memory: Memory, given: MeshArrays, view: View, *, must_check: b
         check_projected(points, projected, indices)
     pieces = None
     if choices.must_cut(n_clipped):
-        pieces = engine.ExactPieces(source, projected, indices, viewport)
+        pieces = engine.Pieces(source, projected, indices, viewport)
     view.mark("clip")
     return exact_mesh(given, projected, indices, pieces, view, viewport)
 
@@ -242,7 +242,7 @@ def exact_mesh(
     given: MeshArrays,
     points: NDArray[np.float64],
     triangles: NDArray[np.int32],
-    pieces: engine.ExactPieces | None,
+    pieces: engine.Pieces | None,
     view: View,
     viewport: engine.Viewport | None,
 ) -> Snapped:

@@ -415,7 +415,8 @@ WEB_EXPORT(web_view_mesh) int web_view_mesh(const void *matrix, int is_affine, i
     if (!counts.n_clipped)
         return 0;
     tl_pieces *p = &scene.pieces;
-    K.clip(&scene.source, vertices, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
+    const tl_projected projected = {.records = vertices};
+    K.clip(&scene.source, &projected, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
     if (!p->n_pieces)
         return 0;
     const size_t v = (size_t)p->n_vertices, t = (size_t)p->n_pieces;
@@ -424,7 +425,7 @@ WEB_EXPORT(web_view_mesh) int web_view_mesh(const void *matrix, int is_affine, i
     p->triangles = web_room(12 * t), p->source = web_room(4 * t);
     if (!p->vertices || !p->wide || !p->inv_w || !p->weights || !p->triangles || !p->source)
         return WEB_FULL;
-    K.clip(&scene.source, vertices, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
+    K.clip(&scene.source, &projected, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
     scene.snapped.pieces = p;
     return 0;
 }
