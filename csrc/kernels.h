@@ -11,9 +11,11 @@
 TL_KERNEL(tl_vertex_counts, snap, const tl_source *source, int64_t first, int64_t end, int subpixel_bits,
           int with_depth, tl_vertex *out, tl_wide *wide)
 
-/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices; `wide` as above. */
+/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices, with a table of wide ones
+ * or NULL, as above; or to points of TL_PLACED numbers each.  A point that cannot be drawn has x NaN, and y says why: a
+ * tl_special. */
 TL_KERNEL(tl_vertex_counts, project, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-          tl_vertex *out, tl_wide *wide)
+          const tl_projected *out)
 
 /* Cuts the triangles that have clipped vertices: of all n, or of the n in ids, which ascend.  With pieces->source NULL
  * only counts. */
@@ -80,10 +82,6 @@ TL_KERNEL(int64_t, draw_mesh, const tl_snapped *snapped, const tl_window *window
  * cannot be drawn: not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are rounded to
  * 2^-bits px, and those beyond 2^62 of these cannot be drawn. */
 TL_KERNEL(int64_t, take_points, const tl_source *source, int64_t first, int64_t end, int bits, double *points)
-
-/* As project.  Points have TL_PLACED numbers each; one that cannot be drawn has x NaN, and y says why: a tl_special. */
-TL_KERNEL(tl_vertex_counts, project_to, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-          const tl_projected *out)
 
 /* Counts the triangles of a mesh by the code that `draw_mesh` has for them, with the sink of the census; the target's
  * samples are read when that is SAMPLES.  Returns as `draw_mesh` does. */

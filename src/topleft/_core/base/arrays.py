@@ -426,14 +426,17 @@ def as_colors(values: ArrayLike) -> NDArray[Any]:
         array = array.astype(np.uint8) if array.dtype == np.float64 else array  # an empty list
     if not (array.ndim == 1 or (array.ndim == 2 and 1 <= array.shape[1] <= 4)):
         raise ValueError(f"colors must have shape (T, C), (V, C), (T,) or (V,) with C in 1..4, got {array.shape}")
+    return as_drawn_colors(array, "; dtype= fills labels")
+
+
+def as_drawn_colors(array: NDArray[Any], hint: str = "") -> NDArray[Any]:
+    """Return colours as a contiguous uint8 or float32 array; `hint` ends the error for larger integers."""
     if array.dtype.kind == "f":
         return np.ascontiguousarray(array, dtype=np.float32)
     if array.dtype.kind not in "iu":
         raise TypeError(f"colors must be uint8 or float32, got dtype {array.dtype}")
     if array.dtype != np.uint8 and array.size and not (0 <= array.min() and array.max() <= 255):
-        raise ValueError(
-            f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}; dtype= fills labels"
-        )
+        raise ValueError(f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}{hint}")
     return np.ascontiguousarray(array, dtype=np.uint8)
 
 

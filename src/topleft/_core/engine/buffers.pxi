@@ -43,6 +43,17 @@ cdef inline tl_projected points_to(double *points) noexcept nogil:
     return out
 
 
+cdef tl_projected projected_to(vertices: Array):
+    """Records, or points (V, PLACED) float64, as kernels take them."""
+    cdef tl_projected out = points_to(NULL)
+    cdef const uint8_t[::1] raw = as_bytes(vertices)
+    if vertices.dtype == np.float64:
+        out.points = <double *>data(raw)
+    else:
+        out.records = <tl_vertex *>data(raw)
+    return out
+
+
 cdef class Source:
     """The caller's (V, C) vertices, contiguous float32, float64 or int64, and the matrix that takes them to clip space."""
 
@@ -89,38 +100,37 @@ cdef class Source:
             n_bad = K.take_points(&self.source, first, end, bits, &points[0, 0] if points is not None else NULL)
         return n_bad
 
-    def project(self, int64_t first, int64_t end, Viewport viewport, uint8_t[::1] records,
+    def project(self, int64_t first, int64_t end, Viewport viewport, vertices: Array,
                 int64_t[:, ::1] wide or None) -> tuple[int, int, int]:
-        """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
-        cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
+        """Project vertices [first, end); returns the numbers of bad, wide and clipped vertices.
+
+        `vertices`: records, into which they are snapped, or points (V, PLACED); bad and clipped ones have x NaN.
+        """
+        cdef tl_projected out = projected_to(vertices)
         cdef tl_vertex_counts counts
+        out.wide = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         if end - first == self.source.n < HELD_VERTICES:
-            counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
+            counts = K.project(&self.source, first, end, &viewport.view, &out)
         else:
             with nogil:
-                counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
+                counts = K.project(&self.source, first, end, &viewport.view, &out)
         return counts.n_bad, counts.n_wide, counts.n_clipped
-
-    def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points) -> tuple[int, int]:
-        """Project vertices [first, end) to points (V, PLACED); returns the numbers of bad and of clipped ones, x NaN."""
-        cdef tl_projected out = points_to(&points[0, 0])
-        cdef tl_vertex_counts counts
-        with nogil:
-            counts = K.project_to(&self.source, first, end, &viewport.view, &out)
-        return counts.n_bad, counts.n_clipped
 
     def project_blocks(self, const uint8_t[::1] is_used, Viewport viewport,
                        uint8_t[::1] records) -> tuple[int, int, int]:
         """Project and snap the blocks of VERTEX_BLOCK vertices that are used; returns as `project` does."""
         cdef int64_t i = 0, end, n = is_used.shape[0], n_bad = 0, n_wide = 0, n_clipped = 0
+        cdef tl_projected out
         cdef tl_vertex_counts counts
+        memset(&out, 0, sizeof(out))
+        out.records = <tl_vertex *>&records[0]
         with nogil:
             while i < n:
                 end = i
                 while end < n and is_used[end]:
                     end += 1
                 if end > i:
-                    counts = K.project(&self.source, i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, self.source.n), &viewport.view, <tl_vertex *>&records[0], NULL)
+                    counts = K.project(&self.source, i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, self.source.n), &viewport.view, &out)
                     n_bad += counts.n_bad
                     n_wide += counts.n_wide
                     n_clipped += counts.n_clipped
@@ -236,25 +246,19 @@ cdef class Pieces:
         `ids`: the triangles that may be cut, ascending; unless given, all of them.
         """
         cdef tl_pieces *p = &self.pieces
-        cdef tl_projected projected
-        cdef const uint8_t[::1] raw = as_bytes(vertices)
+        cdef tl_projected projected = projected_to(vertices)
         cdef int64_t n = triangles.shape[0] if ids is None else ids.shape[0]
         cdef const int32_t *listed = &ids[0] if ids is not None and n else NULL
-        cdef bint is_snapped = vertices.dtype != np.float64
+        cdef bint is_snapped = projected.points == NULL
         cdef uint8_t[::1] records
         cdef int64_t[:, ::1] wide
         cdef double[:, ::1] points, weights
         cdef double[::1] inv_w
         cdef int32_t[:, ::1] corners
         cdef int32_t[::1] owners
-        memset(&projected, 0, sizeof(projected))
         memset(p, 0, sizeof(self.pieces))
         if n == 0:
             return
-        if is_snapped:
-            projected.records = <tl_vertex *>&raw[0]
-        else:
-            projected.points = <double *>&raw[0]
         with nogil:
             K.clip(&source.source, &projected, &triangles[0, 0], listed, n, &viewport.view, p)
         if p.n_pieces == 0:

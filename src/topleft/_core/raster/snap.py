@@ -222,11 +222,11 @@ def project_mesh(memory: Memory, given: MeshArrays, view: View, *, must_check: b
     n, viewport = len(points), view.engine_viewport()
     projected = memory.empty("points", (n, engine.PLACED), np.float64)
 
-    def project_part(first: int, end: int) -> tuple[int, int]:
-        return source.project_points(first, end, viewport, projected)
+    def project_part(first: int, end: int) -> tuple[int, int, int]:
+        return source.project(first, end, viewport, projected, None)
 
     counts = run_parts(project_part, n, given.n_threads)
-    n_bad, n_clipped = map(sum, zip(*counts, strict=True))
+    n_bad, _, n_clipped = map(sum, zip(*counts, strict=True))
     view.mark("vertices")
     given.check_first(is_due=must_check or bool(n_bad or n_clipped))
     if n_bad:

@@ -403,19 +403,20 @@ WEB_EXPORT(web_view_mesh) int web_view_mesh(const void *matrix, int is_affine, i
     tl_vertex *vertices = web_room(n * sizeof *vertices);
     if (!vertices)
         return WEB_FULL;
-    tl_vertex_counts counts = K.project(&scene.source, 0, mesh.source.n, &scene.view, vertices, NULL);
+    tl_projected projected = {.records = vertices};
+    const tl_vertex_counts counts = K.project(&scene.source, 0, mesh.source.n, &scene.view, &projected);
     tl_wide *wide = NULL;
     if (counts.n_wide) {
         if (!(wide = cleared_room(n * sizeof *wide)))
             return WEB_FULL;
-        K.project(&scene.source, 0, mesh.source.n, &scene.view, vertices, wide);
+        projected.wide = wide;
+        K.project(&scene.source, 0, mesh.source.n, &scene.view, &projected);
     }
     scene.snapped.mesh =
         (tl_vertex_set){.vertices = vertices, .wide = wide, .source = &scene.source, .n_vertices = mesh.source.n};
     if (!counts.n_clipped)
         return 0;
     tl_pieces *p = &scene.pieces;
-    const tl_projected projected = {.records = vertices};
     K.clip(&scene.source, &projected, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
     if (!p->n_pieces)
         return 0;
