@@ -28,6 +28,7 @@
 #include "pixels/paint.c"
 #include "pixels/lay.c"
 #include "pixels/planes.c"
+#include "pixels/png.c"
 #include "pixels/points.c"
 #include "pixels/resolve.c"
 #include "pixels/rle.c"

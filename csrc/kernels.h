@@ -130,6 +130,10 @@ TL_KERNEL(int, list_column_runs, const tl_run_source *source, int32_t *rows, tl_
 TL_KERNEL(void, count_runs, const tl_run *runs, const int32_t *object, int64_t n, const tl_rles *rles)
 TL_KERNEL(void, write_counts, const tl_rles *rles, int64_t *text_starts, uint8_t *text)
 
+/* A band of rows as a block of deflate that ends at a byte, and Adler-32 of the bytes so far; `row` has room for
+ * 1 + n_bytes, `out` for tl_png_room.  Returns how many bytes it has. */
+TL_KERNEL(int64_t, encode_rows, const tl_png_rows *rows, uint8_t *row, uint32_t *adler, uint8_t *out)
+
 /* The exact area that the triangles of a slice, from its first on, cover of each pixel, their sum; the window has fewer
  * than 2^31 cells.  Returns as `draw_mesh` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
 TL_KERNEL(int64_t, draw_area, const tl_snapped *snapped, const tl_window *window, const tl_slice *slice,
