@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from topleft._core.base.array_types import F64, I32, Array
-from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
+from topleft._core.base.arrays import as_array, as_colors, check_real, set_aligned, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.options import Sampling, parse, parse_sampling
@@ -299,8 +299,7 @@ class FieldPainter(Painter):
         if values is None:
             raise ValueError("kind 'field' needs values of the vertices or the faces")
         array = as_array("values", values)
-        if array.dtype.kind not in "fiub":
-            raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+        check_real("values", array, "fiub")
         per = parse(PerOption, "per", self.options.get("per", "auto"))
         self.is_of_faces = is_per_face(array, triangles.n_vertices, triangles.n_faces, per)
         self.faces = triangles.faces
