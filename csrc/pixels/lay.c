@@ -9,20 +9,29 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 
-/* How many numbers lie before a whole vector of memory. */
-TL_INLINE int64_t until_aligned(const int32_t *p) { return (int64_t)((0 - (uintptr_t)p / sizeof *p) % TL_LANES); }
+#define TL_LINE 16 /* numbers of a cache line */
 
-/* Writes n numbers of a row: those that were drawn, if there are any, or `blank`. */
+/* How many numbers lie before a whole line of memory. */
+TL_INLINE int64_t until_line(const int32_t *p) { return (int64_t)((0 - (uintptr_t)p / sizeof *p) % TL_LINE); }
+
+/* Writes the numbers [k, end) of a row into caches: those that were drawn, if there are any, or `blanks`. */
+TL_INLINE void lay_near(int32_t *to, const int32_t *drawn, int64_t k, int64_t end, vi blanks)
+{
+    for (; k + TL_LANES <= end; k += TL_LANES)
+        vi_store(to + k, drawn ? vi_load(drawn + k) : blanks);
+    if (k < end)
+        vi_store_masked(to + k, vm_first(end - k), drawn ? vi_load_masked(vm_first(end - k), drawn + k) : blanks);
+}
+
+/* Writes n numbers of a row.  Only whole lines pass the caches: memory takes part of one far more slowly. */
 TL_INLINE void lay_row(int32_t *to, const int32_t *drawn, int64_t n, int32_t blank)
 {
     const vi blanks = vi_set1(blank);
-    int64_t k = min64(until_aligned(to), n);
-    if (k > 0)
-        vi_store_masked(to, vm_first(k), drawn ? vi_load_masked(vm_first(k), drawn) : blanks);
-    for (; k + TL_LANES <= n; k += TL_LANES)
+    const int64_t first = min64(until_line(to), n), end = first + (n - first) / TL_LINE * TL_LINE;
+    lay_near(to, drawn, 0, first, blanks);
+    for (int64_t k = first; k < end; k += TL_LANES)
         vi_stream(to + k, drawn ? vi_load(drawn + k) : blanks);
-    if (k < n)
-        vi_store_masked(to + k, vm_first(n - k), drawn ? vi_load_masked(vm_first(n - k), drawn + k) : blanks);
+    lay_near(to, drawn, end, n, blanks);
 }
 
 static void lay_rows(const tl_laid_rows *rows, int32_t *to, int64_t width)
