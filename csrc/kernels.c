@@ -9,7 +9,7 @@
 #include "clusters/cluster_sort.c"
 #include "clusters/cluster_view.c"
 #include "clusters/mark.c"
-#include "exact/pieces_exact.c"
+#include "exact/pieces.c"
 #include "exact/take_points.c"
 #include "mesh/bend.c"
 #include "mesh/creases.c"

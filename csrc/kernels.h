@@ -11,14 +11,16 @@
 TL_KERNEL(tl_vertex_counts, snap, const tl_source *source, int64_t first, int64_t end, int subpixel_bits,
           int with_depth, tl_vertex *out, tl_wide *wide)
 
-/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices; `wide` as above. */
+/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices, with a table of wide ones
+ * or NULL, as above; or to points of TL_PLACED numbers each.  A point that cannot be drawn has x NaN, and y says why: a
+ * tl_special. */
 TL_KERNEL(tl_vertex_counts, project, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-          tl_vertex *out, tl_wide *wide)
+          const tl_projected *out)
 
-/* Cuts the triangles that have TL_CLIPPED vertices: of all n, or of the n in ids, which ascend.  With pieces->vertices
- * NULL only counts. */
-TL_KERNEL(void, clip, const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids,
-          int64_t n, const tl_view *view, tl_pieces *pieces)
+/* Cuts the triangles that have clipped vertices: of all n, or of the n in ids, which ascend.  With pieces->source NULL
+ * only counts. */
+TL_KERNEL(void, clip, const tl_source *source, const tl_projected *projected, const int32_t *triangles,
+          const int32_t *ids, int64_t n, const tl_view *view, tl_pieces *pieces)
 
 /* Marks the blocks of 2^block_bits vertices that the triangles among n ids use; returns -1, or one of them with an
  * index outside [0, n_vertices). */
@@ -80,14 +82,6 @@ TL_KERNEL(int64_t, draw_mesh, const tl_snapped *snapped, const tl_window *window
  * cannot be drawn: not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are rounded to
  * 2^-bits px, and those beyond 2^62 of these cannot be drawn. */
 TL_KERNEL(int64_t, take_points, const tl_source *source, int64_t first, int64_t end, int bits, double *points)
-
-/* As project.  Points have TL_PLACED numbers each; one that cannot be drawn has x NaN, and y says why: a tl_special. */
-TL_KERNEL(tl_vertex_counts, project_to, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-          const tl_projected *out)
-
-/* Cuts the triangles that have such a vertex; with pieces->points NULL only counts. */
-TL_KERNEL(void, clip_points, const tl_source *source, const double *points, const int32_t *triangles,
-          int64_t n_triangles, const tl_view *view, tl_exact_pieces *pieces)
 
 /* Counts the triangles of a mesh by the code that `draw_mesh` has for them, with the sink of the census; the target's
  * samples are read when that is SAMPLES.  Returns as `draw_mesh` does. */

@@ -89,9 +89,10 @@ typedef struct {
 
 /* Triangles that a clip plane has cut: fans of triangles over their own vertices, in order of
  * their source triangle. */
-typedef struct {
+typedef struct tl_pieces {
     tl_vertex *vertices; /* (n_vertices,) */
     tl_wide *wide;       /* (n_vertices,) */
+    double *points;      /* instead of both where vertices are not snapped: (n_vertices, 3); or NULL */
     double *inv_w;       /* (n_vertices,) */
     double *weights;     /* (n_vertices, 3): barycentrics in the source triangle */
     int32_t *triangles;  /* (n_pieces, 3) into `vertices` */
