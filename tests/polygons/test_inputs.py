@@ -217,7 +217,7 @@ def test_square_with_a_million_holes_keeps_three_quarters_of_each_pixel():
         ([("a", "b"), ("c", "d"), ("e", "f")], TypeError, "rings must be real numbers, got dtype <U1"),
         (np.zeros((3, 2), complex), TypeError, "rings must be real numbers, got dtype complex128"),
         (7, TypeError, "rings must be an array (N, 2), a list of rings or of polygons"),
-        ({"type": "Polygon", "bbox": []}, ValueError, "a Polygon of GeoJSON must have coordinates, got only type, bbox"),
+        ({"type": "Polygon", "id": 1}, ValueError, "a Polygon of GeoJSON must have coordinates, got only type, id"),
         ({"type": "FeatureCollection"}, ValueError, "a FeatureCollection of GeoJSON must have features, got only type"),
         ({"type": "Point", "coordinates": (1, 1)}, TypeError, "geometries must be Polygon or MultiPolygon, got Point"),
     ],
