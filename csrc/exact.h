@@ -20,16 +20,6 @@ typedef struct tl_exact_counts {
     int64_t n_integers;   /* signs that only integers of 2176 bits told */
 } tl_exact_counts;
 
-/* Triangles that clip planes have cut: fans over points of their own, in order of their source triangle. */
-typedef struct tl_exact_pieces {
-    double *points;     /* (n_points, 3) */
-    double *inv_w;      /* (n_points,) */
-    double *weights;    /* (n_points, 3): barycentrics in the source triangle */
-    int32_t *triangles; /* (n_pieces, 3) into `points` */
-    int32_t *source;    /* (n_pieces,) index of the input triangle, ascending */
-    int64_t n_points, n_pieces;
-} tl_exact_pieces;
-
 /* A mesh with the float64 vertices that stand here.  A vertex that cannot be drawn has x NaN.  Drawn are
  * the triangles of the mesh, collapsed to a point where a clip plane cuts them, and then all pieces. */
 typedef struct tl_exact_points {
@@ -39,9 +29,9 @@ typedef struct tl_exact_points {
     int64_t n_points;
     const int32_t *triangles; /* (n_triangles, 3) */
     int64_t n_triangles;
-    const int32_t *names;          /* (n_triangles,) which triangle of the mesh each is of; NULL: its index */
-    const tl_exact_pieces *pieces; /* or NULL */
-    double band;                   /* 1; tests pass less to prove that narrower bands draw wrong pixels */
+    const int32_t *names;           /* (n_triangles,) which triangle of the mesh each is of; NULL: its index */
+    const struct tl_pieces *pieces; /* or NULL */
+    double band;                    /* 1; tests pass less to prove that narrower bands draw wrong pixels */
 } tl_exact_points;
 
 #endif

@@ -11,14 +11,16 @@
 TL_KERNEL(tl_vertex_counts, snap, const tl_source *source, int64_t first, int64_t end, int subpixel_bits,
           int with_depth, tl_vertex *out, tl_wide *wide)
 
-/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices; `wide` as above. */
+/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices, with a table of wide ones
+ * or NULL, as above; or to points of TL_PLACED numbers each.  A point that cannot be drawn has x NaN, and y says why: a
+ * tl_special. */
 TL_KERNEL(tl_vertex_counts, project, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-          tl_vertex *out, tl_wide *wide)
+          const tl_projected *out)
 
-/* Cuts the triangles that have TL_CLIPPED vertices: of all n, or of the n in ids, which ascend.  With pieces->vertices
- * NULL only counts. */
-TL_KERNEL(void, clip, const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids,
-          int64_t n, const tl_view *view, tl_pieces *pieces)
+/* Cuts the triangles that have clipped vertices: of all n, or of the n in ids, which ascend.  With pieces->source NULL
+ * only counts. */
+TL_KERNEL(void, clip, const tl_source *source, const tl_projected *projected, const int32_t *triangles,
+          const int32_t *ids, int64_t n, const tl_view *view, tl_pieces *pieces)
 
 /* Marks the blocks of 2^block_bits vertices that the triangles among n ids use; returns -1, or one of them with an
  * index outside [0, n_vertices). */
@@ -81,14 +83,6 @@ TL_KERNEL(int64_t, draw_mesh, const tl_snapped *snapped, const tl_window *window
  * 2^-bits px, and those beyond 2^62 of these cannot be drawn. */
 TL_KERNEL(int64_t, take_points, const tl_source *source, int64_t first, int64_t end, int bits, double *points)
 
-/* As project.  Points have TL_PLACED numbers each; one that cannot be drawn has x NaN, and y says why: a tl_special. */
-TL_KERNEL(tl_vertex_counts, project_to, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-          const tl_projected *out)
-
-/* Cuts the triangles that have such a vertex; with pieces->points NULL only counts. */
-TL_KERNEL(void, clip_points, const tl_source *source, const double *points, const int32_t *triangles,
-          int64_t n_triangles, const tl_view *view, tl_exact_pieces *pieces)
-
 /* Counts the triangles of a mesh by the code that `draw_mesh` has for them, with the sink of the census; the target's
  * samples are read when that is SAMPLES.  Returns as `draw_mesh` does. */
 TL_KERNEL(int64_t, count_classes, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
@@ -135,6 +129,10 @@ TL_KERNEL(int, list_column_runs, const tl_run_source *source, int32_t *rows, tl_
  * as text, that of object k from text_starts[k] to text_starts[k + 1]: room for 13 characters a count. */
 TL_KERNEL(void, count_runs, const tl_run *runs, const int32_t *object, int64_t n, const tl_rles *rles)
 TL_KERNEL(void, write_counts, const tl_rles *rles, int64_t *text_starts, uint8_t *text)
+
+/* A band of rows as a block of deflate that ends at a byte, and Adler-32 of the bytes so far; `row` has room for
+ * 1 + n_bytes, `out` for tl_png_room.  Returns how many bytes it has. */
+TL_KERNEL(int64_t, encode_rows, const tl_png_rows *rows, uint8_t *row, uint32_t *adler, uint8_t *out)
 
 /* The exact area that the triangles of a slice, from its first on, cover of each pixel, their sum; the window has fewer
  * than 2^31 cells.  Returns as `draw_mesh` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */

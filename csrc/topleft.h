@@ -89,9 +89,10 @@ typedef struct {
 
 /* Triangles that a clip plane has cut: fans of triangles over their own vertices, in order of
  * their source triangle. */
-typedef struct {
+typedef struct tl_pieces {
     tl_vertex *vertices; /* (n_vertices,) */
     tl_wide *wide;       /* (n_vertices,) */
+    double *points;      /* instead of both where vertices are not snapped: (n_vertices, 3); or NULL */
     double *inv_w;       /* (n_vertices,) */
     double *weights;     /* (n_vertices, 3): barycentrics in the source triangle */
     int32_t *triangles;  /* (n_pieces, 3) into `vertices` */
@@ -545,6 +546,17 @@ typedef struct {
     int64_t *ends; /* of the last run of each */
     int64_t *counts;
 } tl_rles;
+
+/* Rows of a picture, in the order of bytes that a PNG has. */
+typedef struct {
+    const uint8_t *pixels;
+    const uint8_t *above;    /* the row before the first; zeros at the top of the picture */
+    int64_t n_rows, n_bytes; /* of a row */
+    int pixel_bytes;         /* 1 to 4 */
+} tl_png_rows;
+
+/* Bytes of n_rows in the file, at most: codes of 12 bits; tables, and what is written past the end. */
+static inline int64_t tl_png_room(int64_t n_rows, int64_t n_bytes) { return n_rows * (1 + n_bytes) * 3 / 2 + 256; }
 
 #include "clusters.h"
 #include "exact.h"

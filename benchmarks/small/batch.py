@@ -44,7 +44,7 @@ def run(options: BatchOptions, _: Save) -> Record:
     record: dict[str, Any] = {
         "schema": 1,
         "kind": "batch",
-        **describe("isal", "pillow"),
+        **describe("pillow"),
         "n_views": options.n_views,
         "n_triangles": options.n_triangles,
         "size": [options.frame_px] * 2,

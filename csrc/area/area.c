@@ -144,32 +144,49 @@ static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
         push_triangle(s, &parts.set, parts.corners + 3 * k);
 }
 
+/* TL_LANES edges from their upper ends on; those that are `on` add to areas in the window. */
+typedef struct {
+    vi x0, y0, dx, dy, width;
+    vm on, is_up; /* is_up: the edge runs from its lower end to the upper one */
+} area_edges;
+
+TL_INLINE area_edges edges_between(const area_plane *p, vi ax, vi ay, vi bx, vi by, vm live)
+{
+    const vm is_up = vi_gt(ay, by);
+    const vi x0 = vi_select(is_up, bx, ax), x1 = vi_select(is_up, ax, bx), y0 = vi_min(ay, by), y1 = vi_max(ay, by);
+    const vi zero = vi_set1(0), dx = vi_sub(x1, x0), dy = vi_sub(y1, y0);
+    const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y0), vi_gt(y1, vi_set1(p->top_fx)));
+    const vm on =
+        vm_and(vm_and(live, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), vi_min(x0, x1))));
+    return (area_edges){x0, y0, dx, dy, vi_max(dx, vi_sub(zero, dx)), on, is_up};
+}
+
+/* Puts edges into the queues of their kinds.  `height`: dy, less than 0 where the area right of the edge is taken away. */
+TL_INLINE void queue_edges(area_state *s, const area_edges *e, vm on, vi height)
+{
+    const int bits = s->plane.bits;
+    const vi dy2 = vi_add(e->dy, e->dy), last = vi_sub(vi_add(e->y0, e->dy), vi_set1(1));
+    vi kind = vi_min(vi_sub(vi_shift_right(last, bits), vi_shift_right(e->y0, bits)), vi_set1(TL_EDGES_LONG));
+    kind = vi_select(vi_gt(e->width, dy2), vi_add(kind, vi_set1(TL_EDGES_FLAT)), kind);
+    kind = vi_select(vi_gt(e->width, vi_add(dy2, vi_shift_left(dy2, 1))), vi_set1(TL_EDGES_SHALLOW), kind);
+    kind = vi_select(on, kind, vi_set1(TL_EDGES_NONE));
+    int32_t kinds[TL_LANES], records[4 * TL_LANES];
+    vi_store(kinds, kind);
+    vi_store_quads(records, (const vi[4]){e->x0, e->y0, e->dx, height});
+    for (int lane = 0; lane < TL_LANES; lane++) /* no branch: edges without effect go to a queue that is emptied */
+        v4_store(&s->edges[kinds[lane]][s->n[kinds[lane]]++].x_fx, v4_load(records + 4 * vi_quad_slot(lane)));
+}
+
 /* The edges of the triangles in `drawn`; `turned` ones have negative area. */
 TL_INLINE void push_edges(area_state *s, const lane_corners *c, vm drawn, vm turned)
 {
-    const area_plane *p = &s->plane;
-    const vi zero = vi_set1(0), one = vi_set1(1), last_kind = vi_set1(TL_EDGES_LONG);
+    const vi zero = vi_set1(0), one = vi_set1(1);
     const vi down = vi_select(turned, one, vi_set1(-1)); /* sign of an edge that runs downwards */
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
-        const vm is_up = vi_gt(c->y[k], c->y[next]);
-        const vi x0 = vi_select(is_up, c->x[next], c->x[k]), x1 = vi_select(is_up, c->x[k], c->x[next]);
-        const vi y0 = vi_min(c->y[k], c->y[next]), y1 = vi_max(c->y[k], c->y[next]);
-        const vi dx = vi_sub(x1, x0), dy = vi_sub(y1, y0), width = vi_max(dx, vi_sub(zero, dx)), dy2 = vi_add(dy, dy);
-        const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y0), vi_gt(y1, vi_set1(p->top_fx)));
-        const vm on =
-            vm_and(vm_and(drawn, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), vi_min(x0, x1))));
-        const vi rows = vi_sub(vi_shift_right(vi_sub(y1, one), p->bits), vi_shift_right(y0, p->bits));
-        vi kind = vi_min(rows, last_kind);
-        kind = vi_select(vi_gt(width, dy2), vi_add(kind, vi_set1(TL_EDGES_FLAT)), kind);
-        kind = vi_select(vi_gt(width, vi_add(dy2, vi_shift_left(dy2, 1))), vi_set1(TL_EDGES_SHALLOW), kind);
-        kind = vi_select(on, kind, vi_set1(TL_EDGES_NONE));
-        const vi negative = vi_select(is_up, vi_sub(zero, down), down);
-        int32_t kinds[TL_LANES], records[4 * TL_LANES];
-        vi_store(kinds, kind);
-        vi_store_quads(records, (const vi[4]){x0, y0, dx, vi_select(vi_gt(negative, zero), dy, vi_sub(zero, dy))});
-        for (int lane = 0; lane < TL_LANES; lane++) /* no branch: edges without effect go to a queue that is emptied */
-            v4_store(&s->edges[kinds[lane]][s->n[kinds[lane]]++].x_fx, v4_load(records + 4 * vi_quad_slot(lane)));
+        const area_edges e = edges_between(&s->plane, c->x[k], c->y[k], c->x[next], c->y[next], drawn);
+        const vi sign = vi_select(e.is_up, vi_sub(zero, down), down);
+        queue_edges(s, &e, e.on, vi_select(vi_gt(sign, zero), e.dy, vi_sub(zero, e.dy)));
     }
     make_room_for_edges(s);
 }

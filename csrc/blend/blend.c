@@ -201,7 +201,7 @@ static void blend_each_float(blend_pass *p)
 {
     walk_state *s = &p->walk;
     const tl_snapped *snapped = p->mix.snapped;
-    const tl_exact_pieces *pieces = snapped->mesh.exact->pieces;
+    const tl_pieces *pieces = snapped->mesh.exact->pieces;
     const int64_t n_pieces = pieces ? pieces->n_pieces : 0;
     s->bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
     for (int64_t i = 0, k = 0; i < snapped->n_triangles && s->bad_row < 0 && !tl_is_given_up(s->window); i++) {

@@ -14,7 +14,7 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
-#include "exact/pieces_exact.c"
+#include "exact/pieces.c"
 #include "exact/sign.c"
 #include "sink/sink.c"
 #include "raster/single_fixed.c"

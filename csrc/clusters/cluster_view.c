@@ -433,7 +433,7 @@ static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, co
     source.n -= c->first_vertex;
     /* whole vectors: those of other clusters that this snaps are not looked at */
     const int64_t n = ((int64_t)c->n_vertices + TL_LANES - 1) / TL_LANES * TL_LANES;
-    const tl_vertex_counts counts = project(&source, 0, n, pass->view, own->vertices, NULL);
+    const tl_vertex_counts counts = project(&source, 0, n, pass->view, &(tl_projected){.records = own->vertices});
     own->snapped = *snapped;
     own->snapped.mesh.vertices = own->vertices;
     own->snapped.mesh.n_vertices = TL_CLUSTER;

@@ -22,25 +22,6 @@
 /* Where the sums of three attributes from `first` on stand: twelve. */
 TL_INLINE int64_t sums_of_three(int64_t first) { return FACE_X + first / 3 * TL_SUMS_OF_THREE; }
 
-/* Finds the rows of attributes of runs, which may be others than those of the points; what has none shows nothing. */
-TL_INLINE void find_color_rows(grad_span *s, const tl_grad_colors *p)
-{
-    const vi rows = vi_set1(clamped_to_int(p->values.n_attr));
-    for (int r = 0; r < s->n_runs; r += TL_LANES) {
-        const vi id = vi_load(s->ids + r), id_3 = vi_add(id, vi_add(id, id));
-        const vm wanted = vm_and(vm_first(s->n_runs - r), vi_gt(id, vi_set1(-1)));
-        vm found = wanted;
-        for (int k = 0; k < 3; k++) {
-            const vi row = vi_gather(wanted, p->corners + k, id_3);
-            found = vm_and(found, vi_gt_unsigned(rows, row));
-            vi_store(s->corners[k] + r, row);
-        }
-        for (int k = 0; k < TL_LANES && vm_any(vm_and_not(wanted, found)); k++)
-            if (vm_bits(vm_and_not(wanted, found)) >> k & 1)
-                s->bad_id = s->ids[r + k], s->ids[r + k] = -1;
-    }
-}
-
 /* Sets the quads of runs: planes of n attributes from `first` on, at most three, and the total. */
 TL_INLINE void set_color_quads(grad_span *s, const tl_grad_values *v, int64_t first, int n)
 {
@@ -146,7 +127,7 @@ TL_INLINE int64_t pull_color_rows(const tl_grad_view *view, const tl_grad_colors
     grad_span s = TL_BEFORE_SPANS(view);
     while (next_grad_span(view, &(id_rows){.rast = v->rast}, view->n_vertices, &s)) {
         set_point_numbers(view, &s, s.inverses);
-        find_color_rows(&s, p);
+        find_corners(&s, p->corners, view->n_triangles, p->values.n_attr); /* others than those of the points, maybe */
         for (int64_t c = 0; c < n_columns; c += 3) {
             const int n = n_columns - c < 3 ? (int)(n_columns - c) : 3;
             set_color_quads(&s, v, c, n);

@@ -152,17 +152,17 @@ TL_INLINE void list_span_runs(grad_span *s, const tl_grad_view *view, const id_r
     s->begins[s->n_runs] = s->n;
 }
 
-/* Finds the corners of runs; what has none below n_rows shows nothing from then on. */
-TL_INLINE void find_corners(grad_span *s, const tl_grad_view *view, int64_t n_rows)
+/* Finds the corners of runs, rows of triangles; what has none below n_rows shows nothing from then on. */
+TL_INLINE void find_corners(grad_span *s, const int32_t *triangles, int64_t n_triangles, int64_t n_rows)
 {
-    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(view->n_triangles)),
+    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(n_triangles)),
              rows = vi_set1(clamped_to_int(n_rows));
     for (int r = 0; r < s->n_runs; r += TL_LANES) {
         const vi id = vi_load(s->ids + r), id_3 = vi_add(id, vi_add(id, id));
         const vm wanted = vm_and(vm_first(s->n_runs - r), vm_and_not(vm_all(), vi_eq(id, none)));
         vm found = vm_and(wanted, vm_and(vi_gt(id, none), vi_gt(end, id)));
         for (int k = 0; k < 3; k++) {
-            const vi corner = vi_gather(found, view->tri + k, id_3);
+            const vi corner = vi_gather(found, triangles + k, id_3);
             found = vm_and(found, vi_gt_unsigned(rows, corner));
             vi_store(s->corners[k] + r, corner);
         }
@@ -189,7 +189,7 @@ TL_INLINE int next_grad_span(const tl_grad_view *view, const id_rows *ids, int64
         return 0;
     s->n = view->width - s->first < TL_GRAD_SPAN ? (int)(view->width - s->first) : TL_GRAD_SPAN;
     list_span_runs(s, view, ids);
-    find_corners(s, view, n_rows);
+    find_corners(s, view->tri, view->n_triangles, n_rows);
     return 1;
 }
 

@@ -23,6 +23,16 @@ typedef struct {
 } vd;
 typedef __m256i vm;
 
+/* Half of the lanes, and one number of 64 bits in all of them. */
+typedef __m128i half_vi;
+TL_INLINE half_vi lower_half(vi a) { return _mm256_castsi256_si128(a); }
+TL_INLINE half_vi upper_half(vi a) { return _mm256_extracti128_si256(a, 1); }
+TL_INLINE vi join_halves(half_vi low, half_vi high)
+{
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(low), high, 1);
+}
+TL_INLINE vi set1_64(uint64_t a) { return _mm256_set1_epi64x((long long)a); }
+
 TL_INLINE vi vi_load(const int32_t *p) { return _mm256_loadu_si256((const __m256i *)p); }
 TL_INLINE void vi_store(int32_t *p, vi a) { _mm256_storeu_si256((__m256i *)p, a); }
 TL_INLINE vi vi_iota(void) { return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7); }
@@ -85,32 +95,6 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         _mm256_storeu_si256((__m256i *)(p + 32 * k), _mm256_and_si256(on, one));
     }
 }
-/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
-typedef struct {
-    __m256i lo, hi;
-} vw;
-TL_INLINE vw vw_load(const uint64_t *p)
-{
-    return (vw){_mm256_loadu_si256((const __m256i *)p), _mm256_loadu_si256((const __m256i *)(p + 4))};
-}
-TL_INLINE void vw_store(uint64_t *p, vw a)
-{
-    _mm256_storeu_si256((__m256i *)p, a.lo), _mm256_storeu_si256((__m256i *)(p + 4), a.hi);
-}
-TL_INLINE __m256i bit_range_64(__m128i begin, __m128i end)
-{
-    const __m256i ones = _mm256_set1_epi64x(-1);
-    return _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(end)),
-                               _mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(begin)));
-}
-TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
-{
-    const __m256i every = _mm256_set1_epi64x((long long)pattern);
-    const __m256i lo = bit_range_64(_mm256_castsi256_si128(begin), _mm256_castsi256_si128(end));
-    const __m256i hi = bit_range_64(_mm256_extracti128_si256(begin, 1), _mm256_extracti128_si256(end, 1));
-    return (vw){_mm256_or_si256(a.lo, _mm256_and_si256(lo, every)), _mm256_or_si256(a.hi, _mm256_and_si256(hi, every))};
-}
-
 /* The order that moves the lanes in `bits` to the front: byte k of the packed list is the k-th lane set. */
 TL_INLINE vi compress_order(unsigned bits)
 {
@@ -130,10 +114,6 @@ TL_INLINE vm vf_lt(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, 
 TL_INLINE vm vf_ge(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_GE_OQ)); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_EQ_OQ)); }
 
-TL_INLINE vd vd_from_vi(vi a)
-{
-    return (vd){_mm256_cvtepi32_pd(_mm256_castsi256_si128(a)), _mm256_cvtepi32_pd(_mm256_extracti128_si256(a, 1))};
-}
 TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(a.lo)), _mm256_cvtpd_ps(a.hi), 1);
@@ -171,45 +151,31 @@ TL_INLINE vd vd_from_vf(vf a)
 {
     return (vd){_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps(a, 1))};
 }
-TL_INLINE vi vi_round(vd a)
-{
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm256_cvtpd_epi32(a.lo)), _mm256_cvtpd_epi32(a.hi), 1);
-}
 TL_INLINE vd vd_select(vm m, vd a, vd b)
 {
-    const __m256d lo = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(m)));
-    const __m256d hi = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(m, 1)));
+    const __m256d lo = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(lower_half(m)));
+    const __m256d hi = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(upper_half(m)));
     return (vd){_mm256_blendv_pd(b.lo, a.lo, lo), _mm256_blendv_pd(b.hi, a.hi, hi)};
 }
-TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
 
 typedef struct {
     wd even, odd;
 } vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
 TL_INLINE vd vd_from_vz(vz z) { return (vd){front_pairs(z.even, z.odd), back_pairs(z.even, z.odd)}; }
-TL_INLINE vi join_quarters(const __m128i *a) { return _mm256_inserti128_si256(_mm256_castsi128_si256(a[0]), a[1], 1); }
+TL_INLINE vi join_quarters(const __m128i *a) { return join_halves(a[0], a[1]); }
 TL_INLINE wd join_pairs(const __m128d *a) { return _mm256_insertf128_pd(_mm256_castpd128_pd256(a[0]), a[1], 1); }
 
 /* Four numbers of a row: other lanes hold two, TL_LANES / 4 rows apart; and back. */
 TL_INLINE wd load_rows_f64(const double *p, const double *other) { return (void)other, _mm256_loadu_pd(p); }
 TL_INLINE void store_rows_f64(double *p, double *other, wd row) { (void)other, _mm256_storeu_pd(p, row); }
 
-TL_INLINE void store_four(tl_vertex *v, wd xy, wd z)
+TL_INLINE void store_half(tl_vertex *v, wd xy, wd z)
 {
     const wd even = _mm256_unpacklo_pd(xy, z), odd = _mm256_unpackhi_pd(xy, z);
     _mm256_storeu_pd((double *)v, front_pairs(even, odd));
     _mm256_storeu_pd((double *)(v + 2), back_pairs(even, odd));
 }
-TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
-{
-    const vd xy = interleave(x, y);
-    store_four(v, xy.lo, z.lo);
-    store_four(v + 4, xy.hi, z.hi);
-}
-
 TL_INLINE vf vf_min_size(vf a, vf b) { return _mm256_min_ps(a, _mm256_andnot_ps(_mm256_set1_ps(-0.0f), b)); }
-TL_INLINE vf vf_of_bits(vi a) { return _mm256_castsi256_ps(a); }
-TL_INLINE vi vi_high_half(vi a) { return _mm256_srli_epi32(a, 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i)
 {
     const vf low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table), i);
@@ -218,17 +184,9 @@ TL_INLINE vf vf_lookup(const float *table, vi i)
 }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm256_castps_si256(vf_lookup((const float *)table, i)); }
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm256_permutevar8x32_ps(_mm256_loadu_ps(p), i); }
-TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
-TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm256_sqrt_pd(a.lo), _mm256_sqrt_pd(a.hi)}; }
-TL_INLINE __m256d bits_minus(__m256d a, uint64_t sum, uint64_t mask)
-{
-    const __m256i b = _mm256_and_si256(_mm256_castpd_si256(a), _mm256_set1_epi64x((long long)mask));
-    return _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x((long long)sum), b));
-}
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
-    return (vd){_mm256_i32gather_pd(p, _mm256_castsi256_si128(i), 8),
-                _mm256_i32gather_pd(p, _mm256_extracti128_si256(i, 1), 8)};
+    return (vd){_mm256_i32gather_pd(p, lower_half(i), 8), _mm256_i32gather_pd(p, upper_half(i), 8)};
 }
 TL_INLINE vi vi_pick(const int32_t *p, vi i)
 {
@@ -262,10 +220,10 @@ TL_INLINE void vf_store_triples(float *p, const vf *c)
     _mm256_storeu_ps(p + 8, _mm256_blend_ps(_mm256_blend_ps(turned[1][0], turned[1][1], 0x24), turned[1][2], 0x49));
     _mm256_storeu_ps(p + 16, _mm256_blend_ps(_mm256_blend_ps(turned[2][0], turned[2][1], 0x49), turned[2][2], 0x92));
 }
-TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
 
 #include "lanes/lanes_x86.h"
 
+TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a)
 {

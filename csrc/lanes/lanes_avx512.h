@@ -23,6 +23,13 @@ typedef struct {
 } vd;
 typedef __mmask16 vm;
 
+/* Half of the lanes, and one number of 64 bits in all of them. */
+typedef __m256i half_vi;
+TL_INLINE half_vi lower_half(vi a) { return _mm512_castsi512_si256(a); }
+TL_INLINE half_vi upper_half(vi a) { return _mm512_extracti64x4_epi64(a, 1); }
+TL_INLINE vi join_halves(half_vi low, half_vi high) { return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1); }
+TL_INLINE vi set1_64(uint64_t a) { return _mm512_set1_epi64((long long)a); }
+
 TL_INLINE vi vi_load(const int32_t *p) { return _mm512_loadu_si512(p); }
 TL_INLINE void vi_store(int32_t *p, vi a) { _mm512_storeu_si512(p, a); }
 TL_INLINE vi vi_iota(void) { return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
@@ -60,26 +67,6 @@ TL_INLINE vm vm_first(int64_t n) { return n >= 16 ? 0xffff : n <= 0 ? 0 : (vm)((
 TL_INLINE vm vm_from_bits(unsigned bits) { return (vm)bits; }
 /* 64 bytes of 0 or 1 */
 TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits) { _mm512_storeu_si512(p, _mm512_maskz_set1_epi8(bits, 1)); }
-/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
-typedef struct {
-    __m512i lo, hi;
-} vw;
-TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm512_loadu_si512(p), _mm512_loadu_si512(p + 8)}; }
-TL_INLINE void vw_store(uint64_t *p, vw a) { _mm512_storeu_si512(p, a.lo), _mm512_storeu_si512(p + 8, a.hi); }
-TL_INLINE __m512i bit_range_64(__m256i begin, __m256i end)
-{
-    const __m512i ones = _mm512_set1_epi64(-1);
-    return _mm512_andnot_si512(_mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(end)),
-                               _mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(begin)));
-}
-TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
-{
-    const __m512i every = _mm512_set1_epi64((long long)pattern);
-    const __m512i lo = bit_range_64(_mm512_castsi512_si256(begin), _mm512_castsi512_si256(end));
-    const __m512i hi = bit_range_64(_mm512_extracti64x4_epi64(begin, 1), _mm512_extracti64x4_epi64(end, 1));
-    return (vw){_mm512_or_si512(a.lo, _mm512_and_si512(lo, every)), _mm512_or_si512(a.hi, _mm512_and_si512(hi, every))};
-}
-
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
@@ -88,10 +75,6 @@ TL_INLINE vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE vm vf_ge(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
 
-TL_INLINE vd vd_from_vi(vi a)
-{
-    return (vd){_mm512_cvtepi32_pd(_mm512_castsi512_si256(a)), _mm512_cvtepi32_pd(_mm512_extracti64x4_epi64(a, 1))};
-}
 TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(a.lo)), _mm512_cvtpd_ps(a.hi), 1);
@@ -124,15 +107,10 @@ TL_INLINE vd interleave(vi even, vi odd)
     return (vd){_mm512_castsi512_pd(_mm512_permutex2var_epi32(even, low, odd)),
                 _mm512_castsi512_pd(_mm512_permutex2var_epi32(even, high, odd))};
 }
-TL_INLINE vi vi_round(vd a)
-{
-    return _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvtpd_epi32(a.lo)), _mm512_cvtpd_epi32(a.hi), 1);
-}
 TL_INLINE vd vd_select(vm m, vd a, vd b)
 {
     return (vd){_mm512_mask_mov_pd(b.lo, (__mmask8)m, a.lo), _mm512_mask_mov_pd(b.hi, (__mmask8)(m >> 8), a.hi)};
 }
-TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
 
 typedef struct {
     wd even, odd;
@@ -147,7 +125,7 @@ TL_INLINE vi join_quarters(const __m128i *a)
 {
     const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a[0]), a[1], 1);
     const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(a[2]), a[3], 1);
-    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+    return join_halves(low, high);
 }
 
 /* Four numbers of each of two rows, which stand TL_LANES / 4 rows apart; and back. */
@@ -169,20 +147,13 @@ TL_INLINE wd back_pairs(wd a, wd b)
     return _mm512_permutex2var_pd(a, _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15), b);
 }
 
-TL_INLINE void store_eight(tl_vertex *v, wd xy, wd z)
+TL_INLINE void store_half(tl_vertex *v, wd xy, wd z)
 {
     const __m512i front = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11);
     const __m512i back = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
     _mm512_storeu_pd(v, _mm512_permutex2var_pd(xy, front, z));
     _mm512_storeu_pd(v + 4, _mm512_permutex2var_pd(xy, back, z));
 }
-TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
-{
-    const vd xy = interleave(x, y);
-    store_eight(v, xy.lo, z.lo);
-    store_eight(v + 8, xy.hi, z.hi);
-}
-
 /* Half vectors: a 64-byte load or store at any column crosses a cache line, one of 32 bytes every other time. */
 typedef __m256i hi;
 typedef __m256 hf;
@@ -209,23 +180,14 @@ TL_INLINE hf hf_sum_depth(double row, hd col)
 }
 
 TL_INLINE vf vf_min_size(vf a, vf b) { return _mm512_range_ps(a, b, 10); } /* the lesser, without its sign */
-TL_INLINE vf vf_of_bits(vi a) { return _mm512_castsi512_ps(a); }
-TL_INLINE vi vi_high_half(vi a) { return _mm512_srli_epi32(a, 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(table)); }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(table)); }
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(p)); }
-TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
-TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm512_sqrt_pd(a.lo), _mm512_sqrt_pd(a.hi)}; }
-TL_INLINE __m512d bits_minus(__m512d a, uint64_t sum, uint64_t mask)
-{
-    const __m512i b = _mm512_and_si512(_mm512_castpd_si512(a), _mm512_set1_epi64((long long)mask));
-    return _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64((long long)sum), b));
-}
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
     const __m512d low = _mm512_loadu_pd(p), high = _mm512_loadu_pd(p + 8);
-    return (vd){_mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_castsi512_si256(i)), high),
-                _mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(i, 1)), high)};
+    return (vd){_mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(lower_half(i)), high),
+                _mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(upper_half(i)), high)};
 }
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(p)); }
 TL_INLINE vi vi_prefix_count(unsigned bits)
@@ -267,7 +229,7 @@ TL_INLINE wd join_pairs(const __m128d *a)
     const __m256d high = _mm256_insertf128_pd(_mm256_castpd128_pd256(a[2]), a[3], 1);
     return _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1);
 }
-TL_INLINE vi vi_ceil(vd a) { return _mm512_inserti64x4(_mm512_castsi256_si512(ceil_eight(a.lo)), ceil_eight(a.hi), 1); }
+TL_INLINE vi vi_ceil(vd a) { return join_halves(ceil_eight(a.lo), ceil_eight(a.hi)); }
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a) { return _mm512_reduce_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
 TL_INLINE vd vd_off_integer(vd a)

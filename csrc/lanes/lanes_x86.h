@@ -21,6 +21,7 @@ TL_INLINE vi vi_mul_high_halves(vi a, vi b) { return TL_MM(mulhi_epu16)(a, b); }
 TL_INLINE vi vi_scale_halves(vi a, vi b) { return TL_MM(mulhrs_epi16)(a, b); }
 TL_INLINE vi vi_add_halves(vi a, vi b) { return TL_MM(add_epi16)(a, b); }
 TL_INLINE vi vi_sub_halves(vi a, vi b) { return TL_MM(sub_epi16)(a, b); }
+TL_INLINE vi vi_high_half(vi a) { return TL_MM(srli_epi32)(a, 16); }
 TL_INLINE vi vi_upper_bytes(vi a) { return TL_MM(srli_epi16)(a, 8); }
 TL_INLINE vi vi_add_bytes(vi a, vi b) { return TL_MM(adds_epu8)(a, b); }
 TL_INLINE vi vi_max_bytes(vi a, vi b) { return TL_MM(max_epu8)(a, b); }
@@ -56,6 +57,30 @@ TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
     for (int k = 0; k < 4; k++)
         vi_store(p + TL_LANES * k, rows[k]);
 }
+/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef struct {
+    vi lo, hi;
+} vw;
+TL_INLINE vw vw_load(const uint64_t *p)
+{
+    return (vw){vi_load((const int32_t *)p), vi_load((const int32_t *)(p + TL_LANES / 2))};
+}
+TL_INLINE void vw_store(uint64_t *p, vw a)
+{
+    vi_store((int32_t *)p, a.lo), vi_store((int32_t *)(p + TL_LANES / 2), a.hi);
+}
+TL_INLINE vi bit_range_64(half_vi begin, half_vi end)
+{
+    const vi ones = TL_MM(set1_epi32)(-1);
+    return TL_SI(andnot)(TL_MM(sllv_epi64)(ones, TL_MM(cvtepu32_epi64)(end)),
+                         TL_MM(sllv_epi64)(ones, TL_MM(cvtepu32_epi64)(begin)));
+}
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    const vi every = set1_64(pattern), lo = bit_range_64(lower_half(begin), lower_half(end));
+    const vi hi = bit_range_64(upper_half(begin), upper_half(end));
+    return (vw){vi_or(a.lo, vi_and(lo, every)), vi_or(a.hi, vi_and(hi, every))};
+}
 TL_INLINE vw vw_zero(void) { return (vw){TL_SI(setzero)(), TL_SI(setzero)()}; }
 /* Numbers with bits [begin, end) set, none where begin >= end; begin >= 0, end in 0..31. */
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
@@ -74,11 +99,17 @@ TL_INLINE void vf_store(float *p, vf a) { TL_MM(storeu_ps)(p, a); }
 TL_INLINE vi vi_low_bits(vd a) { return evens_of(a); }
 TL_INLINE vi vi_nearest(vf a) { return TL_MM(cvtps_epi32)(a); }
 TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? TL_MM(permute_ps)(a, 0xff) : TL_MM(movehdup_ps)(a); }
+TL_INLINE vf vf_of_bits(vi a) { return TL_FROM_SI(ps)(a); }
 TL_INLINE vi vi_bits_of_vf(vf a) { return TL_SI(castps)(a); }
+TL_INLINE vi vi_round(vd a) { return join_halves(TL_MM(cvtpd_epi32)(a.lo), TL_MM(cvtpd_epi32)(a.hi)); }
+TL_INLINE vd vd_from_vi(vi a) { return (vd){TL_MM(cvtepi32_pd)(lower_half(a)), TL_MM(cvtepi32_pd)(upper_half(a))}; }
+TL_INLINE vd vd_load(const double *p) { return (vd){TL_MM(loadu_pd)(p), TL_MM(loadu_pd)(p + TL_LANES / 2)}; }
+TL_INLINE void vd_store(double *p, vd a) { TL_MM(storeu_pd)(p, a.lo), TL_MM(storeu_pd)(p + TL_LANES / 2, a.hi); }
 TL_INLINE vd vd_set1(double a) { return (vd){TL_MM(set1_pd)(a), TL_MM(set1_pd)(a)}; }
 TL_INLINE vd vd_add(vd a, vd b) { return (vd){TL_MM(add_pd)(a.lo, b.lo), TL_MM(add_pd)(a.hi, b.hi)}; }
 TL_INLINE vd vd_sub(vd a, vd b) { return (vd){TL_MM(sub_pd)(a.lo, b.lo), TL_MM(sub_pd)(a.hi, b.hi)}; }
 TL_INLINE vd vd_mul(vd a, vd b) { return (vd){TL_MM(mul_pd)(a.lo, b.lo), TL_MM(mul_pd)(a.hi, b.hi)}; }
+TL_INLINE vd vd_sqrt(vd a) { return (vd){TL_MM(sqrt_pd)(a.lo), TL_MM(sqrt_pd)(a.hi)}; }
 TL_INLINE vd vd_div(vd a, vd b) { return (vd){TL_MM(div_pd)(a.lo, b.lo), TL_MM(div_pd)(a.hi, b.hi)}; }
 /* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes
  * the quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the
@@ -128,6 +159,12 @@ TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *fir
     *y = TL_MM(unpackhi_epi64)(ab, cd);
     z->even = TL_FROM_SI(pd)(TL_MM(unpackhi_epi64)(row[0], row[1]));
     z->odd = TL_FROM_SI(pd)(TL_MM(unpackhi_epi64)(row[2], row[3]));
+}
+TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
+{
+    const vd xy = interleave(x, y);
+    store_half(v, xy.lo, z.lo);
+    store_half(v + TL_LANES / 2, xy.hi, z.hi);
 }
 TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
 {
@@ -246,6 +283,11 @@ TL_INLINE vf vf_load(const float *p) { return TL_MM(loadu_ps)(p); }
 TL_INLINE vf vf_fma(vf a, vf b, vf c) { return TL_MM(fmadd_ps)(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return TL_MM(min_ps)(a, b); }
 TL_INLINE vf vf_max(vf a, vf b) { return TL_MM(max_ps)(a, b); }
+TL_INLINE wd bits_minus(wd a, uint64_t sum, uint64_t mask)
+{
+    const vi b = vi_and(TL_SI(castpd)(a), set1_64(mask));
+    return TL_FROM_SI(pd)(TL_MM(sub_epi64)(set1_64(sum), b));
+}
 TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
 {
     return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)};

@@ -32,7 +32,7 @@ static __attribute__((noinline)) void draw_fallback(meshlet_batch *s, const tl_m
     tl_source source = *pass->source;
     source.data = s->is_f64 ? (const void *)points64 : (const void *)points32;
     source.n = TL_MESHLET_VERTICES + TAIL;
-    pass->kernels->project(&source, 0, TL_MESHLET_VERTICES, pass->view, vertices, NULL);
+    pass->kernels->project(&source, 0, TL_MESHLET_VERTICES, pass->view, &(tl_projected){.records = vertices});
     for (int i = 0; i < TL_MESHLET_ROOM; i++) {
         if (!(which[i >> 6] >> (i & 63) & 1) || m->corners[0][i] == m->corners[1][i]) /* or an empty one */
             continue;

@@ -12,7 +12,7 @@
 
 #include "topleft.h"
 #include "vertex/clip.c"
-#include "exact/pieces_exact.c"
+#include "exact/pieces.c"
 #include "exact/sign.c"
 
 /* Where a pixel is looked at. */
@@ -44,7 +44,7 @@ static int holds(const exact_point *p, exact_point sample)
 }
 
 /* The piece of a triangle that holds a sample, -1 if none does. */
-static int64_t piece_at(const tl_exact_pieces *pieces, int64_t id, exact_point sample, exact_point *corners)
+static int64_t piece_at(const tl_pieces *pieces, int64_t id, exact_point sample, exact_point *corners)
 {
     const int64_t n = pieces ? pieces->n_pieces : 0;
     const int32_t *source = pieces ? pieces->source : NULL;

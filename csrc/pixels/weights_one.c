@@ -74,7 +74,7 @@ static int find_exact(resolve_state *s, const tl_snapped *snapped, int64_t id, c
         s->triangle.corner[k] = corners[k];
     }
     if (is_clipped(&snapped->mesh, corners)) {
-        const tl_exact_pieces *p = points->pieces;
+        const tl_pieces *p = points->pieces;
         const int64_t i = piece_at(p, id, sample_of(&snapped->mesh, x_px, y_px, bits), s->points);
         if (i < 0)
             return 0;

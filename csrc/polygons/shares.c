@@ -40,39 +40,22 @@ typedef struct {
 TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t first, int64_t end, int64_t i, int weight,
                                int32_t right_fx, int32_t down_fx)
 {
-    const area_plane *plane = &s->plane;
-    const vi zero = vi_set1(0), one = vi_set1(1), last_kind = vi_set1(TL_EDGES_LONG), most = vi_set1(s->max_extent);
+    const vi zero = vi_set1(0), most = vi_set1(s->max_extent), right = vi_set1(right_fx), down = vi_set1(down_fx);
     vi ax, ay, bx, by;
     const vm live = load_ring_edges(p, first, end, i, &ax, &ay, &bx, &by);
-    ax = vi_add(ax, vi_set1(right_fx)), ay = vi_add(ay, vi_set1(down_fx));
-    bx = vi_add(bx, vi_set1(right_fx)), by = vi_add(by, vi_set1(down_fx));
-    const vm is_up = vi_gt(ay, by);
-    const vi x0 = vi_select(is_up, bx, ax), x1 = vi_select(is_up, ax, bx), y0 = vi_min(ay, by), y1 = vi_max(ay, by);
-    const vi dx = vi_sub(x1, x0), dy = vi_sub(y1, y0), width = vi_max(dx, vi_sub(zero, dx)), dy2 = vi_add(dy, dy);
-    const vm meets_rows = vm_and(vi_gt(vi_set1(plane->bottom_fx), y0), vi_gt(y1, vi_set1(plane->top_fx)));
-    vm on = vm_and(vm_and(live, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(plane->right_fx), vi_min(x0, x1))));
-    const vm alone = vm_and(on, vm_or(vi_gt(width, most), vi_gt(dy, most)));
+    const area_edges e =
+        edges_between(&s->plane, vi_add(ax, right), vi_add(ay, down), vi_add(bx, right), vi_add(by, down), live);
+    const vm alone = vm_and(e.on, vm_or(vi_gt(e.width, most), vi_gt(e.dy, most)));
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1) {
         const int64_t a = i + __builtin_ctz(lanes), b = a + 1 < end ? a + 1 : first, from = weight > 0 ? a : b,
                       to = weight > 0 ? b : a;
         push_edge(s, p->x_fx[from] + right_fx, p->y_fx[from] + down_fx, p->x_fx[to] + right_fx, p->y_fx[to] + down_fx);
     }
-    on = vm_and_not(on, alone);
+    const vm on = vm_and_not(e.on, alone);
     if (!vm_any(on))
         return;
-    const vi rows = vi_sub(vi_shift_right(vi_sub(y1, one), plane->bits), vi_shift_right(y0, plane->bits));
-    vi kind = vi_min(rows, last_kind);
-    kind = vi_select(vi_gt(width, dy2), vi_add(kind, vi_set1(TL_EDGES_FLAT)), kind);
-    kind = vi_select(vi_gt(width, vi_add(dy2, vi_shift_left(dy2, 1))), vi_set1(TL_EDGES_SHALLOW), kind);
-    /* areas right of edges that run upwards are added */
-    const vi signed_dy = vi_select(is_up, weight > 0 ? dy : vi_sub(zero, dy), weight > 0 ? vi_sub(zero, dy) : dy);
-    int32_t kinds[TL_LANES], records[4 * TL_LANES];
-    vi_spill(kinds, kind);
-    vi_store_quads(records, (const vi[4]){x0, y0, dx, signed_dy});
-    for (unsigned lanes = vm_bits(on); lanes; lanes &= lanes - 1) {
-        const int lane = __builtin_ctz(lanes);
-        v4_store(&s->edges[kinds[lane]][s->n[kinds[lane]]++].x_fx, v4_load(records + 4 * vi_quad_slot(lane)));
-    }
+    const vi negative = vi_sub(zero, e.dy); /* areas right of edges that run upwards are added */
+    queue_edges(s, &e, on, weight > 0 ? vi_select(e.is_up, e.dy, negative) : vi_select(e.is_up, negative, e.dy));
 }
 
 /* Draws a polygon without rings that meet, moved so far, into the cells of the plane. */

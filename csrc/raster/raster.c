@@ -354,7 +354,7 @@ static void clear(const tl_window *window, const tl_target *target)
 /* The pieces of listed triangles. */
 static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t n_whole, const tl_slice *slice)
 {
-    const tl_exact_pieces *pieces = s->snapped->mesh.exact->pieces;
+    const tl_pieces *pieces = s->snapped->mesh.exact->pieces;
     for (int64_t i = slice->first; i < slice->end; i++) {
         int64_t k = first_piece(pieces->source, pieces->n_pieces, slice->ids[i]);
         for (; k < pieces->n_pieces && pieces->source[k] == slice->ids[i]; k++) {
@@ -405,21 +405,14 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
 {
     const tl_snapped drawn = drawn_mesh(snapped);
     const int has_all = !slice->ids && slice->end == snapped->n_triangles;
-    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    tl_exact_counts not_asked_for = {0, 0, 0, 0, 0, 0};
+    tl_exact_counts *const counts = slice->counts ? slice->counts : &not_asked_for;
     tl_slice own = *slice;
     int64_t bad_row = -1;
     own.end = has_all ? drawn.n_triangles : slice->end;
     if (own.first < own.end)
-        TL_LIST_CALL(draw_floats, part->sink, &drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row)
+        TL_LIST_CALL(draw_floats, part->sink, &drawn, snapped->n_triangles, band, part, &own, counts, &bad_row)
     slice->n_outside = own.n_outside;
-    if (slice->counts) {
-        slice->counts->n_triangles += counts.n_triangles;
-        slice->counts->n_on_grid += counts.n_on_grid;
-        slice->counts->n_refined += counts.n_refined;
-        slice->counts->n_turns += counts.n_turns;
-        slice->counts->n_expansions += counts.n_expansions;
-        slice->counts->n_integers += counts.n_integers;
-    }
     return bad_row;
 }
 

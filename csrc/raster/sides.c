@@ -49,16 +49,13 @@ static int shows_side(const tl_snapped *snapped, int64_t i)
 /* Collapses the pieces of a triangle that a plane cuts which do not show the side that is drawn. */
 static void drop_pieces(const tl_snapped *snapped, int64_t i)
 {
-    const tl_exact_pieces *exact = snapped->mesh.exact ? snapped->mesh.exact->pieces : NULL;
-    const tl_pieces *fixed = snapped->mesh.exact ? NULL : snapped->pieces;
-    const int32_t *source = exact ? exact->source : fixed ? fixed->source : NULL;
-    const int64_t n = exact ? exact->n_pieces : fixed ? fixed->n_pieces : 0;
-    tl_vertex_set cut = snapped->mesh;
-    if (fixed)
-        cut = piece_set(fixed, &snapped->mesh);
-    for (int64_t k = first_piece(source, n, i); k < n && source[k] == i; k++) {
-        int32_t *corners = (exact ? exact->triangles : fixed->triangles) + 3 * k;
-        if (turn_of(exact ? exact->points : NULL, 3, &cut, corners) != wanted_turn(snapped))
+    const tl_pieces *p = snapped->mesh.exact ? snapped->mesh.exact->pieces : snapped->pieces;
+    if (!p)
+        return;
+    const tl_vertex_set cut = piece_set(p, &snapped->mesh);
+    for (int64_t k = first_piece(p->source, p->n_pieces, i); k < p->n_pieces && p->source[k] == i; k++) {
+        int32_t *corners = p->triangles + 3 * k;
+        if (turn_of(p->points, 3, &cut, corners) != wanted_turn(snapped))
             corners[1] = corners[2] = corners[0];
     }
 }

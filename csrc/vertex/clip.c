@@ -1,5 +1,5 @@
 /* Clip: the triangles that a clip plane cuts.
- * In: homogeneous vertices.  Out: the pieces that are left, snapped.
+ * In: homogeneous vertices.  Out: convex polygons; and readers of the pieces that exact/pieces.c makes of them.
  * Based on: I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974. */
 #ifndef TL_CLIP_C
 #define TL_CLIP_C
@@ -91,117 +91,6 @@ static int clip_triangle(const tl_source *source, const int32_t *corners, const 
         if (!(polygon[k].pos[3] >= TL_MIN_W * 0.5)) /* overflowed or underflowed in the cut: beyond any picture */
             return 0;
     return n < 3 ? 0 : n;
-}
-
-static inline tl_wide snapped_corner(const tl_pieces *p, int64_t i)
-{
-    if (p->vertices[i].x_fx == TL_SPECIAL)
-        return p->wide[i];
-    return (tl_wide){p->vertices[i].x_fx, p->vertices[i].y_fx};
-}
-
-/* Signed area, doubled, of triangle i of the fan from an apex. */
-static inline tl_int128 fan_area(const tl_pieces *p, int64_t first, int n, int apex, int i)
-{
-    const tl_wide a = snapped_corner(p, first + apex), b = snapped_corner(p, first + (apex + i) % n),
-                  c = snapped_corner(p, first + (apex + i + 1) % n);
-    return i128_sub(i128_product(b.x_fx - a.x_fx, c.y_fx - a.y_fx), i128_product(b.y_fx - a.y_fx, c.x_fx - a.x_fx));
-}
-
-/* The turn of a triangle as drawn (y down) from its clip-space corners: the sign of its homogeneous determinant. */
-static inline int clip_turn(const tl_source *source, const int32_t *corners)
-{
-    double a[4], b[4], c[4];
-    clip_position(source, corners[0], a);
-    clip_position(source, corners[1], b);
-    clip_position(source, corners[2], c);
-    const double det =
-        (a[0] * (b[1] * c[3] - b[3] * c[1]) - a[1] * (b[0] * c[3] - b[3] * c[0])) + a[3] * (b[0] * c[1] - b[1] * c[0]);
-    return (det < 0.0) - (det > 0.0);
-}
-
-/* The snap may dent a corner of the convex polygon inwards; a fan from that corner still turns one way only.  Corners
- * that changed places leave no such fan: then the one with the least area turned over; its triangles that turn
- * against the source triangle are left out.  Returns the apex, and in *turn the sign of the triangles to draw. */
-static int fan_apex(const tl_pieces *p, int64_t first, int n, int source_turn, int *turn)
-{
-    const tl_int128 none = i128_from(0);
-    tl_int128 least = none;
-    int best = -1;
-    for (int apex = 0; apex < n; apex++) {
-        tl_int128 positive = none, negative = none;
-        for (int i = 1; i < n - 1; i++) {
-            const tl_int128 area = fan_area(p, first, n, apex, i);
-            positive = i128_add(positive, i128_max(area, none));
-            negative = i128_add(negative, i128_min(area, none));
-        }
-        if (i128_is_zero(positive) || i128_is_zero(negative)) {
-            *turn = i128_sign(i128_add(positive, negative));
-            return apex;
-        }
-        if (source_turn == 0)
-            source_turn = i128_is_negative(i128_add(positive, negative)) ? -1 : 1;
-        const tl_int128 wrong = source_turn > 0 ? i128_neg(negative) : positive;
-        if (best < 0 || i128_less(wrong, least)) {
-            best = apex;
-            least = wrong;
-        }
-    }
-    *turn = source_turn;
-    return best;
-}
-
-/* Snaps the polygon of one triangle and appends its fan. */
-static void append_pieces(tl_pieces *p, const clip_corner *polygon, int n, int32_t source, int source_turn,
-                          const tl_view *view)
-{
-    const int64_t first = p->n_vertices;
-    tl_vertex_counts counts = {0, 0, 0};
-    for (int k = 0; k < n; k++) {
-        store_projected(polygon[k].pos, view, first + k, p->vertices, p->wide, 1, &counts);
-        p->inv_w[first + k] = 1.0 / polygon[k].pos[3];
-        memcpy(p->weights + 3 * (first + k), polygon[k].weights, sizeof polygon[k].weights);
-    }
-    if (counts.n_bad)
-        return; /* beyond 2^62 in spite of the guard band: not representable, so not drawn */
-    int turn;
-    const int apex = fan_apex(p, first, n, source_turn, &turn);
-    for (int i = 1; i < n - 1; i++) {
-        if (turn == 0 || i128_sign(fan_area(p, first, n, apex, i)) != turn)
-            continue;
-        int32_t *t = p->triangles + 3 * p->n_pieces;
-        t[0] = (int32_t)(first + apex);
-        t[1] = (int32_t)(first + (apex + i) % n);
-        t[2] = (int32_t)(first + (apex + i + 1) % n);
-        p->source[p->n_pieces++] = source;
-    }
-    p->n_vertices += n;
-}
-
-static void clip(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids,
-                 int64_t n_listed, const tl_view *view, tl_pieces *pieces)
-{
-    clip_corner polygon[TL_MAX_CORNERS];
-    const int64_t vertex_room = pieces->n_vertices, room = pieces->n_pieces;
-    pieces->n_vertices = pieces->n_pieces = 0;
-    for (int64_t i = 0; i < n_listed; i++) {
-        const int64_t t = ids ? ids[i] : i;
-        int32_t corners[3];
-        int cut = 0;
-        for (int k = 0; k < 3; k++) {
-            corners[k] = corner_within(triangles[3 * t + k], source->n);
-            cut |= vertices[corners[k]].x_fx == TL_SPECIAL && vertices[corners[k]].y_fx == TL_CLIPPED;
-        }
-        const int n = cut ? clip_triangle(source, corners, view, polygon) : 0;
-        if (n && pieces->vertices) {
-            if (pieces->n_vertices + n > vertex_room || pieces->n_pieces + n - 2 > room)
-                return; /* the mesh has changed since they were counted */
-            append_pieces(pieces, polygon, n, (int32_t)t, clip_turn(source, corners), view);
-        } else if (n) {
-            pieces->n_vertices += n;
-            pieces->n_pieces += n - 2;
-        }
-    }
 }
 
 /* Readers of the pieces. */

@@ -291,16 +291,10 @@ TL_INLINE tl_vertex_counts project_all(const tl_source *source, int64_t first, i
     return counts;
 }
 
-static tl_vertex_counts project_to(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-                                   const tl_projected *out)
+static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                const tl_projected *out)
 {
     return out->points ? project_all(source, first, end, view, out, 0) : project_all(source, first, end, view, out, 1);
-}
-
-static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-                                tl_vertex *out, tl_wide *wide)
-{
-    return project_to(source, first, end, view, &(tl_projected){.records = out, .wide = wide});
 }
 
 #endif

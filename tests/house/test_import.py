@@ -7,7 +7,7 @@ import pytest
 
 import topleft as tl
 
-LATE = ["PIL", "trimesh", "tqdm", "isal", "scipy", "matplotlib", "concurrent.futures", "multiprocessing"]
+LATE = ["PIL", "trimesh", "tqdm", "scipy", "matplotlib", "concurrent.futures", "multiprocessing"]
 LATE += ["torch", "argparse", "logging", "shutil", "tempfile", "traceback", "tomllib", "json"]
 
 

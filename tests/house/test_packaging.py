@@ -68,8 +68,8 @@ def test_metadata_extras_are_the_documented_ones():
     }
 
 
-def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
-    assert requirements_of("render") == {"isal", "trimesh", "tqdm"}
+def test_metadata_render_extra_is_trimesh_and_tqdm():
+    assert requirements_of("render") == {"trimesh", "tqdm"}
 
 
 def test_metadata_torch_extra_is_torch():

@@ -286,19 +286,19 @@ def test_lists_of_every_pixel_stay_in_their_room(isa, guard, width):
     corners = np.stack([x + [0, 0.5, 0, 0.5], y, 0 * y], -1).reshape(-1, 3)
     triangles = (4 * np.arange(2 * width)[:, None] + [0, 1, 2, 1, 3, 2]).reshape(-1, 3)
     rasterizer = tl.Rasterizer((width, 67), threads=3)
-    rasterizer._memory = Guarded(guard)
+    rasterizer._lent.memory = Guarded(guard)
     with on(isa):
-        frags = split_ids(corners, triangles, (width, 67), rasterizer._memory, sampling="msaa8", threads=3)
+        frags = split_ids(corners, triangles, (width, 67), rasterizer._lent.memory, sampling="msaa8", threads=3)
         assert kept(frags)[0].all()
         check_kept(frags)
-    assert "split columns of samples" in rasterizer._memory.names
+    assert "split columns of samples" in rasterizer._lent.memory.names
 
 
 def test_samples_outlive_what_other_verbs_do_with_the_memory():
     scene = mixed(np.random.default_rng(2), 50, (40, 30))
     expected = draw(scene, 4, tl.rasterize)
     rasterizer = tl.Rasterizer(scene.size)
-    for found in (rasterizer.rasterize, partial(split_ids, size=scene.size, memory=rasterizer._memory)):
+    for found in (rasterizer.rasterize, partial(split_ids, size=scene.size, memory=rasterizer._lent.memory)):
         frags = found(scene.vertices, scene.triangles, sampling="msaa4")
         for verb in (rasterizer.coverage, rasterizer.overdraw, rasterizer.rasterize):
             verb(scene.vertices[::-1] * 3, scene.triangles[::-1])

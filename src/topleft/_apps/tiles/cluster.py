@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 from topleft._apps.cluster import MOST_RESTARTS, check_workers, lost, quiet, result_of, send_again
+from topleft._apps.tiles.dask_array import run_job
 
 
 @dataclass(frozen=True)
@@ -29,11 +30,6 @@ class WriteJob:
         """Draw and write it."""
         pixels = self.draw()
         self.store.write(0, self.row, self.column, pixels if self.prepare is None else self.prepare(pixels))
-
-
-def run_write(job: WriteJob) -> None:
-    """Draw and write a window."""
-    job()
 
 
 class ClusterWriters:
@@ -57,7 +53,7 @@ class ClusterWriters:
 
     def _send(self, job: WriteJob, promise: Future[None], n_sent: int) -> None:
         with quiet():
-            task = self._client.submit(run_write, job, pure=False)
+            task = self._client.submit(run_job, job, pure=False)
 
         def end(done: Any) -> None:
             is_written, error = done.status == "finished", result_of(done)[1]

@@ -42,7 +42,7 @@ def received(job: Callable[[], Array]) -> Callable[[], Array]:
 
 
 def run_job(job: Callable[[], Any]) -> Any:
-    """Draw a window."""
+    """Draw a window, and maybe write it."""
     return job()
 
 

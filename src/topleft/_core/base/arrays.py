@@ -114,6 +114,21 @@ def _aligned(value: Any) -> Any:
     return as_aligned(value) if isinstance(value, np.ndarray) else value
 
 
+def check_real(name: str, array: NDArray[Any], kinds: str = "fiu") -> None:
+    """Raise an error unless an array holds real numbers, by the kinds of dtypes that count as such."""
+    if array.dtype.kind not in kinds:
+        raise TypeError(f"{name} must be real numbers, got dtype {array.dtype}")
+
+
+def as_plane_points(name: str, values: ArrayLike) -> NDArray[Any]:
+    """Return points (V, 2), or (V, 3) with heights, as they are."""
+    array = as_array(name, values)
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise ValueError(f"{name} must have shape (V, 2) or (V, 3), got {array.shape}")
+    check_real(name, array)
+    return array
+
+
 def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
     """Return (V, C) vertices as a contiguous float32, float64 or int64 array."""
     array = as_array("vertices", values)
@@ -229,8 +244,7 @@ def as_transform(values: ArrayLike, *, has_poses: bool = False) -> NDArray[Any]:
     array = as_array("transform", values)
     if array.shape[-2:] != (4, 4) or array.ndim > 2 + has_poses:
         raise ValueError(f"transform must have shape (4, 4), got {array.shape}")
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"transform must be real numbers, got dtype {array.dtype}")
+    check_real("transform", array)
     if not np.isfinite(array).all():
         raise ValueError("transform must be finite, got NaN or infinity")
     return array
@@ -426,14 +440,17 @@ def as_colors(values: ArrayLike) -> NDArray[Any]:
         array = array.astype(np.uint8) if array.dtype == np.float64 else array  # an empty list
     if not (array.ndim == 1 or (array.ndim == 2 and 1 <= array.shape[1] <= 4)):
         raise ValueError(f"colors must have shape (T, C), (V, C), (T,) or (V,) with C in 1..4, got {array.shape}")
+    return as_drawn_colors(array, "; dtype= fills labels")
+
+
+def as_drawn_colors(array: NDArray[Any], hint: str = "") -> NDArray[Any]:
+    """Return colours as a contiguous uint8 or float32 array; `hint` ends the error for larger integers."""
     if array.dtype.kind == "f":
         return np.ascontiguousarray(array, dtype=np.float32)
     if array.dtype.kind not in "iu":
         raise TypeError(f"colors must be uint8 or float32, got dtype {array.dtype}")
     if array.dtype != np.uint8 and array.size and not (0 <= array.min() and array.max() <= 255):
-        raise ValueError(
-            f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}; dtype= fills labels"
-        )
+        raise ValueError(f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}{hint}")
     return np.ascontiguousarray(array, dtype=np.uint8)
 
 
@@ -444,8 +461,7 @@ def as_background(background: ArrayLike | None, palette: NDArray[Any]) -> NDArra
     ground = as_array("background", background)
     if ground.shape not in ((), palette.shape[1:]):
         raise ValueError(f"background must be one number or have shape {palette.shape[1:]}, got {ground.shape}")
-    if ground.dtype.kind not in "fiu":
-        raise TypeError(f"background must be real numbers, got dtype {ground.dtype}")
+    check_real("background", ground)
     if palette.dtype == np.uint8 and not ((ground >= 0) & (ground <= 255) & (ground == np.floor(ground))).all():
         raise ValueError(f"background must be whole numbers in 0..255 for uint8 colors, got {ground.tolist()}")
     return ground.astype(palette.dtype)
@@ -454,8 +470,7 @@ def as_background(background: ArrayLike | None, palette: NDArray[Any]) -> NDArra
 def as_values(values: ArrayLike, n_vertices: int, n_triangles: int) -> NDArray[np.float32]:
     """Return attributes as a contiguous float32 array of shape (V,), (V, K) or (T, 3, K)."""
     array = as_array("values", values)
-    if array.dtype.kind not in "fiub":
-        raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+    check_real("values", array, "fiub")
     fits = (array.ndim in (1, 2) and array.shape[0] == n_vertices) or (
         array.ndim == 3 and array.shape[:2] == (n_triangles, 3)
     )

@@ -15,6 +15,9 @@ from topleft._core.base.remote import Location, RemotePath
 #: A file that nobody has written to for so long was left by a process that was killed.
 STALE_S = 3600
 
+BUFFER_BYTES = 1 << 16
+"""Writes are put together to so much; to be told it spares the question whether a file is a terminal."""
+
 
 def write_whole(path: Location, write: Callable[[IO[bytes]], object]) -> None:
     """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file.
@@ -26,18 +29,18 @@ def write_whole(path: Location, write: Callable[[IO[bytes]], object]) -> None:
         write(content)
         path.write_bytes(content.getvalue())
         return
-    if path.is_dir():
-        raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder")
     folder, name = os.path.split(path)
     temporary = os.path.join(folder, f".{name[:100]}.{os.urandom(4).hex()}.part")
     try:
-        with open(temporary, "xb") as file:
+        with open(temporary, "xb", BUFFER_BYTES) as file:
             write(file)
         os.replace(temporary, path)
     except OSError as error:
         _remove(temporary)
         if error.errno is None:
             raise
+        if path.is_dir():
+            raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder") from error
         raise type(error)(error.errno, f"cannot write: {error.strerror}", str(path)) from error
     except BaseException:
         _remove(temporary)

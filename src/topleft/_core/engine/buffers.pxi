@@ -43,6 +43,17 @@ cdef inline tl_projected points_to(double *points) noexcept nogil:
     return out
 
 
+cdef tl_projected projected_to(vertices: Array):
+    """Records, or points (V, PLACED) float64, as kernels take them."""
+    cdef tl_projected out = points_to(NULL)
+    cdef const uint8_t[::1] raw = as_bytes(vertices)
+    if vertices.dtype == np.float64:
+        out.points = <double *>data(raw)
+    else:
+        out.records = <tl_vertex *>data(raw)
+    return out
+
+
 cdef class Source:
     """The caller's (V, C) vertices, contiguous float32, float64 or int64, and the matrix that takes them to clip space."""
 
@@ -89,38 +100,37 @@ cdef class Source:
             n_bad = K.take_points(&self.source, first, end, bits, &points[0, 0] if points is not None else NULL)
         return n_bad
 
-    def project(self, int64_t first, int64_t end, Viewport viewport, uint8_t[::1] records,
+    def project(self, int64_t first, int64_t end, Viewport viewport, vertices: Array,
                 int64_t[:, ::1] wide or None) -> tuple[int, int, int]:
-        """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
-        cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
+        """Project vertices [first, end); returns the numbers of bad, wide and clipped vertices.
+
+        `vertices`: records, into which they are snapped, or points (V, PLACED); bad and clipped ones have x NaN.
+        """
+        cdef tl_projected out = projected_to(vertices)
         cdef tl_vertex_counts counts
+        out.wide = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         if end - first == self.source.n < HELD_VERTICES:
-            counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
+            counts = K.project(&self.source, first, end, &viewport.view, &out)
         else:
             with nogil:
-                counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
+                counts = K.project(&self.source, first, end, &viewport.view, &out)
         return counts.n_bad, counts.n_wide, counts.n_clipped
-
-    def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points) -> tuple[int, int]:
-        """Project vertices [first, end) to points (V, PLACED); returns the numbers of bad and of clipped ones, x NaN."""
-        cdef tl_projected out = points_to(&points[0, 0])
-        cdef tl_vertex_counts counts
-        with nogil:
-            counts = K.project_to(&self.source, first, end, &viewport.view, &out)
-        return counts.n_bad, counts.n_clipped
 
     def project_blocks(self, const uint8_t[::1] is_used, Viewport viewport,
                        uint8_t[::1] records) -> tuple[int, int, int]:
         """Project and snap the blocks of VERTEX_BLOCK vertices that are used; returns as `project` does."""
         cdef int64_t i = 0, end, n = is_used.shape[0], n_bad = 0, n_wide = 0, n_clipped = 0
+        cdef tl_projected out
         cdef tl_vertex_counts counts
+        memset(&out, 0, sizeof(out))
+        out.records = <tl_vertex *>&records[0]
         with nogil:
             while i < n:
                 end = i
                 while end < n and is_used[end]:
                     end += 1
                 if end > i:
-                    counts = K.project(&self.source, i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, self.source.n), &viewport.view, <tl_vertex *>&records[0], NULL)
+                    counts = K.project(&self.source, i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, self.source.n), &viewport.view, &out)
                     n_bad += counts.n_bad
                     n_wide += counts.n_wide
                     n_clipped += counts.n_clipped
@@ -229,35 +239,45 @@ cdef class Pieces:
     cdef tl_pieces pieces
     cdef readonly object arrays  #: tuple[Any, ...] | None
 
-    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, Viewport viewport,
+    def __init__(self, Source source, vertices: Array, const int32_t[:, ::1] triangles, Viewport viewport,
                  const int32_t[::1] ids=None):
-        """`ids`: the triangles that may be cut, ascending; unless given, all of them."""
+        """`vertices`: records, or points (V, PLACED) that are not snapped.
+
+        `ids`: the triangles that may be cut, ascending; unless given, all of them.
+        """
         cdef tl_pieces *p = &self.pieces
+        cdef tl_projected projected = projected_to(vertices)
         cdef int64_t n = triangles.shape[0] if ids is None else ids.shape[0]
         cdef const int32_t *listed = &ids[0] if ids is not None and n else NULL
-        cdef uint8_t[::1] vertices
+        cdef bint is_snapped = projected.points == NULL
+        cdef uint8_t[::1] records
         cdef int64_t[:, ::1] wide
+        cdef double[:, ::1] points, weights
         cdef double[::1] inv_w
-        cdef double[:, ::1] weights
         cdef int32_t[:, ::1] corners
         cdef int32_t[::1] owners
-        p.vertices = NULL
-        p.n_vertices = p.n_pieces = 0
+        memset(p, 0, sizeof(self.pieces))
         if n == 0:
             return
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &viewport.view, p)
+            K.clip(&source.source, &projected, &triangles[0, 0], listed, n, &viewport.view, p)
         if p.n_pieces == 0:
             return
-        vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
+        records = wide = points = None
+        if is_snapped:
+            records, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
+            p.vertices, p.wide = <tl_vertex *>&records[0], <tl_wide *>&wide[0, 0]
+        else:
+            points = np.empty((p.n_vertices, 3))
+            p.points = &points[0, 0]
         inv_w, weights = np.empty(p.n_vertices), np.empty((p.n_vertices, 3))
         corners, owners = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
-        self.arrays = tuple(map(np.asarray, (vertices, wide, inv_w, weights, corners, owners)))
-        p.vertices, p.wide = <tl_vertex *>&vertices[0], <tl_wide *>&wide[0, 0]
+        first = tuple(map(np.asarray, (records, wide))) if is_snapped else (np.asarray(points), None)
+        self.arrays = first + tuple(map(np.asarray, (inv_w, weights, corners, owners)))
         p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
         p.triangles, p.source = &corners[0, 0], &owners[0]
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &viewport.view, p)
+            K.clip(&source.source, &projected, &triangles[0, 0], listed, n, &viewport.view, p)
 
     def __len__(self) -> int:
         return self.pieces.n_pieces

@@ -97,7 +97,7 @@ cdef class PlacedMeshes:
                 out = points_to(<double *>self.place(i))
             else:
                 out.records = <tl_vertex *>self.place(i)
-            counts = K.project_to(&self.sources[i], 0, self.sources[i].n, &self.viewport.view, &out)
+            counts = K.project(&self.sources[i], 0, self.sources[i].n, &self.viewport.view, &out)
             self.is_apart[i] = counts.n_bad + counts.n_wide + counts.n_clipped > 0
 
     def count_left_out(self) -> int:

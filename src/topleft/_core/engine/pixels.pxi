@@ -336,3 +336,23 @@ def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] s
     with nogil:
         K.draw_cloud(&cloud, &window, &rows)
     raise_if_given_up()
+
+
+def png_room(int64_t n_rows, int64_t n_bytes) -> int:
+    """Return how many bytes `encode_rows` needs for rows of n_bytes."""
+    return tl_png_room(n_rows, n_bytes)
+
+
+def encode_rows(const uint8_t[:, ::1] pixels, const uint8_t[::1] above, int pixel_bytes, uint32_t adler,
+                uint8_t[::1] row, uint8_t[::1] out) -> tuple[int, int]:
+    """Write rows (N, B) of a PNG as a block of deflate; return how many bytes it has, and Adler-32 of what it holds.
+
+    `above`: the row before them; `row`: room for 1 + B bytes; `out`: for `png_room`.
+    """
+    cdef tl_png_rows rows
+    cdef int64_t n
+    rows.pixels, rows.above = &pixels[0, 0], &above[0]
+    rows.n_rows, rows.n_bytes, rows.pixel_bytes = pixels.shape[0], pixels.shape[1], pixel_bytes
+    with nogil:
+        n = K.encode_rows(&rows, &row[0], &adler, &out[0])
+    return n, adler

@@ -367,7 +367,7 @@ cdef class WaitingMesh(SnappedMesh):
         cdef int64_t i
         self.projected.records = <tl_vertex *>self.snapped.mesh.vertices
         for i from 0 <= i < source.n by PROJECTED_BLOCK:
-            counts = K.project_to(source, i, min(i + PROJECTED_BLOCK, source.n), self.clip_view(), &self.projected)
+            counts = K.project(source, i, min(i + PROJECTED_BLOCK, source.n), self.clip_view(), &self.projected)
             if counts.n_bad or counts.n_wide or counts.n_clipped:
                 return False
         return True

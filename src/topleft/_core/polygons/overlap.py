@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, shown
+from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, check_real, shown
 from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import check_rows_along_y, numbers_without_data
 from topleft._core.base.grid import Grid
@@ -259,8 +259,7 @@ class Overlap:
         array = as_array("raster", raster.data if is_masked is not np.ma.nomask else raster)
         if array.shape != self.size[::-1]:
             raise ValueError(f"raster must have shape {self.size[::-1]}, got {array.shape}")
-        if array.dtype.kind not in "biuf":
-            raise TypeError(f"raster must be real numbers, got dtype {array.dtype}")
+        check_real("raster", array, "biuf")
         self._check_pixels()
         given = array.reshape(-1)[self.pixels]
         values = given.astype(np.float64)

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.arrays import apart_from, as_array, as_count, as_size, as_subpixel_bits, as_window
+from topleft._core.base.arrays import apart_from, as_array, as_count, as_size, as_subpixel_bits, as_window, check_real
 from topleft._core.base.defaults import MAX_CROSSINGS
 from topleft._core.base.georeference import crs_text, is_same_crs, transformed
 from topleft._core.base.grid import Grid
@@ -275,8 +275,7 @@ def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
         background = -1 if background is None else background
     else:
         table = as_array("values", values)
-        if table.dtype.kind not in "biuf":
-            raise TypeError(f"values must be real numbers, got dtype {table.dtype}")
+        check_real("values", table, "biuf")
         table = table.astype(table.dtype.newbyteorder("="), copy=False)  # rows are written as bytes
         if table.ndim == 0:
             table = np.full(n, table)
@@ -289,8 +288,7 @@ def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
     ground = as_array("background", 0 if background is None else background)
     if ground.shape not in ((), table.shape[1:]):
         raise ValueError(f"background must be one number or have shape {table.shape[1:]}, got {ground.shape}")
-    if ground.dtype.kind not in "biuf":
-        raise TypeError(f"background must be real numbers, got dtype {ground.dtype}")
+    check_real("background", ground, "biuf")
     with np.errstate(invalid="ignore", over="ignore"):
         row = np.broadcast_to(ground, table.shape[1:]).astype(table.dtype)
     if table.dtype.kind in "iub" and not (row == ground).all():

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import I64
-from topleft._core.base.arrays import apart_from, as_aligned, as_array
+from topleft._core.base.arrays import apart_from, as_aligned, as_array, check_real
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +76,7 @@ def as_points(values: Any, name: str) -> npt.NDArray[Any]:
     array = as_array(name, values)
     if array.size == 0:
         return np.empty((0, 2))
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name} must be real numbers, got dtype {array.dtype}")
+    check_real(name, array)
     if array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(f"{name} must have shape (N, 2), got {array.shape}")
     if array.dtype.kind == "u" and array.dtype.itemsize == 8:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import apart_from, as_array, as_background, as_number, as_out
+from topleft._core.base.arrays import apart_from, as_array, as_background, as_drawn_colors, as_number, as_out
 from topleft._core.base.memory import empty
 from topleft._core.base.options import parse
 from topleft._core.base.threads import available_threads, parse_threads, run_parts
@@ -119,13 +119,7 @@ def composite(
 
 def as_palette(colors: ArrayLike, opacity: float | None) -> NDArray[Any]:
     """Return contiguous uint8 or float32 colours with alpha."""
-    array = as_array("colors", colors)
-    if array.dtype.kind in "iu" and array.dtype != np.uint8:
-        if array.size and not (0 <= array.min() and array.max() <= 255):
-            raise ValueError(f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}")
-        array = array.astype(np.uint8)
-    if array.dtype.kind not in "fu":
-        raise TypeError(f"colors must be uint8 or float32, got dtype {array.dtype}")
+    array = as_drawn_colors(as_array("colors", colors))
     allowed = (2, 4) if opacity is None else (1, 3)
     if array.ndim not in (2, 4) or array.shape[-1] not in allowed:
         reason = "alpha among them" if opacity is None else "with opacity"
@@ -138,7 +132,7 @@ def as_palette(colors: ArrayLike, opacity: float | None) -> NDArray[Any]:
             raise ValueError(f"opacity must lie in 0 to 1, got {opacity}")
         alpha = np.rint(255 * opacity) if array.dtype == np.uint8 else opacity
         array = np.concatenate([array, np.full((*array.shape[:-1], 1), alpha, array.dtype)], -1)
-    return np.ascontiguousarray(array, np.uint8 if array.dtype == np.uint8 else np.float32)
+    return array
 
 
 def find_owner(palette: NDArray[Any], per: str, layers: DepthLayers) -> str:

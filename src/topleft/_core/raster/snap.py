@@ -222,18 +222,18 @@ def project_mesh(memory: Memory, given: MeshArrays, view: View, *, must_check: b
     n, viewport = len(points), view.engine_viewport()
     projected = memory.empty("points", (n, engine.PLACED), np.float64)
 
-    def project_part(first: int, end: int) -> tuple[int, int]:
-        return source.project_points(first, end, viewport, projected)
+    def project_part(first: int, end: int) -> tuple[int, int, int]:
+        return source.project(first, end, viewport, projected, None)
 
     counts = run_parts(project_part, n, given.n_threads)
-    n_bad, n_clipped = map(sum, zip(*counts, strict=True))
+    n_bad, _, n_clipped = map(sum, zip(*counts, strict=True))
     view.mark("vertices")
     given.check_first(is_due=must_check or bool(n_bad or n_clipped))
     if n_bad:
         check_projected(points, projected, indices)
     pieces = None
     if choices.must_cut(n_clipped):
-        pieces = engine.ExactPieces(source, projected, indices, viewport)
+        pieces = engine.Pieces(source, projected, indices, viewport)
     view.mark("clip")
     return exact_mesh(given, projected, indices, pieces, view, viewport)
 
@@ -242,7 +242,7 @@ def exact_mesh(
     given: MeshArrays,
     points: NDArray[np.float64],
     triangles: NDArray[np.int32],
-    pieces: engine.ExactPieces | None,
+    pieces: engine.Pieces | None,
     view: View,
     viewport: engine.Viewport | None,
 ) -> Snapped:

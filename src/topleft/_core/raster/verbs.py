@@ -358,15 +358,16 @@ def wireframe(
     return draw_wireframe(SCRATCH, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
 
 
-class OneCallAtATime:
-    """Refuses a call while another one runs."""
+class LentMemory:
+    """Lends a memory to one call at a time, and refuses another one while it runs."""
 
     def __init__(self) -> None:
-        self._lock = Lock()
+        self._lock, self.memory = Lock(), KeptMemory()
 
-    def __enter__(self) -> None:
+    def __enter__(self) -> KeptMemory:
         if not self._lock.acquire(blocking=False):
             raise RuntimeError("a Rasterizer draws one picture at a time, and this one draws: give each thread its own")
+        return self.memory
 
     def __exit__(self, *_: object) -> None:
         self._lock.release()
@@ -396,8 +397,7 @@ class Rasterizer:
     def __init__(self, size: int | tuple[int, int], *, threads: int | None = None) -> None:
         self.size = as_size(size)
         self.threads = parse_threads(threads)
-        self._memory = KeptMemory()
-        self._turn = OneCallAtATime()
+        self._lent = LentMemory()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(type(self), threads=self.threads), (self.size,)
@@ -413,15 +413,15 @@ class Rasterizer:
         self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return the mask of the pixels that a triangle covers, as `topleft.coverage` does."""
-        with self._turn:
-            return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
+        with self._lent as memory:
+            return draw_coverage(memory, vertices, triangles, self._view(view), out)
 
     def overdraw(
         self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return how many triangles cover each pixel, as `topleft.overdraw` does."""
-        with self._turn:
-            return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
+        with self._lent as memory:
+            return draw_overdraw(memory, vertices, triangles, self._view(view), out)
 
     def fill(
         self,
@@ -440,8 +440,8 @@ class Rasterizer:
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
         style = Style(per, background, blend, alpha, resolve, dtype)
-        with self._turn:
-            return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
+        with self._lent as memory:
+            return draw_fill(memory, vertices, triangles, colors, self._view(view), style, out)
 
     def rasterize(
         self,
@@ -455,8 +455,8 @@ class Rasterizer:
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
         checked = self._view(view)
-        with self._turn:
-            return draw_fragments(self._memory, vertices, triangles, checked, depth_test, background_depth, out)
+        with self._lent as memory:
+            return draw_fragments(memory, vertices, triangles, checked, depth_test, background_depth, out)
 
     def wireframe(
         self,
@@ -472,7 +472,5 @@ class Rasterizer:
     ) -> NDArray[Any]:
         """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
         checked = self._view(view, why_snapped=WHY_LINES)
-        with self._turn:
-            return draw_wireframe(
-                self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out
-            )
+        with self._lent as memory:
+            return draw_wireframe(memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)

@@ -17,7 +17,15 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32, MeshLike
-from topleft._core.base.arrays import apart_from, as_array, as_checked_triangles, as_number, as_pair
+from topleft._core.base.arrays import (
+    apart_from,
+    as_array,
+    as_checked_triangles,
+    as_number,
+    as_pair,
+    as_plane_points,
+    check_real,
+)
 from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
 from topleft._core.base.memory import SCRATCH
 from topleft._core.base.options import Sink, parse
@@ -27,7 +35,6 @@ from topleft._core.raster.rasterize import Canvas, draw
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.scene.adapt import as_polygons
-from topleft._meshes.scene.cells import Polygons
 from topleft.typing import PerOption, SurfaceOption, YOption
 
 #: Pixels a triangle. With fewer it pays to compute all planes first: 200,000 triangles at 1080p.
@@ -117,10 +124,9 @@ def field(
     The centres on the slanted side belong to the triangle on its other side, if there is one.
     """
     polygons = as_polygons(mesh)
-    points = _plane_points(polygons)
+    points = as_plane_points("points", polygons.points)
     array = as_array("values", apart_from(out, "values", values))
-    if array.dtype.kind not in "fiub":
-        raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+    check_real("values", array, "fiub")
     is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(PerOption, "per", per))
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     grid = grid_of(size, pixel_size, extent, y, partial(extent_of, points, triangles))
@@ -193,7 +199,7 @@ def height_map(
     """
     parse(SurfaceOption, "surface", surface)
     polygons = as_polygons(mesh)
-    points = _plane_points(polygons)
+    points = as_plane_points("points", polygons.points)
     if points.shape[1] != 3:
         raise ValueError(f"a height map needs points of shape (V, 3), got {points.shape}")
     size, pixel_size = (spacing, None) if isinstance(spacing, Grid) else (None, spacing)
@@ -234,15 +240,6 @@ def nodata_of(nodata: object, dtype: type[Any]) -> npt.NDArray[Any]:
     return np.array([number], dtype)
 
 
-def _plane_points(polygons: Polygons) -> npt.NDArray[Any]:
-    points = as_array("points", polygons.points)
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise ValueError(f"points must have shape (V, 2) or (V, 3), got {points.shape}")
-    if points.dtype.kind not in "fiu":
-        raise TypeError(f"points must be real numbers, got dtype {points.dtype}")
-    return points
-
-
 def grid_of(size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption, box: Callable[[], Extent]) -> Grid:
     """The grid that is given, or the one round an extent: the box of a mesh unless given."""
     if isinstance(size, Grid):
@@ -257,7 +254,7 @@ def extent_around(mesh: MeshLike, extent: ExtentLike | None) -> ExtentLike:
     polygons = as_polygons(mesh)
     if extent is not None:
         return extent
-    points = _plane_points(polygons)
+    points = as_plane_points("points", polygons.points)
     return extent_of(points, as_checked_triangles(polygons.triangles, len(points)))
 
 

@@ -1,10 +1,8 @@
-"""PNG files: from a picture to the bytes of the file, with one fixed filter and the fastest compressor there is.
+"""PNG files: from a picture to the bytes of the file, which are the same on every machine.
 
 Input: an array of uint8 (grey, grey with alpha, RGB, RGBA) or of uint16 (grey). Output: the file, in pieces.
 
-Choosing a filter for each row, as other writers do, takes longer than compressing and gains nothing on rendered
-pictures: here every row is the difference to the row above it, taken by NumPy. The compressor is `isal` where
-it is installed, and zlib's level 1 otherwise.
+The engine filters and compresses, `csrc/pixels/png.c`.
 
 Based on: Portable Network Graphics (PNG) Specification, Third Edition, W3C, 2025.
 """
@@ -14,55 +12,39 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from functools import cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core import engine
+from topleft._core.base.memory import empty
 from topleft.errors import ImageError
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 COLOR_TYPES = {(): 0, (2,): 4, (3,): 2, (4,): 6}
 """Colour types of the header, by the axes after height and width."""
 
-COMPRESSORS = ("auto", "isal", "zlib")
+ZLIB_HEADER, LAST_BLOCK = b"\x78\x01", b"\x03\x00"  # RFC 1950; a block of nothing
 
-FILTER_UP = 2
-BAND_BYTES = 1 << 18
-"""Rows are filtered and compressed by so much at a time: filtered bytes are still in the cache when they are read."""
-
-MIN_CHUNK_BYTES = 1 << 10
-"""Less than this waits for more: zlib gives its first two bytes at once."""
+BAND_BYTES = 1 << 20
+"""Rows are compressed by so much at a time, with codes of their own."""
 
 
-class Deflate(Protocol):
-    """A compressor that takes a stream by pieces."""
-
-    def compress(self, data: Any, /) -> bytes:
-        """Return the output so far."""
-
-    def flush(self) -> bytes:
-        """Return the rest."""
-
-
-def encode(image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None, compressor: str = "auto") -> bytes:
+def encode(image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None) -> bytes:
     r"""Return the bytes of a PNG file.
 
     `image`: (H, W), (H, W, 2), (H, W, 3) or (H, W, 4) uint8, grey to RGBA, or (H, W) uint16, of any layout; `text`:
-    keywords of 1 to 79 characters, and notes in Latin-1. The `compressor` "auto" takes `isal` where it is installed:
-    1.4 ms for 512 x 512 pixels RGBA and not 6, of the same pixels and other bytes. Every row is filtered by "up".
+    keywords of 1 to 79 characters, and notes in Latin-1.
 
     >>> import numpy as np
     >>> encode(np.zeros((2, 2), np.uint8))[:8]
     b'\x89PNG\r\n\x1a\n'
     """
-    return b"".join(pieces(image, text=text, compressor=compressor))
+    return b"".join(pieces(image, text=text))
 
 
-def pieces(
-    image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None, compressor: str = "auto"
-) -> Iterator[bytes]:
+def pieces(image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None) -> Iterator[bytes]:
     """Yield the bytes of `encode` piece by piece, so that a large picture is not copied as a whole."""
     image = np.asarray(image)
     kinds = COLOR_TYPES if image.dtype == np.uint8 else {(): 0} if image.dtype == np.uint16 else {}
@@ -74,34 +56,20 @@ def pieces(
     height, width = image.shape[:2]
     if not image.size:
         raise ImageError(f"a picture of shape {image.shape} has no pixels")
-    deflate = _new_deflate(compressor)
     header = struct.pack(">IIBBBBB", width, height, 8 * image.dtype.itemsize, kinds[image.shape[2:]], 0, 0, 0)
-    yield SIGNATURE + _chunk(b"IHDR", header) + b"".join(_text_chunk(*item) for item in (text or {}).items())
-    data = b""
-    for band in _filtered_bands(image):
-        data += deflate.compress(band)
-        if len(data) >= MIN_CHUNK_BYTES:
-            yield _chunk(b"IDAT", data)
-            data = b""
-    yield _chunk(b"IDAT", data + deflate.flush()) + _chunk(b"IEND", b"")
-
-
-def _filtered_bands(image: npt.NDArray[Any]) -> Iterator[npt.NDArray[np.uint8]]:
-    """Rows (N, 1 + bytes of a row) uint8 by bands: the filter's number, then the difference to the row above."""
-    height = len(image)
-    row_bytes = image[0].size * image.itemsize
+    start = SIGNATURE + _chunk(b"IHDR", header) + b"".join(_text_chunk(*item) for item in (text or {}).items())
+    row_bytes, pixel_bytes = image[0].size * image.itemsize, image[0, 0].size * image.itemsize
     n_rows = min(height, max(1, BAND_BYTES // row_bytes))
-    band = np.empty((n_rows, 1 + row_bytes), np.uint8)
-    band[:, 0] = FILTER_UP
+    row, block = np.empty(1 + row_bytes, np.uint8), empty((engine.png_room(n_rows, row_bytes),), np.uint8)
+    above, adler = np.zeros(row_bytes, np.uint8), 1
     for first in range(0, height, n_rows):
-        end = min(first + n_rows, height)
-        rows = _bytes_of(image[max(0, first - 1) : end])
-        if first == 0:
-            band[0, 1:] = rows[0]  # above the first row all is 0
-        n_differences = len(rows) - 1
-        filtered = band[: end - first]
-        np.subtract(rows[1:], rows[:-1], out=filtered[end - first - n_differences :, 1:])
-        yield filtered
+        rows = _bytes_of(image[first : first + n_rows])
+        n, adler = engine.encode_rows(rows, above, pixel_bytes, adler, row, block)
+        is_last = first + n_rows >= height
+        end = LAST_BLOCK + struct.pack(">I", adler) if is_last else b""
+        data = _chunk(b"IDAT", b"" if first else ZLIB_HEADER, block[:n].data, end)
+        yield b"".join((b"" if first else start, data, _chunk(b"IEND") if is_last else b""))
+        above = rows[-1]
 
 
 def _bytes_of(rows: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
@@ -110,9 +78,11 @@ def _bytes_of(rows: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
     return in_order.view(np.uint8).reshape(len(rows), -1)
 
 
-def _chunk(name: bytes, data: bytes) -> bytes:
-    crc = (_isal() or zlib).crc32
-    return b"".join((struct.pack(">I", len(data)), name, data, struct.pack(">I", crc(data, crc(name)))))
+def _chunk(name: bytes, *parts: bytes | memoryview) -> bytes:
+    crc = zlib.crc32(name)
+    for part in parts:
+        crc = zlib.crc32(part, crc)
+    return b"".join((struct.pack(">I", sum(map(len, parts))), name, *parts, struct.pack(">I", crc)))
 
 
 def _text_chunk(keyword: str, text: str) -> bytes:
@@ -123,23 +93,3 @@ def _text_chunk(keyword: str, text: str) -> bytes:
     if not 1 <= len(key) <= 79 or b"\0" in key + value:
         raise ImageError(f"a keyword of a PNG has 1 to 79 characters and no text has a NUL, got {keyword!r}: {text!r}")
     return _chunk(b"tEXt", key + b"\0" + value)
-
-
-@cache
-def _isal() -> Any:
-    """Return the module of `isal`, whose checksum takes a sixth of the time of zlib's; None without it."""
-    try:
-        from isal import isal_zlib
-    except ImportError:
-        return None
-    return isal_zlib
-
-
-def _new_deflate(compressor: str) -> Deflate:
-    if compressor not in COMPRESSORS:
-        raise ValueError(f"compressor must be one of {', '.join(COMPRESSORS)}, got {compressor!r}")
-    isal = None if compressor == "zlib" else _isal()
-    if compressor == "isal" and isal is None:
-        raise ValueError("compressor 'isal' needs the package isal: pip install isal")
-    deflate: Deflate = (isal or zlib).compressobj(1)
-    return deflate

@@ -126,23 +126,24 @@ def face_normals(vertices: FloatArray, triangles: I32, *, threads: int | None = 
     (0, 0, 0) for a triangle without area.
     """
     out = np.empty((len(triangles), 3))
-
-    def measure(source: engine.Source, corners: I32, first: int, end: int) -> int:
-        return engine.face_normals(source, corners, first, end, out, None)
-
-    _over_faces(vertices, triangles, threads, measure)
+    _measure_faces(vertices, triangles, threads, out, None)
     return out
 
 
 def face_normal_rows(vertices: FloatArray, triangles: I32, *, threads: int | None = None) -> F32:
     """The same as rows (T, 4) float32, the last number 1."""
     rows = np.empty((len(triangles), 4), np.float32)
+    _measure_faces(vertices, triangles, threads, None, rows)
+    return rows
 
+
+def _measure_faces(
+    vertices: FloatArray, triangles: I32, threads: int | None, out: F64 | None, rows: F32 | None
+) -> None:
     def measure(source: engine.Source, corners: I32, first: int, end: int) -> int:
-        return engine.face_normals(source, corners, first, end, None, rows)
+        return engine.face_normals(source, corners, first, end, out, rows)
 
     _over_faces(vertices, triangles, threads, measure)
-    return rows
 
 
 def turned_faces(

@@ -5,8 +5,8 @@ In: a `Shot`, the options of a verb.  Out: `Fragments`, `DepthLayers`, or a mask
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, cast
 
 import numpy as np
@@ -67,18 +67,15 @@ def rasterize_shot(
     return drawn if placed.bent is None else placed.fragments_of(drawn, view)
 
 
-@contextmanager
-def lent(rasterizer: Rasterizer | None, size: tuple[int, int]) -> Iterator[Memory]:
+def lent(rasterizer: Rasterizer | None, size: tuple[int, int]) -> AbstractContextManager[Memory]:
     """Give the memory of a `Rasterizer` of this size, which draws nothing else meanwhile, or fresh memory."""
     if rasterizer is None:  # fragments refer to their inputs, so their memory cannot be reused
-        yield FRESH
-        return
+        return nullcontext(FRESH)
     if not isinstance(rasterizer, Rasterizer):
         raise TypeError(f"rasterizer must be a Rasterizer or None, got {shown(rasterizer)}")
     if rasterizer.size != size:
         raise ValueError(f"rasterizer must have the size {size}, got {rasterizer.size}")
-    with rasterizer._turn:
-        yield rasterizer._memory
+    return rasterizer._lent
 
 
 def draw_one(

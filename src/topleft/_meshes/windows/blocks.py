@@ -23,7 +23,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import I32, Array
-from topleft._core.base.arrays import INT32_MAX, as_aligned, as_array, shown
+from topleft._core.base.arrays import INT32_MAX, as_aligned, as_array, as_plane_points, shown
 from topleft._core.base.memory import FRESH, Memory
 from topleft._meshes.io.limits.npy import check_header
 from topleft._meshes.io.load import load
@@ -209,13 +209,9 @@ def triangles_of(mesh: Any, folder: str | os.PathLike[str] | None) -> Triangles:
 
 def of_arrays(points: Any, triangles: Any, faces: Array | None = None, n_faces: int = 0) -> IndexedTriangles:
     """Return triangles of arrays, with checked shapes and dtypes; mapped ones stay where they are."""
-    points, triangles = as_array("vertices", points), as_array("triangles", triangles)
+    points, triangles = as_plane_points("vertices", points), as_array("triangles", triangles)
     if triangles.size == 0 and triangles.ndim == 1:
         triangles = np.empty((0, 3), np.int32)
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise ValueError(f"vertices must have shape (V, 2) or (V, 3), got {points.shape}")
-    if points.dtype.kind not in "fiu":
-        raise TypeError(f"vertices must be real numbers, got dtype {points.dtype}")
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ValueError(f"triangles must have shape (T, 3), got {triangles.shape}")
     if triangles.dtype.kind not in "iu":

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from topleft._core.base.array_types import F64, I32, Array
-from topleft._core.base.arrays import as_array, as_colors, set_aligned, shown
+from topleft._core.base.arrays import as_array, as_colors, check_real, set_aligned, shown
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.options import Sampling, parse, parse_sampling
@@ -157,38 +157,38 @@ class CoveragePainter(Painter):
     """`coverage`: bool, or float32 for several samples and "area"."""
 
     own = ("sampling",)
+    verb: ClassVar[Callable[..., Array]] = staticmethod(coverage)
+    of_one: ClassVar[tuple[type, Any]] = (np.bool_, False)
+    """The dtype of one sample a pixel, and what it is without triangles."""
 
     def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
         """Check options and values against the mesh."""
         sampling = parse_sampling(self.options.get("sampling", "center"))
+        self.check_sampling(sampling)
         is_share = sampling is Sampling.AREA or sampling.n_samples > 1
-        self.dtype, self.empty = (np.dtype(np.float32), 0.0) if is_share else (np.dtype(bool), False)
+        dtype, self.empty = (np.float32, 0.0) if is_share else self.of_one
+        self.dtype = np.dtype(dtype)
         self.view["sampling"] = str(sampling)
+
+    def check_sampling(self, sampling: Sampling) -> None:
+        """Raise an error for a sampling that windows do not have."""
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
         n = len(payload.triangles)
-        return coverage(self.points(payload), rows(n), size, out=out, **self.view_at(origin, threads))
+        return self.verb(self.points(payload), rows(n), size, out=out, **self.view_at(origin, threads))
 
 
-class OverdrawPainter(Painter):
+class OverdrawPainter(CoveragePainter):
     """`overdraw`: int32, or float32 for "area"."""
 
-    own = ("sampling",)
+    verb = staticmethod(overdraw)
+    of_one = (np.int32, 0)
 
-    def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
-        """Check options and values against the mesh."""
-        sampling = parse_sampling(self.options.get("sampling", "center"))
+    def check_sampling(self, sampling: Sampling) -> None:
+        """Raise an error for several numbers a pixel."""
         if sampling.n_samples > 1:
             raise ValueError(f"sampling must be of one number a pixel for overdraw in tiles, got {str(sampling)!r}")
-        is_area = sampling is Sampling.AREA
-        self.dtype, self.empty = (np.dtype(np.float32), 0.0) if is_area else (np.dtype(np.int32), 0)
-        self.view["sampling"] = str(sampling)
-
-    def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
-        """Return the pixels of a window (H, W)."""
-        n = len(payload.triangles)
-        return overdraw(self.points(payload), rows(n), size, out=out, **self.view_at(origin, threads))
 
 
 class FragmentsPainter(Painter):
@@ -299,8 +299,7 @@ class FieldPainter(Painter):
         if values is None:
             raise ValueError("kind 'field' needs values of the vertices or the faces")
         array = as_array("values", values)
-        if array.dtype.kind not in "fiub":
-            raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+        check_real("values", array, "fiub")
         per = parse(PerOption, "per", self.options.get("per", "auto"))
         self.is_of_faces = is_per_face(array, triangles.n_vertices, triangles.n_faces, per)
         self.faces = triangles.faces

@@ -403,19 +403,21 @@ WEB_EXPORT(web_view_mesh) int web_view_mesh(const void *matrix, int is_affine, i
     tl_vertex *vertices = web_room(n * sizeof *vertices);
     if (!vertices)
         return WEB_FULL;
-    tl_vertex_counts counts = K.project(&scene.source, 0, mesh.source.n, &scene.view, vertices, NULL);
+    tl_projected projected = {.records = vertices};
+    const tl_vertex_counts counts = K.project(&scene.source, 0, mesh.source.n, &scene.view, &projected);
     tl_wide *wide = NULL;
     if (counts.n_wide) {
         if (!(wide = cleared_room(n * sizeof *wide)))
             return WEB_FULL;
-        K.project(&scene.source, 0, mesh.source.n, &scene.view, vertices, wide);
+        projected.wide = wide;
+        K.project(&scene.source, 0, mesh.source.n, &scene.view, &projected);
     }
     scene.snapped.mesh =
         (tl_vertex_set){.vertices = vertices, .wide = wide, .source = &scene.source, .n_vertices = mesh.source.n};
     if (!counts.n_clipped)
         return 0;
     tl_pieces *p = &scene.pieces;
-    K.clip(&scene.source, vertices, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
+    K.clip(&scene.source, &projected, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
     if (!p->n_pieces)
         return 0;
     const size_t v = (size_t)p->n_vertices, t = (size_t)p->n_pieces;
@@ -424,7 +426,7 @@ WEB_EXPORT(web_view_mesh) int web_view_mesh(const void *matrix, int is_affine, i
     p->triangles = web_room(12 * t), p->source = web_room(4 * t);
     if (!p->vertices || !p->wide || !p->inv_w || !p->weights || !p->triangles || !p->source)
         return WEB_FULL;
-    K.clip(&scene.source, vertices, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
+    K.clip(&scene.source, &projected, mesh.triangles, NULL, mesh.n_triangles, &scene.view, p);
     scene.snapped.pieces = p;
     return 0;
 }
