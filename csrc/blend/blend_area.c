@@ -82,8 +82,7 @@ static void push_atlas(area_pass *p, vm m, const lane_corners *c, vm turned, vi 
     vi_compress(p->top + p->n, m, top);
     vi_compress(p->n_rows + p->n, m, rows);
     vi_compress(p->col + p->n, m, vi_sub(col, vi_set1((int32_t)window->x_px)));
-    vi_compress(p->row + p->n, m, vi_sub(row, vi_set1((int32_t)window->y_px)));
-    p->n += __builtin_popcount(vm_bits(m));
+    p->n += vi_compress(p->row + p->n, m, vi_sub(row, vi_set1((int32_t)window->y_px)));
     vi_store(last, ends);
     p->n_atlas_rows = last[TL_LANES - 1];
     lane_corners moved = *c;

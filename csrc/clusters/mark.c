@@ -21,8 +21,7 @@ static int list_new_ids(const int32_t *ids, int n, int64_t n_triangles, vi *befo
         const vi id = n - i >= TL_LANES ? vi_load(ids + i) : vi_select(inside, vi_load_masked(inside, ids + i), none);
         const vm is_there = vm_and(vi_gt(id, none), vi_gt(end, id));
         const vm is_new = vm_and_not(is_there, vi_eq(id, vi_shift_in(id, *before)));
-        vi_compress(listed + n_listed, is_new, id);
-        n_listed += __builtin_popcount(vm_bits(is_new));
+        n_listed += vi_compress(listed + n_listed, is_new, id);
         *before = id;
     }
     return n_listed;

@@ -183,8 +183,7 @@ TL_INLINE int64_t list_changes(const int32_t *ids, const int32_t *others, int64_
     int64_t n_listed = 0, x = 0;
     for (; x + TL_LANES <= n; x += TL_LANES) {
         const vm m = vm_and_not(vm_all(), vi_eq(vi_load(ids + x), vi_load(others + x)));
-        vi_compress(columns + n_listed, m, vi_add(vi_iota(), vi_set1((int32_t)x)));
-        n_listed += __builtin_popcount(vm_bits(m));
+        n_listed += vi_compress(columns + n_listed, m, vi_add(vi_iota(), vi_set1((int32_t)x)));
     }
     for (; x < n; x++) {
         columns[n_listed] = (int32_t)x;
@@ -239,8 +238,9 @@ TL_INLINE void list_some(pair_scan *s, tl_pair_list *list)
     const int64_t row = s->meeting / 2 - in_column;
     vi_compress(list->near + list->n, m, id), vi_compress(list->far + list->n, m, other);
     vi_compress(list->column + list->n, m, vi_sub(x, vi_set1(s->begins && !in_column)));
-    vi_compress(list->where + list->n, m, vi_set1((int32_t)(row << TL_ROW_SHIFT) + in_column * TL_IN_COLUMN));
-    list->n += __builtin_popcount(vm_bits(m)), s->n_taken += TL_LANES;
+    list->n +=
+        vi_compress(list->where + list->n, m, vi_set1((int32_t)(row << TL_ROW_SHIFT) + in_column * TL_IN_COLUMN));
+    s->n_taken += TL_LANES;
 }
 
 /* Lists the next pairs to be looked at, the first pixel of each as the near one; 0 if there are none left. */

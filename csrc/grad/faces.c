@@ -83,8 +83,7 @@ TL_INLINE int64_t list_row_runs(const picture_pass *p, const int32_t *ids, int32
         before = id;
         if (!vm_any(starts)) /* most of what is empty */
             continue;
-        vi_compress(begins + n, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
-        n += __builtin_popcount(vm_bits(starts));
+        n += vi_compress(begins + n, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
     }
     return n;
 }

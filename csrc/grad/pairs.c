@@ -141,8 +141,7 @@ TL_INLINE vm step_walks(pair_walks *w, int64_t i, int is_last, walker_lanes *at)
     const vi outline = vi_gather(m, w->edges->outline, at->id);
     const vm has_edge = vm_and(exit_edges(&placed, 0, &edge), bits_set(outline, TL_IS_AHEAD));
     const vm fails = vm_and_not(m, has_edge);
-    vi_compress(w->failed + w->n_failed, fails, at->pair);
-    w->n_failed += __builtin_popcount(vm_bits(fails));
+    w->n_failed += vi_compress(w->failed + w->n_failed, fails, at->pair);
     m = vm_and(m, has_edge);
     const vi other = vi_gather(m, w->edges->across, vi_add(vi_add(at->id, vi_add(at->id, at->id)), edge.corner));
     vm ends = vi_gt(vi_set1(0), other);
@@ -170,8 +169,7 @@ static void walk_pairs(pair_walks *w)
             const vm m = step_walks(w, i, step == TL_WALK_STEPS, &at);
             vi_compress(w->id + n_left, m, at.id), vi_compress(w->far + n_left, m, at.far);
             vi_compress(w->column + n_left, m, at.column), vi_compress(w->where + n_left, m, at.where);
-            vi_compress(w->pair + n_left, m, at.pair);
-            n_left += __builtin_popcount(vm_bits(m));
+            n_left += vi_compress(w->pair + n_left, m, at.pair);
         }
         w->n = n_left;
     }

@@ -13,7 +13,7 @@
  *   v?_store_some(p, m, a, has_room)    the lanes in m; with room for a vector the others may be written as they are
  *   vi_gather(m, p, i)      p[i] in the lanes of m
  *   vi_stream(p, v)         a store past the caches to an aligned place; end_stream() after the last of them
- *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
+ *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector, and returns how many they are
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
  *   v4_, vi_load_quads, vi_store_quads    four int32; TL_LANES of them as four vectors, lane k in slot vi_quad_slot(k)
  *   vw_zero, vw_load, vw_store, vw_add_range    TL_LANES words of 64 bits
@@ -94,6 +94,11 @@ TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room) { (void)has_r
 TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room) { (void)has_room, hf_store_masked(p, m, a); }
 #endif
 
+TL_INLINE int vi_compress(int32_t *p, vm m, vi a)
+{
+    vi_pack(p, m, a);
+    return __builtin_popcount(vm_bits(m));
+}
 TL_INLINE vi vi_low_half(vi a) { return vi_and(a, vi_set1(0xffff)); }
 TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {

@@ -101,7 +101,7 @@ TL_INLINE vi compress_order(unsigned bits)
     const uint64_t lanes = _pdep_u64(bits, 0x0101010101010101u) * 0xff;
     return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)_pext_u64(0x0706050403020100u, lanes)));
 }
-TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
+TL_INLINE void vi_pack(int32_t *p, vm m, vi a)
 {
     vi_store(p, _mm256_permutevar8x32_epi32(a, compress_order(vm_bits(m))));
 }

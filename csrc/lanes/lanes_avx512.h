@@ -38,7 +38,7 @@ TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return _mm512_cmpgt_epu32_mask(a, b); 
 TL_INLINE vm vi_eq(vi a, vi b) { return _mm512_cmpeq_epi32_mask(a, b); }
 TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm512_mask_mov_epi32(b, m, a); }
 /* compress in registers and store whole: a compress-store to memory is three times as slow */
-TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, a)); }
+TL_INLINE void vi_pack(int32_t *p, vm m, vi a) { _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, a)); }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm512_maskz_loadu_epi32(m, p); }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm512_mask_storeu_epi32(p, m, a); }
 TL_INLINE vi vi_prefix_sum(vi a)

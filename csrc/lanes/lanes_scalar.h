@@ -84,7 +84,7 @@ TL_INLINE vm vi_gt(vi a, vi b) { return a > b; }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return (uint32_t)a > (uint32_t)b; }
 TL_INLINE vm vi_eq(vi a, vi b) { return a == b; }
 TL_INLINE vi vi_select(vm m, vi a, vi b) { return m ? a : b; }
-TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { (void)m, *p = a; }
+TL_INLINE void vi_pack(int32_t *p, vm m, vi a) { (void)m, *p = a; }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return m ? vi_load(p) : 0; }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a)
 {

@@ -334,7 +334,7 @@ static const uint8_t compress_order[16][16] __attribute__((aligned(16))) = {
     {8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 0, 1, 2, 3}, {0, 1, 2, 3, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3},
     {4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3}, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15},
 };
-TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
+TL_INLINE void vi_pack(int32_t *p, vm m, vi a)
 {
     v16u order;
     memcpy(&order, compress_order[vm_bits(m)], sizeof order);

@@ -150,10 +150,8 @@ static int64_t find_bent(const tl_lens *lens, const float *records, int64_t n_ve
             continue;
         const vi ids = vi_add(vi_set1((int32_t)i), vi_iota());
         const vm out = vm_and(rest, find_outside(lens, (const vf(*)[4])corner)), may = vm_and_not(rest, out);
-        vi_compress(outside + *n_outside, out, ids);
-        vi_compress(bent + n_bent, may, ids);
-        *n_outside += __builtin_popcount(vm_bits(out));
-        n_bent += __builtin_popcount(vm_bits(may));
+        *n_outside += vi_compress(outside + *n_outside, out, ids);
+        n_bent += vi_compress(bent + n_bent, may, ids);
     }
     return n_bent;
 }

@@ -33,8 +33,7 @@ TL_INLINE void push_lanes(lane_queue *q, vm m, const vi *v, vi sample, vi size, 
     vi_compress(q->v2 + n, m, v[2]);
     vi_compress(q->sample + n, m, sample);
     vi_compress(q->size + n, m, size);
-    vi_compress(q->triangle + n, m, triangle);
-    q->n = n + __builtin_popcount(vm_bits(m));
+    q->n = n + vi_compress(q->triangle + n, m, triangle);
 }
 
 /* Corners as seen from the sample at (col, row), as pairs. */

@@ -124,9 +124,8 @@ static __attribute__((noinline)) void cover_one(meshlet_batch *s)
         const vi sample = first_sample(slot, v);
         edges_at(v, sample, u, e);
         const vm in = vm_and(vi_none_negative(e[0], e[1], e[2]), live);
-        vi_compress(slot->covered + slot->n_covered, in,
-                    vi_or_three(sample, vi_shift_left(triangle, 8), vi_set1(1 << 24)));
-        slot->n_covered += __builtin_popcount(vm_bits(in));
+        slot->n_covered += vi_compress(slot->covered + slot->n_covered, in,
+                                       vi_or_three(sample, vi_shift_left(triangle, 8), vi_set1(1 << 24)));
     }
 }
 
@@ -161,9 +160,8 @@ static __attribute__((noinline)) void cover_tiny(meshlet_batch *s)
         bits = vi_select(vm_and(vi_none_negative(both[0], both[1], both[2]), vm_and(has_right, has_above)),
                          vi_or(bits, vi_set1(8)), bits);
         const vm any = vm_and(live, vi_any_bit(bits, bits));
-        vi_compress(slot->covered + slot->n_covered, any,
-                    vi_or_three(sample, vi_shift_left(triangle, 8), vi_shift_left(bits, 24)));
-        slot->n_covered += __builtin_popcount(vm_bits(any));
+        slot->n_covered += vi_compress(slot->covered + slot->n_covered, any,
+                                       vi_or_three(sample, vi_shift_left(triangle, 8), vi_shift_left(bits, 24)));
     }
 }
 

@@ -219,8 +219,7 @@ static __attribute__((noinline)) void refine_boxes(walk_state *s, lane_exact *t,
             const vf least = vf_min(vf_min(e[0], e[1]), e[2]);
             in[row][col] = vm_and(box, vf_lt(band, least));
             const vm near = vm_and_not(vm_and_not(vm_and(box, vf_ge(least, below)), in[row][col]), t->on_grid);
-            vi_compress(d.codes + d.n, near, vi_add(vi_iota(), vi_set1((row * TL_SMALL_BOX + col) << 8)));
-            d.n += __builtin_popcount(vm_bits(near));
+            d.n += vi_compress(d.codes + d.n, near, vi_add(vi_iota(), vi_set1((row * TL_SMALL_BOX + col) << 8)));
             for (int k = 0; k < 3; k++)
                 e[k] = vf_sub(e[k], t->dy[k]);
         }

@@ -68,8 +68,7 @@ TL_INLINE void list_outside(const walk_state *s, const lane_batch *b, vi id)
     const vm is_seen = vm_and(b->drawn, vm_and(vi_gt(b->n_cols, vi_set1(0)), vi_gt(end, first)));
     const vm is_beyond = vm_or(vi_gt(b->row, first), vi_gt(end, vi_set1(limits->bottom)));
     const vm m = vm_or(b->single, vm_and(is_seen, is_beyond));
-    vi_compress(slice->outside + slice->n_outside, m, id);
-    slice->n_outside += __builtin_popcount(vm_bits(m));
+    slice->n_outside += vi_compress(slice->outside + slice->n_outside, m, id);
 }
 
 /* The lesser side of boxes before the window cut them. */

@@ -190,9 +190,8 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
         const vm is_refined = vm_and(near[k], vm_and(vi_gt(end, col[k]), vi_gt(col[k], vi_sub(begin, one))));
         if (!vm_any(is_refined))
             continue;
-        vi_compress(d[k].codes + d[k].n, is_refined,
-                    vi_add(vi_iota(), vi_shift_left(vi_add(vi_set1(row), vi_shift_left(col[k], 8)), 8)));
-        d[k].n += __builtin_popcount(vm_bits(is_refined));
+        d[k].n += vi_compress(d[k].codes + d[k].n, is_refined,
+                              vi_add(vi_iota(), vi_shift_left(vi_add(vi_set1(row), vi_shift_left(col[k], 8)), 8)));
     }
     return wide;
 }

@@ -473,8 +473,7 @@ TL_INLINE void take_out_slivers(walk_state *s, lane_exact *t)
     const vm has_plane = vm_and(vd_ge(scaled, box), vd_ge(box, vd_set1(TL_LEAST_BOX)));
     const vm slivers = vm_and_not(t->live, has_plane);
     if (__builtin_expect(vm_any(slivers), 0)) {
-        vi_compress(s->slivers + s->n_slivers, slivers, t->ids);
-        s->n_slivers += __builtin_popcount(vm_bits(slivers));
+        s->n_slivers += vi_compress(s->slivers + s->n_slivers, slivers, t->ids);
         t->live = vm_and(t->live, has_plane);
     }
 }
