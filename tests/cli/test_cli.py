@@ -294,6 +294,8 @@ def test_render_mesh_and_out_reversed_is_refused(run, folder):
         (["cube", "-o", "notes.txt/a.png"], "topleft: cannot write to the folder 'notes.txt': '"),
         (["cube", "-o", "a.gif"], "topleft: OUT must end in one of .png"),
         (["cube", "-o", ""], "topleft: OUT must end in one of .png"),
+        (["cube", "-o", "-"], "topleft: OUT must be a file or a folder, got '-': no picture is written to "),
+        (["cube", "-o", "a/.png"], "topleft: OUT must have a name before .png, got 'a/.png'"),
         (["cube", "torus", "-o", "a.png"], "topleft: several meshes need a folder or {name} in OUT, got 'a.png'"),
         (["cube"], "topleft: say where pictures go: -o/--out, --sheet or --animation (try: topleft render --help)"),
         (["-o", "a.png"], "topleft: there is nothing to render: give MESH or --jobs-file (try: topleft render --help)"),

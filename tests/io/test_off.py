@@ -73,6 +73,15 @@ def test_off_colors_that_one_face_lacks_are_left_out(load):
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+@pytest.mark.parametrize("rest", ["3 0 2 3\n", "3 0 2 3\n3 1 2 3\n"])
+def test_off_faces_beyond_those_of_the_header_are_no_colors(tmp_path, rest):
+    (tmp_path / "a.off").write_text(f"OFF\n4 1 0\n{SQUARE}3 0 1 2\n{rest}")
+    with pytest.warns(tl.MeshWarning, match="numbers after the last face that its header counts not read"):
+        mesh = tl.load(tmp_path / "a.off")
+    assert mesh.colors is None
+    assert mesh.triangles.tolist() == [[0, 1, 2]]
+
+
 def test_off_normals_and_texture_coordinates_are_read(load):
     mesh = load("STNOFF\n3 1 0\n0 0 0 0 0 1 0.5 1\n1 0 0 0 0 1 0.25 1\n0 1 0 0 0 1 0 0\n3 0 1 2\n")
     assert mesh.normals.tolist() == [[0, 0, 1]] * 3

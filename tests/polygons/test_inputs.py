@@ -43,6 +43,8 @@ FEATURES = {
         [SQUARE.astype(int), HOLE],
         np.stack([SQUARE, HOLE]),
         [SQUARE.reshape(-1).tolist(), HOLE.reshape(-1).tolist()],
+        tuple(tuple(map(tuple, ring.tolist())) for ring in (SQUARE, HOLE)),
+        tuple(tuple(map(tuple, ring.tolist())) for ring in (SQUARE, HOLE, OTHER[[0, 1, 0]])),
         (COORDINATES[:8], [0, 4, 8]),
         (COORDINATES[:8], [0, 4, 8], [0, 2]),
         POLYGON,
@@ -87,6 +89,28 @@ def test_shapely_in_each_form():
     assert (tl.polygons([one, shapely.Polygon()], SIZE, values="index") == np.where(TWO == 0, 0, -1)).all()
     with pytest.raises(TypeError, match="must be polygons or multipolygons, got Point"):
         tl.polygons([shapely.Point(1, 1)], SIZE)
+
+
+def test_ring_of_three_tuples_is_a_triangle():
+    corners = ((0, 0), (8, 0), (0, 6))
+    assert (tl.polygons(corners, SIZE) == tl.polygons(np.array(corners), SIZE)).all()
+
+
+def test_table_of_pandas_is_a_ring():
+    pandas = pytest.importorskip("pandas")
+    assert (tl.polygons(pandas.DataFrame(SQUARE, columns=["x", "y"]), SIZE) == tl.polygons(SQUARE, SIZE)).all()
+
+
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_missing_geometry_of_shapely_is_an_empty_polygon(at):
+    shapely = pytest.importorskip("shapely")
+    geometries = [shapely.Polygon(SQUARE, [HOLE]), shapely.Polygon(OTHER)]
+    geometries.insert(at, None)
+    wished = np.where(at <= TWO, TWO + 1, TWO)
+    for rings in (geometries, np.array(geometries)):
+        assert (tl.polygons(rings, SIZE, values="index") == wished).all()
+        assert (tl.tiles(rings, SIZE)[:] == wished).all()
+        assert len(tl.overlap(rings, SIZE)) == 3
 
 
 @pytest.mark.parametrize("dtype", ["i2", "i4", "f4", "f8"])
@@ -193,6 +217,8 @@ def test_square_with_a_million_holes_keeps_three_quarters_of_each_pixel():
         ([("a", "b"), ("c", "d"), ("e", "f")], TypeError, "rings must be real numbers, got dtype <U1"),
         (np.zeros((3, 2), complex), TypeError, "rings must be real numbers, got dtype complex128"),
         (7, TypeError, "rings must be an array (N, 2), a list of rings or of polygons"),
+        ({"type": "Polygon", "id": 1}, ValueError, "a Polygon of GeoJSON must have coordinates, got only type, id"),
+        ({"type": "FeatureCollection"}, ValueError, "a FeatureCollection of GeoJSON must have features, got only type"),
         ({"type": "Point", "coordinates": (1, 1)}, TypeError, "geometries must be Polygon or MultiPolygon, got Point"),
     ],
 )

@@ -67,6 +67,16 @@ def test_zarr_is_the_raster(tmp_path, kind, chunk):
     assert equal(found[:], raster[:])
 
 
+@pytest.mark.parametrize("chunk", [64, 512])
+def test_zarr_of_one_window_has_chunks_of_any_size(tmp_path, chunk):
+    zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
+    raster = raster_of("labels", window=2048)
+    raster.to_zarr(tmp_path / "a.zarr", chunk=chunk)
+    found = zarr.open_array(tmp_path / "a.zarr", mode="r")
+    assert found.chunks == (chunk, chunk)
+    assert equal(found[:], raster[:])
+
+
 @pytest.mark.parametrize("compression", ["gzip", "zstd", "none"])
 def test_zarr_is_compressed_as_asked(tmp_path, compression):
     zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")

@@ -297,6 +297,10 @@ def _pattern(out: str, options: argparse.Namespace) -> str:
     path = location_of(out)
     check_words("OUT", path, ("name", "folder", "view", "index", "layer"))
     is_folder = out.endswith(("/", "\\")) or not path.suffix or (isinstance(path, Path) and path.is_dir())
+    if out == "-":
+        raise UsageError("OUT must be a file or a folder, got '-': no picture is written to standard output")
+    if path.name.lower() in SUFFIXES:
+        raise UsageError(f"OUT must have a name before {path.name}, got {out!r}")
     if not out or (path.suffix.lower() not in SUFFIXES and not is_folder):
         raise UsageError(f"OUT must end in one of {' '.join(SUFFIXES)}, or in / for a folder, got {out!r}")
     several_layers = len(options.layers) > 1 and path.suffix.lower() != ".npz"

@@ -192,7 +192,8 @@ class Tiles(WindowedRaster):
         path : path or URL
             A folder, or whatever fsspec can write to, "s3://bucket/name.zarr".
         chunk : int or (width, height), optional
-            Pixels of a chunk; must divide those of a window. A chunk a window unless given.
+            Pixels of a chunk; must divide those of a window, where the raster has several. A chunk a window unless
+            given.
         compression : {"gzip", "zstd", "none"}
             How chunks are stored; "zstd" needs numcodecs, which comes with zarr.
         levels : int

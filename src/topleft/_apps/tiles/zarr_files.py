@@ -73,7 +73,7 @@ def write_zarr(
     n_levels = as_count("levels", levels)
     window = raster.window_size
     size = window if chunk is None else as_size(chunk, "chunk", smallest=1)
-    if window[0] % size[0] or window[1] % size[1]:
+    if any(w % side and w < length for w, side, length in zip(window, size, raster.size, strict=True)):
         raise ValueError(f"chunk must divide the windows of {window[0]} x {window[1]} pixels, got {size}")
     if n_levels > 1 and any(w % 2 and w < length for w, length in zip(window, raster.size, strict=True)):
         raise ValueError(f"window must have even sides for several levels, got {window[0]} x {window[1]}")

@@ -58,6 +58,7 @@ def as_rings(values: Any) -> RingSet:
         return _bounded(found)
     found = _from_shapely(values)
     if found is None:
+        values = values.to_numpy() if hasattr(values, "to_numpy") else values
         listed = [_rings_of_geometry(g) for g in _geometries(values)] if _is_geometry(values) else _nested(values)
         found = _join(listed)
     return _checked(found)
@@ -111,7 +112,7 @@ def _from_offsets(values: Any) -> RingSet | None:
     """Return the rings of (coordinates, ring_offsets[, polygon_offsets]) or `shapely.to_ragged_array`; else None."""
     if not isinstance(values, tuple) or not 2 <= len(values) <= 3:
         return None
-    if len(values) == 3 and isinstance(values[2], tuple) and not isinstance(values[0], (list, np.ndarray)):
+    if len(values) == 3 and isinstance(values[2], tuple) and isinstance(values[0], int):
         return _from_ragged(np.asarray(values[1]), values[2])
     if np.ndim(values[0]) != 2 or np.ndim(values[1]) != 1 or np.ndim(values[-1]) != 1:
         return None
@@ -171,14 +172,12 @@ def _from_shapely(values: Any) -> RingSet | None:
         values = [values]
     elif hasattr(values, "to_numpy"):
         values = values.to_numpy()
-    if (
-        not isinstance(values, (list, tuple, np.ndarray))
-        or (isinstance(values, np.ndarray) and not values.ndim)
-        or not len(values)
-        or not isinstance(values[0], shapely.Geometry)
-    ):
+    if not isinstance(values, (list, tuple, np.ndarray)) or (isinstance(values, np.ndarray) and not values.ndim):
         return None
-    geometries = np.asarray(values, dtype=object)
+    if not isinstance(next((value for value in values if value is not None), None), shapely.Geometry):
+        return None
+    geometries = np.array(values, dtype=object)
+    geometries[shapely.is_missing(geometries)] = shapely.Polygon()  # as a GeoJSON feature without a geometry
     kinds = np.unique(shapely.get_type_id(geometries))
     if not set(kinds.tolist()) <= {3, 6}:
         names = sorted({g.geom_type for g in geometries.tolist() if g is not None} - {"Polygon", "MultiPolygon"})
@@ -199,7 +198,7 @@ def _geometries(values: Any) -> list[Any]:
         return [g for value in values for g in _geometries(value)]
     values = getattr(values, "__geo_interface__", values)
     if isinstance(values, dict) and values.get("type") == "FeatureCollection":
-        return [feature.get("geometry") for feature in values["features"]]
+        return [feature.get("geometry") for feature in _member(values, "features")]
     return [values]
 
 
@@ -211,12 +210,19 @@ def _rings_of_geometry(geometry: Any) -> list[Any]:
     if kind == "Feature":
         return _rings_of_geometry(geometry.get("geometry"))
     if kind == "GeometryCollection":
-        return [ring for part in geometry["geometries"] for ring in _rings_of_geometry(part)]
+        return [ring for part in _member(geometry, "geometries") for ring in _rings_of_geometry(part)]
     if kind == "Polygon":
-        return [_xy(ring) for ring in geometry["coordinates"]]
+        return [_xy(ring) for ring in _member(geometry, "coordinates")]
     if kind == "MultiPolygon":
-        return [_xy(ring) for part in geometry["coordinates"] for ring in part]
+        return [_xy(ring) for part in _member(geometry, "coordinates") for ring in part]
     raise TypeError(f"geometries must be Polygon or MultiPolygon, got {kind}")
+
+
+def _member(geometry: Any, key: str) -> Any:
+    try:
+        return geometry[key]
+    except KeyError:
+        raise ValueError(f"a {geometry['type']} of GeoJSON must have {key}, got only {', '.join(geometry)}") from None
 
 
 def _xy(ring: Iterable[Sequence[float]]) -> list[tuple[float, float]]:

@@ -97,15 +97,17 @@ def read_off(source: InputFile) -> list[Mesh]:
     lines: list[bytes] = []
     width = len(body.split(b"\n", 1)[0].split())
     faces = _faces_of_one_size(values[n_vertices * width :], n_faces)
-    if faces is None:
+    if faces is None or faces[2] is not None:
         lines = [line for line in body.split(b"\n") if line.strip()]
+    if len(lines) > n_vertices + n_faces:  # numbers on a further line are no colours
+        faces = None
     if faces is None and len(lines) == n_vertices + n_faces:
         faces = _faces_of_lines(lines[n_vertices:])
     if faces is None:  # rows that go over several lines, or some that are left over: corners, and no colours
         width = 3 + 3 * (b"N" in word) + 4 * (b"C" in word) + 2 * word.startswith(b"ST")
         if n_vertices * width > len(values):
             raise MeshError(f"it ends within its {n_vertices} vertices")
-        faces = _faces_of_numbers(values[n_vertices * width :].tolist(), n_faces)
+        faces = _faces_of_numbers(source, values[n_vertices * width :].tolist(), n_faces)
     numbers = values[: n_vertices * width]
     if len(numbers) != n_vertices * width or (n_vertices and width < 3):
         raise MeshError(f"it ends within its {n_vertices} vertices")
@@ -142,7 +144,7 @@ def _faces_of_lines(lines: list[bytes]) -> Faces:
     return whole_numbers(numbers_of_text(b" ".join(corners))), counts, table
 
 
-def _faces_of_numbers(values: list[float], n_faces: int) -> Faces:
+def _faces_of_numbers(source: InputFile, values: list[float], n_faces: int) -> Faces:
     """Faces one after the other."""
     if n_faces > len(values):
         raise MeshError(f"it ends within its {n_faces} faces")
@@ -155,6 +157,8 @@ def _faces_of_numbers(values: list[float], n_faces: int) -> Faces:
         counts.append(int(values[at]))
         corners += values[at + 1 : at + 1 + counts[-1]]
         at += counts[-1] + 1
+    if at < len(values):
+        source.notes.add("numbers after the last face that its header counts not read")
     return whole_numbers(np.array(corners, np.float64)), np.array(counts, np.int64), None
 
 

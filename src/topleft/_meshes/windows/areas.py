@@ -37,7 +37,7 @@ def are_polygons(subject: Any) -> bool:
         return np.ndim(subject[0]) == 2 and np.ndim(subject[1]) == 1 and np.ndim(subject[2]) == 1
     is_array = isinstance(subject, np.ndarray) and subject.dtype == object and subject.ndim == 1
     if (isinstance(subject, list) or is_array) and len(subject):
-        first = subject[0]
+        first = next((each for each in subject if each is not None), None)
         return are_polygons(first) or (isinstance(first, list) and len(first) > 0 and np.ndim(first[0]) == 2)
     return False
 
