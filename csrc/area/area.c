@@ -98,28 +98,37 @@ static void make_room_for_edges(area_state *s)
     s->n[TL_EDGES_NONE] = 0;
 }
 
-/* One edge of a triangle of positive area (y down).  Its kind depends on the edge alone, or triangles that share
- * it would not agree. */
-static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
+/* One edge of a triangle of positive area (y down) as lanes take it.  Its kind depends on the edge alone, or triangles
+ * that share it would not agree.  Returns the kind, TL_EDGES_NONE where it adds nothing; -1 if it is too long for lanes:
+ * it is then drawn here. */
+static int take_edge(area_plane *p, int32_t max_extent, int64_t x0, int64_t y0, int64_t x1, int64_t y1,
+                     edge_record *record)
 {
-    const area_plane *p = &s->plane;
     const int sign = y0 < y1 ? -1 : 1; /* the interior is right of edges that run upwards */
     if (sign > 0) {
         const int64_t x = x0, y = y0;
         x0 = x1, y0 = y1, x1 = x, y1 = y;
     }
-    if (!is_lane_edge(x0, y0, x1, y1, s->max_extent)) {
-        tl_count_work(s->window, 16 * s->window->height);
-        add_exact_edge(&s->plane, x0, y0, x1, y1, sign);
-        return;
+    if (!is_lane_edge(x0, y0, x1, y1, max_extent)) {
+        add_exact_edge(p, x0, y0, x1, y1, sign);
+        return -1;
     }
     const int32_t dx = (int32_t)(x1 - x0), dy = (int32_t)(y1 - y0), width = dx < 0 ? -dx : dx;
+    *record = (edge_record){(int32_t)x0, (int32_t)y0, dx, sign * dy};
     if (dy == 0 || y0 >= p->bottom_fx || y1 <= p->top_fx || min64(x0, x1) >= p->right_fx)
-        return;
+        return TL_EDGES_NONE;
     const int64_t rows = ((y1 - 1) >> p->bits) - (y0 >> p->bits);
-    const int kind =
-        width > 6 * dy ? TL_EDGES_SHALLOW : (int)min64(rows, TL_EDGES_LONG) + (width > 2 * dy ? TL_EDGES_FLAT : 0);
-    s->edges[kind][s->n[kind]++] = (edge_record){(int32_t)x0, (int32_t)y0, dx, sign * dy};
+    return width > 6 * dy ? TL_EDGES_SHALLOW : (int)min64(rows, TL_EDGES_LONG) + (width > 2 * dy ? TL_EDGES_FLAT : 0);
+}
+
+static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
+{
+    edge_record record;
+    const int kind = take_edge(&s->plane, s->max_extent, x0, y0, x1, y1, &record);
+    if (kind < 0)
+        tl_count_work(s->window, 16 * s->window->height);
+    else
+        s->edges[kind][s->n[kind]++] = record;
 }
 
 static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t *corners)

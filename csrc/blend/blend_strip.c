@@ -190,22 +190,13 @@ static void blend_block(blend_state *b, const cell_block *c)
 /* One edge into the cells of a strip.  The same bits as in a queue of area.c. */
 static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
 {
-    const int sign = y0 < y1 ? -1 : 1, bits = plane->bits;
-    if (sign > 0) {
-        const int64_t x = x0, y = y0;
-        x0 = x1, y0 = y1, x1 = x, y1 = y;
-    }
-    if (!is_lane_edge(x0, y0, x1, y1, max_edge_extent(bits))) {
-        add_exact_edge(plane, x0, y0, x1, y1, sign);
+    edge_record record;
+    const int kind = take_edge(plane, max_edge_extent(plane->bits), x0, y0, x1, y1, &record);
+    if (kind < 0 || kind == TL_EDGES_NONE)
         return;
-    }
-    if (y0 == y1 || y0 >= plane->bottom_fx || y1 <= plane->top_fx || min64(x0, x1) >= plane->right_fx)
-        return;
-    const int32_t dx = (int32_t)(x1 - x0), dy = (int32_t)(y1 - y0), width = dx < 0 ? -dx : dx;
-    const edge_record record = {(int32_t)x0, (int32_t)y0, dx, sign * dy};
-    if (width > 6 * dy)
+    if (kind == TL_EDGES_SHALLOW)
         add_shallow_edges(plane, &record, 1);
-    else if (width > 2 * dy)
+    else if (kind >= TL_EDGES_FLAT)
         add_flat_edges(plane, &record, 1);
     else
         add_steep_edges(plane, &record, 1);
