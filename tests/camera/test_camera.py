@@ -218,7 +218,7 @@ def test_from_intrinsics_at_half_the_size_is_the_picture_scaled():
         (lambda: Camera.look_at((0, 0, 5), near=2, far=1), "0 < near < far, got 2 and 1"),
         (lambda: Camera.look_at((0, 0, 5), near=0, far=1), "0 < near < far, got 0 and 1"),
         (lambda: Camera.look_at((0, 0, 5), fov_y_deg=180), "fov_y_deg must lie between 0 and 180, got 180"),
-        (lambda: Camera.look_at((0, 0, 5), ortho_height=0), "height must be positive, got 0"),
+        (lambda: Camera.look_at((0, 0, 5), ortho_height=0), "^ortho_height must be positive, got 0"),
         (lambda: Camera.look_at((0, 0, 5), ortho_height=1, near=1, far=1), "near < far, got 1 and 1"),
         (lambda: Camera(np.eye(3), np.eye(4)), r"view must have shape \(4, 4\), got \(3, 3\)"),
         (lambda: Camera(np.eye(4), np.full((4, 4), np.inf)), "projection must hold finite numbers"),

@@ -416,6 +416,20 @@ def test_counts_without_a_raster_are_areas():
     assert table.counts().tolist() == table.totals().tolist() == [1.5]
 
 
+def test_stdev_of_infinite_pixels_is_nan_without_a_warning():
+    found = tl.overlap([[square(0, 0, 2, 2)]], (2, 2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(found.stdevs(np.full((2, 2), np.inf))).all()
+
+
+def test_tables_are_equal_to_themselves_alone():
+    one, other = (tl.overlap([[square(0, 0, 2, 2)]], (2, 2)) for _ in range(2))
+    assert one == one
+    assert one != other
+    assert len({one, other}) == 2
+
+
 def test_majority_of_equal_areas_is_the_least_number():
     table = tl.overlap([[square(0, 0, 2, 1)], [square(5, 5, 6, 6)]], (2, 1))
     found = table.majorities([[7, 3]])

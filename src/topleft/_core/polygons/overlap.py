@@ -39,7 +39,7 @@ MAX_BLOCK_ENTRIES = 1 << 16
 TAIL = 16
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Overlap:
     """The areas that polygons and pixels share: a sparse matrix, a row for each polygon and a column for each pixel.
 
@@ -169,8 +169,8 @@ class Overlap:
         values = self._values_of(raster, nodata)
         is_known = ~np.isnan(values)
         weights = self.areas * is_known
-        off = np.where(is_known, values - np.repeat(self._mean_of(values), np.diff(self.starts)), 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
+            off = np.where(is_known, values - np.repeat(self._mean_of(values), np.diff(self.starts)), 0.0)
             return np.sqrt(self._added(off**2 * weights) / self._added(weights))
 
     def majorities(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:

@@ -341,7 +341,7 @@ class Camera:
         near = 0.01 * distance if near is None else near
         far = 100 * distance if far is None else far
         if ortho_height is not None:
-            return cls.orthographic(view, near=near, far=far, height=ortho_height)
+            return cls.orthographic(view, near=near, far=far, height=as_positive("ortho_height", ortho_height))
         return cls.perspective(view, near=near, far=far, fov_y_deg=fov_y_deg)
 
     @classmethod
