@@ -11,9 +11,9 @@
 TL_KERNEL(tl_vertex_counts, snap, const tl_source *source, int64_t first, int64_t end, int subpixel_bits,
           int with_depth, tl_vertex *out, tl_wide *wide)
 
-/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices, with a table of wide ones
- * or NULL, as above; or to points of TL_PLACED numbers each.  A point that cannot be drawn has x NaN, and y says why: a
- * tl_special. */
+/* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices, with a table of wide
+ * ones or NULL, as above; or to points of TL_PLACED numbers each.  A point that cannot be drawn has x NaN, and y says
+ * why: a tl_special. */
 TL_KERNEL(tl_vertex_counts, project, const tl_source *source, int64_t first, int64_t end, const tl_view *view,
           const tl_projected *out)
 

@@ -99,8 +99,8 @@ static void make_room_for_edges(area_state *s)
 }
 
 /* One edge of a triangle of positive area (y down) as lanes take it.  Its kind depends on the edge alone, or triangles
- * that share it would not agree.  Returns the kind, TL_EDGES_NONE where it adds nothing; -1 if it is too long for lanes:
- * it is then drawn here. */
+ * that share it would not agree.  Returns the kind, TL_EDGES_NONE where it adds nothing; -1 if it is too long for
+ * lanes: it is then drawn here. */
 static int take_edge(area_plane *p, int32_t max_extent, int64_t x0, int64_t y0, int64_t x1, int64_t y1,
                      edge_record *record)
 {
@@ -170,7 +170,8 @@ TL_INLINE area_edges edges_between(const area_plane *p, vi ax, vi ay, vi bx, vi 
     return (area_edges){x0, y0, dx, dy, vi_max(dx, vi_sub(zero, dx)), on, is_up};
 }
 
-/* Puts edges into the queues of their kinds.  `height`: dy, less than 0 where the area right of the edge is taken away. */
+/* Puts edges into the queues of their kinds.  `height`: dy, less than 0 where the area right of the edge is taken
+ * away. */
 TL_INLINE void queue_edges(area_state *s, const area_edges *e, vm on, vi height)
 {
     const int bits = s->plane.bits;

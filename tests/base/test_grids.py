@@ -122,6 +122,36 @@ def test_no_data_of_a_grid_does_not_count_in_means():
     assert table.means(raster, nodata=7).tolist() != [2]
 
 
+def test_means_refuse_a_raster_that_lies_elsewhere():
+    xarray = pytest.importorskip("xarray")
+    table = tl.overlap([[SQUARE]], GRID)
+    raster = GRID.to_xarray(np.arange(24.0).reshape(4, 6))
+    expected = table.means(raster.values)
+    for same in (raster, raster.assign_coords(x=raster.x.astype("f4") + 0.04), xarray.DataArray(raster.values)):
+        assert table.means(same) == expected
+    for other, what in ((raster[::-1], "rows"), (raster.assign_coords(x=raster.x + 0.06), "columns")):
+        with pytest.raises(ValueError, match=f"raster must lie on the grid of the table: its {what} have centres from"):
+            table.means(other)
+    assert tl.overlap([[SQUARE]], GRID.size).means(raster) == expected
+
+
+def test_means_refuse_a_dataset_that_lies_elsewhere():
+    class Dataset:
+        count, width, height, transform = 1, 6, 4, (1, 0, 0, 0, -1, 4)
+
+        def read(self, band, masked):
+            return np.ones((4, 6))
+
+    table, dataset = tl.overlap([[SQUARE]], GRID), Dataset()
+    assert table.means(dataset) == 1
+    dataset.transform = (1, 0, 0, 0, 1, 0)  # rasterio's for a file that says nothing
+    assert table.means(dataset) == 1
+    for transform, said in (((1, 0, 1, 0, -1, 4), "its columns have"), ((1, 0.1, 0, 0, -1, 4), "one that is turned")):
+        dataset.transform = transform
+        with pytest.raises(ValueError, match=f"raster must lie on the grid of the table.*{said}"):
+            table.means(dataset)
+
+
 @pytest.mark.parametrize("verb", [tl.polygons, tl.overlap])
 def test_polygons_of_another_crs_are_refused_by_name_and_transformed_on_request(verb):
     pyproj = pytest.importorskip("pyproj")

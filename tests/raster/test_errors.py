@@ -266,6 +266,15 @@ def test_rasterize_out_that_is_no_pair_raises():
         tl.rasterize(SQUARE, HALVES, SIZE, out=3)
 
 
+def test_rasterize_out_of_one_memory_raises():
+    ids = np.zeros(SIZE[::-1], np.int32)
+    with raises(ValueError, "out must be two arrays, got a pair that shares memory"):
+        tl.rasterize(SQUARE, HALVES, SIZE, out=(ids, ids.view(np.float32)))
+    both = np.zeros(SIZE[::-1], [("id", np.int32), ("depth", np.float32)])
+    tl.rasterize(SQUARE, HALVES, SIZE, out=(both["id"], both["depth"]))
+    assert np.array_equal(both["id"], tl.rasterize(SQUARE, HALVES, SIZE).triangle)
+
+
 @pytest.mark.parametrize("values", [np.zeros(3), np.zeros((2, 3)), np.zeros((4, 3, 1)), np.zeros((2, 3, 1, 1)), 5.0])
 def test_values_of_wrong_shape_raise(values):
     frags = tl.rasterize(SQUARE, HALVES, SIZE)

@@ -176,6 +176,29 @@ def check_rows_along_y(raster: Any) -> None:
         raise ValueError(f"raster must have its rows along {names[y]}, got dimensions {names}: transpose it")
 
 
+def check_centers(raster: Any, centers: tuple[F64, F64], pixel_size: tuple[float, float]) -> None:
+    """Raise a `ValueError` for a raster with centres of columns or rows a twentieth of a pixel or more from these.
+
+    `raster`: a dataset of rasterio, or a DataArray of xarray. One that says not where it lies passes.
+    """
+    own: list[Any] = [None, None]
+    if hasattr(raster, "transform") and hasattr(raster, "width"):  # of rasterio
+        a, b, c, d, e, f = raster.transform[:6]
+        if b or d:
+            raise ValueError(f"raster must lie on the grid of the table, got one that is turned: {a, b, c, d, e, f}")
+        if (a, c, e, f) != (1, 0, 1, 0):  # which means that it has none
+            own = [c + a * (np.arange(raster.width) + 0.5), f + e * (np.arange(raster.height) + 0.5)]
+    elif isinstance(getattr(raster, "dims", None), tuple) and hasattr(raster, "coords"):
+        names = [next((n for n in raster.dims if str(n).casefold() in known), None) for known in DIMENSIONS]
+        own = [None if name not in raster.coords else np.asarray(raster.coords[name]) for name in names]
+    for what, found, wanted, step in zip(("columns", "rows"), own, centers, pixel_size, strict=True):
+        if found is not None and found.dtype.kind in "iuf" and not (np.abs(found - wanted) < step / 20).all():
+            raise ValueError(
+                f"raster must lie on the grid of the table: its {what} have centres from {found[0]:.10g} to "
+                f"{found[-1]:.10g}, the grid from {wanted[0]:.10g} to {wanted[-1]:.10g}"
+            )
+
+
 def numbers_without_data(raster: Any) -> list[float]:
     """Return the numbers that stand for no data in a raster of xarray."""
     said = getattr(raster, "attrs", None)

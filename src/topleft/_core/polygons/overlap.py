@@ -17,7 +17,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, as_array, as_checked_triangles, as_number, as_real, check_real, shown
 from topleft._core.base.defaults import MAX_CROSSINGS
-from topleft._core.base.georeference import check_rows_along_y, numbers_without_data
+from topleft._core.base.georeference import check_centers, check_rows_along_y, numbers_without_data
 from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits, fits
 from topleft._core.base.options import parse
@@ -55,6 +55,8 @@ class Overlap:
         Width and height of the picture.
     nodata : number, optional
         The value of pixels without data in rasters, unless a method gets another one; that of the `Grid`.
+    grid : Grid, optional
+        Where the picture lies. Rasters of rasterio and xarray that lie elsewhere are then refused.
 
     Examples
     --------
@@ -71,6 +73,7 @@ class Overlap:
     areas: npt.NDArray[np.float32]
     size: tuple[int, int]
     nodata: float | None = None
+    grid: Grid | None = None
     _room: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]] = field(
         default_factory=list, repr=False, compare=False
     )
@@ -249,6 +252,7 @@ class Overlap:
         else:
             as_number("nodata", nodata)
             nodata = np.asarray(nodata).item()  # a whole number stays one
+        given = raster
         if hasattr(raster, "read") and hasattr(raster, "count"):  # of rasterio
             if raster.count != 1:
                 raise ValueError(f"raster must have one band, got {raster.count}: pass raster.read(1, masked=True)")
@@ -260,13 +264,15 @@ class Overlap:
         if array.shape != self.size[::-1]:
             raise ValueError(f"raster must have shape {self.size[::-1]}, got {array.shape}")
         check_real("raster", array, "biuf")
+        if self.grid is not None:
+            check_centers(given, (self.grid.x_centers, self.grid.y_centers), self.grid.pixel_size)
         self._check_pixels()
-        given = array.reshape(-1)[self.pixels]
-        values = given.astype(np.float64)
+        own = array.reshape(-1)[self.pixels]
+        values = own.astype(np.float64)
         with np.errstate(all="ignore"):
             for number in numbers:
                 if number is not None:
-                    values[given == number] = np.nan  # Python's number takes the dtype of the raster
+                    values[own == number] = np.nan  # Python's number takes the dtype of the raster
         if is_masked is not np.ma.nomask:
             values[is_masked.reshape(-1)[self.pixels]] = np.nan
         return values
@@ -369,7 +375,7 @@ def overlap(
     if out is not None and not isinstance(out, Overlap):
         raise TypeError(f"out must be an Overlap, got {type(out).__name__}")
     found_areas = list_areas(prepared, [] if out is None else out._room)
-    return found_areas if not isinstance(size, Grid) else replace(found_areas, nodata=size.nodata)
+    return found_areas if not isinstance(size, Grid) else replace(found_areas, nodata=size.nodata, grid=size)
 
 
 Chunk = tuple[npt.NDArray[Any], npt.NDArray[np.float32]]
