@@ -251,7 +251,7 @@ static uint32_t run_project(void)
                           .subpixel_bits = 8,
                           .near_clip = 1,
                           .far_clip = 1};
-    k->project(&src, 0, the_mesh.n_v, &view, the_mesh.out, NULL);
+    k->project(&src, 0, the_mesh.n_v, &view, &(tl_projected){.records = the_mesh.out});
     return hash_of(the_mesh.out, 16 * (size_t)the_mesh.n_v);
 }
 static uint32_t run_shade(void)

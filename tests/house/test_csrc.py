@@ -110,6 +110,23 @@ def test_file_compiles_alone(name):
     assert result.returncode == 0, result.stderr
 
 
+@pytest.mark.parametrize("name", ["tests/portable/pictures.c", "tests/portable/lanes.c", "benchmarks/lanes/scenes.c"])
+def test_program_compiles_with_what_the_headers_declare(name):
+    if not compiler():
+        pytest.skip("no C compiler: $CC, cc, gcc or clang")
+    table = "tl_kernels_scalar"
+    flags = (
+        "-D_GNU_SOURCE",
+        f"-DTL_KERNELS={table}",
+        f"-DTL_KERNELS_HERE={table}",
+        "-DTL_USE_SCALAR",
+        "-Wall",
+        "-Werror",
+    )
+    result = check_syntax(CSRC.parent / name, flags)
+    assert result.returncode == 0, result.stderr
+
+
 def test_map_lists_the_folders():
     listed = re.findall(r"^- `([^`]+)/`", (CSRC / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert sorted(listed) == sorted(name for name in FOLDERS if name)

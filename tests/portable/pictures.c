@@ -172,10 +172,11 @@ static void draw_scene(const char *name, const tl_source *source, const tl_view 
     tl_pieces pieces = {0};
     for (int i = 0; i < 3 * n_triangles; i++)
         triangles[i] = i;
-    const tl_vertex_counts counts = view ? k->project(source, 0, source->n, view, vertices, wide)
+    const tl_projected projected = {.records = vertices, .wide = wide};
+    const tl_vertex_counts counts = view ? k->project(source, 0, source->n, view, &projected)
                                          : k->snap(source, 0, source->n, 8, 1, vertices, wide);
     if (counts.n_clipped)
-        k->clip(source, vertices, triangles, NULL, n_triangles, view, &pieces);
+        k->clip(source, &projected, triangles, NULL, n_triangles, view, &pieces);
     if (pieces.n_pieces) {
         pieces.vertices = room_for((size_t)pieces.n_vertices * sizeof *pieces.vertices);
         pieces.wide = room_for((size_t)pieces.n_vertices * sizeof *pieces.wide);
@@ -183,7 +184,7 @@ static void draw_scene(const char *name, const tl_source *source, const tl_view 
         pieces.weights = room_for((size_t)pieces.n_vertices * 3 * sizeof *pieces.weights);
         pieces.triangles = room_for((size_t)pieces.n_pieces * 3 * sizeof *pieces.triangles);
         pieces.source = room_for((size_t)pieces.n_pieces * sizeof *pieces.source);
-        k->clip(source, vertices, triangles, NULL, n_triangles, view, &pieces);
+        k->clip(source, &projected, triangles, NULL, n_triangles, view, &pieces);
         tell(name, "weights of pieces", pieces.weights, (size_t)pieces.n_vertices * 3 * sizeof *pieces.weights);
     }
     tell(name, "vertices", vertices, (size_t)source->n * sizeof *vertices);
