@@ -497,11 +497,6 @@ def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDA
     return array
 
 
-def share_memory(one: NDArray[Any], other: NDArray[Any]) -> bool:
-    """Whether a byte of one array is one of another: fields of a structured array share none."""
-    return np.may_share_memory(one, other) and np.shares_memory(one, other)
-
-
 def as_point_size(name: str, value: ArrayLike, n_points: int) -> float | NDArray[np.float64]:
     """Return a positive size, or one of each point, (N,) float64."""
     array = as_array(name, value)

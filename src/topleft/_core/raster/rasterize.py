@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import as_number, as_out, share_memory
+from topleft._core.base.arrays import as_number, as_out
 from topleft._core.base.memory import Memory, MemoryOf, check_fits, empty
 from topleft._core.base.options import Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
@@ -250,7 +250,8 @@ class FragmentOptions(NamedTuple):
             ids_out, depth_out = (None, None) if out is None else cast("tuple[object, object]", out)
         except (TypeError, ValueError):
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
-        if isinstance(ids_out, np.ndarray) and isinstance(depth_out, np.ndarray) and share_memory(ids_out, depth_out):
+        is_both = isinstance(ids_out, np.ndarray) and isinstance(depth_out, np.ndarray)
+        if is_both and np.shares_memory(ids_out, depth_out):  # fields of a structured array share none
             raise ValueError("out must be two arrays, got a pair that shares memory")
         return cls(test, background_depth, ids_out, depth_out)
 
