@@ -1,4 +1,4 @@
-"""The page that needs no Python, in Chromium: the pixels that Python gives, files that are dropped."""
+"""The page that needs no Python, in Chromium: the pixels that Python gives, and the parts that it has."""
 
 import threading
 from functools import partial
@@ -24,10 +24,9 @@ pytestmark = [
 ]
 
 #: What a question of the page's own line gets: its arrays as lists.
-ASK = """async ([name, given, text]) => {
-  const parts = text === null ? [] : [new TextEncoder().encode(text)];
+ASK = """async ([name, given]) => {
   try {
-    const {arrays, ...header} = await document.querySelector(".explorer").app.line.ask(name, given, parts);
+    const {arrays, ...header} = await document.querySelector(".explorer").app.line.ask(name, given);
     return {...header, arrays: Object.fromEntries(Object.entries(arrays).map(([key, array]) => [key, [...array]]))};
   } catch (error) {
     return {error: error.message};
@@ -59,8 +58,8 @@ def page(tmp_path_factory):
     server.server_close()
 
 
-def ask(page, question, text=None, **given):
-    return page.evaluate(ASK, [question, given, text])
+def ask(page, question, **given):
+    return page.evaluate(ASK, [question, given])
 
 
 def test_first_picture_is_that_of_python(page):
@@ -72,14 +71,8 @@ def test_first_picture_is_that_of_python(page):
         assert mine["arrays"][name] == np.ravel(array).tolist()
 
 
-@pytest.mark.parametrize("layer", ["smooth", "flat", "triangle", "overdraw"])
-def test_view_of_the_first_mesh_is_that_of_python(page, layer):
-    view = {"size": [96, 72], "azimuth": 12.5, "layer": layer, "sampling": "msaa4"}
-    own = answer(Session(Content()), {"id": 1, "do": "mesh.draw", **view})
-    assert ask(page, "mesh.draw", **view)["arrays"]["pixels"] == np.ravel(own.arrays["pixels"]).tolist()
-
-
-def test_broken_file_gets_a_sentence_and_the_page_lives_on(page):
-    reply = ask(page, "mesh.open", "v 1 2\n", name="two.obj")
-    assert reply == {"error": "cannot read 'two.obj': broken, or not a '.obj' file (its vertex 1 has 2 of 3 numbers)"}
-    assert ask(page, "mesh.open", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", name="one.obj")["n_triangles"] == 1
+def test_page_without_python_has_no_part_mesh(page):
+    shown = page.evaluate(
+        "[...document.querySelectorAll('[data-tab]')].filter((one) => !one.hidden).map((one) => one.dataset.tab)"
+    )
+    assert shown == ["pixels", "steps", "race"]

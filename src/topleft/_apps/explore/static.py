@@ -14,47 +14,36 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
-
-from topleft import Mesh
-from topleft._apps.explore import mesh_view, pixels, race, trace
+from topleft._apps.explore import pixels, race, trace
 from topleft._apps.explore.content import MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES, SCENES, scene
 from topleft._apps.explore.handlers import hello
 from topleft._apps.explore.session import SCRIPTS, Content, Request, Session
 from topleft._apps.explore.state import Look, PixelState, Turn
-from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.whole_file import write_whole
-from topleft._meshes.picture.shade import plain_numbers
 from topleft.errors import MissingPackageError
 from topleft.methods import CLASSICS, find_method
 from topleft.methods.classics.classic_kernels import FORMS, list_kinds
 from topleft.methods.reference import sampling
 from topleft.scene_families import FAMILIES, walk
-from topleft.scenes import shape
 from topleft.typing import CullOption, DepthTestOption, SamplingOption
 
 SETS = ("simd128", "scalar")
 """The instruction sets of the kernels; a page fetches one."""
 
-IN_PLACE_OF_PYTHON = (
-    "worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js", "race.js", "mesh.js",
-    "camera.js", "files.js",
-)  # fmt: skip
+IN_PLACE_OF_PYTHON = ("worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js", "race.js")
 """The modules that answer the page."""
 
-LIT = ("smooth", "flat", "unlit", "normals")
-LAYERS = (*LIT, "triangle", "overdraw")
-"""What a frame of a mesh shows without Python."""
+TABS = ("pixels", "steps", "race")
+"""The parts of a page without Python: meshes are drawn by Python alone."""
 
 N_SEEDS = 3
 """Of each scene of the part Race."""
 
-CHOICES = ("layer", "sampling", "cull", "fov", "up", "spin")
-"""What a page without Python lets choose of a mesh."""
-
 
 def write_static(folder: Path, content: Content) -> list[Path]:
     """Write the page into a folder, which is made, and return what was written."""
+    if content.mesh is not None:
+        raise ValueError(f"--export must have no mesh, got {content.name!r}: a page without Python draws none")
     page = files("topleft._apps.explore").joinpath("page")
     modules = {name: page.joinpath(name) for name in (f"topleft-{one}.wasm" for one in SETS)}
     if missing := [name for name, module in modules.items() if not module.is_file()]:
@@ -66,8 +55,6 @@ def write_static(folder: Path, content: Content) -> list[Path]:
     made |= {name: module.read_bytes() for name, module in modules.items()}
     made["index.html"] = static_html(page).encode()
     made["data.json"] = json.dumps(data_of(content), allow_nan=False, separators=(",", ":")).encode()
-    mesh, _ = first_mesh(content)
-    made["mesh.bin"] = mesh.vertices.tobytes() + mesh.triangles.tobytes()
     made["race.bin"] = race_scenes()[1]
     folder.mkdir(parents=True, exist_ok=True)
     written = []
@@ -95,7 +82,7 @@ def data_of(content: Content) -> dict[str, Any]:
         "look": Look,
     }
     return {
-        "hello": {**greeting, "saves": (), "has_plan": False},
+        "hello": {**greeting, "tabs": TABS, "saves": (), "has_plan": False},
         "states": {name: scene(name) for name in SCENES},
         "defaults": defaults,
         "limits": {
@@ -103,7 +90,6 @@ def data_of(content: Content) -> dict[str, Any]:
             "max_slow_tests": pixels.MAX_SLOW_TESTS,
             "words": {name: get_args(kind) for name, kind in words.items()},
         },
-        "mesh": mesh_data(content),
         "classics": classics(),
         "n_classics": len(FORMS),
         "steps": steps_data(),
@@ -116,33 +102,6 @@ def data_of(content: Content) -> dict[str, Any]:
         "ink": pixels.INK,
         "area_error": float(pixels.AREA_ERROR),
         "wrong": pixels.WRONG,
-    }  # fmt: skip
-
-
-def first_mesh(content: Content) -> tuple[Mesh, str]:
-    """The mesh that the part Mesh begins with, and its name."""
-    if content.mesh is not None:
-        return content.mesh, content.name
-    return Mesh(*shape(mesh_view.FIRST_SHAPE)), mesh_view.FIRST_SHAPE
-
-
-def mesh_data(content: Content) -> dict[str, Any]:
-    """What the part Mesh knows of its first mesh, whose arrays are a file, and how meshes look."""
-    mesh, name = first_mesh(content)
-    named = {"layer": [(one, one) for one in LAYERS]}
-    return {
-        "name": name, "is_f64": mesh.vertices.dtype == np.float64, "n_vertices": len(mesh.vertices),
-        "layers": LAYERS, "lit": LIT,
-        "view": {one.name: one.default for one in fields(mesh_view.MeshView) if one.default is not MISSING},
-        "max_side_px": mesh_view.MAX_SIDE_PX, "max_pixels": mesh_view.MAX_PIXELS,
-        "heat": list(zip(mesh_view.HEAT_LABELS, mesh_view.HEAT[1:, :3].tolist(), strict=True)),
-        "heat_table": mesh_view.HEAT.tolist(), "heat_classes": mesh_view.heat_classes().tolist(),
-        "controls": [
-            (title, [(label, key, named.get(key, options)) for label, key, options in rows if key in CHOICES])
-            for title, rows in mesh_view.CONTROLS.items()
-        ],
-        **plain_numbers(mesh),
-        "light_of_srgb": LIGHT_OF_SRGB.tolist(),
     }  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import INT32_MAX
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
-from topleft._core.base.defaults import DEFAULT_CREASE
 from topleft._core.base.memory import empty
 from topleft._core.base.options import parse
 from topleft._core.base.threads import count_threads, parse_threads, run_parts, threads_for
@@ -31,12 +30,11 @@ from topleft._core.raster.fragments import Fragments, SeenSamples
 from topleft._core.raster.sampling import sample_positions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.environment import Environment
-from topleft._meshes.model.light import AMBIENT, TO_HEADLIGHT, Fog, Light, as_lights, as_not_negative
+from topleft._meshes.model.light import AMBIENT, Fog, Light, as_lights, as_not_negative
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.model.normals import EQUAL_ANGLE_DEG
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import ShadingInputs, Surface, kept_look, light_rows, material_row
+from topleft._meshes.picture.look import ShadingInputs, Surface, kept_look, light_rows
 from topleft.typing import ShadingOption
 
 MIN_PX_PER_THREAD = 1 << 14
@@ -129,16 +127,6 @@ class ShadingOptions:
 def plain_material(color: Color | None) -> Material:
     """The material of a mesh that has none; checking one takes a hundredth of a small picture."""
     return Material(color)
-
-
-def plain_numbers(mesh: Mesh) -> dict[str, Any]:
-    """How a mesh without colours, materials and normals is lit, as JSON takes it: for a page without Python."""
-    color, _, _, specular, shininess, *_ = material_row(plain_material(DEFAULT_COLOR), mesh, Surface((), False), -1.0)
-    return {
-        "crease": min(DEFAULT_CREASE + EQUAL_ANGLE_DEG, 180.0),
-        "light": {"to": TO_HEADLIGHT.tolist(), "color": 1 - AMBIENT, "ambient": AMBIENT},
-        "material": {"color": color[:3], "specular": specular[0], "shininess": shininess},
-    }
 
 
 class ShownInstance(NamedTuple):

@@ -5,7 +5,7 @@ export const SINK = {mask: 0, count: 1, label: 2, nearest: 4, farthest: 5};
 export const TEST = {outer: 1, inner: 2};
 export const CULL = {none: 0, back: 1, front: 2};
 export const METHOD = {auto: 0, edge: 1, scanline: 2};
-const FULL = -2, MOST_STEPS = 2 ** 30;
+const FULL = -2;
 
 // What this machine has no memory for: the sentence that Python has.
 export class OutOfMemory extends Error {
@@ -27,7 +27,6 @@ export class Kernels {
 
   constructor(exports) {
     this.exports = exports;
-    this.start = exports.web_used();
   }
 
   // Calls `work`, and frees what it has taken of memory, whatever it ends with.
@@ -127,59 +126,5 @@ export class Kernels {
       this.check(this.exports.web_wireframe(pixels));
       return this.get(Uint8Array, pixels, n);
     });
-  }
-
-  // Triangles of polygons, lists of vertices: Int32Array (3 t).
-  cut(polygons, vertices) {
-    if (polygons.every((face) => face.length === 3)) return Int32Array.from(polygons.flat());
-    return this.within(() => {
-      const corners = polygons.flat(), n = polygons.reduce((sum, face) => sum + Math.max(0, face.length - 2), 0);
-      const most = polygons.reduce((high, face) => Math.max(high, face.length), 0), out = this.room(24 * n);
-      const done = this.check(this.exports.web_cut(
-        this.put(Float64Array.from(vertices)), this.put(BigInt64Array.from(corners, BigInt)),
-        this.put(BigInt64Array.from(polygons, ({length}) => BigInt(length))), polygons.length, most, MOST_STEPS, out));
-      if (done < polygons.length) throw new Error("its polygons take too many comparisons to be cut into triangles");
-      return Int32Array.from(this.get(BigInt64Array, out, 3 * n), (row) => corners[Number(row)]);
-    });
-  }
-
-  // Takes a mesh: what was there before is gone. Returns its box, {ends}, the middle of that, {center}, as a number of the
-  // vertices {origin}, and how far it reaches from there, {radius}.
-  // `colors` (Uint8Array, 4 n) with `decode`, the light of each value, and `normals` (Float64Array, 3 n) are those of a file.
-  takeMesh({vertices, triangles, colors, normals, decode}, leastCosine) {
-    this.exports.web_release(this.start);
-    this.isF64 = vertices instanceof Float64Array;
-    const box = this.room(48), points = this.put(vertices), corners = this.put(triangles);
-    const given = this.put(Uint32Array.of(...[colors, normals, colors && decode].map((array) => array ? this.put(array) : 0)));
-    const n = this.check(this.exports.web_take_mesh(points, Number(this.isF64), vertices.length / 3, corners, triangles.length / 3, leastCosine, given, box));
-    this.counts = {n_vertices: n, n_triangles: triangles.length / 3};
-    this.mesh = this.exports.web_used();
-    const ends = this.get(Float64Array, box, 6), center = [0, 1, 2].map((k) => ends[k] / 2 + ends[3 + k] / 2);
-    let most = 0;
-    for (const i of triangles) {
-      const [x, y, z] = [0, 1, 2].map((k) => (vertices[3 * i + k] - center[k]) ** 2);
-      most = Math.max(most, x + y + z);
-    }
-    const round = this.isF64 ? (x) => x : Math.fround, origin = [0, 1, 2].map((k) => round(round(ends[k] / 2) + round(ends[3 + k] / 2)));
-    return {center, origin, radius: Math.sqrt(most) || 1, ends};
-  }
-
-  // Brings the mesh into view by a matrix, clip from object space (4 rows), and calls `work`.
-  viewing(matrix, [width, height], cull, work) {
-    return this.within(() => {
-      const own = this.put((this.isF64 ? Float64Array : Float32Array).from(matrix.flat()));
-      const isAffine = matrix[3].every((value, k) => value === (k === 3 ? 1 : 0));
-      this.check(this.exports.web_view_mesh(own, Number(isAffine), width, height, CULL[cull]));
-      this.size = [width, height];
-      return work();
-    });
-  }
-
-  // Shades what is in view: RGBA. `look` as web_look of web.c has it, `samples` in sixteenths of a pixel.
-  render(look, samples) {
-    const [width, height] = this.size, pixels = this.room(4 * width * height);
-    const at = this.put(Int32Array.from(samples.flat(), (value) => value * 16)), given = this.put(look);
-    this.check(this.exports.web_render(given, Math.log2(samples.length), at, pixels));
-    return this.get(Uint8ClampedArray, pixels, 4 * width * height);
   }
 }

@@ -1,7 +1,6 @@
 // Answers the page in the place of Python: the questions of handlers.py that need no more than the kernels.
-// In: a question {do, id, ...} and its parts. Out: a promise of [header, parts], as messages.py splits an answer.
+// In: a question {do, id, ...}. Out: a promise of [header, parts], as messages.py splits an answer.
 
-import * as mesh from "./mesh.js";
 import {drawAll} from "./pixels.js";
 import {probe} from "./probe.js";
 import * as race from "./race.js";
@@ -21,9 +20,6 @@ const HANDLERS = {
   "race.families": race.families,
   "race.draw": race.draw,
   "race.column": race.column,
-  "mesh.open": mesh.open,
-  "mesh.draw": mesh.draw,
-  "mesh.pick": mesh.pick,
 };
 
 export class Answerer {
@@ -32,13 +28,12 @@ export class Answerer {
     Object.assign(this, {kernels, data, load});
   }
 
-  async answer(question, parts = []) {
+  async answer(question) {
     const {id} = question;
     try {
-      const part = `${question.do}`.split(".")[0];
-      if (part === "mesh" || part === "race") this.data[part].bytes ??= await this.load(`${part}.bin`);
+      if (`${question.do}`.startsWith("race.")) this.data.race.bytes ??= await this.load("race.bin");
       if (!(question.do in HANDLERS)) throw new Error(`nothing is called '${question.do}' here`);
-      const {header, arrays = {}} = HANDLERS[question.do](this.kernels, this.data, question, parts);
+      const {header, arrays = {}} = HANDLERS[question.do](this.kernels, this.data, question);
       const listed = Object.entries(arrays).map(([name, [array, shape]], part) => [name, {dtype: NAMES.get(array.constructor), shape, part}]);
       return [{...header, id, arrays: Object.fromEntries(listed)}, Object.values(arrays).map(([array]) => new Uint8Array(array.buffer))];
     } catch (error) {

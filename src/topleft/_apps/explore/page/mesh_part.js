@@ -132,7 +132,7 @@ export function meshPart(app, panel) {
       ...mesh.controls.map(([title, rows]) => group(title, ...rows.map(control))), legend,
       make("div.buttons", {}, button("Reset the camera", () => change(home()), "0")),
       group("Picked", make("p.hint", {}, "A click tells which triangle shows."), found),
-      group("Keep", make("div.buttons", {}, ...app.hello.saves ? [] : saves, button("Copy link", () => app.copyLink())), ...app.hello.has_plan === false ? [] : [planBox]));
+      group("Keep", make("div.buttons", {}, ...saves, button("Copy link", () => app.copyLink())), planBox));
   }
   panel.append(make("div.layout", {}, stage, side));
   new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);

@@ -19,9 +19,9 @@ const ready = (async () => {
   return new Answerer(await Kernels.of(module), data, load);
 })();
 
-onmessage = async ({data: [question, parts]}) => {
+onmessage = async ({data: question}) => {
   try {
-    const [header, own] = await (await ready).answer(question, parts);
+    const [header, own] = await (await ready).answer(question);
     postMessage([header, own], [...new Set(own.map((part) => part.buffer))]);
   } catch (error) {
     postMessage([{id: question.id, error: error.message}, []]);
