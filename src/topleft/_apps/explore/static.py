@@ -30,7 +30,10 @@ from topleft.typing import CullOption, DepthTestOption, SamplingOption
 SETS = ("simd128", "scalar")
 """The instruction sets of the kernels; a page fetches one."""
 
-IN_PLACE_OF_PYTHON = ("worker.js", "local.js", "kernels.js", "pixels.js", "probe.js", "exact.js", "steps.js", "race.js")
+IN_PLACE_OF_PYTHON = (
+    "worker.js", "local.js", "kernels.js", "numbers.js", "state.js", "exact.js", "pixels.js", "probe.js", "steps.js",
+    "race.js",
+)  # fmt: skip
 """The modules that answer the page."""
 
 TABS = ("pixels", "steps", "race")

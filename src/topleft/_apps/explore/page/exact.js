@@ -1,8 +1,7 @@
 // The exact picture of areas and of conservative coverage without Python: what methods/reference draws by fractions, in
 // whole numbers of any length. In: a state. Out: how much of each pixel triangles cover, and how many.
 
-import {rint} from "./pixels.js";
-import {cross, quotient, wholeOf} from "./probe.js";
+import {cross, quotient, rint, wholeOf} from "./numbers.js";
 
 // Triangles with an area that are not culled, positive corners [x, y] each, from the corner of the window, and the unit.
 function trianglesOf({vertices, triangles, origin, cull}, bits) {

@@ -2,8 +2,9 @@
 // what each method makes of them is drawn and counted here.
 
 import {SINK} from "./kernels.js";
-import {bitsOf, checkReach, nearOrigin, refuse, Refusal, rint, takeScene} from "./pixels.js";
-import {cross, wholeOf} from "./probe.js";
+import {cross, rint, wholeOf} from "./numbers.js";
+import {nearOrigin, takeScene} from "./pixels.js";
+import {bitsOf, checkReach, refuse, Refusal} from "./state.js";
 
 // The scene of a family where its sliders stand: the nearest of those that were written.
 function sceneAt({race}, {family, positions, seed = 0}) {

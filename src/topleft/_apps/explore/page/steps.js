@@ -1,7 +1,8 @@
 // The part Steps without Python: what trace.py answers. The kernels tell their steps; here they are put into words.
 
-import {asFloat, bitsOf, checkMethod, checkReach, refuse, takeScene} from "./pixels.js";
-import {sixDigits} from "./probe.js";
+import {asFloat, sixDigits} from "./numbers.js";
+import {takeScene} from "./pixels.js";
+import {bitsOf, checkMethod, checkReach, refuse} from "./state.js";
 
 const isNumber = (value) => typeof value === "bigint" || typeof value === "number";
 
