@@ -70,7 +70,6 @@ FLAGS_AVX512 = [
     *FLAGS_AVX2,
     *("-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd", "-mprefer-vector-width=512"),
 ]
-FLAGS_VBMI = [*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2"]
 
 CPUS_OF_WINDOWS = {"win-amd64": "x86_64", "win-arm64": "aarch64", "win32": "i686"}
 
@@ -96,11 +95,6 @@ int probe(__m256i a) { return (int)_lzcnt_u32((unsigned)_mm256_movemask_epi8(_mm
 PROBE_AVX512 = """
 #include <immintrin.h>
 __m512i probe(__m512i a, __mmask64 m) { return _mm512_mask_mullo_epi64(_mm512_lzcnt_epi32(a), (__mmask8)m, a, a); }
-"""
-
-PROBE_VBMI = """
-#include <immintrin.h>
-__m512i probe(__m512i a, __mmask64 m) { return _mm512_maskz_compress_epi8(m, _mm512_permutex2var_epi8(a, a, a)); }
 """
 
 
@@ -260,8 +254,6 @@ class BuildTopleft(build_ext):
 
         What takes longest stands first, so that no core waits for it at the end.
         """
-        flags_vbmi = FLAGS_C + FLAGS_VBMI
-        vbmi_accepted = pool.submit(self.accepts, flags_vbmi, PROBE_VBMI)
         isas = self.isas_to_build(pool)
         own = ["-DTL_NO_INT128"] if os.environ.get("TOPLEFT_NO_INT128") == "1" else []
         flags = {isa.name: FLAGS_C + isa.flags + own for isa in isas}
@@ -271,13 +263,8 @@ class BuildTopleft(build_ext):
             told = [flag for flag in [*self.compiler.compiler_so[1:], *unit_flags] if "/" not in flag]
             macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
 
-        # Beside AVX-512, and no instruction set of its own: a unit for what draws meshlets on newer CPUs.
-        has_vbmi = "avx512" in flags and vbmi_accepted.result()
-        macros += [("TL_HAVE_VBMI", "1")] if has_vbmi else []
-
         units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in reversed(flags.items())]
         units.append((ext, FLAGS_CYTHON, []))
-        units += [(ROOT / "csrc/meshlets/meshlets.c", flags_vbmi, [])] if has_vbmi else []
         return [*units, (ROOT / "csrc/dispatch.c", FLAGS_C, macros)]
 
     def classic_units(self, ext: Extension) -> list[tuple[Path | Extension, list[str], list[tuple[str, str]]]]:

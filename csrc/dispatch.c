@@ -64,8 +64,8 @@ static const tl_isa_unit UNITS[TL_N_ISA] = {
 /* Features of the CPU and the operating system, by hand: __builtin_cpu_supports needs a library that clang
  * for Windows does not link. */
 typedef struct {
-    unsigned ecx_1, ebx_7, ecx_7, ecx_extended; /* registers of cpuid */
-    unsigned saved;                             /* which vectors a thread keeps while others run, of xgetbv */
+    unsigned ecx_1, ebx_7, ecx_extended; /* registers of cpuid */
+    unsigned saved;                      /* which vectors a thread keeps while others run, of xgetbv */
 } cpu_words;
 
 #ifdef __APPLE__ /* its system tells of longer ones once they are used, and saves them from then on */
@@ -77,10 +77,10 @@ enum { SAVES_AVX2 = 0x06, SAVES_AVX512 = 0xe6 };
 static cpu_words ask_cpu(void)
 {
     cpu_words cpu = {0};
-    unsigned a, b, d;
+    unsigned a, b, c, d;
     if (__get_cpuid(1, &a, &b, &cpu.ecx_1, &d) && (cpu.ecx_1 & bit_OSXSAVE))
         __asm__ volatile("xgetbv" : "=a"(cpu.saved), "=d"(d) : "c"(0));
-    __get_cpuid_count(7, 0, &a, &cpu.ebx_7, &cpu.ecx_7, &d);
+    __get_cpuid_count(7, 0, &a, &cpu.ebx_7, &c, &d);
     __get_cpuid(0x80000001u, &a, &b, &cpu.ecx_extended, &d);
     return cpu;
 }
@@ -103,27 +103,11 @@ static int cpu_has_avx512(void)
     return cpu_has_avx2() && has(cpu.saved, SAVES_AVX512) &&
            has(cpu.ebx_7, bit_AVX512F | bit_AVX512BW | bit_AVX512DQ | bit_AVX512VL | bit_AVX512CD);
 }
-
-#ifdef TL_HAVE_VBMI
-extern const tl_meshlet_kernels tl_meshlets_vbmi;
-
-static int cpu_has_vbmi(void) { return has(ask_cpu().ecx_7, bit_AVX512VBMI | bit_AVX512VBMI2); }
-#endif
 #else /* every processor has the unit's instructions: aarch64, WebAssembly */
 static int cpu_has_simd128(void) { return 1; }
 static int cpu_has_avx2(void) { return 0; }
 static int cpu_has_avx512(void) { return 0; }
 #endif
-
-const tl_meshlet_kernels *tl_meshlets_beside(const tl_kernels *kernels)
-{
-#ifdef TL_HAVE_VBMI
-    if (kernels == UNITS[TL_ISA_AVX512].kernels && cpu_has_avx512() && cpu_has_vbmi())
-        return &tl_meshlets_vbmi;
-#endif
-    (void)kernels;
-    return NULL;
-}
 
 const char *tl_isa_name(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].name : NULL; }
 

@@ -22,9 +22,6 @@ const char *tl_isa_flags(int i_isa);
 /* The kernels of an available instruction set, NULL for any other name. */
 const tl_kernels *tl_kernels_for(const char *name);
 
-/* The kernels of meshlets beside these: of AVX-512 on a CPU with VBMI and VBMI2, NULL elsewhere. */
-const tl_meshlet_kernels *tl_meshlets_beside(const tl_kernels *kernels);
-
 /* The compiler of this binary, for example "gcc 12.2.0", and the version it was compiled as. */
 const char *tl_compiler(void);
 const char *tl_version(void);

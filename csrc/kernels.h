@@ -50,11 +50,6 @@ TL_KERNEL(void, measure_clusters, const tl_source *source, const uint8_t *corner
 TL_KERNEL(void, survey_clusters, const tl_clustered *mesh, const tl_cluster_view *view, int64_t step,
           int64_t n_of[TL_N_VISIBILITIES])
 
-/* Counts of the same clusters those that the window may show, and in *n_hidden those of them that lie wholly behind
- * surfaces of the target. */
-TL_KERNEL(int64_t, count_hidden, const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window,
-          const tl_target *target, int64_t step, int64_t *n_hidden)
-
 /* Tells of n boxes, each under a matrix of its own in place of the view's, whether they may show: not outside of the
  * window, nor, unless target is NULL, behind its surfaces. */
 TL_KERNEL(void, find_shown, const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,

@@ -571,6 +571,4 @@ typedef struct tl_kernels {
 #include "kernels.h"
 } tl_kernels;
 
-#include "meshlets.h"
-
 #endif

@@ -156,7 +156,7 @@ def parts_beside_whole() -> Scenes:
             for verb in (tl.rasterize_mesh, tl.render):
                 kept = {} if n_trees else {"rasterizer": tl.Rasterizer(HD, threads=1)}
                 draw = partial(verb, subject, camera, HD, threads=1, **kept)
-                for _ in range(17):  # after which meshlets are there
+                for _ in range(2):  # the second picture sorts clusters
                     draw()
                 yield f"terrain of {n:,}{name}, {look}, {verb.__name__}", {
                     "whole": draw, f"{found.n_drawn:,} in {found.n_parts} parts": partial(draw, tolerance=0.5),

@@ -3,8 +3,8 @@
 In: scenes of `scenes.py`. Out: a record with a row for each scene and one for each mesh.
 
 Both ways are the public call on memory that is kept, on one thread; each has a `Mesh` of its own, of the same arrays.
-The planner's has been drawn before: it is in clusters or in meshlets where `topleft._core.raster.choices` says that
-this pays. The other never is. A third one, where the first is in meshlets, never is in these.
+The planner's has been drawn before: it is in clusters where `topleft._core.raster.choices` says that this pays.
+The other never is.
 """
 
 from __future__ import annotations
@@ -27,14 +27,12 @@ from benchmarks.harness.arguments import Options, count, fraction, names, option
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, read_record, tell
 from benchmarks.harness.turns import digits, quartiles
-from benchmarks.harness.ways import Draw, Picture, Way, answers_of, check_same_bits, take_rounds
+from benchmarks.harness.ways import Draw, Picture, Way, check_same_bits, take_rounds
 from benchmarks.report.study import Study
 from benchmarks.static import tables
 from benchmarks.static.scenes import StaticScene, scenes
-from topleft._core.raster.choices import ClusterRoute
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.costs import cost_table
 from topleft._meshes.picture import instances, rounds
 
 WHOLE = {"pays_to_cluster": False}
@@ -42,13 +40,8 @@ FORCED = {
     "pays_to_cluster": True, "pays_to_cluster_shaded": True, "pays_to_draw_clusters": True,
     "pays_to_draw_instances": True,
 }  # fmt: skip
-NEVER_GROWN = {"pays_to_grow": False}
 
 Row = dict[str, Any]
-
-
-LONGEST_BACKOFF = 9
-"""Pictures after which a mesh that is drawn whole is asked again whether clusters pay."""
 
 
 @dataclass(frozen=True)
@@ -177,11 +170,6 @@ def measure_scene(scene: StaticScene, options: StaticOptions) -> Row:
         ways.append(Way("clusters", drawing(scene), FORCED))
         with ways[2].in_force(), counting(counts):
             ways[2].draw()
-    is_grown = grow(planned)
-    if is_grown:
-        ways.append(Way("without meshlets", drawing(scene), NEVER_GROWN))
-        with ways[-1].in_force():
-            ways[-1].draw()  # the second picture sorts clusters
     check_same_bits(scene.label, ways)
     n_rounds = max(3, min(options.rounds, int(options.most_seconds * 1e3 / (4 * whole_first))))
     times = take_rounds(ways, n_rounds, options.seconds, time.thread_time, math.inf)
@@ -206,20 +194,7 @@ def measure_scene(scene: StaticScene, options: StaticOptions) -> Row:
     }
     if shares is None:
         row["clusters_faster"] = quartiles(times[1] / times[2])
-    if is_grown:
-        row["ungrown_ms"], row["grown_faster"] = quartiles(times[-1]), quartiles(times[-1] / times[0])
     return row
-
-
-def grow(planned: Way) -> bool:
-    """Draw as often as it takes before a mesh is grown into meshlets; returns whether it was."""
-
-    def draw_often() -> Picture:
-        for _ in range(int(cost_table().grown_pictures) + LONGEST_BACKOFF):
-            picture = planned.draw()
-        return picture
-
-    return ClusterRoute.MESHLETS in answers_of("cluster_route", draw_often)
 
 
 def measure_model(scene: StaticScene) -> Row:
@@ -282,7 +257,6 @@ def row_text(row: Row) -> str:
     width, height = row["size"]
     what = f"{row['model']}, {row['view']}, {row['cull']} {row['verb']} {row['sampling']} {width}x{height}"
     how = "in clusters" if row["is_clustered"] else f"whole (clusters x {row['clusters_faster'][1]:.2f})"
-    how = f"in meshlets, x {row['grown_faster'][1]:.2f} of without" if "grown_faster" in row else how
     return f"{what:72} {row['whole_ms'][1]:9.3f} -> {row['ms'][1]:9.3f} ms  x {row['faster'][1]:6.2f}  {how}"
 
 

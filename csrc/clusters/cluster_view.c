@@ -358,24 +358,6 @@ static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, 
     }
 }
 
-/* Counts of the same clusters those that the window may show, and in *n_hidden those of them that the window
- * hides. */
-static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window,
-                            const tl_target *target, int64_t step, int64_t *n_hidden)
-{
-    int64_t n = 0;
-    *n_hidden = 0;
-    for (int64_t i = 0; i < mesh->n_clusters; i += step) {
-        const tl_cluster *c = mesh->clusters + i;
-        const seen_box box = place_box(c->low, c->high, v->matrix);
-        if (visibility_of(c, v, &box, 0) != TL_VISIBILITY_FRONT)
-            continue;
-        n++;
-        *n_hidden += is_cluster_hidden(c, v, window, target);
-    }
-    return n;
-}
-
 /* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window or between
  * samples, nor, with a target of depths, behind them. */
 static void find_shown(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,

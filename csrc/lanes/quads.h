@@ -5,10 +5,10 @@
  *
  *   vq_set1 vq_load vq_store    as their names say; + - * / are those of the compiler
  *   vq_load_some(p, n)          the first n of four numbers, zeros beyond
- *   vqd_load vqd_store vqd_set1 vqd_add vqd_sub vqd_mul vqd_from_vq vq_from_vqd    of float64, as their names say
+ *   vqd_load vqd_store vqd_set1 vqd_add vqd_mul vqd_from_vq vq_from_vqd    of float64, as their names say
  *   vqd_above_zero(a, b)        bit k: number k of both is above 0
  *   vq4_set1(a) vq4_all(a)      a number everywhere; a quad, four times
- *   vq4_add vq4_sub vq4_mul vq4_div    as their names say
+ *   vq4_add vq4_sub vq4_mul     as their names say
  *   TL_VQ4_PERMUTE(a, i, j, k, l)      the lanes i, j, k, l of each quad
  *   TL_VQ4_BLEND(a, b, bits)    lane k of each quad from b where bit k is set
  *   vq4_pixels()                0, 1, 2, 3: each in all lanes of its quad
@@ -44,7 +44,6 @@ TL_INLINE vqd vqd_set1(double a) { return _mm256_set1_pd(a); }
 TL_INLINE vqd vqd_load(const double *p) { return _mm256_loadu_pd(p); }
 TL_INLINE void vqd_store(double *p, vqd a) { _mm256_storeu_pd(p, a); }
 TL_INLINE vqd vqd_add(vqd a, vqd b) { return _mm256_add_pd(a, b); }
-TL_INLINE vqd vqd_sub(vqd a, vqd b) { return _mm256_sub_pd(a, b); }
 TL_INLINE vqd vqd_mul(vqd a, vqd b) { return _mm256_mul_pd(a, b); }
 TL_INLINE vqd vqd_from_vq(vq a) { return _mm256_cvtps_pd((__m128)a); }
 TL_INLINE vq vq_from_vqd(vqd a) { return (vq)_mm256_cvtpd_ps(a); }
@@ -67,7 +66,6 @@ TL_INLINE vqd vqd_load(const double *p)
 }
 TL_INLINE void vqd_store(double *p, vqd a) { *(vq_halves_there *)p = a.of[0], *(vq_halves_there *)(p + 2) = a.of[1]; }
 TL_INLINE vqd vqd_add(vqd a, vqd b) { return (vqd){{a.of[0] + b.of[0], a.of[1] + b.of[1]}}; }
-TL_INLINE vqd vqd_sub(vqd a, vqd b) { return (vqd){{a.of[0] - b.of[0], a.of[1] - b.of[1]}}; }
 TL_INLINE vqd vqd_mul(vqd a, vqd b) { return (vqd){{a.of[0] * b.of[0], a.of[1] * b.of[1]}}; }
 TL_INLINE vqd vqd_from_vq(vq a) { return (vqd){{{(double)a[0], (double)a[1]}, {(double)a[2], (double)a[3]}}}; }
 TL_INLINE vq vq_from_vqd(vqd a)
@@ -90,7 +88,6 @@ TL_INLINE vq4 vq4_all(vq a) { return _mm512_broadcast_f32x4((__m128)a); }
 TL_INLINE vq4 vq4_add(vq4 a, vq4 b) { return _mm512_add_ps(a, b); }
 TL_INLINE vq4 vq4_sub(vq4 a, vq4 b) { return _mm512_sub_ps(a, b); }
 TL_INLINE vq4 vq4_mul(vq4 a, vq4 b) { return _mm512_mul_ps(a, b); }
-TL_INLINE vq4 vq4_div(vq4 a, vq4 b) { return _mm512_div_ps(a, b); }
 #define TL_VQ4_PERMUTE(a, i, j, k, l) _mm512_permute_ps(a, (i) | (j) << 2 | (k) << 4 | (l) << 6)
 #define TL_VQ4_BLEND(a, b, bits) _mm512_mask_blend_ps((__mmask16)((bits) * 0x1111), a, b)
 TL_INLINE vq4 vq4_pixels(void) { return _mm512_setr_ps(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3); }
@@ -143,7 +140,6 @@ TL_INLINE vq4 vq4_all(vq a) { return (vq4){{two_quads((__m128)a, (__m128)a), two
 TL_INLINE vq4 vq4_add(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_add_ps); }
 TL_INLINE vq4 vq4_sub(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_sub_ps); }
 TL_INLINE vq4 vq4_mul(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_mul_ps); }
-TL_INLINE vq4 vq4_div(vq4 a, vq4 b) { return TL_VQ4_EACH(a, b, _mm256_div_ps); }
 #define TL_VQ4_PERMUTE(a, i, j, k, l)                                           \
     ((vq4){{_mm256_permute_ps((a).of[0], (i) | (j) << 2 | (k) << 4 | (l) << 6), \
             _mm256_permute_ps((a).of[1], (i) | (j) << 2 | (k) << 4 | (l) << 6)}})
@@ -211,7 +207,6 @@ TL_INLINE vq4 vq4_set1(float a) { return vq4_all(vq_set1(a)); }
 TL_VQ4_EACH(vq4_add, a, b, a.of[k] + b.of[k])
 TL_VQ4_EACH(vq4_sub, a, b, a.of[k] - b.of[k])
 TL_VQ4_EACH(vq4_mul, a, b, a.of[k] * b.of[k])
-TL_VQ4_EACH(vq4_div, a, b, a.of[k] / b.of[k])
 #define TL_VQ4_SHUFFLE(a, b, ...)                                                                               \
     ((vq4){{TL_VQ_SHUFFLE((a).of[0], (b).of[0], __VA_ARGS__), TL_VQ_SHUFFLE((a).of[1], (b).of[1], __VA_ARGS__), \
             TL_VQ_SHUFFLE((a).of[2], (b).of[2], __VA_ARGS__), TL_VQ_SHUFFLE((a).of[3], (b).of[3], __VA_ARGS__)}})

@@ -16,7 +16,7 @@ FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 #: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
 LADDER = (
     ("base",), ("lanes",), ("vertex",), ("clusters", "exact", "mesh"), ("sink",), ("raster",), ("large_shapes",),
-    ("area", "points", "meshlets"),
+    ("area", "points"),
     ("pixels",), ("blend", "grad", "lines", "polygons", "shade", "tiles"), ("grid",),
 )  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}
@@ -103,7 +103,7 @@ def has_instructions(isa: str) -> bool:
 def test_file_compiles_alone(name):
     if not compiler():
         pytest.skip("no C compiler: $CC, cc, gcc or clang")
-    isa = "vbmi" if "meshlet" in name or name == "lanes/halves.h" else Path(name).stem.rpartition("_")[2]
+    isa = Path(name).stem.rpartition("_")[2]
     if isa in FLAGS_OF_ISA and not has_instructions(isa):
         pytest.skip(f"{compiler()[0]} does not know {isa}")
     result = check_syntax(CSRC / name, FLAGS_OF_ISA.get(isa, ()))

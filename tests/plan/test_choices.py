@@ -400,7 +400,7 @@ def test_no_table_of_costs_changes_a_bit(seed):
         found = [bits_of(tl.rasterize(vertices, triangles, SIZE)), several.samples_triangle, several.samples_depth]
         found += [tl.fill(vertices, triangles, colors, SIZE, sampling=name) for name in ("center", "msaa2", "area")]
         found += [tl.coverage(vertices, triangles, SIZE, sampling="area"), tl.overdraw(vertices, triangles, SIZE)]
-        for _ in range(3):  # the third picture may be of clusters, or of meshlets
+        for _ in range(3):  # the third picture may be of clusters
             found += [tl.render(one, size=SIZE, sampling="msaa4", threads=2) for one in (mesh, scene)]
             found += [bits_of(tl.rasterize_mesh(mesh, size=SIZE, cull="back"))]
         return found

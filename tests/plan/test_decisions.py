@@ -12,7 +12,6 @@ import pytest
 
 from topleft._core.base.options import Sink
 from topleft._core.raster import choices
-from topleft._core.raster.choices import ClusterRoute
 from topleft._core.raster.cluster_draw import Survey
 from topleft._core.raster.view import View
 
@@ -66,28 +65,18 @@ def shares():
 def clusters():
     culled = views({}, {"cull": "back"}, sizes=SIZES[:1])
     kept = [choices.pays_to_cluster(n, drawn, k) for n in COUNTS for drawn in (0, 1) for k in (1, 15, 16)]
-    grown = [choices.pays_to_grow(n, t, 1000) for n in (15, 16) for t in COUNTS]
     snapped = [choices.pays_to_snap_all(n, w * h) for n in COUNTS for w, h in SIZES]
     together = [choices.pays_to_share_instances(n, rows) for n in COUNTS for rows in (7.5, 8.0)]
     drawn = [choices.pays_to_draw_clusters(view, n, s) for view in culled for n in COUNTS for s in surveys()]
-    return kept + grown + snapped + together + drawn
-
-
-def meshlets():
-    return [
-        choices.pays_to_draw_meshlets(view, n, survey, hidden)
-        for view in views({}, {"cull": "back"}, sizes=SIZES[1::2])
-        for n, survey, hidden in product(COUNTS[::2], surveys(), SHARES[::2])
-    ]
+    return kept + snapped + together + drawn
 
 
 def sampled():
     options = [{"cull": cull, "sampling": f"msaa{n}"} for cull in ("none", "back") for n in (2, 4, 16)]
-    routes = ClusterRoute.CLUSTERS, ClusterRoute.MESHLETS
     return [
-        choices.pays_to_draw_samples(route, view, n, survey, lambda b=beyond: b)
+        choices.pays_to_draw_samples(view, n, survey, lambda b=beyond: b)
         for view in views(*options, sizes=SIZES[2::3])
-        for route, n, survey, beyond in product(routes, COUNTS[1::2], surveys()[::3], (0.0, 0.01, 0.5))
+        for n, survey, beyond in product(COUNTS[1::2], surveys()[::3], (0.0, 0.01, 0.5))
     ]
 
 
@@ -140,7 +129,7 @@ def split():
 
 
 GRIDS = (
-    arrays_by_threads, draws_by_threads, shares, clusters, meshlets, sampled, instances, flat, sorting, bounds,
+    arrays_by_threads, draws_by_threads, shares, clusters, sampled, instances, flat, sorting, bounds,
     blending, colours, labels, split,
 )  # fmt: skip
 
@@ -149,9 +138,8 @@ DECIDED = {
     "arrays_by_threads": (96, 32, "278bfa1eff08511b"),
     "draws_by_threads": (193536, 105366, "db0a20145174c260"),
     "shares": (192, 48, "deedb067a68f7d6a"),
-    "clusters": (11760, 4571, "b44150dd6574cc8c"),
-    "meshlets": (114912, 35990, "9d17c939f804ff9d"),
-    "sampled": (65664, 20955, "057125f20bfde487"),
+    "clusters": (11664, 4492, "e0525a33df0266eb"),
+    "sampled": (32832, 8994, "b88453e7e4a55581"),
     "instances": (24624, 9329, "5647fd5ae1372f66"),
     "flat": (10752, 5238, "cae0f22b1ce82c8d"),
     "sorting": (64512, 7382, "3ed8e8a7b0759050"),

@@ -293,21 +293,6 @@ def test_plan_of_a_mesh_counts_its_clusters():
     assert plan.scratch_bytes["clusters"] > mesh.clusters.n_bytes > 0
 
 
-@pytest.mark.skipif(not engine.has_meshlets(), reason="no AVX-512 with VBMI, or other kernels in use")
-@pytest.mark.parametrize(("cull", "is_whole"), [("none", False), ("back", True)])
-def test_plan_of_a_mesh_tells_of_its_meshlets_and_counts_their_bytes(cull, is_whole):
-    vertices, triangles = tl.scenes.blob(100_000)
-    mesh = tl.Mesh(vertices.astype(np.float32), triangles)
-    camera = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
-    plan = tl.plan(mesh, camera, (1280, 720), threads=1, cull=cull)
-    row = stage(plan, "meshlets")
-    assert row.choice.startswith("from picture 16 on")
-    assert (stage(plan, "clusters").choice == "none") == is_whole
-    guess = plan.scratch_bytes["meshlets"]
-    assert guess == pytest.approx(mesh.clusters.meshlets.n_bytes, rel=0.1)
-    assert tl.plan(mesh, camera, (1280, 720), cull=cull).scratch_bytes["meshlets"] == mesh.clusters.meshlets.n_bytes
-
-
 @pytest.mark.parametrize(
     ("n_triangles", "options", "why"),
     [
@@ -382,7 +367,7 @@ def test_costs_that_cannot_be_read_are_passed_over(text):
 
 
 @pytest.mark.parametrize("value", [None, {}, [], "x", True, [1.0], float("nan"), -1.0, 0.0, 1e9])
-@pytest.mark.parametrize("name", ["call", "snap", "wake", "blend_bytes", "near_pixels", "meshlet_both", "machine"])
+@pytest.mark.parametrize("name", ["call", "snap", "wake", "blend_bytes", "near_pixels", "sampled_cluster", "machine"])
 def test_costs_that_no_machine_has_are_passed_over(name, value):
     costs.cache_file().parent.mkdir()
     costs.cache_file().write_text(json.dumps(vars_of(costs.Costs(date="today")) | {name: value}))

@@ -11,7 +11,6 @@ import topleft as tl
 from topleft._core import engine
 from topleft._core.base.memory import FreshMemory
 from topleft._core.base.options import Sink
-from topleft._core.raster.choices import ClusterRoute
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
@@ -194,7 +193,7 @@ def test_masks_and_counts_have_the_same_bits(isa, sink):
             pixels = np.empty_like(expected)
             covered = np.empty(engine.Target.covered_shape(SIZE[1], SIZE[0]), np.uint64)
             target = engine.Target(sink, pixels, None, covered)
-            if not ClusteredMesh(clusters, view).draw(FreshMemory(), target, ClusterRoute.CLUSTERS):
+            if not ClusteredMesh(clusters, view).draw(FreshMemory(), target):
                 continue  # a vertex does not fit 32 bits
         assert_same(pixels, expected)
         n_compared += expected.any()

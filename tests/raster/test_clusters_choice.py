@@ -47,29 +47,22 @@ def test_clusters_are_drawn_where_enough_is_left_out(n, cull, outside, front, pa
     assert choices.pays_to_draw_clusters(view, n, Survey(outside, 0.0, 1 - outside - front, front)) == pays
 
 
-FROM_CLUSTERS, FROM_MESHLETS = choices.ClusterRoute.CLUSTERS, choices.ClusterRoute.MESHLETS
-
-
 @pytest.mark.parametrize(
-    ("route", "n", "cull", "outside", "front", "beyond", "pays"),
+    ("n", "cull", "outside", "front", "beyond", "pays"),
     [
-        (FROM_CLUSTERS, 300_000, "none", 0.0, 0.4, 0.0, True),
-        (FROM_CLUSTERS, 100_000, "none", 0.0, 0.4, 0.0, False),  # too few for the pixels
-        (FROM_CLUSTERS, 300_000, "none", 0.0, 0.9, 0.0, False),  # most show
-        (FROM_CLUSTERS, 1_000_000, "back", 0.0, 0.4, 0.0, False),
-        (FROM_CLUSTERS, 10_000_000, "back", 0.0, 0.4, 0.0, True),
-        (FROM_CLUSTERS, 300_000, "back", 0.95, 0.0, 0.5, True),  # from inside
-        (FROM_CLUSTERS, 300_000, "back", 0.95, 0.0, 0.0, False),
-        (FROM_CLUSTERS, 300_000, "back", 0.5, 0.4, 0.5, False),
-        (FROM_MESHLETS, 100_000, "none", 0.0, 0.4, 0.0, True),
-        (FROM_MESHLETS, 300_000, "back", 0.0, 0.4, 0.0, False),
-        (FROM_MESHLETS, 1_000_000, "back", 0.0, 0.4, 0.0, True),
-        (FROM_MESHLETS, 1_000_000, "back", 0.95, 0.0, 0.0, False),
+        (300_000, "none", 0.0, 0.4, 0.0, True),
+        (100_000, "none", 0.0, 0.4, 0.0, False),  # too few for the pixels
+        (300_000, "none", 0.0, 0.9, 0.0, False),  # most show
+        (1_000_000, "back", 0.0, 0.4, 0.0, False),
+        (10_000_000, "back", 0.0, 0.4, 0.0, True),
+        (300_000, "back", 0.95, 0.0, 0.5, True),  # from inside
+        (300_000, "back", 0.95, 0.0, 0.0, False),
+        (300_000, "back", 0.5, 0.4, 0.5, False),
     ],
 )
-def test_samples_are_drawn_from_clusters_where_triangles_are_many(route, n, cull, outside, front, beyond, pays):
+def test_samples_are_drawn_from_clusters_where_triangles_are_many(n, cull, outside, front, beyond, pays):
     view, survey = View.parse((1920, 1080), {"cull": cull, "sampling": "msaa4"}), Survey(outside, 0.0, 0.0, front)
-    assert choices.pays_to_draw_samples(route, view, n, survey, lambda: beyond) == pays
+    assert choices.pays_to_draw_samples(view, n, survey, lambda: beyond) == pays
 
 
 @pytest.mark.parametrize("clip_depth", ["minus_one_to_one", "zero_to_one"])

@@ -7,9 +7,8 @@ import shutil
 
 FLAGS_AVX2 = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt")
 FLAGS_AVX512 = (*FLAGS_AVX2, "-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd")
-FLAGS_VBMI = (*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2")
 FLAGS_SIMD128 = ("-msse4.1", "-mpopcnt", "-mno-mmx") if platform.machine() in ("x86_64", "AMD64") else ()
-FLAGS_OF_ISA = {"simd128": FLAGS_SIMD128, "avx2": FLAGS_AVX2, "avx512": FLAGS_AVX512, "vbmi": FLAGS_VBMI}
+FLAGS_OF_ISA = {"simd128": FLAGS_SIMD128, "avx2": FLAGS_AVX2, "avx512": FLAGS_AVX512}
 
 
 @functools.cache

@@ -158,15 +158,6 @@ cdef class Clustered:
         with nogil:
             K.survey_clusters(&self.mesh, &view.view, step, &n_of[0])
 
-    def count_hidden(self, SnappedMesh mesh, ClusterView view, Target target, int64_t step) -> tuple[int, int]:
-        """Count one cluster of each `step` that the picture may show; returns how many, and how many of them it hides."""
-        cdef tl_window window = mesh.window(0, target.height, target.width)
-        cdef tl_target rows = target.rows(0)
-        cdef int64_t n, n_hidden
-        with nogil:
-            n = K.count_hidden(&self.mesh, &view.view, &window, &rows, step, &n_hidden)
-        return n, n_hidden
-
     def draw(self, SnappedMesh mesh, Source source, ClusterView seen, bint may_be_hidden, Target target,
              int64_t first_row, int64_t n_rows, int32_t[::1] room, int32_t[::1] others, bint is_first,
              bint is_last) -> tuple[int, int, int]:

@@ -12,22 +12,19 @@ import numpy as np
 
 include "contract.pxi"  # the declarations of csrc's headers: packaging/bindings.py makes it
 
-# The kernels in use. Scalar until `isa.py` has chosen: never NULL. The meshlet kernels beside them may be NULL; to ask
-# the CPU again takes up to 0.1 ms on a virtual machine.
+# The kernels in use. Scalar until `isa.py` has chosen: never NULL.
 cdef const tl_kernels *K = tl_kernels_for(b"scalar")
-cdef const tl_meshlet_kernels *BESIDE = NULL
 cdef str isa_name = "scalar"
 
 
 def use_isa(name: str) -> None:
     """Let all further calls run on the kernels of one available instruction set."""
-    global K, BESIDE, isa_name
+    global K, isa_name
     cdef bytes key = name.encode()
     cdef const tl_kernels *kernels = tl_kernels_for(key)
     if kernels == NULL:
         raise ValueError(f"instruction set must be one of {', '.join(isa_available())}, got {name!r}")
-    K, BESIDE = kernels, tl_meshlets_beside(kernels)
-    isa_name = name
+    K, isa_name = kernels, name
 
 
 def isa_in_use() -> str:
@@ -100,7 +97,6 @@ include "exact.pxi"
 include "triangles.pxi"
 include "instances.pxi"
 include "clusters.pxi"
-include "meshlets.pxi"
 include "pixels.pxi"
 include "rle.pxi"
 include "matrices.pxi"

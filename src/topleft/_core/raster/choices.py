@@ -26,7 +26,6 @@ from topleft.typing import DepthTestOption
 
 if TYPE_CHECKING:
     from topleft._core.raster.cluster_draw import Survey
-    from topleft._core.raster.clusters import Clusters
     from topleft._core.raster.snap import Snapped
 
 #: Sinks that give the same picture whatever the order of triangles.
@@ -39,26 +38,6 @@ SHAPES_OF = {
 }  # fmt: skip
 
 WORK_OF = {Sink.MASK: "bits", Sink.SAMPLES: "bits", Sink.COUNT: "counts", Sink.LABEL: "labels"}
-
-
-class ClusterRoute(Enum):
-    """How `rasterize` draws a mesh that is sorted into clusters."""
-
-    WHOLE = "as a mesh without clusters"
-    CLUSTERS = "cluster by cluster"
-    MESHLETS = "from meshlets"
-
-
-class MeshletLimits(NamedTuple):
-    """Limits above which a mesh is drawn from meshlets: `triangles`, or the share outside and those in view a pixel."""
-
-    triangles: float
-    outside: float
-    density: float
-    hidden: float
-    hidden_of_large: float
-    """Of large triangles, and so much more with each triangle in view a pixel."""
-    hidden_growth: float
 
 
 class SampledLimits(NamedTuple):
@@ -226,42 +205,20 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
     return n_triangles >= costs.cluster_triangles and (n_drawn > 0 or n_instances >= costs.cluster_instances)
 
 
-def cluster_route(
-    view: View, sink: Sink, clusters: Clusters, survey: Survey, find_beyond: Callable[[], float]
-) -> ClusterRoute:
-    """Return how a view of a mesh in clusters is drawn; `survey`: their visibility in it.
+def pays_to_draw_from_clusters(view: View, n_triangles: int, survey: Survey, find_beyond: Callable[[], float]) -> bool:
+    """Tell whether a view of a mesh in clusters is drawn from these; `survey`: their visibility in it.
 
     `find_beyond`: the share of the vertices beyond the near or far plane.
     """
-    n = clusters.n_triangles
-    is_grown = can_draw_meshlets(view, sink, is_float32=clusters.is_float32)
-    is_grown = is_grown and pays_to_grow(clusters.n_pictures, n, len(clusters))
-    if is_grown and pays_to_draw_from(ClusterRoute.MESHLETS, view, n, survey, clusters.hidden, find_beyond):
-        return ClusterRoute.MESHLETS
-    pays = pays_to_draw_from(ClusterRoute.CLUSTERS, view, n, survey, clusters.hidden, find_beyond)
-    return ClusterRoute.CLUSTERS if pays else ClusterRoute.WHOLE
-
-
-def pays_to_draw_from(
-    route: ClusterRoute, view: View, n_triangles: int, survey: Survey, hidden: float, find_beyond: Callable[[], float]
-) -> bool:
-    """Tell whether a view of a mesh is drawn from clusters or from meshlets, as `route` says."""
     if view.sampling.n_samples > 1:
-        return pays_to_draw_samples(route, view, n_triangles, survey, find_beyond)
-    if route is ClusterRoute.MESHLETS:
-        return pays_to_draw_meshlets(view, n_triangles, survey, hidden)
+        return pays_to_draw_samples(view, n_triangles, survey, find_beyond)
     return pays_to_draw_clusters(view, n_triangles, survey)
 
 
-def pays_to_draw_samples(
-    route: ClusterRoute, view: View, n_triangles: int, survey: Survey, find_beyond: Callable[[], float]
-) -> bool:
-    """Tell whether several samples of a mesh are drawn from clusters or meshlets, one after the other."""
+def pays_to_draw_samples(view: View, n_triangles: int, survey: Survey, find_beyond: Callable[[], float]) -> bool:
+    """Tell whether several samples of a mesh are drawn from clusters, one after the other."""
     costs, is_culled = cost_table(), view.cull != CULL_CODES["none"]
-    if route is ClusterRoute.MESHLETS:
-        limits = SampledLimits(*(costs.sampled_meshlet_culled if is_culled else costs.sampled_meshlet))
-    else:
-        limits = SampledLimits(*(costs.sampled_cluster_culled if is_culled else costs.sampled_cluster))
+    limits = SampledLimits(*(costs.sampled_cluster_culled if is_culled else costs.sampled_cluster))
     n_pixels, n_samples = view.size[0] * view.size[1], view.sampling.n_samples
     are_many = n_triangles >= limits.triangles * n_samples or survey.outside >= limits.outside
     if survey.front > costs.cluster_front:
@@ -279,42 +236,6 @@ def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
     limits = costs.cluster_small, costs.cluster_middle, (math.inf, 0.0, 0.0)
     least = next(shares[is_culled] for below, *shares in limits if n_triangles < below)
     return survey.front <= costs.cluster_front and survey.outside >= least
-
-
-def can_draw_meshlets(view: View, sink: Sink, *, is_float32: bool) -> bool:
-    """Tell whether a view of a mesh in clusters may be drawn from meshlets, where there is code for these.
-
-    Their coordinates are float32 numbers, whatever the dtype. They draw triangles of 16 bits between near and far.
-    """
-    if not (engine.has_meshlets() and sink in (Sink.NEAREST, Sink.FARTHEST) and is_float32):
-        return False
-    is_near = max(*view.size, *view.viewport, *map(abs, view.origin)) <= engine.MAX_DRAWN_PX
-    is_clipped = view.near_clip and view.far_clip
-    is_sampled = view.sampling is Sampling.CENTER or view.sampling.n_samples > 1
-    return is_near and is_clipped and view.subpixel_bits <= 8 and is_sampled and view.grid_bits == view.subpixel_bits
-
-
-def pays_to_grow(n_pictures: int, n_triangles: int, n_clusters: int) -> bool:
-    """Tell whether a mesh in clusters has been drawn often enough to grow it into meshlets.
-
-    A mesh without shared vertices never is: its clusters hold few triangles.
-    """
-    costs = cost_table()
-    return n_pictures >= costs.grown_pictures and n_triangles >= costs.grown_cluster * n_clusters
-
-
-def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: float) -> bool:
-    """Tell whether a view of a mesh is drawn from meshlets; `survey`: the visibility of its clusters.
-
-    `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom.
-    """
-    costs = cost_table()
-    limits = MeshletLimits(*(costs.meshlet_both if view.cull == CULL_CODES["none"] else costs.meshlet_culled))
-    density = n_triangles * (1.0 - survey.outside) / (view.size[0] * view.size[1])
-    are_dense = density >= limits.density or survey.outside >= costs.meshlet_sparse
-    are_many = n_triangles >= limits.triangles or (survey.outside >= limits.outside and are_dense)
-    most_hidden = min(limits.hidden, limits.hidden_of_large + limits.hidden_growth * density)
-    return are_many and survey.front <= costs.cluster_front and hidden <= most_hidden
 
 
 def pays_to_draw_instances(

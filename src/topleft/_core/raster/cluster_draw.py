@@ -18,7 +18,6 @@ from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.choices import ClusterRoute
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.snap import snap_mesh, source_of
 from topleft._core.raster.view import View
@@ -36,9 +35,6 @@ SURVEYED = 50
 #: Clusters that tell the same of a picture of several samples, which depends on how many triangles lie in view a pixel,
 #: and vertices that tell how many lie beyond the near and far planes: 20 microseconds each.
 SURVEYED_OF_SAMPLES = 200
-
-#: Clusters that tell how much a picture hides: 40 microseconds. With 50 the share of a ball is off by 0.1.
-SURVEYED_BEHIND = 200
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 NO_TRIANGLES: NDArray[np.int32] = np.empty((0, 3), np.int32)
@@ -115,40 +111,28 @@ class ClusteredMesh(SeenBoxes):
         is_beyond = (z < (0.0 if self._view.zero_to_one else -w)) | (z > w)
         return float(is_beyond.mean()) if len(some) else 0.0
 
-    def route(self, sink: Sink) -> ClusterRoute:
-        """Return how a picture of the mesh is drawn, and count that picture."""
+    def pays(self) -> bool:
+        """Tell whether a picture of the mesh is drawn from its clusters, and let them note that."""
         clusters = self.clusters
         if clusters.n_drawn is not None:
-            return ClusterRoute.CLUSTERS
+            return True
         survey = self.survey(SURVEYED_OF_SAMPLES if self._view.sampling.n_samples > 1 else SURVEYED)
-        found = choices.cluster_route(self._view, sink, clusters, survey, self.find_beyond)
-        clusters.backoff.note(pays=found is not ClusterRoute.WHOLE)
-        return found
+        pays = choices.pays_to_draw_from_clusters(self._view, clusters.n_triangles, survey, self.find_beyond)
+        clusters.backoff.note(pays=pays)
+        return pays
 
-    def draw(
-        self, memory: Memory, target: engine.Target, route: ClusterRoute, sample: tuple[int, int] = (0, 0)
-    ) -> bool:
-        """Clear a target and draw the mesh by the route found; returns as `draw_clustered` does.
+    def draw(self, memory: Memory, target: engine.Target, sample: tuple[int, int] = (0, 0)) -> bool:
+        """Clear a target and draw the mesh; returns as `draw_clustered` does.
 
         `sample`: where in a pixel it is sampled, in sub-pixels from the centre.
         """
         n_triangles = self.clusters.n_drawn or self.clusters.n_triangles
         height, n_threads = self._view.size[1], count_threads(self._view.threads, n_triangles)
-        if route is ClusterRoute.MESHLETS:
-            return self.draw_meshlets(memory, target, min(n_threads, height), sample)
         memories, tops = (
             [memory] if n_threads == 1 else [FRESH] * n_threads,
             equal_bands(height, min(n_threads, height)),
         )
         return draw_clustered(memories, tops, lambda *_: [0], lambda _: self, target, sample)
-
-    def note_hidden(self, target: engine.Target) -> None:
-        """Note the share of the mesh that a target hides; it decides how the next picture is drawn."""
-        can_draw_meshlets = self.clusters.n_drawn is None and choices.can_draw_meshlets(
-            self._view, Sink(target.sink), is_float32=self.clusters.is_float32
-        )
-        if can_draw_meshlets and self.clusters.is_look_due():
-            self.clusters.hidden = self.hidden_share(target)
 
     def draw_rows(
         self,
@@ -181,24 +165,6 @@ class ClusteredMesh(SeenBoxes):
         ids: NDArray[np.int32] = np.empty((height, width), np.int32)
         target = engine.Target(sink, ids, np.empty((height, width), np.float32), None)
         return self.draw_rows(FRESH, target, 0, height)[1]
-
-    def hidden_share(self, target: engine.Target, n_most: int = SURVEYED_BEHIND) -> float:
-        """Return the share of the clusters in view that a target hides, from a sample of them."""
-        seen, step = self._seen(target.sink), max(1, round(len(self.clusters) / n_most))
-        n, n_hidden = self.clusters.engine.count_hidden(self._empty, seen, target, step)
-        return n_hidden / max(1, n)
-
-    def draw_meshlets(
-        self, memory: Memory, target: engine.Target, n_parts: int, sample: tuple[int, int] = (0, 0)
-    ) -> bool:
-        """Clear a target and draw the mesh from meshlets, as `draw_clustered` does from clusters."""
-        height, meshlets = self._view.size[1], self.clusters.meshlets
-        empty = self._empty.at_sample(*sample)
-        drawn = engine.MeshletPass(meshlets.engine, empty, self._own, self._seen(target.sink), target)
-        parts = draw_pass(memory, drawn, len(meshlets), self.clusters.n_triangles, height, n_parts)
-        if not any(map(len, parts)):
-            return True
-        return draw_others(memory, self, np.unique(np.concatenate(parts)), target, equal_bands(height, n_parts), sample)
 
     def part(self, *triangles: NDArray[np.int32]) -> engine.SnappedMesh:
         """Return the mesh with the vertices of some triangles snapped, maybe more; -1 is no triangle."""
@@ -251,36 +217,6 @@ class ClusteredMesh(SeenBoxes):
                 n_cut += engine.list_cut(array, own, records, cut[n_cut:])
             pieces = engine.Pieces(source, records, own, self._viewport, np.unique(cut[:n_cut]))
         return self._snapped(source, records, own, pieces, is_used)
-
-
-def draw_pass(
-    memory: Memory, drawn: engine.MeshletPass, n: int, n_triangles: int, height: int, n_parts: int
-) -> list[NDArray[np.int32]]:
-    """Draw the visible ones of n meshlets in `n_parts` bands of rows; returns the triangles still to be drawn."""
-    words = engine.SEEN_BYTES // 4
-    found: NDArray[np.int32] = memory.empty("meshlets found", (words * (n + 16),), np.int32)
-    odd: NDArray[np.int32] = memory.empty("meshlets odd", (n + 16,), np.int32)
-
-    def list_part(first: int, end: int) -> tuple[int, int, int]:
-        first, end = first * 16, min(end * 16, n)
-        return first, *drawn.find(first, end, found[words * first :], odd[first:])
-
-    n_found = n_odd = 0
-    for first, n_own, n_own_odd in run_parts(list_part, -(-n // 16), n_parts):
-        if first:
-            found[words * n_found : words * (n_found + n_own)] = found[words * first : words * (first + n_own)]
-            odd[n_odd : n_odd + n_own_odd] = odd[first : first + n_own_odd]
-        n_found += n_own
-        n_odd += n_own_odd
-    rows = [0, height] if n_parts == 1 else drawn.split_rows(found, n_found, n_parts)
-    room: NDArray[np.int32] = memory.empty("meshlets sorted", (n_parts, words * (n_found + 1)), np.int32)
-    others: NDArray[np.int32] = memory.empty("meshlets others", (n_parts, n_triangles + 1), np.int32)
-
-    def draw_rows(i: int, _: int) -> NDArray[np.int32]:
-        place = rows[i], rows[i + 1], True, room[i], others[i]
-        return others[i, : drawn.draw(found, n_found, odd, n_odd, *place)].copy()
-
-    return run_parts(draw_rows, n_parts, n_parts)
 
 
 def draw_clustered(

@@ -1,28 +1,22 @@
 """Clusters: a mesh sorted once, so that a view leaves out triangles that cannot show in it.
 
-In: the vertices and triangles of a mesh in object space. Out: copies of them in clusters and in meshlets.
+In: the vertices and triangles of a mesh in object space. Out: a copy of them in clusters.
 """
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.base.memory import allocate
 from topleft._core.base.threads import count_threads, run_parts
 
 #: `tl_cluster` of csrc/clusters.h.
 RECORD = np.dtype([("low", np.float64, 3), ("high", np.float64, 3), ("axis", np.float64, 3), ("cone_cos", np.float64),
                    ("min_area", np.float64), ("min_height", np.float64), ("first_triangle", np.int64),
                    ("first_vertex", np.int64), ("n_triangles", np.int32), ("n_vertices", np.int32)])  # fmt: skip
-
-#: How much is hidden is found out once in so many pictures: cameras move little between pictures, and 45 microseconds
-#: are 2.5 % of 70,000 triangles in 512x512.
-PICTURES_A_LOOK = 4
 
 
 class Backoff:
@@ -55,10 +49,6 @@ class Clusters:
         The vertices of the mesh.
     triangles : ndarray of int32, shape (T, 3)
         Its triangles, their indices checked.
-    n_pictures : int
-        How many pictures of the mesh there have been that might have been drawn in clusters.
-    hidden : float
-        The share of the clusters in view that picture `hidden_at` hid, one of the last `PICTURES_A_LOOK`.
     own_points : ndarray, shape (N, 3)
         The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
     n_bytes : int
@@ -105,36 +95,12 @@ class Clusters:
         order: NDArray[np.int32],
     ) -> None:
         self.points, self.triangles, self.backoff = points, triangles, Backoff()
-        self.n_pictures, self.hidden, self.hidden_at = 0, 0.0, -PICTURES_A_LOOK
         self.own_points, self._records, self.order = own_points, records, order
         self.engine, self.n_drawn = engine.Clustered(records, boxes, corners, order), None
         self.n_bytes = sum(array.nbytes for array in (own_points, records, boxes, corners, order))
 
-    @cached_property
-    def is_float32(self) -> bool:
-        """Whether all coordinates are float32 numbers, as those of most files are, whatever their dtype."""
-        with np.errstate(over="ignore"):
-            return bool((self.points == self.points.astype(np.float32)).all())
-
-    @cached_property
-    def meshlets(self) -> Meshlets:
-        """The same triangles in meshlets, made on first access (`pays_to_grow` in `choices.py`)."""
-        return Meshlets(self)
-
-    @property
-    def has_meshlets(self) -> bool:
-        """Whether they have been made."""
-        return "meshlets" in self.__dict__
-
     def __len__(self) -> int:
         return len(self.engine)
-
-    def is_look_due(self) -> bool:
-        """Tell whether to measure how much this picture hides, and note that it is measured."""
-        is_due = self.n_pictures - self.hidden_at >= PICTURES_A_LOOK
-        if is_due:
-            self.hidden_at = self.n_pictures
-        return is_due
 
     @property
     def n_triangles(self) -> int:
@@ -191,51 +157,6 @@ def measure_clusters(
 
     run_parts(measure, len(boxes), count_threads(threads, len(corners)))
     return boxes
-
-
-class Meshlets:
-    """A copy of a mesh in N meshlets: up to 64 vertices and 96 triangles each.
-
-    `blocks`: (N * MESHLET_BYTES,) uint8, `tl_meshlet` of ``csrc/meshlets.h``: vertices, corners, and which triangle of
-    the mesh each is. `bounds`: (MESHLET_BOUNDS, N + MESHLET_TAIL) float32. `counts`: (N + MESHLET_TAIL,) uint8, the
-    triangles of each, with the empty ones. `n_bytes`: of the copy.
-    """
-
-    def __init__(self, clusters: Clusters) -> None:
-        """Grow the triangles of clusters with float32 numbers, in the order that these have along a curve."""
-        points, triangles, order = clusters.points.astype(np.float32, copy=False), clusters.triangles, clusters.order
-        n = len(triangles)
-        source = engine.Source(points)
-        n_pieces = -(-n // engine.MESHLET_PIECE)
-        n_parts = min(n_pieces, count_threads(None, n))
-
-        def grow(first_piece: int, end_piece: int) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.uint8]]:
-            first, end = first_piece * engine.MESHLET_PIECE, min(end_piece * engine.MESHLET_PIECE, n)
-            most = engine.most_meshlets(end - first)
-            meshlets: NDArray[np.uint8] = np.empty(most * engine.MESHLET_BYTES, np.uint8)
-            records: NDArray[np.float32] = np.empty((most, engine.MESHLET_BOUNDS), np.float32)
-            n_triangles: NDArray[np.uint8] = np.empty(most, np.uint8)
-            numbers: NDArray[np.int32] = np.full(len(points), -1, np.int32)
-            room: NDArray[np.uint8] = np.empty(engine.GROW_ROOM, np.uint8)
-            place = first, end, numbers, room
-            n_grown = engine.grow_meshlets(source, triangles, order, *place, meshlets, records, n_triangles)
-            return meshlets[: n_grown * engine.MESHLET_BYTES], records[:n_grown], n_triangles[:n_grown]
-
-        parts = run_parts(grow, n_pieces, n_parts)
-        n_meshlets = sum(len(part[2]) for part in parts)
-        meshlets = allocate(n_meshlets * engine.MESHLET_BYTES)[: n_meshlets * engine.MESHLET_BYTES]
-        np.concatenate([part[0] for part in parts], out=meshlets)
-        bounds: NDArray[np.float32] = np.zeros((engine.MESHLET_BOUNDS, n_meshlets + engine.MESHLET_TAIL), np.float32)
-        np.concatenate([part[1].T for part in parts], axis=1, out=bounds[:, :n_meshlets])
-        counts: NDArray[np.uint8] = np.zeros(n_meshlets + engine.MESHLET_TAIL, np.uint8)
-        np.concatenate([part[2] for part in parts], out=counts[:n_meshlets])
-        middle, radius = np.abs(bounds[:3, :n_meshlets].astype(np.float64)), bounds[3, :n_meshlets].astype(np.float64)
-        self.engine = engine.Grown(meshlets, bounds, counts, (middle + radius).max(axis=1, initial=0).tolist())
-        self.blocks, self.bounds, self.counts = meshlets, bounds, counts
-        self.n_bytes = meshlets.nbytes + bounds.nbytes + counts.nbytes
-
-    def __len__(self) -> int:
-        return len(self.engine)
 
 
 def box_of(points: NDArray[Any]) -> NDArray[np.float64]:

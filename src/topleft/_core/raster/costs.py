@@ -160,18 +160,9 @@ class Costs:
     )
     exact_times: float = row(1.1, "ratio", "vertices that are not snapped, in a draw", "docs/design/exact.md")
 
-    # meshlets: triangles or (share outside and triangles a pixel in view); hidden at most, of large ones, by density
-    grown_pictures: float = row(16, "pictures", "before a mesh is grown, which a hundred pay back", STATIC)
-    grown_cluster: float = row(150, "triangles", "in a cluster, on the mean: soup is never grown", STATIC)
-    meshlet_sparse: float = row(0.6, "share", "clusters outside, for views of few triangles a pixel", STATIC)
-    meshlet_culled: Numbers = row((60_000, 0.1, 0.02, 0.6, 0.17, 0.4), "limits", "meshlets with culled faces", STATIC)
-    meshlet_both: Numbers = row((90_000, 0.5, 0.0, 0.7, 0.35, 1.0), "limits", "meshlets of both sides", STATIC)
-
-    # several samples from them: triangles in view a pixel; triangles a sample or the share outside
+    # several samples from clusters: triangles in view a pixel; triangles a sample or the share outside
     sampled_cluster: Numbers = row((0.06, 15_000, 0.1), "limits", "samples from clusters, both sides", STATIC)
     sampled_cluster_culled: Numbers = row((0.2, 1_500_000, 0.9), "limits", "the same, culled", STATIC)
-    sampled_meshlet: Numbers = row((0.04, 0, 0.0), "limits", "samples from meshlets, both sides", STATIC)
-    sampled_meshlet_culled: Numbers = row((0.1, 125_000, 0.3), "limits", "the same, culled", STATIC)
     inside_samples: float = row(100, "samples", "for a triangle beyond the near or far plane, at most", "blobs, inside")
     inside_outside: float = row(0.7, "share", "clusters outside, likewise at least", "blobs, inside")
 

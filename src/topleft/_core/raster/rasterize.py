@@ -367,28 +367,25 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, options: Frag
         clusters = view.static.find_clusters()
     if clusters is None:
         return None
-    clusters.n_pictures += 1
     if not clusters.backoff.is_over():
         return None
     mesh = ClusteredMesh(clusters, view)
-    route = mesh.route(sink)
-    if route is choices.ClusterRoute.WHOLE:
+    if not mesh.pays():
         return None
     if view.sampling.n_samples > 1:
-        return draw_cluster_samples(memory, mesh, view, options, sink, route)
+        return draw_cluster_samples(memory, mesh, view, options, sink)
     ids, depth = buffers_of(memory, view, options)
     bounds = memory.empty("bounds", engine.Target.bounds_shape(*ids.canvas.shape), np.float32)
     target = engine.Target(sink, ids.canvas, depth.canvas, None, bounds=bounds)
-    if not mesh.draw(memory, target, route):
+    if not mesh.draw(memory, target):
         return None
-    mesh.note_hidden(target)
     lay_background(ids.canvas, depth.canvas, sink, options.background)
     view.mark("draw")
     return Fragments(ids.drawn(), depth.drawn(), mesh.part, len(clusters.points), clusters.n_triangles)
 
 
 def draw_cluster_samples(
-    memory: Memory, mesh: ClusteredMesh, view: View, options: FragmentOptions, sink: Sink, route: choices.ClusterRoute
+    memory: Memory, mesh: ClusteredMesh, view: View, options: FragmentOptions, sink: Sink
 ) -> Fragments | None:
     """Draw a mesh in clusters into a plane a sample, one after the other; None as `draw_clusters` returns it."""
     (width, height), n = view.size, view.sampling.n_samples
@@ -399,9 +396,8 @@ def draw_cluster_samples(
     bounds = memory.empty("bounds", engine.Target.bounds_shape(height, width), np.float32)
     for plane, z, sample in zip(ids, depth, samples, strict=True):
         target = engine.Target(sink, plane, z, None, bounds=bounds)
-        if not mesh.draw(memory, target, route, sample):
+        if not mesh.draw(memory, target, sample):
             return None
-    mesh.note_hidden(target)
     lay_background(ids, depth, sink, options.background)
     view.mark("draw")
     copy_planes(ids, depth, options)

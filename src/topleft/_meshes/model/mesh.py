@@ -256,7 +256,6 @@ class Mesh:
         clusters = self.find_clusters()
         if clusters is None:
             return True
-        clusters.n_pictures += 1
         return not clusters.backoff.is_over()
 
     @cached_property

@@ -16,10 +16,9 @@ from topleft._core.base.arrays import as_array
 from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.options import Sampling, Sink
 from topleft._core.raster import choices
-from topleft._core.raster.choices import ClusterRoute, Drawing, Route
+from topleft._core.raster.choices import Drawing, Route
 from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
 from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.costs import cost_table
 from topleft._core.raster.sampling import area_cells, band_bytes, sample_positions, split_bytes
 from topleft._core.raster.snap import Snapped, snap_mesh
 from topleft._core.raster.view import View
@@ -35,9 +34,6 @@ CLASSES = (
 
 MOST_SHOWS = "most of the mesh shows, and drawing that cluster by cluster takes longer"
 
-#: Measured on closed meshes: 89 triangles a meshlet.
-TRIANGLE_BYTES_OF_MESHLETS = 19.2
-
 
 @dataclass(frozen=True, slots=True)
 class ClusterFacts:
@@ -49,7 +45,6 @@ class ClusterFacts:
     n_turned: int = 0  # away from the eye
     n_hidden: int = 0
     n_drawn: int = 0
-    meshlet_bytes: int = 0  # about, where later pictures are drawn from meshlets
 
 
 class Decided(NamedTuple):
@@ -257,29 +252,12 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTestOption 
     clusters = mesh.clusters
     seen = ClusteredMesh(clusters, view)
     few = seen.survey(SURVEYED_OF_SAMPLES if view.sampling.n_samples > 1 else SURVEYED)
-    n, beyond = len(clusters), seen.find_beyond
-    pays = choices.pays_to_draw_from(ClusterRoute.CLUSTERS, view, n_triangles, few, 0.0, beyond)
-    can_grow = choices.can_draw_meshlets(view, sink, is_float32=clusters.is_float32)
-    can_grow = can_grow and choices.pays_to_grow(int(cost_table().grown_pictures), n_triangles, n)
-    if not (pays or can_grow):
+    if not choices.pays_to_draw_from_clusters(view, n_triangles, few, seen.find_beyond):
         return ClusterFacts(None, MOST_SHOWS)
+    n = len(clusters)
     found = seen.survey(n)
     n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
-    n_hidden = n - n_outside - n_turned - n_drawn
-    hidden = n_hidden / max(1, n_hidden + n_drawn)
-    drawn_from = ClusterRoute.MESHLETS, view, n_triangles, found, hidden, beyond
-    is_grown = can_grow and choices.pays_to_draw_from(*drawn_from)
-    meshlet_bytes = bytes_of_meshlets(clusters) if is_grown else 0
-    if not pays:
-        return ClusterFacts(None, MOST_SHOWS, meshlet_bytes=meshlet_bytes)
-    return ClusterFacts(clusters, "", n_outside, n_turned, n_hidden, n_drawn, meshlet_bytes)
-
-
-def bytes_of_meshlets(clusters: Clusters) -> int:
-    """Return the memory of a mesh's meshlets: exactly once they are grown, about before."""
-    if clusters.has_meshlets:
-        return clusters.meshlets.n_bytes
-    return round(TRIANGLE_BYTES_OF_MESHLETS * clusters.n_triangles)
+    return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)
 
 
 def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
@@ -324,8 +302,6 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch |= band_bytes(n, (height, width), n_bytes, facts.drawing.n_threads)
     elif facts.is_sliced:
         scratch["outside"] = 4 * (n + 16 * facts.drawing.n_threads)
-    if found is not None and found.meshlet_bytes:
-        scratch["meshlets"] = found.meshlet_bytes
     return scratch, results
 
 

@@ -66,8 +66,7 @@ def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
 def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int, costs: Costs) -> list[Stage]:
     """Return the stages of a mesh that is drawn again, with one on the savings of its clusters, for each sample."""
     if found.clusters is None:
-        stages[1:1] = [Stage("clusters", "none", found.why_not, timed_in="method"), *plan_meshlets(found, costs)]
-        return stages
+        return [stages[0], Stage("clusters", "none", found.why_not, timed_in="method"), *stages[1:]]
     n, n_triangles = len(found.clusters), found.clusters.n_triangles
     names = {"outside of the picture": found.n_outside, "turned away": found.n_turned, "hidden": found.n_hidden}
     parts = [f"{count:,} {text}" for text, count in names.items() if count]
@@ -93,18 +92,7 @@ def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int, cost
             scaled.append(replace(stage, estimated_ms=total))
         else:
             scaled.append(stage)
-    scaled[1:1] = [row, *plan_meshlets(found, costs)]
-    return scaled
-
-
-def plan_meshlets(found: ClusterFacts, costs: Costs) -> list[Stage]:
-    """Return the stage of a mesh that is drawn from meshlets once it has been drawn often, if it is."""
-    if not found.meshlet_bytes:
-        return []
-    choice = f"from picture {costs.grown_pictures:g} on, at most {engine.MESHLET_TRIANGLES} triangles each"
-    why = "a mesh that is drawn so often is worth growing, once; estimates are of the pictures before"
-    rejected = ("from the first picture on: growing takes as long as a hundred of them save",)
-    return [Stage("meshlets", choice, why, rejected, timed_in="method")]
+    return [scaled[0], row, *scaled[1:]]
 
 
 def plural(n: int, thing: str) -> str:
