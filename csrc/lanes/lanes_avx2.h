@@ -95,15 +95,25 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         _mm256_storeu_si256((__m256i *)(p + 32 * k), _mm256_and_si256(on, one));
     }
 }
-/* The order that moves the lanes in `bits` to the front: byte k of the packed list is the k-th lane set. */
-TL_INLINE vi compress_order(unsigned bits)
-{
-    const uint64_t lanes = _pdep_u64(bits, 0x0101010101010101u) * 0xff;
-    return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)_pext_u64(0x0706050403020100u, lanes)));
-}
+/* Tables by the bits of a mask, for pdep and pext are microcode on Zen 1 and 2: up to 290 cycles each.  A row has a byte
+ * for each lane and is built from the highest lane down: with(row, lane) is the row after a lane that is set. */
+#define TL_ROWS_0(with, row) row, with(row, 0)
+#define TL_ROWS_1(with, row) TL_ROWS_0(with, row), TL_ROWS_0(with, with(row, 1))
+#define TL_ROWS_2(with, row) TL_ROWS_1(with, row), TL_ROWS_1(with, with(row, 2))
+#define TL_ROWS_3(with, row) TL_ROWS_2(with, row), TL_ROWS_2(with, with(row, 3))
+#define TL_ROWS_4(with, row) TL_ROWS_3(with, row), TL_ROWS_3(with, with(row, 4))
+#define TL_ROWS_5(with, row) TL_ROWS_4(with, row), TL_ROWS_4(with, with(row, 5))
+#define TL_ROWS_6(with, row) TL_ROWS_5(with, row), TL_ROWS_5(with, with(row, 6))
+#define TL_ROWS_7(with, row) TL_ROWS_6(with, row), TL_ROWS_6(with, with(row, 7))
+#define TL_PUT_FIRST(row, lane) ((row) << 8 | (lane))
+#define TL_COUNT_FROM(row, lane) ((row) + (UINT64_C(0x0101010101010101) << 8 * (lane)))
+static const uint64_t packing_orders[256] = {TL_ROWS_7(TL_PUT_FIRST, UINT64_C(0))};
+static const uint64_t prefix_counts[256] = {TL_ROWS_7(TL_COUNT_FROM, UINT64_C(0))};
+
+TL_INLINE vi row_of_bytes(uint64_t row) { return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)row)); }
 TL_INLINE void vi_pack(int32_t *p, vm m, vi a)
 {
-    vi_store(p, _mm256_permutevar8x32_epi32(a, compress_order(vm_bits(m))));
+    vi_store(p, _mm256_permutevar8x32_epi32(a, row_of_bytes(packing_orders[vm_bits(m)])));
 }
 
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
@@ -192,11 +202,7 @@ TL_INLINE vi vi_pick(const int32_t *p, vi i)
 {
     return _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)p), i);
 }
-TL_INLINE vi vi_prefix_count(unsigned bits)
-{
-    const uint64_t ones = 0x0101010101010101u;
-    return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)(_pdep_u64(bits, ones) * ones)));
-}
+TL_INLINE vi vi_prefix_count(unsigned bits) { return row_of_bytes(prefix_counts[bits]); }
 
 /* Writes the fourth column over that of TL_LANES rows of four. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)

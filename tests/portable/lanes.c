@@ -133,6 +133,8 @@ static void test_bits(void)
     tell_ints("running sum");
     EACH((vi_store(out_i + i, vi_shift_in(AI, before)), before = AI))
     tell_ints("one lane up");
+    for (int i = 0; i < N; i++) /* AI > BI has every mask of eight lanes, twice */
+        a_i[i] = i, b_i[i] = i + (i / 8 >> i % 8 & 1 ? -N : N);
     EACH((counts = vi_add(vi_prefix_count(vm_bits(vi_gt(AI, BI))), vi_last(counts)), vi_store(out_i + i, counts)))
     tell_ints("running count");
     int n = 0;
