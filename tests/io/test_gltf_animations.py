@@ -247,3 +247,57 @@ def test_animated_node_with_a_matrix_stays_and_is_told(tmp_path):
     with pytest.warns(MeshWarning, match="animations of nodes that have a matrix not played"):
         mesh = tl.load(tmp_path / "a.glb", time=0)
     assert np.allclose(corners(mesh), 2 * TRIANGLE)
+
+
+def morphed(n_targets, n_weights, n_keys=1, **more):
+    """A triangle with morph targets that move it by 1, and an animation of so many weights a key, all at their most."""
+    file = GltfFile()
+    delta = file.accessor(np.ones((3, 3), np.float32))
+    file.node(mesh=file.mesh(file.primitive(targets=[{"POSITION": delta}] * n_targets)))
+    animation(file, "weights", np.arange(n_keys), np.full(n_weights * n_keys, 255, np.uint8), normalized=True, **more)
+    return file
+
+
+@pytest.mark.parametrize(("n_targets", "n_weights"), [(2, 1), (1, 2), (0, 1)])
+def test_animated_weights_are_as_many_as_the_targets(load, n_targets, n_weights):
+    message = f"an animation has {n_weights} numbers for 1 keys of {n_targets} morph targets"
+    with pytest.raises(MeshError, match=message):
+        load(morphed(n_targets, n_weights), 0)
+
+
+def test_animated_weights_of_a_node_without_a_mesh_are_refused(load):
+    file = morphed(1, 1)
+    file.tree["animations"][0]["channels"][0]["target"]["node"] = file.node()
+    with pytest.raises(MeshError, match="an animation has 1 numbers for 1 keys of 0 morph targets"):
+        load(file, 0)
+
+
+def test_animation_decodes_the_keys_about_its_time_alone(load):
+    options = {"max_unpacked_bytes": 2 * 3 * 4}  # three weights of two keys, as float32
+    for time in (0, 99.5, 999, 2000):
+        mesh = load(morphed(3, 3, 1000), time, load=lambda path, **moment: tl.load(path, **moment, **options))
+        assert (corners(mesh) == TRIANGLE + 3).all()
+
+
+def test_animation_of_sparse_values_is_read(load):
+    file = GltfFile().shown()
+    animation(file, "translation", [0, 1, 2], np.zeros((3, 3), np.float32))
+    row = file.tree["accessors"][-1]
+    del row["bufferView"]
+    places, rows = np.uint8([2]), np.float32([[0, 0, 7]])
+    row["sparse"] = {"count": 1, "indices": {"bufferView": file.view(places.tobytes()), "componentType": 5121}}
+    row["sparse"]["values"] = {"bufferView": file.view(rows.tobytes())}
+    for time, z in {0: 0, 1: 0, 1.5: 3.5, 3: 7}.items():
+        assert np.allclose(corners(load(file, time)), TRIANGLE + np.array([0, 0, z]))
+
+
+def test_each_channel_of_an_animation_spends_its_keys_and_its_numbers(load):
+    file = moved("translation", range(10), np.zeros((10, 3), np.float32))
+    row = file.tree["animations"][0]
+    row["channels"] = [{"sampler": 0, "target": {"node": file.node(), "path": "translation"}} for _ in range(20)]
+
+    def read(path, **moment):
+        return tl.load(path, **moment, max_vertices=13 * 20 - 1)
+
+    with pytest.raises(MeshError, match="has 260 vertices, more than the 259 of max_vertices"):
+        load(file, 0, load=read)

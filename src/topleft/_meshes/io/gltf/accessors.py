@@ -65,8 +65,23 @@ class Accessors:
         """
         row = entry(self._tree, "accessors", index)
         if index not in self._arrays:
-            self._arrays[index] = self._decoded(row, index)
+            self._arrays[index] = self._decoded(row, index, 0, self.shape(index)[0])
         return self._arrays[index]
+
+    def rows(self, index: Any, first: int, end: int) -> Array:
+        """Rows [first, end) of `array(index)`; no others are decoded, unless the accessor is sparse."""
+        row = entry(self._tree, "accessors", index)
+        if "sparse" in row or index in self._arrays:
+            return self.array(index)[first:end]
+        return self._decoded(row, index, first, end)
+
+    def shape(self, index: Any) -> tuple[int, int]:
+        """The shape (N, K) of `array(index)`, which is not decoded."""
+        row = entry(self._tree, "accessors", index)
+        kind = row.get("type")
+        if kind not in N_COMPONENTS or row.get("componentType") not in DTYPES:
+            raise MeshError(f"accessors[{index}] is of {kind!r} and {row.get('componentType')!r}, which is no type")
+        return whole(row, "count"), N_COMPONENTS[kind]
 
     def view(self, index: Any) -> npt.NDArray[np.uint8]:
         """The bytes of a view of a buffer."""
@@ -77,20 +92,22 @@ class Accessors:
             raise MeshError(f"bufferViews[{index}] ends at byte {start + size} of a buffer of {len(buffer)}")
         return buffer[start : start + size]
 
-    def _decoded(self, row: Tree, index: int) -> Array:
-        n, kind, code = whole(row, "count"), row.get("type"), row.get("componentType")
-        if kind not in N_COMPONENTS or code not in DTYPES:
-            raise MeshError(f"accessors[{index}] is of {kind!r} and {code!r}, which is no type")
-        n_columns, dtype = N_COMPONENTS[kind], np.dtype(DTYPES[code])
+    def _decoded(self, row: Tree, index: int, first: int, end: int) -> Array:
+        """Rows [first, end) of an accessor, which are all of them if it is sparse."""
+        (n_all, n_columns), dtype, n = self.shape(index), np.dtype(DTYPES[row["componentType"]]), end - first
         sparse = row.get("sparse")
-        self._source.budget.check("max_vertices", n // (3 if kind == "SCALAR" else 1))
+        self._source.budget.check("max_vertices", n // (3 if n_columns == 1 else 1))
+        if not 0 <= first <= end <= n_all:
+            raise MeshError(f"accessors[{index}] has {n_all} rows, and its row {end - 1} is read")
         if "bufferView" in row:
             stride = whole(entry(self._tree, "bufferViews", row["bufferView"]), "byteStride", 0)
-            values = self._rows(row["bufferView"], whole(row, "byteOffset", 0), n, n_columns, dtype, stride)
+            start = whole(row, "byteOffset", 0) + first * (stride or n_columns * dtype.itemsize)
+            values = self._rows(row["bufferView"], start, n, n_columns, dtype, stride)
         else:
             self._source.budget.spend("max_unpacked_bytes", n * n_columns * dtype.itemsize)
             values = np.zeros((n, n_columns), dtype)
         if sparse is not None:
+            self._source.budget.spend("max_nodes", 1)  # it takes the time of a primitive
             places = sparse["indices"]
             n_set = whole(sparse, "count")
             at_dtype = np.dtype(DTYPES[places["componentType"]])

@@ -8,6 +8,7 @@ Based on: Khronos Group, "glTF 2.0 Specification", 2021, 3.11 and appendix C.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,9 @@ from topleft._meshes.io.references import InputFile, Moment
 from topleft.errors import MeshError
 
 ALL_CLIPS = "all"
-N_NUMBERS = {"translation": 3, "rotation": 4, "scale": 3, "weights": None}
+N_NUMBERS = {"translation": 3, "rotation": 4, "scale": 3}
+"""By property; `weights` have a number for each morph target of the mesh."""
+
 N_PARTS = {"STEP": 1, "LINEAR": 1, "CUBICSPLINE": 3}
 """Values of a key: a spline has a tangent before the value and one behind it."""
 
@@ -32,6 +35,7 @@ def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -
     rows = tree.get("animations")
     if not rows:
         raise MeshError(f"{str(source.path)!r} has no animations, so it has no time={moment.time:g}")
+    count_targets = cache(lambda mesh: n_targets_of(tree, mesh))
     found: dict[tuple[int, str], list[float]] = {}
     for animation in chosen(tree, rows, moment.clip, source):
         for channel in animation["channels"]:
@@ -39,19 +43,27 @@ def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -
             if "node" not in target:  # that of an extension
                 continue
             node, path = entry(tree, "nodes", target["node"]), target.get("path")
-            if path not in N_NUMBERS:
+            if path != "weights" and path not in N_NUMBERS:
                 raise MeshError(f"an animation moves {path!r} of a node"[:120])
             if "matrix" in node and path != "weights":
                 source.notes.add("animations of nodes that have a matrix not played")
             elif (target["node"], path) not in found:
                 sampler = entry(animation, "samplers", channel.get("sampler"))
+                n_targets = count_targets(node["mesh"]) if "mesh" in node else 0
+                n_numbers = n_targets if path == "weights" else N_NUMBERS[path]
                 source.budget.spend("max_nodes", 1)
-                source.budget.spend("max_vertices", len(accessors.array(sampler.get("input"))))  # keys, each time
-                found[target["node"], path] = value_at(sampler, accessors, moment.time, path).tolist()
+                n_keys, _ = accessors.shape(sampler.get("input"))
+                source.budget.spend("max_vertices", n_keys + n_numbers)  # each channel reads all keys of its sampler
+                found[target["node"], path] = value_at(sampler, accessors, moment.time, path, n_numbers).tolist()
     nodes = list(tree["nodes"]) if found else []
     for (index, path), value in found.items():
         nodes[index] = {**nodes[index], path: value}
     return {**tree, "nodes": nodes} if found else tree
+
+
+def n_targets_of(tree: Tree, mesh: Any) -> int:
+    """The number of morph targets of a mesh: that of its primitive with the most."""
+    return max((len(primitive.get("targets", ())) for primitive in entry(tree, "meshes", mesh)["primitives"]), default=0)
 
 
 def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFile) -> list[Tree]:
@@ -74,31 +86,33 @@ def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFil
     raise MeshError(f"cannot read {str(source.path)!r}: clip must be {span}, or one of {some}, got {clip!r}")
 
 
-def value_at(sampler: Tree, accessors: Accessors, time: float, path: str) -> F64:
-    """The value (C,) of a sampler at a time."""
+def value_at(sampler: Tree, accessors: Accessors, time: float, path: str, n_numbers: int) -> F64:
+    """The `n_numbers` values (C,) of a sampler at a time; the two keys about it are decoded, and no others."""
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in N_PARTS:
         raise MeshError(f"an animation has the interpolation {kind!r}"[:120])
-    keys, values = (accessors.array(sampler.get(name)).astype(np.float64) for name in ("input", "output"))
-    keys = keys.ravel()
+    keys = accessors.array(sampler.get("input")).astype(np.float64).ravel()
     n, n_parts = len(keys), N_PARTS[kind]
     if not n or not (np.isfinite(keys).all() and (np.diff(keys) >= 0).all()):
         raise MeshError("an animation is broken: its keys do not go up")
-    n_numbers = N_NUMBERS[path] or values.size // (n * n_parts)
-    if values.size != n * n_parts * n_numbers:
-        raise MeshError(f"an animation has {values.size} numbers for {n} keys of {path}")
-    of_key = values.reshape(n, n_parts, n_numbers)
-    value = of_key[:, n_parts // 2]
+    n_rows, n_columns = accessors.shape(sampler.get("output"))
+    if n_rows * n_columns != n * n_parts * n_numbers or n_rows % n:
+        wish = f"{n_numbers} morph targets" if path == "weights" else path
+        raise MeshError(f"an animation has {n_rows * n_columns} numbers for {n} keys of {wish}")
     time = float(np.float32(time))  # as the keys are: 0.1 is not before its own key
     i = int(np.searchsorted(keys, time, side="right")) - 1
+    first, end = max(i, 0), min(i + 2, n)
+    rows = accessors.rows(sampler.get("output"), first * (n_rows // n), end * (n_rows // n))
+    of_key = rows.astype(np.float64).reshape(end - first, n_parts, n_numbers)
+    value = of_key[:, n_parts // 2]
     if i < 0 or i == n - 1 or kind == "STEP":
-        return value[max(i, 0)]
+        return value[0]
     span = keys[i + 1] - keys[i]
     u = float((time - keys[i]) / span)
-    before, behind = value[i], value[i + 1]
+    before, behind = value
     if kind == "CUBICSPLINE":
         rise = (3 - 2 * u) * u * u
-        leaving, arriving = span * ((u - 2) * u + 1) * u * of_key[i, 2], span * (u - 1) * u * u * of_key[i + 1, 0]
+        leaving, arriving = span * ((u - 2) * u + 1) * u * of_key[0, 2], span * (u - 1) * u * u * of_key[1, 0]
         return (1 - rise) * before + leaving + rise * behind + arriving
     first, second = slerp_weights(before, behind, u) if path == "rotation" else (1 - u, u)
     return first * before + second * behind

@@ -13,6 +13,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64, Array
 from topleft._core.base.color import encode_srgb
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, normalized
-from topleft._meshes.io.gltf.animations import posed
+from topleft._meshes.io.gltf.animations import n_targets_of, posed
 from topleft._meshes.io.gltf.draco import DracoSize, declared_by_draco
 from topleft._meshes.io.gltf.materials import Materials
 from topleft._meshes.io.references import Cloud, InputFile
@@ -105,6 +106,7 @@ def read_cameras(source: InputFile) -> list[CameraOfFile]:
     for index in nodes.shown():
         node = entry(tree, "nodes", index)
         if "camera" in node:
+            source.budget.spend("max_nodes", 1)
             row = entry(tree, "cameras", node["camera"])
             kind = row.get("type")
             if kind not in ("perspective", "orthographic"):
@@ -279,6 +281,7 @@ class _Reader:
         self._nodes = _Nodes(tree)
         self._shapes: dict[tuple[int, int], _Shape | None] = {}
         self._skins: dict[int, F64] = {}
+        self._count_targets = cache(lambda mesh: n_targets_of(tree, mesh))
         self._meshes_of_draco: dict[int, tuple[DracoSize, Any]] = {}  # by their views
 
     def parts(self) -> Iterator[Mesh]:
@@ -288,13 +291,14 @@ class _Reader:
             if "mesh" not in node:
                 continue
             mesh = entry(self._tree, "meshes", node["mesh"])
-            weights = node.get("weights", mesh.get("weights", ()))
+            weights = self._weights(node, mesh)
             places: list[F64] | None = None
             for i, primitive in enumerate(mesh["primitives"]):
                 shape = self._shape(node, i, primitive, weights)
                 if primitive.get("mode") == POINTS and "POSITION" in primitive["attributes"]:
                     self._add_cloud(primitive, self._nodes.matrix(index))
                 if shape is None:
+                    self._source.budget.spend("max_nodes", 1)
                     continue
                 if places is None:
                     places = self._places(index, node)
@@ -308,6 +312,15 @@ class _Reader:
                     self._source.budget.spend(option, len(matrices) * count)
                 for matrix in matrices:
                     yield _placed(shape, matrix, materials)
+
+    def _weights(self, node: Tree, mesh: Tree) -> list[float]:
+        """The weights of the morph targets of a node; none if all are 0."""
+        weights = list(node.get("weights", mesh.get("weights", ())))
+        n_targets = self._count_targets(node["mesh"])
+        if len(weights) not in (0, n_targets):
+            raise MeshError(f"meshes[{node['mesh']}] has {n_targets} morph targets, and {len(weights)} weights")
+        self._source.budget.spend("max_vertices", len(weights))
+        return weights if any(weights) else []
 
     def _add_cloud(self, primitive: Tree, matrix: F64) -> None:
         """Keep the points of a primitive, in the colours of its vertices or its material."""
@@ -346,14 +359,15 @@ class _Reader:
             matrices[:, :3, 3] = given["TRANSLATION"][:n]
         return [engine.product(world, matrix) for matrix in matrices]
 
-    def _shape(self, node: Tree, i: int, primitive: Tree, weights: Any) -> _Shape | None:
+    def _shape(self, node: Tree, i: int, primitive: Tree, weights: list[float]) -> _Shape | None:
         """The triangles of a primitive, moved by its morph targets and its skin; None if it has none."""
-        has_targets = bool(primitive.get("targets")) and any(weights)
+        has_targets = bool(primitive.get("targets") and weights)
         key = (node["mesh"], i)
         skin = node["skin"] if "skin" in node and "JOINTS_0" in primitive["attributes"] else None
         is_shared = not has_targets and skin is None
         if is_shared and key in self._shapes:
             return self._shapes[key]
+        self._source.budget.spend("max_nodes", 1)  # a shape takes as long as its place
         attributes = primitive["attributes"]
         mode = primitive.get("mode", TRIANGLES)
         if mode not in (TRIANGLES, STRIP, FAN):
@@ -376,8 +390,9 @@ class _Reader:
             self._shapes[key] = shape
         return shape
 
-    def _morphed(self, values: dict[str, Array], targets: list[Tree], weights: Any) -> dict[str, Array]:
+    def _morphed(self, values: dict[str, Array], targets: list[Tree], weights: list[float]) -> dict[str, Array]:
         """The attributes that targets move, moved."""
+        self._source.budget.spend("max_vertices", len(weights))
         moved: dict[str, Array] = {}
         for weight, target in zip(weights, targets, strict=False):
             if not weight:
