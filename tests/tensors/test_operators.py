@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch")
 
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
-from topleft._torch import pictures  # noqa: E402
+from topleft._torch import operators, pictures  # noqa: E402
 
 CTX = dr.RasterizeContext()
 EDGES = ("silhouette", "area", "straight-through")
@@ -249,6 +249,14 @@ def test_indices_of_no_vertex_are_refused(index):
     tri = torch.tensor([[0, 1, index]])
     with pytest.raises(IndexError, match=re.escape("triangles must hold indices in [0, 3)")):
         dr.interpolate(torch.zeros(3, 2), torch.zeros(1, 2, 2, 4), tri)
+
+
+@pytest.mark.parametrize("dtype", [torch.int32, torch.int64])
+def test_checked_triangles_lie_in_memory_that_no_other_thread_can_write(dtype):
+    tri = torch.tensor([[0, 1, 2]], dtype=dtype)
+    checked = operators.triangles_of(tri, 3)
+    tri[:] = 2**30
+    assert (checked == [[0, 1, 2]]).all() and not checked.flags.writeable
 
 
 def test_rast_of_other_programs_may_hold_anything():

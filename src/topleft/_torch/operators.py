@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from topleft import rasterize as draw
-from topleft._core.base.arrays import check_rows
+from topleft._core.base.arrays import as_checked_triangles
 from topleft._core.gradients import tensors
 from topleft._core.gradients.bands import MIN_PX_PER_THREAD
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid, TexelFilter, TexelLook, TexelsBeyond
@@ -31,12 +31,8 @@ def numpy_of(tensor: Tensor | None) -> Any:
 
 
 def triangles_of(tri: Tensor, n_vertices: int) -> NDArray[np.int32]:
-    """Return triangles whose vertices exist."""
-    if tri.dtype == torch.int64 and tri.numel() and not -(2**31) <= int(tri.min()) <= int(tri.max()) < 2**31:
-        raise IndexError(f"triangles must hold indices in [0, {n_vertices}), got {int(tri.min())} to {int(tri.max())}")
-    array: NDArray[np.int32] = numpy_of(tri.to(torch.int32))
-    check_rows(array, n_vertices)
-    return array
+    """Return triangles whose vertices exist, in memory that no tensor has: another thread may change `tri` meanwhile."""
+    return as_checked_triangles(numpy_of(tri), n_vertices)
 
 
 def grid_of(tri: Tensor, pixels: Tensor, n_vertices: int) -> PixelGrid:
