@@ -256,7 +256,8 @@ def test_checked_triangles_lie_in_memory_that_no_other_thread_can_write(dtype):
     tri = torch.tensor([[0, 1, 2]], dtype=dtype)
     checked = operators.triangles_of(tri, 3)
     tri[:] = 2**30
-    assert (checked == [[0, 1, 2]]).all() and not checked.flags.writeable
+    assert (checked == [[0, 1, 2]]).all()
+    assert not checked.flags.writeable
 
 
 def test_rast_of_other_programs_may_hold_anything():

@@ -31,7 +31,7 @@ def numpy_of(tensor: Tensor | None) -> Any:
 
 
 def triangles_of(tri: Tensor, n_vertices: int) -> NDArray[np.int32]:
-    """Return triangles whose vertices exist, in memory that no tensor has: another thread may change `tri` meanwhile."""
+    """Return triangles whose vertices exist, as a copy: another thread may write to `tri` during a call."""
     return as_checked_triangles(numpy_of(tri), n_vertices)
 
 

@@ -63,7 +63,8 @@ def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -
 
 def n_targets_of(tree: Tree, mesh: Any) -> int:
     """The number of morph targets of a mesh: that of its primitive with the most."""
-    return max((len(primitive.get("targets", ())) for primitive in entry(tree, "meshes", mesh)["primitives"]), default=0)
+    primitives = entry(tree, "meshes", mesh)["primitives"]
+    return max((len(primitive.get("targets", ())) for primitive in primitives), default=0)
 
 
 def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFile) -> list[Tree]:
