@@ -63,8 +63,9 @@ def posed(tree: Tree, accessors: Accessors, moment: Moment, source: InputFile) -
 
 def n_targets_of(tree: Tree, mesh: Any) -> int:
     """The number of morph targets of a mesh: that of its primitive with the most."""
-    primitives = entry(tree, "meshes", mesh)["primitives"]
-    return max((len(primitive.get("targets", ())) for primitive in primitives), default=0)
+    return max(
+        (len(primitive.get("targets", ())) for primitive in entry(tree, "meshes", mesh)["primitives"]), default=0
+    )
 
 
 def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFile) -> list[Tree]:
@@ -102,9 +103,9 @@ def value_at(sampler: Tree, accessors: Accessors, time: float, path: str, n_numb
         raise MeshError(f"an animation has {n_rows * n_columns} numbers for {n} keys of {wish}")
     time = float(np.float32(time))  # as the keys are: 0.1 is not before its own key
     i = int(np.searchsorted(keys, time, side="right")) - 1
-    first, end = max(i, 0), min(i + 2, n)
-    rows = accessors.rows(sampler.get("output"), first * (n_rows // n), end * (n_rows // n))
-    of_key = rows.astype(np.float64).reshape(end - first, n_parts, n_numbers)
+    start, end = max(i, 0), min(i + 2, n)
+    rows = accessors.rows(sampler.get("output"), start * (n_rows // n), end * (n_rows // n))
+    of_key = rows.astype(np.float64).reshape(end - start, n_parts, n_numbers)
     value = of_key[:, n_parts // 2]
     if i < 0 or i == n - 1 or kind == "STEP":
         return value[0]

@@ -315,7 +315,7 @@ class _Reader:
 
     def _weights(self, node: Tree, mesh: Tree) -> list[float]:
         """The weights of the morph targets of a node; none if all are 0."""
-        weights = list(node.get("weights", mesh.get("weights", ())))
+        weights: list[float] = list(node["weights"] if "weights" in node else mesh.get("weights", ()))
         n_targets = self._count_targets(node["mesh"])
         if len(weights) not in (0, n_targets):
             raise MeshError(f"meshes[{node['mesh']}] has {n_targets} morph targets, and {len(weights)} weights")
