@@ -95,8 +95,8 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         _mm256_storeu_si256((__m256i *)(p + 32 * k), _mm256_and_si256(on, one));
     }
 }
-/* Tables by the bits of a mask, for pdep and pext are microcode on Zen 1 and 2: up to 290 cycles each.  A row has a byte
- * for each lane and is built from the highest lane down: with(row, lane) is the row after a lane that is set. */
+/* Tables by the bits of a mask, for pdep and pext are microcode on Zen 1 and 2: up to 290 cycles each.  A row has a
+ * byte for each lane and is built from the highest lane down: with(row, lane) is the row after a lane that is set. */
 #define TL_ROWS_0(with, row) row, with(row, 0)
 #define TL_ROWS_1(with, row) TL_ROWS_0(with, row), TL_ROWS_0(with, with(row, 1))
 #define TL_ROWS_2(with, row) TL_ROWS_1(with, row), TL_ROWS_1(with, with(row, 2))
