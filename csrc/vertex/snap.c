@@ -125,6 +125,8 @@ static int64_t narrow_triangles(const int64_t *restrict triangles, int64_t n_tri
         for (int64_t i = first; bad && i < end; i++)
             if ((uint64_t)triangles[i] >= n)
                 return i / 3;
+        if (bad) /* another thread has changed the index since it was written to `out` */
+            return first / 3;
     }
     return -1;
 }
