@@ -14,6 +14,7 @@ from topleft import scenes
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.scene.adapt import as_mesh, as_polygons
+from topleft.errors import MeshWarning
 
 SIZE = (64, 48)
 VERTICES, TRIANGLES = scenes.shape("icosahedron")
@@ -100,7 +101,8 @@ def test_as_mesh_of_an_empty_scene_is_refused():
 def test_as_mesh_of_meshio_takes_surface_cells():
     meshio = pytest.importorskip("meshio")
     theirs = meshio.Mesh(POINTS, [("line", [[0, 1]]), ("triangle", [[1, 4, 2]]), ("quad", [[0, 1, 2, 3]])])
-    mesh = as_mesh(theirs)
+    with pytest.warns(MeshWarning, match="cells of kind 'line' not drawn"):
+        mesh = as_mesh(theirs)
     assert mesh.triangles.tolist() == [[1, 4, 2], [0, 1, 2], [0, 2, 3]]
     assert np.shares_memory(mesh.vertices, theirs.points)
 

@@ -17,7 +17,6 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import replace
 from typing import Any
 from urllib.parse import unquote
@@ -58,9 +57,6 @@ PACKAGES = {
 }  # fmt: skip
 """Formats that trimesh reads by packages of their own."""
 
-BY_MESHIO = (
-    ".bdf", ".f3grid", ".inp", ".mdpa", ".mesh", ".meshb", ".msh", ".nas", ".su2", ".ugrid", ".vtk", ".vtu",
-)  # fmt: skip
 CONVERTERS = {
     **dict.fromkeys(
         (".3ds", ".amf", ".blend", ".fbx", ".lwo", ".x", ".x3d"),
@@ -98,8 +94,6 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
             scene, double_sided = _scene(trimesh, source, suffix)
             parts = [_sided(part, double_sided) for part in _parts(scene, source)]
     except NotImplementedError:
-        if suffix in BY_MESHIO:
-            raise MissingPackageError(_needs(source, "meshio")) from None
         if suffix in CONVERTERS:
             told = CONVERTERS[suffix].format(name=source.path.stem, suffix=source.path.suffix)
             raise MeshError(f"cannot read {str(source.path)!r}: there is no reader of {suffix}; {told}") from None
@@ -238,8 +232,7 @@ def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | No
     content = source.content()
     if suffix != ".dae":
         del content  # which is counted
-        with counted_vtu(source.budget) if suffix == ".vtu" else contextlib.nullcontext():
-            return trimesh.load_scene(str(source.path), process=False), None
+        return trimesh.load_scene(str(source.path), process=False), None
 
     class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
         def get(self, name: str) -> bytes:
@@ -259,46 +252,6 @@ def _sided(mesh: Mesh, double_sided: bool | None) -> Mesh:
     if double_sided is None:
         return mesh
     return replace(mesh, materials=tuple(replace(one, double_sided=double_sided) for one in mesh.materials))
-
-
-_unpacking: ContextVar[Budget | None] = ContextVar("_unpacking", default=None)
-
-
-class _CountedModule:
-    """A module that unpacks, on the budget of the file that is being read."""
-
-    def __init__(self, module: Any, unpacker: str) -> None:
-        self._module, self._unpacker = module, unpacker
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._module, name)
-
-    def decompress(self, content: bytes) -> bytes:
-        """All that the module unpacks of some bytes; a `MeshError` if it is more than allowed."""
-        budget = _unpacking.get()
-        if budget is None:
-            return self._module.decompress(content)
-        unpacker = getattr(self._module, self._unpacker)()
-        most = budget.limit("max_unpacked_bytes") + 1
-        unpacked: bytes = unpacker.decompress(content, most)
-        budget.spend("max_unpacked_bytes", len(unpacked))
-        return unpacked
-
-
-@contextmanager
-def counted_vtu(budget: Budget) -> Iterator[None]:
-    """Have meshio unpack the arrays of a VTU file on its budget; elsewhere it reads as ever."""
-    with contextlib.suppress(ImportError):
-        from meshio.vtu import _vtu
-
-        for name, unpacker in (("zlib", "decompressobj"), ("lzma", "LZMADecompressor")):
-            if not isinstance(getattr(_vtu, name), _CountedModule):
-                setattr(_vtu, name, _CountedModule(getattr(_vtu, name), unpacker))
-    token = _unpacking.set(budget)
-    try:
-        yield
-    finally:
-        _unpacking.reset(token)
 
 
 def _note_missing_pictures(content: bytes, source: InputFile) -> None:
@@ -329,7 +282,7 @@ def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep the messages of trimesh and meshio off the terminal; errors give the reason."""
+    """Keep the messages of trimesh off the terminal; errors give the reason."""
     import logging
 
     logger = logging.getLogger("trimesh")

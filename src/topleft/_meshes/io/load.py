@@ -30,6 +30,12 @@ Made = TypeVar("Made")
 
 GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
 ARCHIVE_SUFFIXES = (".zip", ".zae", ".tgz", ".gz", ".bz2")
+MESHIO_READERS: dict[str, tuple[str, ...]] = {
+    ".bdf": ("nastran",), ".f3grid": ("flac3d",), ".inp": ("abaqus",), ".mdpa": ("mdpa",), ".mesh": ("medit",),
+    ".meshb": ("medit",), ".msh": ("ansys", "gmsh"), ".nas": ("nastran",), ".su2": ("su2",), ".ugrid": ("ugrid",),
+    ".vtk": ("vtk",), ".vtu": ("vtu",),
+}  # fmt: skip
+"""The modules of meshio that read each suffix, in the order in which they are tried."""
 
 
 def load(
@@ -47,7 +53,7 @@ def load(
     max_unpacked_bytes: int | None = None,
     scale: float = 1.0,
 ) -> Mesh | Points:
-    r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and other formats.
+    r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh and meshio others.
 
     Parameters
     ----------
@@ -99,7 +105,7 @@ def load(
     ValueError
         If `time` is negative, infinite or NaN, or `scale` is not positive and finite.
     MissingPackageError
-        If trimesh, or a package that it needs for this format, is not installed.
+        If trimesh, meshio, or a package that one needs for this format, is not installed.
 
     Warns
     -----
@@ -212,6 +218,10 @@ def _parts(source: InputFile) -> list[Mesh]:
             with unpacked(source.path, source.budget) as (folder, paths):
                 members = [InputFile(path, source.budget, archive=source, home=folder) for path in paths]
                 return [part for member in members for part in _parts(member)]
+        case suffix if suffix in MESHIO_READERS:
+            from topleft._meshes.io.solvers import read_by_meshio
+
+            return read_by_meshio(source, MESHIO_READERS[suffix])
         case _:
             from topleft._meshes.io.foreign import read_by_trimesh
 

@@ -18,11 +18,12 @@ import numpy as np
 from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_crease
 from topleft._core.base.defaults import DEFAULT_CREASE
+from topleft._core.base.notes import tell
 from topleft._meshes.io.load import load
+from topleft._meshes.model.cells import Polygons, of_arrays, of_cells, of_grid, of_padded, of_pair, of_triangulation
 from topleft._meshes.model.from_trimesh import placed
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.scene.cells import Polygons, of_arrays, of_cells, of_grid, of_padded, of_pair, of_triangulation
 
 
 def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
@@ -56,6 +57,11 @@ def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
     ValueError
         If it has no faces that are surfaces, or as `Mesh` does.
 
+    Warns
+    -----
+    MeshWarning
+        Once for each kind of cells of meshio and VTK that is not drawn: lines, say, or solid cells beside surfaces.
+
     Examples
     --------
     >>> as_mesh(([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]])).vertices.tolist()
@@ -79,10 +85,8 @@ def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
     if hasattr(subject, "visual") and hasattr(subject, "faces"):
         return replace(placed(subject, np.eye(4)), crease=crease)
     polygons = as_polygons(subject)
-    points = polygons.points
-    if points.ndim == 2 and points.shape[1] == 2:
-        points = np.column_stack([points, np.zeros(len(points))])
-    return Mesh(points, polygons.triangles, crease=crease)
+    tell((f"mesh: cells of kind {kind!r} not drawn" for kind in polygons.not_drawn), stacklevel=2)
+    return Mesh(polygons.points_in_space, polygons.triangles, crease=crease)
 
 
 def as_polygons(subject: MeshLike) -> Polygons:

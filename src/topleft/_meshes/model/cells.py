@@ -5,7 +5,7 @@ Input: meshes of meshio, pyvista and matplotlib, or arrays; `adapt.py` tells the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,6 +55,16 @@ class Polygons(NamedTuple):
 
     n_faces: int
 
+    not_drawn: tuple[str, ...] = ()
+    """Kinds of cells that the triangles are not of."""
+
+    @property
+    def points_in_space(self) -> npt.NDArray[Any]:
+        """(V, 3): z is 0 where points are flat."""
+        if self.points.ndim == 2 and self.points.shape[1] == 2:
+            return np.column_stack([self.points, np.zeros(len(self.points))])
+        return self.points
+
 
 def of_triangulation(subject: Any) -> Polygons:
     """Triangles of matplotlib's Triangulation that are not masked."""
@@ -100,19 +110,20 @@ def of_cells(subject: Any) -> Polygons:
 
 def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Polygons:
     """Triangles of the surface cells of meshio, block after block; where there are none, of the skin of solid ones."""
-    blocks = list(blocks)
-    surfaces = [block for block in blocks if block.type in CORNERS_OF_CELL]
-    if surfaces:
-        return _of_blocks(
-            points, [as_array("cells", block.data)[:, : CORNERS_OF_CELL[block.type]] for block in surfaces]
-        )
-    solids = [
-        (SOLID_OF_CELL[block.type], as_array("cells", block.data)) for block in blocks if block.type in SOLID_OF_CELL
-    ]
-    if not solids:
+    blocks = [block for block in blocks if len(block.data)]
+    drawn: Mapping[str, object] = CORNERS_OF_CELL
+    if not any(block.type in drawn for block in blocks):
+        drawn = SOLID_OF_CELL
+    kept = [(block.type, as_array("cells", block.data)) for block in blocks if block.type in drawn]
+    if not kept:
         kinds = ", ".join(block.type for block in blocks) or "none"
         raise ValueError(f"mesh has no triangles: its cells are {kinds}")
-    return _skin(points, solids)
+    if drawn is CORNERS_OF_CELL:
+        polygons = _of_blocks(points, [cells[:, : CORNERS_OF_CELL[kind]] for kind, cells in kept])
+    else:
+        polygons = _skin(points, [(SOLID_OF_CELL[kind], cells) for kind, cells in kept])
+    not_drawn = dict.fromkeys(block.type for block in blocks if block.type not in drawn)
+    return polygons._replace(not_drawn=tuple(not_drawn))
 
 
 def of_grid(subject: Any) -> Polygons:
