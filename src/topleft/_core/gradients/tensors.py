@@ -426,12 +426,16 @@ known: deque[tuple[NDArray[np.int32], NDArray[np.int32]]] = deque(maxlen=4)
 
 
 def halves_across(tri: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return what `find_halves_across` does, of the last meshes as it was found; it is not to be written to."""
+    """Return what `find_halves_across` does, of the last meshes as it was found; it is not to be written to.
+
+    Another thread may write to `tri` meanwhile: what is kept is of a copy.
+    """
     for triangles, across in list(known):
         if triangles.shape == tri.shape and np.array_equal(triangles, tri):
             return across
-    found = find_halves_across(tri)
-    known.append((tri.copy(), found))
+    triangles = tri.copy()
+    found = find_halves_across(triangles)
+    known.append((triangles, found))
     return found
 
 

@@ -107,7 +107,7 @@ class Accessors:
             self._source.budget.spend("max_unpacked_bytes", n * n_columns * dtype.itemsize)
             values = np.zeros((n, n_columns), dtype)
         if sparse is not None:
-            self._source.budget.spend("max_nodes", 1)  # it takes the time of a primitive
+            self._source.budget.spend("max_nodes", 1)  # reading a sparse accessor takes as long as reading a primitive
             places = sparse["indices"]
             n_set = whole(sparse, "count")
             at_dtype = np.dtype(DTYPES[places["componentType"]])

@@ -367,7 +367,7 @@ class _Reader:
         is_shared = not has_targets and skin is None
         if is_shared and key in self._shapes:
             return self._shapes[key]
-        self._source.budget.spend("max_nodes", 1)  # a shape takes as long as its place
+        self._source.budget.spend("max_nodes", 1)  # to read a shape takes as long as to place it
         attributes = primitive["attributes"]
         mode = primitive.get("mode", TRIANGLES)
         if mode not in (TRIANGLES, STRIP, FAN):
