@@ -57,7 +57,7 @@ class Cut:
         return np.flatnonzero(self.is_cut).astype(np.int32)
 
     def of_parts(self, source: I32) -> Cut:
-        """The same of parts of triangles."""
+        """The cut materials of parts of triangles, from the triangle of each part."""
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
 
@@ -76,7 +76,7 @@ def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
 
 
 def find_cut(mesh: Mesh, material: Material | None) -> Cut | None:
-    """The same, found now."""
+    """Find the materials with holes of a mesh, and their triangles."""
     materials = mesh.materials if material is None else (material,)
     holes = [has_holes(one, mesh) for one in materials]
     if not any(holes):
