@@ -22,7 +22,7 @@ def scene_of(mesh, *scales, degrees=0.0):
 
 
 def stretched_copies(mesh):
-    return [kept for key, kept in mesh.known[look.ShadingMesh].items() if key]
+    return list(mesh.cache.stretched.values())
 
 
 def test_stretched_mesh_is_kept_while_it_turns():
@@ -37,10 +37,10 @@ def test_stretched_mesh_beyond_the_limit_leaves_the_mesh_itself(monkeypatch):
     monkeypatch.setattr(look, "MOST_STRETCHED", 0)
     mesh = tl.Mesh(*BALL)
     tl.render(scene_of(mesh, (1, 1, 1)), CAMERA, (32, 32))
-    own = mesh.known[look.ShadingMesh][b""]
+    own = mesh.cache.shading
     tl.render(scene_of(mesh, (1, 0.5, 0.3), (1, 0.5, 0.4)), CAMERA, (32, 32))
     assert len(stretched_copies(mesh)) == 1
-    assert mesh.known[look.ShadingMesh][b""] is own
+    assert mesh.cache.shading is own
 
 
 @pytest.mark.parametrize("scale", [(1, 0.5, 0.3), (-1, 1, 1), (1, 1e-3, 1)])

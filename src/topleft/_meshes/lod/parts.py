@@ -23,6 +23,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
 from topleft._core.raster.clusters import RECORD, Clusters, box_of, measure_clusters, sort_clusters
+from topleft._meshes.model.cache import MeshCache
 from topleft._meshes.model.mesh import Mesh, read_only, with_normals
 
 #: Triangles of a part of the mesh itself, about. Of hills of a million within half a pixel, seen from near, views
@@ -164,6 +165,10 @@ class CutMesh(Mesh):
 
     is_in_parts = True
 
+    def note_drawn(self) -> int:
+        """Count nothing: each picture has a mesh that is cut for its view."""
+        return 0
+
     def find_clusters(self) -> Clusters:
         """Those of the chosen parts, always: without them all parts would have to be looked at."""
         return self.clusters
@@ -186,7 +191,7 @@ class CutMesh(Mesh):
         return sum(end - first for first, end in self.__dict__["_runs"])
 
     def as_mesh(self) -> Mesh:
-        """The cut as a mesh whose triangles are made when something reads them."""
+        """The same for whoever draws its triangles himself."""
         mesh = object.__new__(LateMesh)
         own = {field.name: vars(self)[field.name] for field in fields(Mesh) if field.name != "triangles"}
         vars(mesh).update(own, _cut=self)
@@ -223,8 +228,8 @@ class PartedMesh:
         defaults = {field.name: None for field in fields(Mesh)}
         look = {name: getattr(like, name) for name in ("materials", "crease", "color_interpolation")}
         points = self._pool.arrays["vertices"]
-        known = {"known": {}, "vertex_box": box_of(points), "is_finite": bool(np.isfinite(points).all())}
-        self._of_all = defaults | look | self._pool.arrays | known
+        shared = {"cache": MeshCache(), "vertex_box": box_of(points), "is_finite": bool(np.isfinite(points).all())}
+        self._of_all = defaults | look | self._pool.arrays | shared
 
     def choose(self, matrix: F64, viewport: tuple[int, int], window: F64, tolerance: float) -> tuple[I32, float]:
         """Return the coarsest parts that are sure to be within a tolerance, and the most pixels that they are off."""

@@ -19,6 +19,7 @@ from topleft._core.base.arrays import as_array, as_checked_triangles, as_crease,
 from topleft._core.base.options import parse
 from topleft._core.raster import choices
 from topleft._core.raster.clusters import Clusters, box_of
+from topleft._meshes.model.cache import MeshCache
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
 from topleft._meshes.model.texture import Texture
@@ -243,13 +244,13 @@ class Mesh:
 
     def note_drawn(self) -> int:
         """Note that there is a picture of the mesh; returns how many there were before."""
-        n_drawn: int = self.__dict__.get("_n_drawn", 0)
-        self.__dict__["_n_drawn"] = n_drawn + 1
-        return n_drawn
+        self.cache.n_drawn += 1
+        return self.cache.n_drawn - 1
 
     def find_clusters(self) -> Clusters | None:
-        """The clusters, from the second picture of a large mesh on; this counts as one."""
-        return self.clusters if choices.pays_to_cluster(len(self.triangles), self.note_drawn()) else None
+        """The clusters, from the second picture of a large mesh on; a call counts as a picture."""
+        is_large = choices.pays_to_cluster(len(self.triangles), 1)
+        return self.clusters if is_large and self.note_drawn() else None
 
     def is_drawn_whole(self) -> bool:
         """Whether this picture needs no look at the clusters: there are none, or they have not paid lately."""
@@ -259,9 +260,9 @@ class Mesh:
         return not clusters.backoff.is_over()
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
-        """What pictures have found out of it, to find it at once."""
-        return {}
+    def cache(self) -> MeshCache:
+        """Values computed for its next pictures."""
+        return MeshCache()
 
     @property
     def has_clusters(self) -> bool:
@@ -380,7 +381,7 @@ def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt
 def _groups_by_hash(
     attributes: tuple[npt.NDArray[Any], ...],
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
-    """First rows and groups of equal rows, by their bits, in a sixth of the time; None if some are not numbers."""
+    """The same of rows that are equal where their bits are, in a sixth of the time; None if some are not numbers."""
     n = len(attributes[0])
     if not 0 < n < 1 << 30 or any(rows.dtype.kind == "f" and np.isnan(rows).any() for rows in attributes):
         return None

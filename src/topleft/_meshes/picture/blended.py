@@ -34,7 +34,6 @@ from topleft._meshes.picture.buffers import place
 from topleft._meshes.picture.fragments import SceneFragments, shown_of
 from topleft._meshes.picture.holes import Mask, cuts_of, draw_solid
 from topleft._meshes.picture.instances import PlacedScene
-from topleft._meshes.picture.look import kept_look
 from topleft._meshes.picture.shade import Lit, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
@@ -72,8 +71,8 @@ def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
 
 
 def mask_of(mesh: Mesh, material: Material | None) -> Mask | None:
-    """The same, found once."""
-    return kept_look(mesh.known, blended_triangles, material, lambda: blended_triangles(mesh, material))
+    """Which triangles of a mesh blend in a material, from its cache."""
+    return mesh.cache.blended.find(material, lambda: blended_triangles(mesh, material))
 
 
 def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | None:
@@ -85,7 +84,7 @@ def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | 
     def make() -> list[Mask | None]:
         return [mask_of(one.mesh, one.material if material is None else material) for one in scene]
 
-    masks = kept_look(scene.known, blended_masks, material, make)
+    masks = scene.cache.blended.find(material, make)
     return None if all(mask is None for mask in masks) else masks
 
 

@@ -31,7 +31,7 @@ from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.buffers import draw_nearest, lent, place, rasterize_shot
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.instances import PlacedScene
-from topleft._meshes.picture.look import ShadingInputs, Surface, kept_look
+from topleft._meshes.picture.look import ShadingInputs, Surface
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
 
@@ -57,7 +57,7 @@ class Cut:
         return np.flatnonzero(self.is_cut).astype(np.int32)
 
     def of_parts(self, source: I32) -> Cut:
-        """The cut materials of parts of triangles, from the triangle of each part."""
+        """The same of parts of triangles."""
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
 
@@ -72,11 +72,11 @@ class MaskedInstance(NamedTuple):
 
 def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
     """The materials with holes of a mesh, or this one, and their triangles, kept; None if there are none."""
-    return kept_look(mesh.known, Cut, material, lambda: find_cut(mesh, material))
+    return mesh.cache.cuts.find(material, lambda: find_cut(mesh, material))
 
 
 def find_cut(mesh: Mesh, material: Material | None) -> Cut | None:
-    """Find the materials with holes of a mesh, and their triangles."""
+    """Find the materials with holes of a mesh, or this one, and their triangles; None if there are none."""
     materials = mesh.materials if material is None else (material,)
     holes = [has_holes(one, mesh) for one in materials]
     if not any(holes):
@@ -92,7 +92,7 @@ def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
     def make() -> list[Cut | None]:
         return [cut_of(one.mesh, one.material if material is None else material) for one in scene]
 
-    return kept_look(scene.known, Cut, material, make)
+    return scene.cache.cuts.find(material, make)
 
 
 def draw_visible(

@@ -262,15 +262,16 @@ class PlacedScene:
     def _sides(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
         """The `tl_cull` of each instance, and which have triangles with two sides beside others with one."""
         view, key = self._view, (self._view.cull, self._view.sides_by_material)
-        known: dict[Any, Any] = self.whole.known if self._material is None else {}
-        if key not in known:  # which holds wherever the scene stands, but for what is mirrored
+        kept = self.whole.cache.sides if self._material is None else {}
+        found = kept.get(key)
+        if found is None:
             sides: NDArray[np.int32] = np.full(len(self.scene), view.cull, np.int32)
             is_mixed = np.zeros(len(sides), np.bool_)
             for _, _, at in self.whole.looks(self._material) if view.sides_by_material else ():
                 sides[at], is_single = self._sides_of(self.whole[at[0]])
                 is_mixed[at] = is_single is not None
-            known[key] = sides, is_mixed
-        culls, is_mixed = known[key]
+            found = kept[key] = sides, is_mixed
+        culls, is_mixed = found
         is_mirrored = self.scene.are_mirrored
         return (np.where(is_mirrored, MIRRORED[culls], culls) if is_mirrored.any() else culls), is_mixed
 

@@ -79,9 +79,9 @@ def kept_picture(
         kinds = tuple(map(type, shading["color"])), tuple(map(type, shading["background"]))  # (1.0, 0, 0) is red
         given = options | shading
         key = size, *given.items(), *map(type, given.values()), *kinds
-        pictures = mesh.known.setdefault(KeptPicture, {})
+        pictures = mesh.cache.pictures
         if key in pictures:
-            return cast("KeptPicture | None", pictures[key])
+            return pictures[key]
     except TypeError:  # a list, say, which may change
         return None
     if len(pictures) == MOST_KEPT:

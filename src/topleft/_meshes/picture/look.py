@@ -6,10 +6,10 @@ Input: a mesh, its materials, lights, a camera and the size of the whole picture
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from topleft._core.base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts, threads_of_rows
 from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.cache import MOST_LOOKS
 from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT, Environment
 from topleft._meshes.model.light import TO_HEADLIGHT, Fog, Light
 from topleft._meshes.model.material import Material
@@ -36,13 +37,8 @@ from topleft._meshes.model.texture import Texture
 
 LIGHT_CODES = {"directional": 0, "point": 1, "spot": 3}  # tl_light_kind in csrc/shading.h
 
-Kept = TypeVar("Kept")
-
 MOST_STRETCHED = 1 << 18
 """Vertices of stretched copies that are kept of a mesh, 40 bytes each and 20 for each of its triangles."""
-
-MOST_TABLES = 256
-"""Tables that are kept of a mesh: instances differ in material, and whether faces are flat, lit, mirrored."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,15 +105,20 @@ def color_rows(colors: npt.NDArray[np.uint8]) -> F32:
 
 
 def shading_mesh_of(mesh: Mesh, stretch: F64 | None) -> ShadingMesh:
-    """The shading mesh of a mesh in its own space or stretched, made once; of many stretched ones the last are kept."""
-    known: dict[bytes, ShadingMesh] = mesh.known.setdefault(ShadingMesh, {})
-    key = b"" if stretch is None else stretch.tobytes()
-    found = known.get(key)
+    """The shading mesh of a mesh in object space, or stretched, from its cache."""
+    cache = mesh.cache
+    if stretch is None:
+        if cache.shading is None:
+            cache.shading = ShadingMesh(mesh)
+        return cache.shading
+    key = stretch.tobytes()
+    found = cache.stretched.get(key)
     if found is None:
         found = ShadingMesh(mesh, stretch)
-        if stretch is not None and len(known) * len(mesh.vertices) > MOST_STRETCHED:
-            known = mesh.known[ShadingMesh] = {b"": known[b""]} if b"" in known else {}
-        known[key] = found
+        n_kept = len(cache.stretched) + (cache.shading is not None)
+        if n_kept * len(mesh.vertices) > MOST_STRETCHED:
+            cache.stretched.clear()
+        cache.stretched[key] = found
     return found
 
 
@@ -165,19 +166,6 @@ class Surface:
         return any(one.is_metallic_rough for one in self.materials)
 
 
-def kept_look(
-    known: dict[Any, Any], kind: Any, material: Material | None, make: Callable[[], Kept], *key: object
-) -> Kept:
-    """A value that a mesh or a scene has in a material, made once; the last ones are kept."""
-    values = known.setdefault(kind, {})
-    found = values.get((id(material), *key))
-    if found is None:
-        if len(values) == MOST_TABLES:
-            values.clear()
-        found = values[(id(material), *key)] = make(), material  # which keeps its id
-    return found[0]
-
-
 def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: bool) -> engine.ShadingTable:
     """The kernels' inputs of a mesh, without a view; the last ones are kept."""
     kept = own.tables.get((surface, is_mirrored))
@@ -202,7 +190,7 @@ def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: boo
     )
     back_side = 1.0 if is_mirrored else -1.0
     table.set_materials([material_row(one, mesh, surface, back_side) for one in surface.materials])
-    if len(own.tables) == MOST_TABLES:
+    if len(own.tables) == MOST_LOOKS:
         own.tables.clear()
     own.tables[surface, is_mirrored] = table
     return table

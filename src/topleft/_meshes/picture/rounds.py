@@ -42,10 +42,10 @@ def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], 
     n, n_instances = scene.n_triangles, len(scene)
     if not choices.pays_to_cluster(n, 1):
         return False
-    if not scene.known.get("are drawn often"):
+    if not scene.cache.is_drawn_often:
         wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
-        scene.known["are drawn often"] = all(wanted)
-    if not (scene.known["are drawn often"] and scene.backoff.is_over()):
+        scene.cache.is_drawn_often = all(wanted)
+    if not (scene.cache.is_drawn_often and scene.backoff.is_over()):
         return False
     survey = survey_instances(placed)
     layers = partial(count_layers, scene, clip_from_world)

@@ -34,7 +34,7 @@ from topleft._meshes.model.light import AMBIENT, Fog, Light, as_lights, as_not_n
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.texture import Texture
-from topleft._meshes.picture.look import ShadingInputs, Surface, kept_look, light_rows
+from topleft._meshes.picture.look import ShadingInputs, Surface, light_rows
 from topleft.typing import ShadingOption
 
 MIN_PX_PER_THREAD = 1 << 14
@@ -252,7 +252,7 @@ def surface_of(shown: ShownInstance, options: ShadingOptions) -> Surface:
         plain = own or (plain_material(options.color if mesh.colors is None else None),)
         return Surface(plain, own is mesh.materials and len(own) > 1, *look)
 
-    return kept_look(mesh.known, Surface, material, make, *look, options.color)
+    return mesh.cache.surfaces.find(material, make, *look, options.color)
 
 
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:

@@ -22,12 +22,16 @@ from topleft._core.base.arrays import INT32_MAX, as_real, check_regular, set_rea
 from topleft._core.base.color import ColorLike
 from topleft._core.raster.clusters import Backoff
 from topleft._meshes.io.load import load
+from topleft._meshes.model.cache import ByMaterial
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, extreme_points, trusted_mesh, used_vertices
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.pose import as_pose
 from topleft._meshes.scene.adapt import as_mesh, is_mesh_like
+
+if TYPE_CHECKING:
+    from topleft._meshes.picture.holes import Cut
 
 EYE = np.eye(4)
 
@@ -126,6 +130,28 @@ IN_PLACE = Instance(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)))
 vars(IN_PLACE)["is_mirrored"] = False  # as copies know
 
 
+class SceneCache:
+    """Values computed of one scene for its next pictures: scenes made of it by `with_transforms` share them.
+
+    They go with the last of these scenes; no copy or pickle has them. Memory, for N instances, T triangles of all
+    instances and M different meshes: `joined_triangles` takes 12 T bytes, `first_vertices` 8 N, `mesh_list` about 64 M,
+    each of `sides` 5 N; `cuts` and `blended` refer to values of the meshes. Threads share it as they do a `MeshCache`.
+    """
+
+    def __init__(self) -> None:
+        self.is_drawn_often = False
+        """Whether pictures have drawn each mesh so often that clusters pay."""
+        self.first_vertices: npt.NDArray[np.int64] | None = None
+        self.joined_triangles: npt.NDArray[np.int32] | None = None
+        self.mesh_list: tuple[engine.MeshList, npt.NDArray[np.int64]] | None = None
+        self.sides: dict[tuple[int, bool], tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]] = {}
+        """By `cull` and whether materials decide: the `tl_cull` of each instance unless mirrored, which are mixed."""
+        self.cuts: ByMaterial[list[Cut | None]] = ByMaterial()
+        """The materials with holes of each instance."""
+        self.blended: ByMaterial[list[npt.NDArray[np.bool_] | None]] = ByMaterial()
+        """The blended triangles of each instance."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene:
     """Meshes in one world.
@@ -208,30 +234,30 @@ class Scene:
     @property
     def first_vertices(self) -> npt.NDArray[np.int64]:
         """Where the vertices of each instance begin when all are counted, and the number of all: (N + 1,) int64."""
-        found = self.known.get("first vertices")
+        found = self.cache.first_vertices
         if found is None:
-            found = self.known["first vertices"] = self._firsts(lambda mesh: len(mesh.vertices))
+            found = self.cache.first_vertices = self._firsts(lambda mesh: len(mesh.vertices))
         return found
 
     @property
     def joined_triangles(self) -> npt.NDArray[np.int32]:
         """The triangles of all instances, by vertices as `first_vertices` counts them: (T, 3) int32."""
-        found = self.known.get("joined triangles")
+        found = self.cache.joined_triangles
         if found is None:
             meshes, of_instance = self._numbered
             found = np.concatenate([meshes[k].triangles for k in of_instance.tolist()])
             found += np.repeat(self.first_vertices[:-1].astype(np.int32), np.diff(self.first_ids))[:, None]
-            self.known["joined triangles"] = found
+            self.cache.joined_triangles = found
         return found
 
     @property
     def mesh_list(self) -> tuple[engine.MeshList, npt.NDArray[np.int64]]:
         """The different meshes, and which of them each instance has, (N,)."""
-        found = self.known.get("mesh list")
+        found = self.cache.mesh_list
         if found is None:
             meshes, of_instance = self._numbered
             listed = engine.MeshList([(mesh.vertices, mesh.triangles) for mesh in meshes])
-            found = self.known["mesh list"] = listed, of_instance
+            found = self.cache.mesh_list = listed, of_instance
         return found
 
     @cached_property
@@ -296,9 +322,9 @@ class Scene:
         return [mesh for mesh, _ in self.meshes.values()], of_instance
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
-        """What has been found out of meshes and materials, wherever they stand: `with_transforms` keeps it."""
-        return {}
+    def cache(self) -> SceneCache:
+        """Values computed for its next pictures."""
+        return SceneCache()
 
     def looks(self, material: Material | None) -> list[tuple[Mesh, Material | None, npt.NDArray[np.intp]]]:
         """The different meshes, each with this material or that of its instances, and which instances these are."""
@@ -377,7 +403,7 @@ class Scene:
                 check_regular(f"transforms[{k}]", matrix)
             mirrored = np.array([engine.determinant(matrix[:3, :3]) < 0 for matrix in placed], np.uint8)
         kept = {"first_ids": self.first_ids, "meshes": self.meshes, "boxes": self.boxes, "backoff": self.backoff}
-        own = {"known": self.known, "_numbered": self._numbered}
+        own = {"cache": self.cache, "_numbered": self._numbered}
         return self._but(transforms=placed, are_mirrored=mirrored.view(np.bool_), **kept, **own)
 
     def with_meshes(self, meshes: Sequence[Mesh], of_instance: npt.NDArray[np.int64]) -> Scene:
@@ -478,7 +504,7 @@ def as_subject(given: MeshLike | Scene | Points) -> Mesh | Scene | Points:
 
 
 def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
-    """The scene or mesh that calls draw as triangles; points are refused."""
+    """The same for calls that need triangles: points are refused."""
     return given if isinstance(given, Scene) else as_mesh(given)
 
 
