@@ -67,7 +67,7 @@ TL_KERNEL(int64_t, narrow_triangles, const int64_t *triangles, int64_t n_triangl
 
 /* Returns -1, or, when it has met an index outside [0, n_vertices), the number of a row at or before which there is
  * one; the picture is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every other
- * beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0.  A bad row
+ * beats.  A slice needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0.  A bad row
  * of a mesh without snapped vertices may also be that of one that is not finite; it is drawn without clusters and not
  * to SAMPLES. */
 TL_KERNEL(int64_t, draw_mesh, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
@@ -92,8 +92,8 @@ TL_KERNEL(void, set_flat_depth, int32_t *ids, int64_t n, int32_t flip, float dep
 TL_KERNEL(int64_t, bin, const tl_snapped *snapped, const tl_window *window, int32_t reach_fx, int band_bits,
           tl_bins *bins)
 
-/* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands + 2
- * numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
+/* Lists the triangles of each band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts`
+ * has n_bands + 2 numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
 TL_KERNEL(void, list_bins, const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed)
 
 /* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach. */
@@ -148,7 +148,8 @@ TL_KERNEL(void, inverse_ws, const tl_source *source, int64_t first, int64_t end,
 /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
 TL_KERNEL(void, barycentric, const tl_snapped *snapped, const tl_window *window, const int32_t *ids, float *out)
 
-/* The same, applied to float32 values (n_vertices, n_values), or (n_triangles, 3, n_values) per corner. */
+/* Values at each pixel of `ids` by the weights of `barycentric`: of float32 (n_vertices, n_values), or
+ * (n_triangles, 3, n_values) per corner. */
 TL_KERNEL(void, interpolate, const tl_snapped *snapped, const tl_window *window, const int32_t *ids,
           const float *values, int n_values, int per_corner, float background, float *out)
 
@@ -193,7 +194,8 @@ TL_KERNEL(void, set_inverse_w, const tl_source *source, const float *rows, int64
 TL_KERNEL(void, shade, const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
           const float *depth, uint8_t *pixels)
 
-/* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target. With
+/* The picture of several samples a pixel, from planes of ids and depth that lie `stride` pixels apart, one a sample;
+ * otherwise as `shade`; samples_fx as in tl_target. With
  * `split`, its rows those of the window, there is the plane of the first sample alone. */
 TL_KERNEL(void, shade_samples, const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
           int sample_bits, int64_t stride, const int32_t *ids, const float *depth, const tl_split *split,

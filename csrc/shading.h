@@ -51,7 +51,7 @@ typedef struct {
     float specular[3];
     float shininess; /* Blinn's exponent; 0: no highlight */
     int is_unlit;
-    float cutoff;              /* samples with less opacity are left out by draw_cutout; 0: none */
+    float cutoff;              /* samples with less opacity are cut out; 0: none */
     const tl_texture *texture; /* or NULL, as all of them */
     /* The rest, and textures with a transform or of the second set, are read where `is_full` alone. */
     int is_full;

@@ -230,8 +230,8 @@ static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGM
 
 #define TL_FLIP INT32_MAX
 
-/* Where a picture of a few large triangles is written row by row: the most spans of a row, of each triangle one for
- * each sample, and of a band of rows. */
+/* Limits of a picture of a few large triangles, written row by row: spans in a row (one for each triangle and sample),
+ * spans in a band of rows. */
 #define TL_SHAPE_SLOTS 128
 #define TL_SHAPE_SPANS 4096
 
@@ -239,8 +239,8 @@ static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGM
 #define TL_BLENDED_RUNS 128  /* of a row of these */
 #define TL_SHAPES_BLENDED 16 /* triangles */
 
-/* How many are few, by the other way to draw them: bits; every triangle stored over a background; labels
- * first, or samples averaged. */
+/* The largest number of triangles drawn row by row, by what the other path would be: bits; every triangle stored over a
+ * background; labels first, or samples averaged. */
 typedef enum { TL_SHAPES_OF_BITS = 2, TL_SHAPES_STORED = 4, TL_SHAPES_LABELLED = 64 } tl_shape_limit;
 static inline int tl_is_large_shapes(int64_t n, int n_samples, int64_t width, int64_t height, tl_shape_limit most)
 {
@@ -249,7 +249,7 @@ static inline int tl_is_large_shapes(int64_t n, int n_samples, int64_t width, in
     return n <= (int64_t)most && fits && n * px_each <= width * height;
 }
 
-/* The same of flat colours that are blended over a background. */
+/* Whether triangles of flat colours that are blended over a background are drawn row by row. */
 static inline int tl_shapes_are_blended(int64_t n, int64_t width, int64_t height)
 {
     return n <= TL_SHAPES_BLENDED && width >= 64 && width < (1 << 25) && n << 18 <= width * height;

@@ -139,7 +139,8 @@ TL_INLINE int64_t next_met(const uint64_t *met, int64_t k, int64_t end)
     return end;
 }
 
-/* The same where it is known which cells edges meet: those between are written as runs, unread. */
+/* Accumulates the areas of a plane whose cells that edges meet are listed as bits: the cells between them are written
+ * as runs, unread. */
 TL_INLINE int accumulate_met(const area_plane *plane, const tl_area *target, int is_clamped)
 {
     const int64_t stride = plane->stride, n_cols = plane->n_cols;

@@ -59,7 +59,7 @@ typedef struct {
     int32_t signed_dy; /* > 0: the area right of it is added */
 } edge_record;
 
-/* The same, ready for its rows; and TL_LANES of them. */
+/* An edge ready for its rows; edge_lanes: TL_LANES edges. */
 typedef struct {
     double x, slope;           /* px from the pixel column of the upper end; px per unit of y_fx */
     double steep, height;      /* cell units per px of x, halved; cell units per unit of y_fx */
@@ -101,7 +101,7 @@ TL_INLINE edge_lanes setup_edge_lanes(const area_plane *plane, const int32_t *re
     return e;
 }
 
-/* The same operations. */
+/* The operations of setup_edge_lanes for a single edge: equal bits. */
 static inline edge_one setup_edge(const area_plane *plane, const edge_record *r)
 {
     const int32_t mask = (1 << plane->bits) - 1, dy = r->signed_dy < 0 ? -r->signed_dy : r->signed_dy;
@@ -194,7 +194,7 @@ TL_INLINE vi ramp_areas(int n_quads, vd xa, vd xb, vd steep, vd height, vi *area
     return vi_round(first);
 }
 
-/* The same as differences, into the cells. */
+/* Adds the areas of ramp_areas to the cells of a plane, as differences from cell to cell. */
 TL_INLINE void add_row(area_plane *plane, int n_quads, vd xa, vd xb, vd steep, vd height, vi col, vi row)
 {
     const int n = 4 * n_quads;

@@ -196,7 +196,8 @@ static void blend_each_fixed(blend_pass *p)
     }
 }
 
-/* The same, and in its place the pieces of one that clip planes cut. */
+/* Every triangle by itself, with vertices that are not snapped.  Clip planes cut a triangle into pieces, which are
+ * drawn in its place. */
 static void blend_each_float(blend_pass *p)
 {
     walk_state *s = &p->walk;

@@ -137,8 +137,8 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
     }
     b->n_laid = max64(b->n_laid, row + n);
     for (int k = 0; b->shapes && k < n; k++) {
-        take_aside(b, at[0][k], 4 * left->n_quads);
-        take_aside(b, at[1][k], 4 * right->n_quads);
+        read_buffered(b, at[0][k], 4 * left->n_quads);
+        read_buffered(b, at[1][k], 4 * right->n_quads);
     }
     for (int k = 0; k < 2; k++)
         for (int q = 0; q < sides[k]->n_quads; q++)

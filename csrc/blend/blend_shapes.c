@@ -26,7 +26,7 @@ TL_INLINE void put_band(blend_state *b, int64_t n_rows, int64_t at, open_run *ru
         const row_runs *r = f->rows + row;
         for (int k = 0; k < r->n; k++) {
             const int64_t first = at + r->col[k], end = at + r->col[k + 1];
-            if (r->key[k] != TL_KEY_ASIDE) {
+            if (r->key[k] != TL_KEY_BUFFERED) {
                 add_pixels(run, first, end, color_of_mix(f, r->key[k])->value, pixel_bytes);
                 continue;
             }
@@ -52,12 +52,12 @@ static int64_t blend_large_shapes(blend_state *b)
     f.canvas = canvas, f.pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     f.one = *b, f.one.stride = f.one.n_samples = 1;
     for (int k = 0; k < 1 << TL_MIXED_KEYS_BITS; k++)
-        f.colors[k].key = TL_KEY_ASIDE; /* no key of a colour */
+        f.colors[k].key = TL_KEY_BUFFERED; /* no key of a colour */
     tl_window band = *window;
     open_run run = start_pixels(canvas->pixels, window->width, window->height, canvas->stride_px);
     f.is_in_place = !canvas->packed;
     if (f.is_in_place)
-        run.n_px = 0; /* nothing is written twice: pixels aside are there already */
+        run.n_px = 0; /* nothing is written twice: buffered pixels are there already */
     b->shapes = &f, b->window = &band, b->packed = canvas->packed;
     b->stride = f.is_in_place ? canvas->stride_px : window->width;
     b->n_laid = INT64_MAX;

@@ -36,7 +36,7 @@ TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, t
     if (b->shapes) {
         const unsigned bits = vm_bits(on);
         const int first = __builtin_ctz(bits);
-        take_aside(b, at + first, 32 - __builtin_clz(bits) - first);
+        read_buffered(b, at + first, 32 - __builtin_clz(bits) - first);
     }
     if (!b->is_flat) {
         const unsigned bits = vm_bits(on);
@@ -187,7 +187,7 @@ static void blend_block(blend_state *b, const cell_block *c)
         blend_cells_f32(b, c);
 }
 
-/* One edge into the cells of a strip.  The same bits as in a queue of area.c. */
+/* One edge into the cells of a strip.  The bits equal those of a queue of area.c. */
 static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
 {
     edge_record record;

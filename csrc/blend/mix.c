@@ -57,7 +57,7 @@ static void begin_gouraud(blend_state *b, int64_t id, const tl_vertex_set *set, 
             is_piece ? b->snapped->pieces->weights + 3 * (int64_t)b->resolve.triangle.corner[k] : NULL;
 }
 
-/* The same of a triangle of the mesh that no plane cuts. */
+/* Takes up a triangle of the mesh that no plane cuts, with colours of its vertices. */
 static void begin_gouraud_of_mesh(blend_state *b, int64_t id)
 {
     int32_t corners[3];
@@ -65,7 +65,7 @@ static void begin_gouraud_of_mesh(blend_state *b, int64_t id)
     begin_gouraud(b, id, &b->snapped->mesh, corners, 0);
 }
 
-/* The same of a triangle of the mesh, or of a piece of it, with vertices that are not snapped. */
+/* Takes up a triangle of the mesh, or a piece of it, with colours of its vertices, which are not snapped. */
 static void begin_exact_gouraud(blend_state *b, int64_t id, int64_t piece)
 {
     const tl_exact_points *points = b->snapped->mesh.exact;

@@ -17,7 +17,7 @@
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
 
-#define TL_KEY_ASIDE (1ull << 63) /* the pixels of the run stand aside, each for itself */
+#define TL_KEY_BUFFERED (1ull << 63) /* the pixels of the run are in the side buffer, each by itself */
 #define TL_MIXED_KEYS_BITS 4
 
 /* The colour of a key: as it stands in the picture, and as a pixel of the canvas. */
@@ -31,7 +31,7 @@ typedef struct {
 } mixed_color;
 
 typedef struct shape_state {
-    const tl_canvas *canvas; /* the picture; the state of the pass draws aside */
+    const tl_canvas *canvas; /* the picture; the state of the pass draws into the side buffer */
     int pixel_bytes, is_in_place;
     int64_t id; /* of the triangle at hand */
     mixed_color colors[1 << TL_MIXED_KEYS_BITS];
@@ -90,22 +90,22 @@ TL_INLINE int run_from(row_runs *r, int32_t col)
     return k;
 }
 
-/* Runs [k, end) become one, with pixels that stand aside, together with neighbours of that kind. */
+/* Joins runs [k, end), whose pixels are in the side buffer, and neighbours of that kind. */
 TL_INLINE void join_runs(row_runs *r, int k, int end)
 {
-    if (k > 0 && r->key[k - 1] == TL_KEY_ASIDE)
+    if (k > 0 && r->key[k - 1] == TL_KEY_BUFFERED)
         k--;
-    if (end < r->n && r->key[end] == TL_KEY_ASIDE)
+    if (end < r->n && r->key[end] == TL_KEY_BUFFERED)
         end++;
     const int n_gone = end - k - 1;
-    r->key[k] = TL_KEY_ASIDE;
+    r->key[k] = TL_KEY_BUFFERED;
     for (int i = k + 1; n_gone > 0 && i + n_gone <= r->n; i++)
         r->col[i] = r->col[i + n_gone], r->key[i] = r->key[i + n_gone];
     r->n -= n_gone;
 }
 
-/* Sees to it that the pixels [first, end) of a row stand aside. */
-static __attribute__((noinline)) void put_aside(blend_state *b, int64_t row, int32_t first, int32_t end)
+/* Puts the pixels [first, end) of a row into the side buffer. */
+static __attribute__((noinline)) void buffer_pixels(blend_state *b, int64_t row, int32_t first, int32_t end)
 {
     shape_state *f = b->shapes;
     row_runs *r = f->rows + row;
@@ -114,7 +114,7 @@ static __attribute__((noinline)) void put_aside(blend_state *b, int64_t row, int
     const int from = run_from(r, first), to = run_from(r, end);
     const int64_t at = row * b->stride, n_channels = b->n_channels;
     for (int k = from; k < to; k++) {
-        if (r->key[k] == TL_KEY_ASIDE)
+        if (r->key[k] == TL_KEY_BUFFERED)
             continue;
         const mixed_color *c = color_of_mix(f, r->key[k]);
         if (f->canvas->is_u8)
@@ -127,15 +127,15 @@ static __attribute__((noinline)) void put_aside(blend_state *b, int64_t row, int
     join_runs(r, from, to);
 }
 
-static void take_aside(blend_state *b, int64_t at, int64_t n)
+static void read_buffered(blend_state *b, int64_t at, int64_t n)
 {
     const int64_t row = (int64_t)((uint32_t)at / (uint32_t)b->stride);
     const int32_t first = (int32_t)(at - row * b->stride), end = (int32_t)(first + n);
     const row_runs *r = b->shapes->rows + row;
     for (int k = 0; k < r->n && r->col[k] <= first; k++)
-        if (r->key[k] == TL_KEY_ASIDE && end <= r->col[k + 1])
+        if (r->key[k] == TL_KEY_BUFFERED && end <= r->col[k + 1])
             return;
-    put_aside(b, row, first, end);
+    buffer_pixels(b, row, first, end);
 }
 
 static void lay_whole(blend_state *b, int64_t at, int64_t n)
@@ -145,12 +145,12 @@ static void lay_whole(blend_state *b, int64_t at, int64_t n)
     const uint64_t bit = 1ull << f->id;
     row_runs *r = f->rows + row;
     if (r->n >= TL_BLENDED_RUNS)
-        put_aside(b, row, 0, r->col[r->n]);
+        buffer_pixels(b, row, 0, r->col[r->n]);
     const int from = run_from(r, (int32_t)(at - start)), to = run_from(r, (int32_t)(at - start + n));
     for (int k = from; k < to; k++) {
         if (b->whole_mode == TL_MIX_REPLACE)
             r->key[k] = bit;
-        else if (r->key[k] == TL_KEY_ASIDE)
+        else if (r->key[k] == TL_KEY_BUFFERED)
             mix_pixels(b, start + r->col[k], r->col[k + 1] - r->col[k]);
         else
             r->key[k] |= bit;

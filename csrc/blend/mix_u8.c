@@ -152,8 +152,8 @@ TL_INLINE vi mix_part_u8(vi d, vi s, vi area, vm m, tl_mix mode)
     return move_bytes(d, mode == TL_MIX_REPLACE ? s : mix_whole_u8(d, s, m, mode), coverage);
 }
 
-/* The same, and exact where the part is the whole: a weight in 2^-15 is too coarse for an alpha below
- * 255. */
+/* Mixes a part of each pixel, exactly where the part is the whole pixel: a weight in 2^-15 is too coarse for an alpha
+ * below 255. */
 TL_INLINE vi mix_area_u8(vi d, vi s, vi area, vm m, tl_mix mode, tl_mix whole_mode)
 {
     const vi part = mix_part_u8(d, s, area, m, mode);

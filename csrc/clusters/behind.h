@@ -29,7 +29,8 @@ TL_INLINE int row_beats(const float *row, int64_t col0, int64_t col1, vf depth, 
     return 1;
 }
 
-/* The same of a row with bounds, which keep the results of whole segments: depths only come before them. */
+/* Whether all depths of some columns beat this one, in a row with bounds: they keep the results of whole segments, and
+ * later depths only come before them. */
 TL_INLINE int bounded_row_beats(const float *row, float *bounds, int64_t width, int64_t col0, int64_t col1, float depth,
                                 int is_farthest)
 {

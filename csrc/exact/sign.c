@@ -342,7 +342,7 @@ static int big_terms_sign(const edge_term *terms, int n)
 
 #define TL_MAX_TERMS 3
 
-/* The same by sums that do not overlap, where these are in range. */
+/* The sign of a sum of n edge functions, by expansions of float64 where they are in range, else by big_terms_sign. */
 static int terms_sign(const edge_term *terms, int n)
 {
     double sum[2 * 16 * TL_MAX_TERMS + 1];

@@ -45,7 +45,7 @@ TL_INLINE int64_t pixel_into(double at, double by, int64_t size)
 }
 
 /* Adds what an edge moves, from pixel to pixel, to the gradients of its ends. */
-static void pull_area_edge(const tl_grad_area *p, int64_t triangle, int32_t first, int32_t last, double sign)
+static void backward_area_edge(const tl_grad_area *p, int64_t triangle, int32_t first, int32_t last, double sign)
 {
     const double *a = p->points_px + 2 * (int64_t)first, *b = p->points_px + 2 * (int64_t)last;
     const double by[2] = {b[0] - a[0], b[1] - a[1]}, size[2] = {(double)p->width, (double)p->height};
@@ -88,7 +88,7 @@ static void grad_area(const tl_grad_area *p)
         const double *d = p->points_px + 2 * (int64_t)c[2];
         const double area = (b[0] - a[0]) * (d[1] - a[1]) - (d[0] - a[0]) * (b[1] - a[1]);
         for (int k = 0; k < 3 && area != 0.0; k++)
-            pull_area_edge(p, i, c[k], c[(k + 1) % 3], area > 0.0 ? 1.0 : -1.0);
+            backward_area_edge(p, i, c[k], c[(k + 1) % 3], area > 0.0 ? 1.0 : -1.0);
     }
 }
 

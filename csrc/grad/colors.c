@@ -77,8 +77,8 @@ TL_INLINE void sum_up_pixels(const run_plane *plane, int from, const float *g_ou
 }
 
 /* Adds the gradients of n attributes at the pixels of a run, none of which is clamped. */
-TL_INLINE void pull_three(const tl_grad_view *view, const grad_span *s, int r, const float *g_out, int n,
-                          int64_t n_columns, const double *begins, double *moments)
+TL_INLINE void backward_three(const tl_grad_view *view, const grad_span *s, int r, const float *g_out, int n,
+                              int64_t n_columns, const double *begins, double *moments)
 {
     const run_plane plane = plane_of_run(s, r);
     const int n_pixels = s->begins[r + 1] - s->begins[r];
@@ -90,7 +90,7 @@ TL_INLINE void pull_three(const tl_grad_view *view, const grad_span *s, int r, c
 }
 
 /* The gradients at a run that is clamped somewhere, in float64, straight to the corners. */
-static void pull_clamped(const tl_grad_view *view, const tl_grad_colors *p, const pixel_run *run)
+static void backward_clamped(const tl_grad_view *view, const tl_grad_colors *p, const pixel_run *run)
 {
     const tl_grad_values *v = &p->values;
     const double x = middle_at(view, 0, run->column), y = middle_at(view, 1, run->row);
@@ -114,14 +114,14 @@ static void pull_clamped(const tl_grad_view *view, const tl_grad_colors *p, cons
             g_point.u += g * step[0], g_point.v += g * step[1];
             add_to_corners(to, c, g * (double)rast[0], g * (double)rast[1], g);
         }
-        pull_point(view, &t, &g_point, 2.0 * view->scale[0] * (double)i, 0, &s);
+        backward_point(view, &t, &g_point, 2.0 * view->scale[0] * (double)i, 0, &s);
     }
-    close_row(s.a, s.a_x, x, y, sums);
-    close_triangle(view, run->id, sums, p->vertices, 0);
+    add_row_sums(s.a, s.a_x, x, y, sums);
+    finish_triangle(view, run->id, sums, p->vertices, 0);
 }
 
 /* The pixels of a band, but for what its triangles have summed up; n_columns: of the attributes, a constant for few. */
-TL_INLINE int64_t pull_color_rows(const tl_grad_view *view, const tl_grad_colors *p, int64_t n_columns)
+TL_INLINE int64_t backward_color_rows(const tl_grad_view *view, const tl_grad_colors *p, int64_t n_columns)
 {
     const tl_grad_values *v = &p->values;
     grad_span s = TL_BEFORE_SPANS(view);
@@ -137,11 +137,11 @@ TL_INLINE int64_t pull_color_rows(const tl_grad_view *view, const tl_grad_colors
                 if (run.id < 0)
                     continue;
                 if (is_unclamped(rast, INFINITY) && is_unclamped(rast + 4 * (run.n - 1), INFINITY)) {
-                    double *sums = begun_sums(view, p->faces, &s, r);
-                    pull_three(view, &s, r, (const float *)v->out + n_columns * run.at + c, n, n_columns, sums,
-                               sums + sums_of_three(c));
+                    double *sums = sums_for(view, p->faces, &s, r);
+                    backward_three(view, &s, r, (const float *)v->out + n_columns * run.at + c, n, n_columns, sums,
+                                   sums + sums_of_three(c));
                 } else if (c == 0) {
-                    pull_clamped(view, p, &run);
+                    backward_clamped(view, p, &run);
                 }
             }
         }
@@ -149,12 +149,12 @@ TL_INLINE int64_t pull_color_rows(const tl_grad_view *view, const tl_grad_colors
     return s.bad_id;
 }
 
-static int64_t pull_colors(const tl_grad_view *view, const tl_grad_colors *p)
+static int64_t backward_colors(const tl_grad_view *view, const tl_grad_colors *p)
 {
     switch (p->values.n_columns) {
-    case 1: return pull_color_rows(view, p, 1);
-    case 3: return pull_color_rows(view, p, 3);
-    default: return pull_color_rows(view, p, p->values.n_columns);
+    case 1: return backward_color_rows(view, p, 1);
+    case 3: return backward_color_rows(view, p, 3);
+    default: return backward_color_rows(view, p, p->values.n_columns);
     }
 }
 
@@ -165,25 +165,25 @@ typedef struct {
      * total there.  NULL: corners as they stand in the mesh; sums count from x and y, which are the first two. */
     int32_t *const *corners;
     const int32_t *column, *row;
-} closing_places;
+} face_places;
 
 /* TL_LANES triangles to close, of which n have sums: the rows of their corners and attributes. */
 typedef struct {
     const double *sums; /* of the first one */
     int64_t n_columns;
-    const closing_places *places;
+    const face_places *places;
     int64_t first;
     int n;
     int32_t from[TL_MAX_LANES]; /* 0, 1, 2 and so on; the first one's beyond n */
     int32_t corners[3][TL_MAX_LANES], rows[3][TL_MAX_LANES];
     vd v[3][3], q[3][3], units[3];
-} closing_lanes;
+} face_lanes;
 
-TL_INLINE void load_closing(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, closing_lanes *l,
-                            vd *x0, vd *y0)
+TL_INLINE void load_faces(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, face_lanes *l, vd *x0,
+                          vd *y0)
 {
     const int32_t *const corners[3] = {l->corners[0], l->corners[1], l->corners[2]};
-    const closing_places *places = l->places;
+    const face_places *places = l->places;
     double about[2][TL_MAX_LANES];
     vd z[3];
     for (int i = 0; i < TL_LANES; i++)
@@ -232,8 +232,8 @@ TL_INLINE void find_rows(tl_grad_sums *sums, int n, const int32_t rows[3][TL_MAX
 }
 
 /* Adds the gradients of the attributes of corners; returns those of q_k, added. */
-TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l, double *const to[3][TL_MAX_LANES],
-                                vd by_q[3][3])
+TL_INLINE void finish_attributes(const tl_grad_colors *p, const face_lanes *l, double *const to[3][TL_MAX_LANES],
+                                 vd by_q[3][3])
 {
     const int64_t n = p->values.n_columns;
     for (int64_t first = 0; first < n; first += 3) {
@@ -261,16 +261,16 @@ TL_INLINE void close_attributes(const tl_grad_colors *p, const closing_lanes *l,
     }
 }
 
-/* Gradients of the corners of triangles and of their attributes from their sums, as pull_corners gives them. */
-static void close_triangles(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, closing_lanes *l)
+/* Gradients of the corners of triangles and of their attributes from their sums, as backward_corners gives them. */
+static void finish_triangles(const tl_grad_view *view, const tl_grad_colors *p, const int32_t *ids, face_lanes *l)
 {
     vd x0, y0, by_q[3][3], g[3][4];
     double *to[3][TL_MAX_LANES];
-    load_closing(view, p, ids, l, &x0, &y0);
+    load_faces(view, p, ids, l, &x0, &y0);
     for (int k = 0; k < 9; k++)
         by_q[k / 3][k % 3] = g[k / 3][k % 3] = vd_set1(0.0);
     find_rows(p->attr, l->n, l->rows, to);
-    close_attributes(p, l, to, by_q);
+    finish_attributes(p, l, to, by_q);
     for (int k = 0; k < 3; k++) { /* q_k = v_i x v_j */
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         for (int a = 0; a < 3; a++) {
@@ -289,27 +289,27 @@ static void close_triangles(const tl_grad_view *view, const tl_grad_colors *p, c
 }
 
 /* Ends a band: from sums of triangles to those of their corners. */
-TL_INLINE void close_colors(const tl_grad_view *view, const tl_grad_colors *p, const closing_places *places)
+TL_INLINE void finish_colors(const tl_grad_view *view, const tl_grad_colors *p, const face_places *places)
 {
     const tl_grad_sums *faces = p->faces;
     for (int64_t i = 0; i < faces->n; i += TL_LANES) {
-        closing_lanes l = {.sums = faces->sums + i * faces->n_columns,
-                           .n_columns = faces->n_columns,
-                           .places = places,
-                           .first = i,
-                           .n = (int)(faces->n - i < TL_LANES ? faces->n - i : TL_LANES)};
-        close_triangles(view, p, faces->rows + i, &l);
+        face_lanes l = {.sums = faces->sums + i * faces->n_columns,
+                        .n_columns = faces->n_columns,
+                        .places = places,
+                        .first = i,
+                        .n = (int)(faces->n - i < TL_LANES ? faces->n - i : TL_LANES)};
+        finish_triangles(view, p, faces->rows + i, &l);
     }
-    forget_band(p->faces);
-    leave_band(p->vertices);
-    leave_band(p->attr);
+    reset_band(p->faces);
+    flush_band(p->vertices);
+    flush_band(p->attr);
 }
 
 /* See kernels.h. */
 static int64_t grad_colors_vjp(const tl_grad_view *view, const tl_grad_colors *p)
 {
-    const int64_t bad_id = pull_colors(view, p);
-    close_colors(view, p, &(closing_places){.moments = FACE_X, .stride = TL_SUMS_OF_THREE});
+    const int64_t bad_id = backward_colors(view, p);
+    finish_colors(view, p, &(face_places){.moments = FACE_X, .stride = TL_SUMS_OF_THREE});
     return bad_id;
 }
 

@@ -80,8 +80,8 @@ TL_INLINE void slopes_on_face(cube_point *p, const vd *by, vd *slopes)
 
 /* Gradients of directions (3) and of what they change by (3, 2) from those of u, v and the slopes; has_slopes: whether
  * they have any. */
-TL_INLINE void pull_cube(const cube_point *p, const vd *g_uv, const vd *g_slopes, vd *g_direction, vd *g_by,
-                         int has_slopes)
+TL_INLINE void backward_cube(const cube_point *p, const vd *g_uv, const vd *g_slopes, vd *g_direction, vd *g_by,
+                             int has_slopes)
 {
     const vd zero = vd_set1(0.0), half = vd_set1(0.5), d = p->along[2];
     vd along[3] = {zero, zero, zero}, by[2][3] = {{zero, zero, zero}, {zero, zero, zero}};

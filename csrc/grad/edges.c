@@ -49,8 +49,8 @@ TL_INLINE int in_band(const tl_grad_view *view, int64_t pixel)
 }
 
 /* Adds what column c says of the shares of a pair; returns what its gradient moves from the far pixel to the near. */
-TL_INLINE double pull_column(const tl_grad_edges *e, const tl_pair *pair, const tl_pair_edge *edge, int64_t c,
-                             double *g_near, double *g_far, int is_f64)
+TL_INLINE double backward_column(const tl_grad_edges *e, const tl_pair *pair, const tl_pair_edge *edge, int64_t c,
+                                 double *g_near, double *g_far, int is_f64)
 {
     const double a = get_real(e->g_out, e->n_channels * pair->near + c, is_f64);
     const double b = get_real(e->g_out, e->n_channels * pair->far + c, is_f64);
@@ -60,21 +60,21 @@ TL_INLINE double pull_column(const tl_grad_edges *e, const tl_pair *pair, const 
 }
 
 /* Gradients of the two colours of a pair, and of its edge. */
-TL_INLINE void pull_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair,
-                         const tl_pair_edge *edge, tl_grad_sums *sums, int is_f64)
+TL_INLINE void backward_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair,
+                             const tl_pair_edge *edge, tl_grad_sums *sums, int is_f64)
 {
     double g_near = 0.0, g_far = 0.0;
     const int64_t near = e->n_channels * pair->near, far = e->n_channels * pair->far;
     const int has_near = in_band(view, pair->near), has_far = in_band(view, pair->far);
     for (int64_t c = 0; c < e->n_channels; c++) {
-        const double moved = pull_column(e, pair, edge, c, &g_near, &g_far, is_f64);
+        const double moved = backward_column(e, pair, edge, c, &g_near, &g_far, is_f64);
         if (has_near)
             put_real(e->g_color, near + c, get_real(e->g_color, near + c, is_f64) + moved, is_f64);
         if (has_far)
             put_real(e->g_color, far + c, get_real(e->g_color, far + c, is_f64) - moved, is_f64);
     }
     if (in_band(view, pair->near < pair->far ? pair->near : pair->far))
-        pull_edge(view, pair, edge, g_near, g_far, sums);
+        backward_edge(view, pair, edge, g_near, g_far, sums);
 }
 
 /* The weights of a triangle at the middle of a pixel, perspective-correct; 0 when it lies outside. */
@@ -100,7 +100,7 @@ static int weights_of_middle(const tl_grad_view *view, int32_t id, int64_t pixel
 }
 
 /* The straight-through rule: of the triangle that hangs over its neighbour, where no other cuts it. */
-static void pull_straight(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, tl_grad_sums *sums)
+static void backward_straight(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, tl_grad_sums *sums)
 {
     double weights[3], step = 0.0, other[3];
     const int hangs = pair->far_id < 0 || weights_of_middle(view, pair->far_id, pair->near, other);
@@ -120,7 +120,7 @@ static void pull_straight(const tl_grad_view *view, const tl_grad_edges *e, cons
         const int32_t vertex = view->tri[3 * (int64_t)id + k];
         g_px[pair->axis] = pair->flip * step * weights[k];
         if (get_real(view->pos, 4 * (int64_t)vertex + 3, view->is_f64) > 0.0)
-            pull_vertex(view, sums, vertex, g_px);
+            backward_vertex(view, sums, vertex, g_px);
     }
 }
 
@@ -262,11 +262,11 @@ TL_INLINE void blend_pair(const tl_grad_view *view, const tl_grad_edges *e, cons
     const tl_pair *pair = &p->pair;
     if (e->rule == TL_PAIR_STRAIGHT) {
         if (e->g_out)
-            pull_straight(view, e, pair, sums);
+            backward_straight(view, e, pair, sums);
         return;
     }
     if (e->g_out) {
-        pull_pair(view, e, pair, &p->edge, sums, is_f64);
+        backward_pair(view, e, pair, &p->edge, sums, is_f64);
         return;
     }
     if (in_band(view, pair->near) && p->edge.near != 0.0)
@@ -296,10 +296,10 @@ TL_INLINE void edges_of_band(const tl_grad_view *view, const tl_grad_edges *e, t
     while (next_pairs(&scan, &list, is_f64)) {
         for (int64_t i = 0; i < list.n; i++)
             list.turned[i] = -is_nearer(view, e, &list, i, is_f64);
-        turn_pairs(&list);
-        const int64_t n = list_met(view, e, &list, which);
+        orient_pairs(&list);
+        const int64_t n = list_pairs(view, e, &list, which);
         for (int64_t i = 0; i < n; i += TL_LANES) {
-            const int64_t n_met = meet_some(view, e, &list, which + i, n - i, pairs);
+            const int64_t n_met = find_pairs(view, e, &list, which + i, n - i, pairs);
             for (int64_t k = 0; k < n_met; k++)
                 blend_pair(view, e, pairs + k, sums, is_f64);
         }
@@ -325,7 +325,7 @@ static void grad_edges(const tl_grad_view *view, const tl_grad_edges *e, tl_grad
 {
     smooth_rows(view, e, sums);
     if (e->g_out)
-        leave_band(sums);
+        flush_band(sums);
 }
 
 #endif

@@ -235,7 +235,7 @@ TL_INLINE int is_nearer_at(const picture_pass *p, const tl_pair_list *list, int6
 }
 
 /* Finds the pairs of all rows: those with the row below, then those within a row. */
-static void list_met_pairs(const picture_pass *p)
+static void list_row_pairs(const picture_pass *p)
 {
     const int64_t lowest = p->all.first_row, top = p->all.end_row;
     pair_scan scan = scan_of(&p->all, &p->l->edges, lowest, top);
@@ -246,10 +246,10 @@ static void list_met_pairs(const picture_pass *p)
     while (next_pairs(&scan, &list, 0)) {
         for (int64_t i = 0; i < list.n; i++)
             list.turned[i] = -is_nearer_at(p, &list, i);
-        turn_pairs(&list);
-        const int64_t n_met = list_met(p->view, &p->l->edges, &list, which);
+        orient_pairs(&list);
+        const int64_t n_met = list_pairs(p->view, &p->l->edges, &list, which);
         for (int64_t i = 0; i < n_met; i += TL_LANES) {
-            const int64_t end = n + meet_some(p->view, &p->l->edges, &list, which + i, n_met - i, p->pairs + n);
+            const int64_t end = n + find_pairs(p->view, &p->l->edges, &list, which + i, n_met - i, p->pairs + n);
             for (; n < end; n++) {
                 const tl_pair *pair = &p->pairs[n].pair;
                 const int64_t own = (int64_t)pair->middle[1] + (pair->axis && pair->flip > 0.0);

@@ -53,7 +53,7 @@ typedef struct {
     int64_t n;
     int32_t near[TL_PAIRS_ROOM], far[TL_PAIRS_ROOM];     /* triangles; the last may be -1 */
     int32_t column[TL_PAIRS_ROOM], where[TL_PAIRS_ROOM]; /* of the near pixel; where: its row and TL_IN_COLUMN, ... */
-    int32_t turned[TL_PAIRS_ROOM];                       /* see turn_pairs */
+    int32_t turned[TL_PAIRS_ROOM];                       /* see orient_pairs */
     int32_t end[TL_PAIRS_ROOM];                          /* the triangle that has the edge between them, -1 for none */
 } tl_pair_list;
 
@@ -176,7 +176,7 @@ static void walk_pairs(pair_walks *w)
 }
 
 /* The far ones of pairs become the near ones, where `turned` is -1. */
-TL_INLINE void turn_pairs(tl_pair_list *list)
+TL_INLINE void orient_pairs(tl_pair_list *list)
 {
     const vi in_column = vi_set1(TL_IN_COLUMN), is_beyond = vi_set1(TL_IS_BEYOND);
     for (int64_t i = 0; i < list->n; i += TL_LANES) {
@@ -192,7 +192,7 @@ TL_INLINE void turn_pairs(tl_pair_list *list)
 }
 
 /* Finds where the surface ends or folds between pairs: from the near triangles, else from the far ones. */
-static void end_walks(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list)
+static void finish_walks(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list)
 {
     pair_walks w;
     const size_t size = (size_t)list->n * sizeof(int32_t);
@@ -204,7 +204,7 @@ static void end_walks(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_
     walk_pairs(&w);
     for (int64_t k = 0; k < w.n_failed; k++)
         list->turned[w.failed[k]] = list->far[w.failed[k]] < 0 ? 0 : -1;
-    turn_pairs(list);
+    orient_pairs(list);
     w.n = 0;
     for (int64_t k = 0; k < w.n_failed; k++) {
         const int32_t i = w.failed[k];
@@ -339,8 +339,8 @@ static int64_t store_pairs(const tl_grad_view *view, const tl_pair_list *list, c
 }
 
 /* Finds the edges of n pairs of a list, of TL_LANES at most; returns of how many something comes. */
-TL_INLINE int64_t meet_some(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair_list *list,
-                            const int32_t *which, int64_t n, tl_met_pair *out)
+TL_INLINE int64_t find_pairs(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair_list *list,
+                             const int32_t *which, int64_t n, tl_met_pair *out)
 {
     pair_lanes p;
     const int is_area = e->rule == TL_PAIR_AREA;
@@ -363,11 +363,11 @@ TL_INLINE int64_t meet_some(const tl_grad_view *view, const tl_grad_edges *e, co
 }
 
 /* Lists the pairs of a list of which something may come, after their walks; returns how many. */
-static int64_t list_met(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list, int32_t *which)
+static int64_t list_pairs(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list, int32_t *which)
 {
     int64_t n = 0;
     if (e->rule == TL_PAIR_AREA)
-        end_walks(view, e, list);
+        finish_walks(view, e, list);
     for (int64_t i = 0; i < list->n; i++) {
         which[n] = (int32_t)i;
         n += e->rule != TL_PAIR_AREA || list->end[i] >= 0;
@@ -376,7 +376,7 @@ static int64_t list_met(const tl_grad_view *view, const tl_grad_edges *e, tl_pai
 }
 
 /* Adds a gradient of a vertex's pixel coordinates to its sums of x, y, z, w. */
-TL_INLINE void pull_vertex(const tl_grad_view *view, tl_grad_sums *sums, int32_t vertex, const double *g_px)
+TL_INLINE void backward_vertex(const tl_grad_view *view, tl_grad_sums *sums, int32_t vertex, const double *g_px)
 {
     double *to = sums_of(sums, vertex);
     const double w = get_real(view->pos, 4 * (int64_t)vertex + 3, view->is_f64);
@@ -388,8 +388,8 @@ TL_INLINE void pull_vertex(const tl_grad_view *view, tl_grad_sums *sums, int32_t
 }
 
 /* Adds what the ends of an edge get, from the gradients of both shares. */
-static void pull_edge(const tl_grad_view *view, const tl_pair *pair, const tl_pair_edge *edge, double g_near,
-                      double g_far, tl_grad_sums *sums)
+static void backward_edge(const tl_grad_view *view, const tl_pair *pair, const tl_pair_edge *edge, double g_near,
+                          double g_far, tl_grad_sums *sums)
 {
     const double g_t = g_near * edge->near_by[0] + g_far * edge->far_by[0];
     const double by_rise = (g_near * edge->near_by[1] + g_far * edge->far_by[1]) / edge->rise;
@@ -397,7 +397,7 @@ static void pull_edge(const tl_grad_view *view, const tl_pair *pair, const tl_pa
         const double g = g_t * edge->ends[k] + (k ? by_rise : -by_rise);
         double g_px[2];
         g_px[pair->axis] = pair->flip * g, g_px[1 - pair->axis] = -edge->slope * g;
-        pull_vertex(view, sums, edge->vertices[k], g_px);
+        backward_vertex(view, sums, edge->vertices[k], g_px);
     }
 }
 

@@ -47,8 +47,8 @@ static void find_steps(const picture_pass *p, int64_t row)
         }
 }
 
-/* Finds what the gradients of a row say of its pairs: of their edges, and what these move from pixel to pixel. */
-static void pull_pairs(const picture_pass *p, int64_t row)
+/* Gradients of the edges of a row's pairs, and of the colours that the pairs move. */
+static void backward_pairs(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->l->n_columns, *pairs = p->l->row_pairs + (row - p->all.first_row);
     tl_grad_edges e = {.g_out = as_picture(p), .n_channels = n};
@@ -58,13 +58,13 @@ static void pull_pairs(const picture_pass *p, int64_t row)
         double g_near = 0.0, g_far = 0.0;
         e.steps = p->l->steps + n * i;
         if (p->l->edges.rule == TL_PAIR_STRAIGHT) {
-            pull_straight(p->view, &e, pair, p->l->vertices);
+            backward_straight(p->view, &e, pair, p->l->vertices);
             continue;
         }
         for (int64_t c = 0; c < n; c++)
-            moves[c] = moves[n + c] = pull_column(&e, pair, &p->pairs[i].edge, c, &g_near, &g_far, 0);
+            moves[c] = moves[n + c] = backward_column(&e, pair, &p->pairs[i].edge, c, &g_near, &g_far, 0);
         if (in_band(p->view, pair->near < pair->far ? pair->near : pair->far))
-            pull_edge(p->view, pair, &p->pairs[i].edge, g_near, g_far, p->l->vertices);
+            backward_edge(p->view, pair, &p->pairs[i].edge, g_near, g_far, p->l->vertices);
     }
 }
 
@@ -214,7 +214,7 @@ TL_INLINE void compare_some(float *out, const float *target, vf scale, vf *squar
     }
 }
 
-/* The same of a row; returns the sum of squares. */
+/* Writes the gradient of a row over its numbers; returns the sum of the squares of the differences. */
 static double compare_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
@@ -273,16 +273,16 @@ static tl_grad_colors colors_of(const picture_pass *p)
         .first_column = TL_FEW_COLUMNS};
 }
 
-TL_ONCE void pull_clamped_run(const picture_pass *p, int64_t r, int64_t row, int64_t n_pixels)
+TL_ONCE void backward_clamped_run(const picture_pass *p, int64_t r, int64_t row, int64_t n_pixels)
 {
     const pixel_run run = run_of_face(p, r, row, n_pixels);
     tl_grad_colors colors = colors_of(p);
     colors.values.rast = points_of_clamped(p, &run);
-    pull_clamped(p->view, &colors, &run);
+    backward_clamped(p->view, &colors, &run);
 }
 
 /* Adds the gradients of a row to the sums of its faces.  `ahead` may be NULL. */
-TL_INLINE void pull_row(const picture_pass *p, int64_t row, const float *ahead, int64_t n_columns)
+TL_INLINE void backward_row(const picture_pass *p, int64_t row, const float *ahead, int64_t n_columns)
 {
     const int64_t end = p->l->row_runs[row + 1 - p->all.first_row], width = p->view->width;
     const int64_t n_of_face = p->l->faces->n_columns;
@@ -296,7 +296,7 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, const float *ahead, 
         if (faces[r] < 0)
             continue;
         if (faces[r] & 1) {
-            pull_clamped_run(p, r, row, n_pixels);
+            backward_clamped_run(p, r, row, n_pixels);
             continue;
         }
         double *face = numbers + (faces[r] >> 1) * n_of_face;
@@ -318,15 +318,15 @@ TL_INLINE void pull_row(const picture_pass *p, int64_t row, const float *ahead, 
 }
 
 /* Ends a band: from sums of faces to those of corners. */
-static void close_faces(const picture_pass *p)
+static void finish_faces(const picture_pass *p)
 {
     const tl_grad_colors colors = colors_of(p);
-    const closing_places places = {.moments = place_of_three(0) + THREE_SUMS,
-                                   .stride = TL_SUMS_OF_FACE,
-                                   .column = p->column,
-                                   .row = p->row,
-                                   .corners = p->corners};
-    close_colors(p->view, &colors, &places);
+    const face_places places = {.moments = place_of_three(0) + THREE_SUMS,
+                                .stride = TL_SUMS_OF_FACE,
+                                .column = p->column,
+                                .row = p->row,
+                                .corners = p->corners};
+    finish_colors(p->view, &colors, &places);
 }
 
 /* Rows drawn, finished, led back, one after the other, each in its place: what its pairs move waits until those of the
@@ -355,12 +355,12 @@ TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
             const double found = finish_row(p, row - 2);
             sum += row - 2 >= view->first_row && row - 2 < view->end_row ? found : 0.0;
             if (is_back && row - 2 >= view->first_row)
-                pull_pairs(p, row - 2);
+                backward_pairs(p, row - 2);
         }
         if (is_back && row - 3 >= view->first_row && row - 3 < taken_end)
             move_between(p, row - 3, 1);
         if (is_back && row - ROWS_WAITING >= view->first_row)
-            pull_row(p, row - ROWS_WAITING, has_picture ? 0 : ahead, n_columns);
+            backward_row(p, row - ROWS_WAITING, has_picture ? 0 : ahead, n_columns);
     }
     return sum;
 }
@@ -376,16 +376,16 @@ static double grad_picture(const tl_grad_view *view, tl_grad_picture *l)
         list_faces(&p);
     set_up_faces(&p);
     if (!l->g_out)
-        list_met_pairs(&p);
+        list_row_pairs(&p);
     switch (l->n_columns) {
     case 1: sum = pass_rows(&p, 1); break;
     case 3: sum = pass_rows(&p, 3); break;
     default: sum = pass_rows(&p, l->n_columns);
     }
     if (l->out)
-        forget_band(l->faces);
+        reset_band(l->faces);
     else
-        close_faces(&p);
+        finish_faces(&p);
     return sum;
 }
 

@@ -141,7 +141,7 @@ TL_INLINE double *sums_of(tl_grad_sums *sums, int64_t row)
     return sums->sums + slot * sums->n_columns;
 }
 
-/* The same of the three corners of a triangle. */
+/* The sums of the rows of a triangle's three corners. */
 TL_INLINE void corner_sums(const tl_grad_view *view, tl_grad_sums *sums, int32_t id, double **out)
 {
     for (int k = 0; k < 3; k++)
@@ -149,16 +149,16 @@ TL_INLINE void corner_sums(const tl_grad_view *view, tl_grad_sums *sums, int32_t
 }
 
 /* Ends a band: rows have no place again. */
-TL_INLINE void leave_band(tl_grad_sums *sums)
+TL_INLINE void flush_band(tl_grad_sums *sums)
 {
     for (int64_t i = 0; i < sums->n; i++)
         sums->slot_of[sums->rows[i]] = -1;
 }
 
 /* Ends a band whose sums are not needed any longer. */
-TL_INLINE void forget_band(tl_grad_sums *sums)
+TL_INLINE void reset_band(tl_grad_sums *sums)
 {
-    leave_band(sums);
+    flush_band(sums);
     sums->n = 0;
 }
 

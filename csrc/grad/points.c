@@ -1,5 +1,5 @@
-/* Where pixels lie in the triangles that they show: weights, z/w, and what the weights change by from pixel to pixel;
- * and backwards, from gradients of these to sums of gradients by vertex.
+/* Weights of the corners at each pixel, z/w, and their derivatives; and backwards, from gradients of these to sums of
+ * gradients by vertex.
  * In: ids of a picture.  Out: `rast`, `rast_db`; backward: sums of x, y, z, w.
  *
  * With X, Y a pixel's middle, about that (X0, Y0) of the first pixel that shows the triangle, and x' = x - X0 w,
@@ -305,8 +305,8 @@ typedef struct {
 enum { FACE_BEGUN = 2, FACE_X = 4, FACE_Y = 8, FACE_ONE = 12 };
 
 /* Adds the gradients at X. */
-TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, const point_gradients *g, double x,
-                          int has_db, row_sums *s)
+TL_INLINE void backward_point(const tl_grad_view *view, const grad_triangle *t, const point_gradients *g, double x,
+                              int has_db, row_sums *s)
 {
     const double a[3] = {plane_at(t->q[0], x), plane_at(t->q[1], x), plane_at(t->q[2], x)};
     const double total = plane_at(t->sum, x), r = total == 0.0 ? 0.0 : 1.0 / total;
@@ -338,7 +338,7 @@ TL_INLINE void pull_point(const tl_grad_view *view, const grad_triangle *t, cons
 }
 
 /* Adds what a run that begins at x, y has summed up to the sums of its triangle: gradients of a_k, and times X. */
-TL_INLINE void close_row(const double *a, const double *a_x, double x, double y, double *sums)
+TL_INLINE void add_row_sums(const double *a, const double *a_x, double x, double y, double *sums)
 {
     if (sums[FACE_BEGUN] == 0.0)
         sums[0] = x, sums[1] = y, sums[FACE_BEGUN] = 1.0;
@@ -353,7 +353,7 @@ TL_INLINE void close_row(const double *a, const double *a_x, double x, double y,
 
 /* Gradients of q_k, of z_k and of w_k, from the sums of a triangle.  z/w is sum z_k a_k / D, with D = sum w_k a_k the
  * same at every pixel: the determinant of the corners. */
-TL_INLINE void pull_depth(const grad_triangle *t, const double *sums, double by_q[3][3], double *g_z, double *g_w)
+TL_INLINE void backward_depth(const grad_triangle *t, const double *sums, double by_q[3][3], double *g_z, double *g_w)
 {
     const double moments[3] = {sums[FACE_X + 3], sums[FACE_Y + 3], sums[FACE_ONE + 3]};
     double under = 0.0, g_under = 0.0;
@@ -378,8 +378,8 @@ TL_INLINE void pull_depth(const grad_triangle *t, const double *sums, double by_
 }
 
 /* Adds gradients of the corners of a triangle, from those of q_k = v_i x v_j about x, y, of z_k and of w_k. */
-TL_INLINE void pull_corners(const grad_triangle *t, double by_q[3][3], double x, double y, const double *g_z,
-                            const double *g_w, double **to)
+TL_INLINE void backward_corners(const grad_triangle *t, double by_q[3][3], double x, double y, const double *g_z,
+                                const double *g_w, double **to)
 {
     double g[3][3] = {{0}};
     for (int k = 0; k < 3; k++) {
@@ -397,18 +397,19 @@ TL_INLINE void pull_corners(const grad_triangle *t, double by_q[3][3], double x,
 }
 
 /* Gradients of the corners of a triangle from its sums. */
-static void close_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices, int is_f64)
+static void finish_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices,
+                            int is_f64)
 {
     grad_triangle t;
     double *to[3], by_q[3][3], g_z[3], g_w[3];
     load_seen_triangle(view, id, sums[0], sums[1], &t, is_f64);
     corner_sums(view, vertices, id, to);
-    pull_depth(&t, sums, by_q, g_z, g_w);
-    pull_corners(&t, by_q, sums[0], sums[1], g_z, g_w, to);
+    backward_depth(&t, sums, by_q, g_z, g_w);
+    backward_corners(&t, by_q, sums[0], sums[1], g_z, g_w, to);
 }
 
 /* The sums of the triangle of a run, about its first pixel where they begin. */
-TL_INLINE double *begun_sums(const tl_grad_view *view, tl_grad_sums *faces, const grad_span *s, int r)
+TL_INLINE double *sums_for(const tl_grad_view *view, tl_grad_sums *faces, const grad_span *s, int r)
 {
     double *sums = sums_of(faces, s->ids[r]);
     if (sums[FACE_BEGUN] == 0.0) {
@@ -459,8 +460,8 @@ TL_INLINE int is_unclamped(const float *rast, float z_most)
 }
 
 /* Adds the gradients at the pixels of a run, none of which is clamped. */
-TL_INLINE void pull_run_of_points(const tl_grad_view *view, const grad_span *s, int r, const float *g_rast,
-                                  double *sums)
+TL_INLINE void backward_run_of_points(const tl_grad_view *view, const grad_span *s, int r, const float *g_rast,
+                                      double *sums)
 {
     const run_plane plane = plane_of_run(s, r);
     const vq4 zero = vq4_set1(0.0f);
@@ -483,8 +484,8 @@ TL_INLINE void pull_run_of_points(const tl_grad_view *view, const grad_span *s, 
 }
 
 /* The gradients at the pixels of a run in float64. */
-TL_INLINE void pull_points_of(const tl_grad_view *view, const tl_grad_points *p, const pixel_run *run, int has_db,
-                              int is_f64)
+TL_INLINE void backward_points_of(const tl_grad_view *view, const tl_grad_points *p, const pixel_run *run, int has_db,
+                                  int is_f64)
 {
     grad_triangle t;
     row_sums s;
@@ -499,15 +500,15 @@ TL_INLINE void pull_points_of(const tl_grad_view *view, const tl_grad_points *p,
                              {0}};
         for (int c = 0; has_db && c < 4; c++)
             g.db[c] = get_real(p->g_db, at + c, is_f64);
-        pull_point(view, &t, &g, 2.0 * view->scale[0] * (double)i, has_db, &s);
+        backward_point(view, &t, &g, 2.0 * view->scale[0] * (double)i, has_db, &s);
     }
     double *sums = sums_of(p->faces, run->id);
-    close_row(s.a, s.a_x, x, y, sums);
+    add_row_sums(s.a, s.a_x, x, y, sums);
     for (int k = 0; k < 3; k++)
         sums[FACE_X + k] += s.q[0][k], sums[FACE_Y + k] += s.q[1][k];
 }
 
-static int64_t pull_points_in_lanes(const tl_grad_view *view, const tl_grad_points *p)
+static int64_t backward_points_in_lanes(const tl_grad_view *view, const tl_grad_points *p)
 {
     grad_span s = TL_BEFORE_SPANS(view);
     while (next_grad_span(view, &(id_rows){.rast = p->rast}, view->n_vertices, &s)) {
@@ -519,44 +520,44 @@ static int64_t pull_points_in_lanes(const tl_grad_view *view, const tl_grad_poin
             if (run.id < 0)
                 continue;
             if (is_unclamped(rast, z_most) && is_unclamped(rast + 4 * (run.n - 1), z_most))
-                pull_run_of_points(view, &s, r, (const float *)p->g_rast + 4 * run.at,
-                                   begun_sums(view, p->faces, &s, r));
+                backward_run_of_points(view, &s, r, (const float *)p->g_rast + 4 * run.at,
+                                       sums_for(view, p->faces, &s, r));
             else
-                pull_points_of(view, p, &run, 0, 0);
+                backward_points_of(view, p, &run, 0, 0);
         }
     }
     return s.bad_id;
 }
 
-TL_INLINE int64_t pull_points(const tl_grad_view *view, const tl_grad_points *p, int has_db, int is_f64)
+TL_INLINE int64_t backward_points(const tl_grad_view *view, const tl_grad_points *p, int has_db, int is_f64)
 {
     pixel_run run = before_shown(view);
     while (next_shown(view, p->rast, view->n_vertices, &run, is_f64))
-        pull_points_of(view, p, &run, has_db, is_f64);
+        backward_points_of(view, p, &run, has_db, is_f64);
     return run.bad_id;
 }
 
-static int64_t pull_point_rows(const tl_grad_view *view, const tl_grad_points *p)
+static int64_t backward_point_rows(const tl_grad_view *view, const tl_grad_points *p)
 {
     if (view->is_f64)
-        return pull_points(view, p, p->g_db != 0, 1);
-    return p->g_db ? pull_points(view, p, 1, 0) : pull_points_in_lanes(view, p);
+        return backward_points(view, p, p->g_db != 0, 1);
+    return p->g_db ? backward_points(view, p, 1, 0) : backward_points_in_lanes(view, p);
 }
 
 /* Ends a band: from sums of triangles to those of their corners. */
-static void close_points(const tl_grad_view *view, const tl_grad_points *p)
+static void finish_points(const tl_grad_view *view, const tl_grad_points *p)
 {
     for (int64_t i = 0; i < p->faces->n; i++)
-        close_triangle(view, p->faces->rows[i], p->faces->sums + p->faces->n_columns * i, p->vertices, view->is_f64);
-    leave_band(p->vertices);
+        finish_triangle(view, p->faces->rows[i], p->faces->sums + p->faces->n_columns * i, p->vertices, view->is_f64);
+    flush_band(p->vertices);
 }
 
 /* See kernels.h. */
 static int64_t grad_points_vjp(const tl_grad_view *view, const tl_grad_points *p)
 {
-    const int64_t bad_id = pull_point_rows(view, p);
-    close_points(view, p);
-    forget_band(p->faces);
+    const int64_t bad_id = backward_point_rows(view, p);
+    finish_points(view, p);
+    reset_band(p->faces);
     return bad_id;
 }
 

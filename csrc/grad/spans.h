@@ -94,7 +94,7 @@ TL_INLINE void load_some_columns(const float *p, int stride, int n, vf *columns)
         load_columns_f32(p, stride, columns);
 }
 
-/* The same of four numbers, in the order of quads; and back. */
+/* n <= TL_LANES rows of four numbers as columns, in the order of quads; store_some_quads writes them back. */
 TL_INLINE void load_some_quads(const float *p, int n, vf *columns)
 {
     float some[4 * TL_MAX_LANES];
@@ -155,8 +155,7 @@ TL_INLINE void list_span_runs(grad_span *s, const tl_grad_view *view, const id_r
 /* Finds the corners of runs, rows of triangles; what has none below n_rows shows nothing from then on. */
 TL_INLINE void find_corners(grad_span *s, const int32_t *triangles, int64_t n_triangles, int64_t n_rows)
 {
-    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(n_triangles)),
-             rows = vi_set1(clamped_to_int(n_rows));
+    const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(n_triangles)), rows = vi_set1(clamped_to_int(n_rows));
     for (int r = 0; r < s->n_runs; r += TL_LANES) {
         const vi id = vi_load(s->ids + r), id_3 = vi_add(id, vi_add(id, id));
         const vm wanted = vm_and(vm_first(s->n_runs - r), vm_and_not(vm_all(), vi_eq(id, none)));

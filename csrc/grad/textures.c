@@ -86,10 +86,10 @@ typedef struct {
     int64_t n_left;
     vi row;
     vm m;
-} pulled_lanes;
+} backward_lanes;
 
 /* Adds the gradients of pixels to their texels of a level, `share` times. */
-TL_INLINE void scatter_shares(const pulled_lanes *p, const texel_shares *quad, int level, vm m, vd share,
+TL_INLINE void scatter_shares(const backward_lanes *p, const texel_shares *quad, int level, vm m, vd share,
                               tl_grad_sums *sums, int is_f64)
 {
     const int64_t n = p->t->n_channels;
@@ -119,8 +119,8 @@ TL_INLINE void scatter_shares(const pulled_lanes *p, const texel_shares *quad, i
 }
 
 /* Gradients of u and v, and of the levels, from those of pixels by a level. */
-TL_INLINE void pull_shares(const pulled_lanes *p, const texel_shares *quad, int level, vm m, vd share, vd *g_uv,
-                           vd *total, int is_f64)
+TL_INLINE void backward_shares(const backward_lanes *p, const texel_shares *quad, int level, vm m, vd share, vd *g_uv,
+                               vd *total, int is_f64)
 {
     vd value[4], g[4], texel[4];
     for (int k = 0; k < 4; k++)
@@ -154,7 +154,7 @@ TL_INLINE void store_looks(const tl_grad_texture *t, const look_lanes *look, int
     for (int k = 0; k < 4; k++)
         g_slopes[k] = vd_mul(g_level, look->by[k]);
     if (n_axes == 3) {
-        pull_cube(&look->cube, g_uv, g_slopes, g_place, by, t->uv_da != 0);
+        backward_cube(&look->cube, g_uv, g_slopes, g_place, by, t->uv_da != 0);
         for (int k = 0; k < 3; k++)
             g_place[k] = vd_select(look->is_there, g_place[k], zero);
         for (int k = 0; t->uv_da && k < 6; k++)
@@ -169,7 +169,7 @@ TL_INLINE void store_looks(const tl_grad_texture *t, const look_lanes *look, int
 }
 
 /* Which pixels have a gradient in some channel. */
-TL_INLINE vm find_pulled(const pulled_lanes *p, int is_f64)
+TL_INLINE vm find_backward(const backward_lanes *p, int is_f64)
 {
     const vd zero = vd_set1(0.0);
     vm is_zero = vm_all();
@@ -182,7 +182,7 @@ TL_INLINE vm find_pulled(const pulled_lanes *p, int is_f64)
     return vm_and_not(p->m, is_zero);
 }
 
-TL_INLINE void pull_texels(const tl_grad_view *view, const tl_grad_texture *t, tl_grad_sums *sums, int is_f64)
+TL_INLINE void backward_texels(const tl_grad_view *view, const tl_grad_texture *t, tl_grad_sums *sums, int is_f64)
 {
     const int64_t end_pixel = view->end_row * view->width;
     const int n_axes = t->edge == TL_EDGE_CUBE ? 3 : 2;
@@ -191,9 +191,9 @@ TL_INLINE void pull_texels(const tl_grad_view *view, const tl_grad_texture *t, t
     clear_band(view, t->g_bias, 1);
     for (int64_t pixel = view->first_row * view->width; pixel < end_pixel; pixel += TL_LANES) {
         const int n = end_pixel - pixel < TL_LANES ? (int)(end_pixel - pixel) : TL_LANES;
-        pulled_lanes p = {t, at_pixel(t->out, t->n_channels, pixel, is_f64), view->width * view->height - pixel,
-                          vi_min(vi_iota(), vi_set1(n - 1)), vm_first(n)};
-        p.m = find_pulled(&p, is_f64);
+        backward_lanes p = {t, at_pixel(t->out, t->n_channels, pixel, is_f64), view->width * view->height - pixel,
+                            vi_min(vi_iota(), vi_set1(n - 1)), vm_first(n)};
+        p.m = find_backward(&p, is_f64);
         if (!vm_any(p.m))
             continue;
         vd share, g_uv[2] = {vd_set1(0.0), vd_set1(0.0)}, g_level = vd_set1(0.0), total;
@@ -209,7 +209,7 @@ TL_INLINE void pull_texels(const tl_grad_view *view, const tl_grad_texture *t, t
                 scatter_shares(&p, &quad, level, m, share, sums, is_f64);
             if (!t->g_uv)
                 continue;
-            pull_shares(&p, &quad, level, m, share, g_uv, &total, is_f64);
+            backward_shares(&p, &quad, level, m, share, g_uv, &total, is_f64);
             const vm is_low = vi_eq(look.low, vi_set1(level)),
                      has_upper = vm_and_not(m, vd_ge(vd_set1(0.0), look.upper));
             const vd change = vd_select(is_low, vd_sub(vd_set1(0.0), total), total);
@@ -219,16 +219,16 @@ TL_INLINE void pull_texels(const tl_grad_view *view, const tl_grad_texture *t, t
             store_looks(t, &look, pixel, p.m, g_uv, g_level, is_f64);
     }
     if (sums)
-        leave_band(sums);
+        flush_band(sums);
 }
 
 /* See kernels.h. */
 static void grad_texels_vjp(const tl_grad_view *view, const tl_grad_texture *texture, tl_grad_sums *sums)
 {
     if (view->is_f64)
-        pull_texels(view, texture, sums, 1);
+        backward_texels(view, texture, sums, 1);
     else
-        pull_texels(view, texture, sums, 0);
+        backward_texels(view, texture, sums, 0);
 }
 
 #endif

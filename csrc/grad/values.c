@@ -175,7 +175,8 @@ static int64_t grad_values(const tl_grad_view *view, const tl_grad_values *v)
 }
 
 /* The gradients that derivatives of attributes give at the pixels of a run. */
-TL_INLINE void pull_slopes(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, double **to, int is_f64)
+TL_INLINE void backward_slopes(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, double **to,
+                               int is_f64)
 {
     for (int64_t at = run->at; at < run->at + run->n; at++) {
         double db[4], g_db[4] = {0}, step[2];
@@ -202,8 +203,8 @@ TL_INLINE void add_to_corners(double **to, int64_t column, double by_u, double b
 }
 
 /* The gradients that n attributes from `first` on give at the pixels of a run; those of `rast` are added. */
-TL_INLINE void pull_run(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, int64_t first, int n,
-                        int64_t n_columns, double **to, int is_f64)
+TL_INLINE void backward_run(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, int64_t first, int n,
+                            int64_t n_columns, double **to, int is_f64)
 {
     double step[TL_FEW_COLUMNS][2], sum[TL_FEW_COLUMNS][3] = {{0}};
     for (int c = 0; c < n; c++)
@@ -227,7 +228,7 @@ TL_INLINE void pull_run(const tl_grad_values *v, const pixel_run *run, const int
         add_to_corners(to, first + c, sum[c][0], sum[c][1], sum[c][2]);
 }
 
-TL_INLINE int64_t pull_values(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int is_f64)
+TL_INLINE int64_t backward_values(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int is_f64)
 {
     double *to[3];
     int64_t rows[3];
@@ -239,16 +240,17 @@ TL_INLINE int64_t pull_values(const tl_grad_view *view, const tl_grad_values *v,
         corner_sums(view, sums, run.id, to);
         for (int64_t c = 0; c < v->n_columns; c += TL_FEW_COLUMNS) {
             const int64_t n = v->n_columns - c;
-            pull_run(v, &run, rows, c, n < TL_FEW_COLUMNS ? (int)n : TL_FEW_COLUMNS, v->n_columns, to, is_f64);
+            backward_run(v, &run, rows, c, n < TL_FEW_COLUMNS ? (int)n : TL_FEW_COLUMNS, v->n_columns, to, is_f64);
         }
         if (v->out_da)
-            pull_slopes(v, &run, rows, to, is_f64);
+            backward_slopes(v, &run, rows, to, is_f64);
     }
     return run.bad_id;
 }
 
 /* Those of n attributes of float32 at the pixels of a run, TL_SUMMED at most summed up in float32. */
-TL_INLINE void pull_quads(const tl_grad_values *v, const pixel_run *run, const grad_span *s, int r, int n, double **to)
+TL_INLINE void backward_quads(const tl_grad_values *v, const pixel_run *run, const grad_span *s, int r, int n,
+                              double **to)
 {
     const float *attr = (const float *)v->attr, *rast = (const float *)v->rast + 4 * run->at;
     const float *g_out = (const float *)v->out + n * run->at;
@@ -273,7 +275,7 @@ TL_INLINE void pull_quads(const tl_grad_values *v, const pixel_run *run, const g
     }
 }
 
-TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int n)
+TL_INLINE int64_t backward_values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums, int n)
 {
     grad_span s = TL_BEFORE_SPANS(view);
     clear_band(view, v->g_rast, 4);
@@ -284,27 +286,27 @@ TL_INLINE int64_t pull_values_in_lanes(const tl_grad_view *view, const tl_grad_v
             if (run.id < 0)
                 continue;
             corner_sums(view, sums, run.id, to);
-            pull_quads(v, &run, &s, r, n, to);
+            backward_quads(v, &run, &s, r, n, to);
         }
     return s.bad_id;
 }
 
-static int64_t pull_value_rows(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
+static int64_t backward_value_rows(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
     switch (!view->is_f64 && has_few_values(v) && !v->out_da ? v->n_columns : 0) {
-    case 1: return pull_values_in_lanes(view, v, sums, 1);
-    case 2: return pull_values_in_lanes(view, v, sums, 2);
-    case 3: return pull_values_in_lanes(view, v, sums, 3);
-    case 4: return pull_values_in_lanes(view, v, sums, 4);
-    default: return view->is_f64 ? pull_values(view, v, sums, 1) : pull_values(view, v, sums, 0);
+    case 1: return backward_values_in_lanes(view, v, sums, 1);
+    case 2: return backward_values_in_lanes(view, v, sums, 2);
+    case 3: return backward_values_in_lanes(view, v, sums, 3);
+    case 4: return backward_values_in_lanes(view, v, sums, 4);
+    default: return view->is_f64 ? backward_values(view, v, sums, 1) : backward_values(view, v, sums, 0);
     }
 }
 
 /* See kernels.h. */
 static int64_t grad_values_vjp(const tl_grad_view *view, const tl_grad_values *v, tl_grad_sums *sums)
 {
-    const int64_t bad_id = pull_value_rows(view, v, sums);
-    leave_band(sums);
+    const int64_t bad_id = backward_value_rows(view, v, sums);
+    flush_band(sums);
     return bad_id;
 }
 

@@ -1,7 +1,7 @@
 /* Quads: four float32 that belong together, those of a pixel or of a corner; four quads, of four pixels; and four
  * float64.
  *
- * The same bits on every instruction set: nothing is fused, and each sum has one order.
+ * Equal bits on every instruction set: nothing is fused, and each sum has one order.
  *
  *   vq_set1 vq_load vq_store    as their names say; + - * / are those of the compiler
  *   vq_load_some(p, n)          the first n of four numbers, zeros beyond

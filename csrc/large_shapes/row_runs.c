@@ -81,13 +81,13 @@ TL_INLINE void lay_span(row_runs *r, int32_t first, int32_t end, key_change chan
 /* ---- pixels ------------------------------------------------------------------------------------------------------ */
 
 /* n > 0 pixels of one value.  Vectors begin at multiples of their size, for a store across two cache lines takes twice
- * as long; where `may_pass`, the last one may write up to a vector further than n, which is written later. */
-TL_INLINE void put_words(int32_t *pixels, int64_t n, int32_t value, int may_pass)
+ * as long; `may_overrun`: it may write up to one vector past n; the caller overwrites that. */
+TL_INLINE void put_words(int32_t *pixels, int64_t n, int32_t value, int may_overrun)
 {
     const vi values = vi_set1(value);
     int32_t *const end = pixels + n;
     int32_t *p = pixels + TL_LANES - ((uintptr_t)pixels >> 2) % TL_LANES;
-    if (!may_pass && n < TL_LANES) {
+    if (!may_overrun && n < TL_LANES) {
         vi_store_masked(pixels, vm_first(n), values);
         return;
     }
@@ -95,17 +95,17 @@ TL_INLINE void put_words(int32_t *pixels, int64_t n, int32_t value, int may_pass
     for (; end - p >= 4 * TL_LANES; p += 4 * TL_LANES)
         for (int k = 0; k < 4; k++)
             vi_store(p + k * TL_LANES, values);
-    for (; end - p >= (may_pass ? 1 : TL_LANES); p += TL_LANES)
+    for (; end - p >= (may_overrun ? 1 : TL_LANES); p += TL_LANES)
         vi_store(p, values);
-    if (!may_pass)
+    if (!may_overrun)
         vi_store(end - TL_LANES, values);
 }
 
-/* The same of bytes. */
-TL_INLINE void put_bytes(uint8_t *pixels, int64_t n, uint8_t value, int may_pass)
+/* n > 0 bytes of one value; `may_overrun` as of put_words. */
+TL_INLINE void put_bytes(uint8_t *pixels, int64_t n, uint8_t value, int may_overrun)
 {
     const int64_t size = 4 * TL_LANES;
-    if (!may_pass || TL_LANES == 1) {
+    if (!may_overrun || TL_LANES == 1) {
         memset(pixels, value, (size_t)n);
         return;
     }
@@ -115,7 +115,7 @@ TL_INLINE void put_bytes(uint8_t *pixels, int64_t n, uint8_t value, int may_pass
         put_words((int32_t *)(void *)aligned, (pixels + n - aligned + 3) >> 2, (int32_t)(value * 0x01010101u), 1);
 }
 
-/* The same of any size. */
+/* n > 0 pixels of one value and of any size. */
 static void put_pixels(char *pixels, int64_t n, const char *value, size_t pixel_bytes)
 {
     const size_t all = (size_t)n * pixel_bytes, most = 1024 / pixel_bytes * pixel_bytes;
@@ -127,8 +127,8 @@ static void put_pixels(char *pixels, int64_t n, const char *value, size_t pixel_
     }
 }
 
-/* The same, of many pixels, by vectors that begin at multiples of their size: as many as hold whole pixels, three of
- * pixels of 3 or 12 bytes. */
+/* Many pixels of one value and of any size, by vectors that begin at multiples of their size: as many as hold whole
+ * pixels, three of pixels of 3 or 12 bytes. */
 TL_INLINE void put_patterns(char *pixels, int64_t n, const char *value, int64_t pixel_bytes, int n_vectors)
 {
     const int64_t size = 4 * TL_LANES, period = n_vectors * size;
@@ -174,15 +174,15 @@ TL_INLINE void close_run(const open_run *run, int pixel_bytes)
 {
     char *const pixels = run->pixels + run->first * pixel_bytes;
     const int64_t n = run->end - run->first;
-    const int may_pass = run->n_px - run->end >= 4 * TL_LANES;
+    const int may_overrun = run->n_px - run->end >= 4 * TL_LANES;
     int32_t word;
     if (n <= 0)
         return;
     memcpy(&word, run->value, 4);
     if (pixel_bytes == 1)
-        put_bytes((uint8_t *)pixels, n, (uint8_t)run->value[0], may_pass);
+        put_bytes((uint8_t *)pixels, n, (uint8_t)run->value[0], may_overrun);
     else if (pixel_bytes == 4)
-        put_words((int32_t *)(void *)pixels, n, word, may_pass);
+        put_words((int32_t *)(void *)pixels, n, word, may_overrun);
     else if (pixel_bytes % 3)
         put_patterns(pixels, n, run->value, pixel_bytes, 1);
     else

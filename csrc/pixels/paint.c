@@ -74,7 +74,7 @@ static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int
     return i128_is_zero(high) ? i128_low(low) != 0 : i128_sign(high);
 }
 
-/* The same of vertices that are not snapped. */
+/* Sign of w1 * d1 + w2 * d2 - halves * w_sum / 2, exact, of vertices that are not snapped. */
 static int compare_points(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int d1, int d2, int halves)
 {
     const exact_point *p = s->points, sample = sample_of(s->exact, x_px, y_px, bits);

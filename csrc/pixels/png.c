@@ -144,7 +144,7 @@ TL_INLINE void code_symbol(int symbol, uint32_t *counts, const png_codes *codes,
         write_code(w, codes->of_symbol[symbol]);
 }
 
-/* The same of a match, but for what is too short at its end; returns how many bytes it has. */
+/* Counts a match, or writes its code, without an end too short for a symbol; returns how many bytes are coded. */
 TL_INLINE int64_t code_match(int64_t length, uint32_t *counts, const png_codes *codes, png_writer *w)
 {
     int64_t rest = length;
@@ -158,7 +158,7 @@ TL_INLINE int64_t code_match(int64_t length, uint32_t *counts, const png_codes *
     return length - rest;
 }
 
-/* The same of a filtered row of n bytes. */
+/* Counts the symbols of a filtered row of n bytes, or writes their codes. */
 TL_INLINE void code_row(const uint8_t *row, int64_t n, int step, uint32_t *counts, const png_codes *codes,
                         png_writer *w)
 {

@@ -27,7 +27,7 @@ TL_INLINE uint8_t mean_u8(const uint8_t *values, int sample_bits, const tl_trans
     return transfer ? transfer->encode[mean] : (uint8_t)mean;
 }
 
-/* The same, each sample as often as its alpha says. */
+/* The mean of samples that are weighted by their alpha. */
 TL_INLINE uint8_t weighted_mean_u8(const uint8_t *values, const uint8_t *alpha, int sample_bits,
                                    const tl_transfer *transfer)
 {

@@ -82,7 +82,7 @@ typedef struct {
     int has_far_texels; /* some are prefetched */
     int is_plain;       /* edge functions and normals of vertices are all that runs need */
     int n_runs, n_special;
-    float most_shortest;    /* of RUN_SHORTEST of the runs that set_plain_runs has set, INFINITY of others */
+    float max_min_length;   /* the largest RUN_SHORTEST of plain runs; INFINITY where runs are not plain */
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
     /* vectors of runs begin with a cache line: one across two takes twice as long */
@@ -239,7 +239,7 @@ TL_INLINE void load_positions_f32(const float *positions, const int32_t *vertice
         p[axis] = vf_of_bits(bits[axis + 1]);
 }
 
-/* The same of float32 or float64, as float64. */
+/* The positions (x, y, z) of TL_LANES vertices, of rows of float32 or float64, as float64. */
 TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *vertices, vd *p)
 {
     if (!is_f64) {
@@ -452,7 +452,8 @@ static void special_edges(special_run *e, const double *x_fx, const double *y_fx
     e->area = (float)area;
 }
 
-/* The same of one that is cut: from homogeneous corners, with q in the edge functions; the area is +-1. */
+/* Edge functions of a triangle that a clip plane cuts: from homogeneous corners, with q in the edge functions; the
+ * area is +-1. */
 static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vertex_set *set, const int32_t *corners,
                               double y, double unit, float *row_step)
 {
@@ -681,7 +682,7 @@ TL_INLINE vm find_exact_edges(shade_runs *s, int slot, int64_t row, const vd *x,
     return vm_and_not(vm_all(), vm_and(has_weights, vd_ge(most, vd_add(vd_abs(step1), vd_abs(step2)))));
 }
 
-/* The same of corners that are not loaded yet. */
+/* Loads the corners of TL_LANES runs and sets their edge functions. */
 TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
@@ -828,7 +829,7 @@ TL_INLINE float largest_lane(vf a)
     return most;
 }
 
-/* The same of runs that need no more than normals of vertices, where none is special: 0 if one is.  Passes of few
+/* Sets up runs that need no more than normals of vertices: 0 if one of them is special.  Passes of few
  * operations, so that those of several vectors of runs overlap. */
 TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
 {
@@ -868,7 +869,7 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
         put_normals(s, slot, vf_from_vi(vi_load(s->ints[RUN_SUM] + slot)), q, (const vf(*)[3])normal);
         most = vf_max(most, vf_load(s->floats[RUN_SHORTEST] + slot));
     }
-    s->most_shortest = largest_lane(most);
+    s->max_min_length = largest_lane(most);
     return 1;
 }
 
@@ -879,7 +880,7 @@ TL_ONCE void set_runs(shade_runs *s, int64_t row)
     const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
     const int is_exact = s->snapped->mesh.exact != NULL;
     s->n_special = 0;
-    s->most_shortest = INFINITY;
+    s->max_min_length = INFINITY;
     if (!s->n_runs)
         return;
     /* the rest of the last vector: a triangle that is there */

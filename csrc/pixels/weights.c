@@ -74,7 +74,7 @@ static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
     return e->area == 0.0f ? TL_ALONE : s->n_special + 1;
 }
 
-/* The same of a run of vertices that are not snapped: float64 where each weight is then within 2^-30. */
+/* How a run of vertices that are not snapped is to be weighed: float64 where each weight is then within 2^-30. */
 static int32_t weigh_exact_run(weighed_span *r, int slot, const int32_t *corners, int64_t row)
 {
     shade_runs *s = &r->runs;

@@ -91,8 +91,8 @@ static void mask_listed_row(int32_t *v, int n, int64_t width, uint8_t *out)
     memset(out + at, 0, (size_t)(width - at));
 }
 
-/* The same by the nonzero rule.  at has bottom - top + 1 numbers; `list` room for n_list, at least as many as the
- * polygon has edges; cells tl_polygon_stride(width), all 0, and left so, and bits a bit for each. */
+/* Masks a polygon by the nonzero rule.  `at` has bottom - top + 1 numbers; `list` room for n_list, at least as many as
+ * the polygon has edges; cells tl_polygon_stride(width), all 0, and left so, and bits a bit for each. */
 static void mask_nonzero(const tl_polygons *p, int64_t polygon, int64_t width, int64_t top, int64_t bottom,
                          uint32_t *at, int32_t *list, int64_t n_list, int32_t *cells, uint64_t *bits, uint8_t *out)
 {

@@ -548,7 +548,8 @@ static void certify_polygons(const tl_polygons *p, int64_t first, int64_t end, i
             (uint8_t)(p->is_wide[i] ? is_simple(p, 1, i, weights, room) : is_simple(p, 0, i, weights, room));
 }
 
-/* The same of polygons that are known to be valid: the first ring of each is its border, the others are holes. */
+/* Sets weights and is_simple of polygons that are known to be valid: the first ring of each is its border, the others
+ * are holes. */
 static void trust_polygons(const tl_polygons *p, int64_t first, int64_t end, int8_t *weights, uint8_t *is_simple_out)
 {
     for (int64_t i = first; i < end; i++) {

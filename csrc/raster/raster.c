@@ -404,8 +404,8 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
 {
     const tl_snapped drawn = drawn_mesh(snapped);
     const int has_all = !slice->ids && slice->end == snapped->n_triangles;
-    tl_exact_counts not_asked_for = {0, 0, 0, 0, 0, 0};
-    tl_exact_counts *const counts = slice->counts ? slice->counts : &not_asked_for;
+    tl_exact_counts unused = {0, 0, 0, 0, 0, 0};
+    tl_exact_counts *const counts = slice->counts ? slice->counts : &unused;
     tl_slice own = *slice;
     int64_t bad_row = -1;
     own.end = has_all ? drawn.n_triangles : slice->end;

@@ -26,7 +26,7 @@ typedef struct {
     unsigned live;
 } row_lanes;
 
-/* The same in memory. */
+/* TL_LANES triangles of a queue, in memory. */
 typedef struct {
     float start[3][TL_MAX_LANES], step[3][TL_MAX_LANES], inverse[3][TL_MAX_LANES]; /* left, right, third */
     int32_t third_is_left[TL_MAX_LANES], third_is_right[TL_MAX_LANES];             /* 0 or -1 */
@@ -98,7 +98,7 @@ TL_INLINE void store_edges(tl_geometry g, tl_sink sink, const row_lanes *lanes, 
 
 /* ---- row ends -------------------------------------------------------------------------------------------- */
 
-/* The same of TL_LANES rows of triangle k, from row0 on. */
+/* The ends of TL_LANES rows of triangle k, from row0 on. */
 TL_INLINE void find_rows_of_one(tl_geometry g, const row_edges *r, int k, vm third_is_left, vm third_is_right, int row0,
                                 int n_cols, vi *first, vi *end, vm *doubted)
 {
@@ -126,7 +126,7 @@ TL_INLINE void put_lanes(const tl_target *target, tl_sink sink, int64_t at, vm m
     if (sink_has_depth(sink))
         put_depths(target, sink, at, m, sum_depth(z_row, z_col), id);
     else
-        put_numbers(target, sink, at, m, vi_set1(number_of(target, sink, id)));
+        put_numbers(target, sink, at, m, vi_set1(stored_value(target, sink, id)));
 }
 
 /* Rows of a block of at most TL_BLOCK_COLS columns, of a mask TL_BIT_COLS; the depth of a sample is the sum of its
@@ -145,7 +145,7 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
         return;
     }
     if (is_half && (sink == TL_SINK_COUNT || sink == TL_SINK_LABEL)) {
-        const hi number = hi_lower(vi_set1(number_of(target, sink, id)));
+        const hi number = hi_lower(vi_set1(stored_value(target, sink, id)));
         for (int row = 0; row < n_rows; row++, at += stride)
             put_numbers_half(target, sink, at, (hm)bits[row * stride_of_rows], number);
         return;
@@ -281,7 +281,7 @@ TL_INLINE void draw_spans(const tl_target *target, tl_sink sink, vi first, vi en
     }
 }
 
-/* The same in blocks of TL_LANES columns. */
+/* Draws the samples [first, end) of up to TL_LANES rows in blocks of TL_LANES columns. */
 TL_INLINE void draw_blocks(tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r, int64_t k,
                            vi first, vi end, int n_cols, const double *z_row, int64_t at, double unit, int32_t id)
 {

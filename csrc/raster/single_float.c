@@ -71,7 +71,7 @@ TL_INLINE double larger_of(double a, double b) { return b > a ? b : a; }
 TL_INLINE double least_of(double a, double b, double c) { return lesser_of(lesser_of(a, b), c); }
 TL_INLINE double most_of(double a, double b, double c) { return larger_of(larger_of(a, b), c); }
 
-/* The same operations as plane_of_lanes and take_out_slivers in triangles_float.c. */
+/* The depth plane, by the operations of plane_of_lanes and take_out_slivers in triangles_float.c: equal bits. */
 static void plane_of_points(single_triangle *t, double width, double height)
 {
     const exact_point *p = t->edges.corners;
@@ -124,7 +124,8 @@ static void setup_single_edges(const walk_state *s, single_triangle *t, double w
 /* The nearest integer of a number below 2^51. */
 TL_INLINE double nearest_of(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
 
-/* The same from vertices that lie on 2^-8 px, near enough that 2E < 2^51: without a band.  Returns whether they do. */
+/* The edge functions from vertices that lie on 2^-8 px, near enough that 2E < 2^51: without a band.  Returns whether
+ * they do. */
 static int setup_on_grid(single_triangle *t)
 {
     refined_triangle *e = &t->edges;

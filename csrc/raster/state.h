@@ -87,7 +87,7 @@ typedef struct {
     vi sample;       /* the first sample: row * stride_px + column */
 } lane_triangles;
 
-/* The same of TL_FLOAT: TL_LANES triangles, turned so that their areas are positive. */
+/* TL_LANES triangles of TL_FLOAT, turned so that their areas are positive. */
 typedef struct {
     vi ids;
     vd x[3], y[3], z[3];           /* z: where there is depth */
@@ -158,7 +158,7 @@ TL_INLINE vm not_culled(tl_cull cull, vm positive, vm negative)
     return cull == TL_CULL_BACK ? negative : cull == TL_CULL_FRONT ? positive : vm_or(positive, negative);
 }
 
-/* The same of extents up to 2^25 units: twice the area is exact in float64, at every step. */
+/* Triangles of extents up to 2^25 units that are not turned away: twice the area is exact in float64, at every step. */
 TL_INLINE vm find_unculled(const lane_corners *c, tl_cull cull, vm *is_negative)
 {
     const vd x1 = vd_from_vi(vi_sub(c->x[1], c->x[0])), y1 = vd_from_vi(vi_sub(c->y[1], c->y[0]));
@@ -312,7 +312,7 @@ TL_INLINE void fetch_rows(const void *rows, size_t n_bytes, const int32_t *corne
         __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[k] * n_bytes));
 }
 
-/* The same of triangles in a list, and the rows of indices of the next ones. */
+/* Prefetches the rows of vertices of triangles in a list, and the rows of indices of the next ones. */
 TL_INLINE void fetch_listed(const void *rows, size_t n_bytes, const int32_t *triangles, const int32_t *ids)
 {
     for (int k = 0; k < TL_LANES; k++) {

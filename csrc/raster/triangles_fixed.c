@@ -118,7 +118,7 @@ TL_INLINE void place_triangles(const walk_state *s, tl_sink sink, const lane_cor
     setup_edges_lanes(t, s->window, sink);
 }
 
-/* The same operations as setup_plane in setup.c. */
+/* The depth planes, by the operations of setup_plane in setup.c: equal bits. */
 TL_INLINE lane_planes plane_lanes(const lane_triangles *t, const vd *z)
 {
     const vd x1 = vd_from_vi(t->dx[0]), y1 = vd_from_vi(t->dy[0]);

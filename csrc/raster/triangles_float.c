@@ -201,7 +201,7 @@ TL_INLINE void measure_points(lane_exact *t)
     t->band = vf_mul(t->xy, vf_set1(TL_BOX_BAND));
 }
 
-/* The same of points that are rounded to places. */
+/* The first step of set_box_edges, of points that are rounded to places. */
 TL_INLINE void measure_places(const walk_state *s, const vi *x_fx, const vi *y_fx, vi col, vi row, lane_exact *t)
 {
     const vf unit = vf_set1(TL_PLACE_UNIT);
@@ -214,7 +214,7 @@ TL_INLINE void measure_places(const walk_state *s, const vi *x_fx, const vi *y_f
     t->band = vf_mul(t->xy, vf_set1(TL_PLACE_BAND));
 }
 
-/* The same for boxes of up to 4x4 samples, from points in float32; finds the turns, too. */
+/* The edge functions over boxes of up to 4x4 samples, from points in float32; finds the turns, too. */
 TL_INLINE void set_box_edges(const walk_state *s, lane_exact *t, vm on_grid)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f);
@@ -518,7 +518,7 @@ TL_INLINE void setup_float(walk_state *s, tl_sink sink, lane_exact *t, int of_bo
     }
 }
 
-/* The same operations as plane_of_points in single_float.c. */
+/* The depth planes, by the operations of plane_of_points in single_float.c: equal bits. */
 TL_INLINE lane_planes plane_of_lanes(const walk_state *s, const lane_exact *t)
 {
     const vd zero = vd_set1(0.0);

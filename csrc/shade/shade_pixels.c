@@ -43,7 +43,7 @@ TL_INLINE void find_most_pixels(shaded_lanes *p, const shade_runs *s, int i, int
     }
 }
 
-/* The same of all runs. */
+/* The lanes of vector i of the span that begins at `column`, and the edge functions of all runs. */
 TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {
     find_most_pixels(p, s, i, column);
@@ -107,12 +107,12 @@ TL_INLINE vm find_normals(shaded_lanes *p)
     const vf squared = dot3(p->normal, p->normal), scale = vf_div(vf_set1(1.0f), vf_sqrt(squared));
     for (int axis = 0; axis < 3; axis++)
         p->normal[axis] = vf_mul(p->normal[axis], scale);
-    if (!vm_any(vf_ge(vf_set1(p->s->most_shortest), squared)))
+    if (!vm_any(vf_ge(vf_set1(p->s->max_min_length), squared)))
         return vm_first(0);
     return vm_and(p->visible, vf_ge(pick(p, RUN_SHORTEST), squared));
 }
 
-/* The same, and the normal of the face where there is none. */
+/* Unit normals towards the viewer: those of the corners, or that of the face where they cancel. */
 TL_INLINE void set_normals(shaded_lanes *p)
 {
     const vm has_none = find_normals(p);

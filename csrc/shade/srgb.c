@@ -116,7 +116,7 @@ TL_INLINE vf grey_light(const shaded_lanes *p)
     return vf_mul(diffuse[0], vf_set1(TL_GREY_STEPS));
 }
 
-/* The same of vector i of the span that begins at `column`, whatever its runs and normals are. */
+/* The light of vector i of the span that begins at `column`, whatever its runs and normals are. */
 static void light_any_grey(const shade_runs *s, int i, int64_t column, float *steps)
 {
     shaded_lanes p;
@@ -125,7 +125,8 @@ static void light_any_grey(const shade_runs *s, int i, int64_t column, float *st
     vf_store(steps, grey_light(&p));
 }
 
-/* The same.  Calls that take the lanes would have them all stored for every vector, so the rare cases begin again. */
+/* The light of vector i of the span that begins at `column`.  A call that takes the lanes would store them all for
+ * every vector, so the rare cases begin again. */
 TL_INLINE void light_grey(const shade_runs *s, int i, int64_t column, float *steps)
 {
     shaded_lanes p;

@@ -202,7 +202,7 @@ TL_INLINE void sample_laid(const tl_texture *t, vf u, vf v, const vf *du, const 
         rgba[c] = vf_mul(rgba[c], vf_set1(1.0f / 65535.0f));
 }
 
-/* The same of one texture alone. */
+/* Samples a texture that shares its layout with no other. */
 TL_INLINE void sample_texture(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, vf *rgba, int n_channels)
 {
     laid_texture laid;

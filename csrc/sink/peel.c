@@ -58,7 +58,7 @@ static void cross_lanes(const tl_crossings *c, int64_t at, vm m, vf depth)
     }
 }
 
-/* The same, as layers. */
+/* Adds the lanes in m of a triangle to the layers of their pixels. */
 static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int32_t id)
 {
     const tl_peeled *p = target->peeled;

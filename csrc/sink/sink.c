@@ -112,8 +112,8 @@ TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm 
         put_buffers(target, sink, at, m, depth, vi_set1(id));
 }
 
-/* What a sample without depth adds to a count, or the number that it makes of a label. */
-TL_INLINE int32_t number_of(const tl_target *target, tl_sink sink, int32_t id)
+/* The value that a sample without depth stores: 1 for counts, the (flipped) id for labels. */
+TL_INLINE int32_t stored_value(const tl_target *target, tl_sink sink, int32_t id)
 {
     return sink == TL_SINK_COUNT ? 1 : id ^ target->flip;
 }
@@ -179,7 +179,7 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
         put_uncovered(target, at, n, id);
         return;
     }
-    const vi number = vi_set1(number_of(target, sink, id));
+    const vi number = vi_set1(stored_value(target, sink, id));
     for (int64_t k = 0; k < n; k += TL_LANES)
         put_numbers(target, sink, at + k, vm_first(n - k), number);
 }
@@ -288,7 +288,7 @@ static __attribute__((noinline)) void put_columns_farthest(const plane_row *r, c
     put_columns(r, target, TL_SINK_FARTHEST, at, first, end);
 }
 
-/* The same without segments where all depths lie before the triangle.  Along a row depths as they are
+/* Puts a row of columns without segments where all depths lie before the triangle.  Along a row depths as they are
  * rounded never turn back, so those at the ends of a segment bound the others, to the bit.  A segment covered
  * whole has a bound from then on: other depths only come before it.  Returns whether anything was left out. */
 TL_INLINE int put_bounded(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, float *bounds,

@@ -70,7 +70,7 @@ static inline void set_projected(const double *p, const tl_view *view, int was_c
     out[2] = z > FLT_MAX ? FLT_MAX : z < -FLT_MAX ? -FLT_MAX : z; /* only without near and far planes */
 }
 
-/* The same, snapped. */
+/* Perspective divide and viewport, then rounded to sub-pixels and stored. */
 static inline void store_projected(const double *p, const tl_view *view, int64_t i, tl_vertex *out, tl_wide *wide,
                                    int was_cut, tl_vertex_counts *counts)
 {
@@ -192,7 +192,7 @@ TL_INLINE vm inside_lanes(const vd *p, const tl_view *view)
     return inside;
 }
 
-/* The same of float32 numbers: 0 < w < infinity equals the two tests of w. */
+/* Lanes of float32 inside the planes of w, near and far: 0 < w < infinity equals the two tests of w. */
 TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
 {
     const vf z = p[2], w = p[3], zero = vf_set1(0.0f);

@@ -124,7 +124,8 @@ static inline int clip_box(tl_triangle *t, const tl_window *window)
  * steep that float64 would lose bits that float32 shows, and the exact weights are used. */
 #define TL_SLIVER_BITS 12
 
-/* The depth plane over the corners, per half sub-pixel.  The same operations as plane_lanes in triangles_fixed.c. */
+/* The depth plane over the corners, per half sub-pixel.  The operations are those of plane_lanes in triangles_fixed.c:
+ * equal bits. */
 static inline void setup_plane(tl_triangle *t)
 {
     const double x1 = (double)(t->x_fx[1] - t->x_fx[0]), y1 = (double)(t->y_fx[1] - t->y_fx[0]), z1 = t->z[1] - t->z[0];

@@ -127,7 +127,7 @@ def two_triangles() -> Shape:
 
 
 def square_of_four() -> Shape:
-    """The same square as four triangles round its centre (75, 75)."""
+    """The square of `two_triangles` as four triangles round its centre (75, 75)."""
     vertices = np.array([[50.0, 50], [100, 50], [100, 100], [50, 100], [75, 75]])
     return vertices, np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], dtype=np.int32)
 

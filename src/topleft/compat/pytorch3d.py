@@ -34,7 +34,7 @@ class Fragments:
     dists: Any
 
     def detach(self) -> Fragments:
-        """The same without gradients."""
+        """Fragments without gradients."""
         parts = {name: getattr(self, name).detach() for name in ("zbuf", "bary_coords", "dists")}
         return replace(self, **parts)
 

@@ -80,7 +80,7 @@ class Folder:
         return any(not name.startswith(".") for name in os.listdir(self.location))
 
     def absolute(self) -> Folder:
-        """The same folder for processes that run in other ones."""
+        """The folder by its absolute path, for processes that run in other folders."""
         return Folder(self.location.absolute()) if isinstance(self.location, Path) else self
 
     def names(self) -> list[str]:

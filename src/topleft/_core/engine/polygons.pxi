@@ -146,7 +146,7 @@ cdef class SnappedPolygons:
 
     def mask_nonzero(self, int64_t polygon, uint8_t[:, ::1] out, int64_t top, int64_t bottom, uint32_t[::1] at,
                      int32_t[::1] room, int32_t[::1] cells, uint64_t[::1] bits):
-        """The same by the nonzero rule; `cells`: a row, 0."""
+        """Write rows [top, bottom) of the mask of a polygon by the nonzero rule; `cells`: a row, 0."""
         cdef tl_polygons set = self.asking()
         with nogil:
             K.mask_nonzero(&set, polygon, self.width, top, bottom, &at[0], &room[0], room.shape[0], &cells[0],

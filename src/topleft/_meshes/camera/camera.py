@@ -159,11 +159,11 @@ class Camera:
         return projection
 
     def straightened(self) -> Camera:
-        """The same camera without its lens."""
+        """The camera without its lens."""
         return self if self.lens is None else replace(self, lens=None)
 
     def placed(self, transform: F64) -> Camera:
-        """The same camera in the object space of an instance at `transform` (4, 4), world from object."""
+        """The camera in the object space of an instance at `transform` (4, 4), world from object."""
         return replace(self, view=engine.product(self.view, transform))
 
     def project(self, points: npt.ArrayLike, size: int | tuple[int, int]) -> F64:

@@ -374,7 +374,7 @@ def eye_of(camera: Camera) -> F64:
 
 
 def with_gutter(baked: Baked, gutter: int, n_threads: int) -> Baked:
-    """The same with texels round the charts that have the value of the nearest texel."""
+    """Baked texels, with texels round the charts that have the value of the nearest texel."""
     if not gutter:
         return baked
     height = len(baked.triangle)

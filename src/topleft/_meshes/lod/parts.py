@@ -191,7 +191,7 @@ class CutMesh(Mesh):
         return sum(end - first for first, end in self.__dict__["_runs"])
 
     def as_mesh(self) -> Mesh:
-        """The same for whoever draws its triangles himself."""
+        """The cut as a mesh whose triangles are made when something reads them."""
         mesh = object.__new__(LateMesh)
         own = {field.name: vars(self)[field.name] for field in fields(Mesh) if field.name != "triangles"}
         vars(mesh).update(own, _cut=self)

@@ -170,7 +170,7 @@ class Layer(NamedTuple):
         return len(self.starts) - 1
 
     def as_one(self) -> Layer | None:
-        """The same level as one part; None if it is, or is too large to be collapsed at once."""
+        """The level as a single part; None if it is, or is too large to be collapsed at once."""
         n = len(self.corners.triangles)
         if self.n_parts == 1 or n > MOST_WHOLE:
             return None

@@ -381,7 +381,7 @@ def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt
 def _groups_by_hash(
     attributes: tuple[npt.NDArray[Any], ...],
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
-    """The same of rows that are equal where their bits are, in a sixth of the time; None if some are not numbers."""
+    """First rows and groups of equal rows, by their bits, in a sixth of the time; None if some are not numbers."""
     n = len(attributes[0])
     if not 0 < n < 1 << 30 or any(rows.dtype.kind == "f" and np.isnan(rows).any() for rows in attributes):
         return None

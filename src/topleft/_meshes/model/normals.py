@@ -131,7 +131,7 @@ def face_normals(vertices: FloatArray, triangles: I32, *, threads: int | None = 
 
 
 def face_normal_rows(vertices: FloatArray, triangles: I32, *, threads: int | None = None) -> F32:
-    """The same as rows (T, 4) float32, the last number 1."""
+    """Unit normals of the triangles as rows (T, 4) float32, the last number 1."""
     rows = np.empty((len(triangles), 4), np.float32)
     _measure_faces(vertices, triangles, threads, None, rows)
     return rows
@@ -185,7 +185,7 @@ def unit_or_zero(vectors: FloatArray) -> F64:
 
 
 def unit_rows(vectors: FloatArray, turn: F64 | None = None) -> F32:
-    """The same as rows (N, 4) float32, the last number 1; of `vectors @ turn` where there is a matrix (3, 3)."""
+    """Vectors scaled to length 1 as rows (N, 4) float32, the last number 1; first multiplied by `turn` (3, 3)."""
     matrix = None if turn is None else np.ascontiguousarray(turn, np.float64)
     return _row_by_row(
         vectors, lambda source, a, b, out: engine.unit_vectors(source, matrix, a, b, None, out), 4, np.float32

@@ -135,7 +135,7 @@ class Texture:
         return self._mipmap(None)
 
     def compiled_cut_at(self, cutoff: float) -> engine.Mipmap:
-        """The same for an alpha test: its halvings let through as much of their area as the picture does."""
+        """The kernels' input for an alpha test: its halvings let through as much of their area as the picture does."""
         if not self.has_alpha or self.filter not in HALVING or not 0 < cutoff <= 1:
             return self.compiled
         cut: dict[float, engine.Mipmap] = self.__dict__.setdefault("_cut", {})

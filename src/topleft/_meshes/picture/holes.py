@@ -57,7 +57,7 @@ class Cut:
         return np.flatnonzero(self.is_cut).astype(np.int32)
 
     def of_parts(self, source: I32) -> Cut:
-        """The same of parts of triangles."""
+        """The cut materials of parts of triangles, from the triangle of each part."""
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
 

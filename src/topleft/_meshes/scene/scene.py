@@ -504,7 +504,7 @@ def as_subject(given: MeshLike | Scene | Points) -> Mesh | Scene | Points:
 
 
 def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
-    """The same for calls that need triangles: points are refused."""
+    """The scene or mesh that calls draw as triangles; points are refused."""
     return given if isinstance(given, Scene) else as_mesh(given)
 
 
