@@ -66,9 +66,17 @@ TL_INLINE vf vf_from_unsigned(vi a)
     const vf low = _mm256_cvtepi32_ps(_mm256_and_si256(a, _mm256_set1_epi32(0xffff)));
     return _mm256_add_ps(_mm256_mul_ps(high, _mm256_set1_ps(65536.0f)), low);
 }
+/* Loads: hardware gathers are microcode on Zen 1 and 2, and on Intel's cores with the cure of Downfall; a Zen 3 draws
+ * `photometric_loss` of 70,000 triangles at 0.93 of their time.  Lanes that are not in m read p[0], which is there if
+ * any lane is in m. */
 TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
 {
-    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), p, i, m, 4);
+    if (_mm256_testz_si256(m, m))
+        return _mm256_setzero_si256();
+    int32_t k[8];
+    vi_store(k, _mm256_and_si256(m, i));
+    return _mm256_and_si256(m,
+                            _mm256_setr_epi32(p[k[0]], p[k[1]], p[k[2]], p[k[3]], p[k[4]], p[k[5]], p[k[6]], p[k[7]]));
 }
 
 TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
@@ -194,9 +202,19 @@ TL_INLINE vf vf_lookup(const float *table, vi i)
 }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm256_castps_si256(vf_lookup((const float *)table, i)); }
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm256_permutevar8x32_ps(_mm256_loadu_ps(p), i); }
+TL_INLINE __m256d pick_half(const float *p, __m128i twice)
+{
+    const __m256i even = _mm256_cvtepu32_epi64(twice);
+    const __m256i at =
+        _mm256_or_si256(_mm256_or_si256(even, _mm256_slli_epi64(even, 32)), _mm256_set1_epi64x(INT64_C(1) << 32));
+    const __m256d low = _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_loadu_ps(p), at));
+    const __m256d high = _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_loadu_ps(p + 8), at));
+    return _mm256_blendv_pd(low, high, _mm256_castsi256_pd(_mm256_slli_epi64(even, 60)));
+}
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
-    return (vd){_mm256_i32gather_pd(p, lower_half(i), 8), _mm256_i32gather_pd(p, upper_half(i), 8)};
+    const vi twice = _mm256_add_epi32(i, i);
+    return (vd){pick_half((const float *)p, lower_half(twice)), pick_half((const float *)p, upper_half(twice))};
 }
 TL_INLINE vi vi_pick(const int32_t *p, vi i)
 {
