@@ -15,10 +15,14 @@ SQUARE = [[1, 1], [4, 1], [4, 3], [1, 3], [1, 1]]
 GEOJSON = {
     "type": "FeatureCollection",
     "features": [
-        {"type": "Feature", "properties": {"zone": 3}, "geometry": {"type": "Polygon", "coordinates": [SQUARE]}},
         {
             "type": "Feature",
-            "properties": {"zone": 700},
+            "properties": {"zone": 3, "area": 2},
+            "geometry": {"type": "Polygon", "coordinates": [SQUARE]},
+        },
+        {
+            "type": "Feature",
+            "properties": {"zone": 700, "area": 2},
             "geometry": {"type": "Polygon", "coordinates": [[[4, 1], [6, 1], [6, 3]]]},
         },
     ],
@@ -91,7 +95,7 @@ def test_what_is_no_polygon_is_told(files, run):
     said = {**COCO, "annotations": [{"id": 1, "image_id": 5, "segmentation": None}]}
     files.joinpath("none.json").write_text(json.dumps(said))
     status, lines = run("mask", "none.json", "-o", "m.png", "--image", "cat")
-    assert (status, lines) == (1, ["topleft: cat: 1 objects are no polygons and were left out"])
+    assert (status, lines) == (1, ["topleft: 'none.json': objects left out: 'annotation 1 has no polygons'"])
     assert not picture("m.png").any()
 
 
@@ -138,16 +142,53 @@ def test_crowds_are_drawn_unless_left_out(files, run):
         ({"size": [5, 3], "counts": [15]}, "annotation 0 is of 3x5 pixels, its image of 5x3"),
         ({"size": [3, 5], "counts": "é"}, "annotation 0 has run lengths that are no text of COCO, at 'é'"),
         ({"size": [3, 5], "counts": "P"}, "annotation 0 has run lengths that end within a number"),
-        ({"size": [3, 5], "counts": ["a"]}, "something is missing or of a wrong kind"),
-        ([[1, 2, 3]], "something is missing or of a wrong kind"),
-        ([[1, 2, "a", 3, 4, 5]], "something is missing or of a wrong kind"),
+        ({"size": [3, 5], "counts": ["a"]}, "annotation 0 is broken (ValueError("),
+        ({"size": [3, 5]}, "annotation 0 has no polygons"),
+        ("22240K", "annotation 0 has no polygons"),
+        ([], "annotation 0 has no polygons"),
+        ([1, 2, 3, 4, 5, 6], "annotation 0 is broken (TypeError("),
+        ([[[1, 2], [3, 4], [5, 6], [7, 8]]], "annotation 0 is broken (TypeError("),
+        ([[1, 2, 3]], "annotation 0 has a ring of 3 numbers"),
+        ([[1, 2, "a", 3, 4, 5]], "annotation 0 is broken (ValueError("),
+        ([[1, 2, float("nan"), 3, 4, 5]], "annotation 0 has a coordinate of nan"),
     ],
 )
-def test_broken_segmentations_are_refused_in_one_line(files, run, segmentation, said):
-    annotated(files, segmentation)
-    status, lines = run("mask", "runs.json", "-o", "m.png")
-    assert (status, len(lines)) == (2, 1)
+def test_annotation_that_is_broken_is_left_out_and_told(files, run, segmentation, said):
+    annotated(files, segmentation, {"size": [3, 5], "counts": RUNS})
+    status, lines = run("mask", "runs.json", "-o", "m.png", "--labels", "index")
+    assert (status, len(lines)) == (1, 1)
+    assert "'runs.json': objects left out: " in lines[0]
     assert said in lines[0]
+    assert (picture("m.png") == 2 * MASK).all()  # an annotation that is left out keeps its number
+    assert run("mask", "runs.json", "-o", "rle.json") == (status, lines)
+    first, second = json.loads(files.joinpath("rle.json").read_text())["annotations"]
+    assert json.dumps(first["segmentation"]) == json.dumps(segmentation)
+    assert second["segmentation"] == {"size": [3, 5], "counts": TEXT}
+
+
+@pytest.mark.parametrize("ring", [[], [1, 1], [1, 1, 5, 5]])
+def test_ring_without_area_of_coco_is_left_out_and_the_rest_is_drawn(files, run, ring):
+    annotated(files, [ring, [1, 0, 3, 0, 3, 2, 1, 2], ring])
+    said = f"topleft: 'runs.json': rings left out: 'annotation 0 has a ring of {len(ring) // 2} points'"
+    assert run("mask", "runs.json", "-o", "m.png") == (1, [said])
+    assert picture("m.png").tolist() == [[0, 255, 255, 0, 0]] * 2 + [[0] * 5]
+
+
+def test_ring_without_area_of_geojson_is_left_out_and_the_rest_is_drawn(files, run):
+    holes = [[[2, 2], [3, 2]], [[2, 1], [3, 1], [3, 2], [2, 2]]]
+    lone = {"type": "MultiPolygon", "coordinates": [[[[0, 0]], SQUARE], [SQUARE, *holes]]}
+    bad = {"type": "Feature", "properties": {"zone": "a"}, "geometry": {"type": "Polygon", "coordinates": [[[0, 0]]]}}
+    good = {"type": "Feature", "properties": {"zone": 9}, "geometry": lone}
+    files.joinpath("a.json").write_text(json.dumps({"type": "FeatureCollection", "features": [bad, {}, None, good]}))
+    how = "--size", "5x4", "--extent", 0, 5, 0, 4
+    status, (line,) = run("mask", "a.json", "-o", "m.png", "--labels", "zone", *how)
+    assert status == 1
+    assert "rings left out: 'feature 0 has a ring of 1 points', 'feature 3 has a ring of 1 points', 'feature 3 " in line
+    assert "objects left out: 'feature 0 has no polygons', \"feature 1 is broken (KeyError('type'))\", " in line
+    assert picture("m.png").tolist() == [[0] * 5, [0, 9, 9, 9, 0], [0, 9, 0, 9, 0], [0] * 5]
+    status, lines = run("raster", "a.json", "-o", "m.tif", "--values", "zone", "--nodata", 0, "--quiet", *how)
+    assert (status, lines) == (1, [line])
+    assert (picture("m.tif") == picture("m.png")).all()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"type": "FeatureCollection"}', '{"annotations": [1]}', "{"])
@@ -204,11 +245,19 @@ def test_images_of_one_id_are_refused(files, run):
     assert (status, "1 ids of images stand more than once" in lines[0]) == (2, True)
 
 
-def test_annotation_of_an_image_that_is_not_there_is_refused(files, run):
-    content = {**COCO, "annotations": [{**COCO["annotations"][0], "id": 7, "image_id": 99}]}
+def test_annotations_and_images_that_are_broken_are_left_out_and_told(files, run):
+    lost = [{**COCO["annotations"][0], "id": 7, "image_id": 99}, {"id": 8}, "a", {"id": 9, "image_id": [5]}]
+    images = [*COCO["images"], {"id": 7, "file_name": "x.png"}]
+    content = {**COCO, "images": images, "annotations": [*lost, *COCO["annotations"], {"id": 10, "image_id": 7}]}
     files.joinpath("lost.json").write_text(json.dumps(content))
-    status, lines = run("mask", "lost.json", "-o", "{name}.png")
-    assert (status, "annotation 7 is of image 99, which is not there" in lines[0]) == (2, True)
+    status, (line,) = run("mask", "lost.json", "-o", "{name}.png")
+    assert status == 1
+    assert "objects left out: \"image 7 is broken (KeyError('width'))\", " in line
+    assert (
+        "'annotation 7 is of image 99, which is not there', \"annotation 8 is broken (KeyError('image_id'))\"" in line
+    )
+    assert picture("6.png").tolist() == [[0, 255, 255]] * 2
+    assert not files.joinpath("x.png").exists()
 
 
 @pytest.mark.parametrize("name", ["..", "a/..", "../../x.jpg", "/", "a\0b"])
@@ -265,14 +314,14 @@ def test_labels_that_are_no_whole_numbers_are_refused(files, run, value):
     [
         (float("inf"), "feature 0 has a coordinate of inf"),
         (float("nan"), "feature 0 has a coordinate of nan"),
-        (10**400, "something is missing or of a wrong kind"),
+        (10**400, "feature 0 is broken (OverflowError("),
         (5e-324, "reaches over 5e-324 x 5e-324: --extent must give the area"),
     ],
 )
-def test_planes_of_no_size_are_refused_in_one_line(files, run, far, said):
+def test_planes_of_no_size_are_refused(files, run, far, said):
     plane(files, [[0, 0], [far, 0], [far, far]])
     status, lines = run("mask", "plane.json", "-o", "m.png")
-    assert (status, len(lines)) == (2, 1)
+    assert (status, "--extent must give the area" in lines[-1]) == (2, True)
     assert said in lines[0]
 
 
@@ -410,10 +459,28 @@ def test_json_has_run_lengths_of_each_object_of_coco(files, run):
     assert first["segmentation"] == tl.to_rle(union)
     assert (first["area"], first["bbox"]) == (int(union.sum()), [0, 0, 5, 3])
     assert (first["image_id"], first["category_id"], second["image_id"], second["category_id"]) == (5, 2, 6, 9)
-    assert content["images"][0] == {"id": 5, "file_name": "cat", "width": 8, "height": 4}
-    assert {"id": 2, "name": "cat"} in content["categories"]
+    assert (content["images"], content["categories"]) == (COCO["images"], COCO["categories"])
     (picture, _) = load_polygons("rle.json")
     assert (tl.polygons(picture.polygons, (8, 4)) == union).all()
+
+
+def test_json_of_coco_has_all_else_as_the_file_has_it(files, run):
+    box = {"id": 40, "image_id": 5, "category_id": 2, "bbox": [1, 1, 2, 2], "segmentation": []}
+    more = {"score": 0.5, "keypoints": [1, 2, 2], "attributes": {"truncated": True}, "category": "own", "iscrowd": 1}
+    named = {"id": 5, "file_name": "train/a b.tar/cat.0001.jpg", "width": 8, "height": 4, "license": 3}
+    content = {
+        "info": {"year": 2020}, "licenses": [{"id": 3}], "images": [named, {**named, "id": "x", "file_name": 7}],
+        "categories": [{"id": 2, "name": "cat", "supercategory": "animal", "keypoints": ["nose"]}, {"id": 77}],
+        "annotations": [box, {**COCO["annotations"][0], **more}, {**box, "id": 41, "image_id": "x"}],
+    }  # fmt: skip
+    files.joinpath("all.json").write_text(json.dumps(content))
+    said = "topleft: 'all.json': objects left out: 'annotation 40 has no polygons', 'annotation 41 has no polygons'"
+    assert run("mask", "all.json", "-o", "rle.json") == (1, [said])
+    found = json.loads(files.joinpath("rle.json").read_text())
+    drawn = found["annotations"][1]
+    assert drawn["segmentation"] == tl.to_rle(tl.polygons([[part] for part in PARTS], (8, 4)))
+    content["annotations"][1] |= {name: drawn[name] for name in ("segmentation", "area", "bbox")}
+    assert found == content
 
 
 def test_json_of_geojson_has_properties_and_the_grid_of_the_mask(files, run):
@@ -422,7 +489,7 @@ def test_json_of_geojson_has_properties_and_the_grid_of_the_mask(files, run):
     content = json.loads(files.joinpath("rle.json").read_text())
     drawn = tl.polygons(GEOJSON, tl.Grid((7, 4), (0, 7, 0, 4)), values="index")
     assert [one["segmentation"] for one in content["annotations"]] == tl.to_rle(drawn, labels=[0, 1])
-    assert [one["attributes"]["zone"] for one in content["annotations"]] == [3, 700]
+    assert [one["attributes"] for one in content["annotations"]] == [{"zone": 3, "area": 2}, {"zone": 700, "area": 2}]
 
 
 def test_json_goes_with_neither_labels_nor_sampling(files, run):

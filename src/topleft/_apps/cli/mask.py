@@ -7,7 +7,9 @@ import json
 import math
 import re
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any, get_args
 
@@ -16,12 +18,13 @@ import numpy.typing as npt
 
 from topleft import Grid, polygons, save_image
 from topleft._apps.cli.arguments import FAILED, UsageError, add_command, positive, size
-from topleft._apps.cli.report import complain, write_json
+from topleft._apps.cli.report import complain, complain_of_lacks, write_json
 from topleft._core.base.defaults import MAX_CROSSINGS, SUFFIXES
 from topleft._core.base.georeference import is_same_crs, transformed
+from topleft._core.base.notes import listening
 from topleft._core.base.options import Sampling
 from topleft._core.polygons.rle import encode_polygons
-from topleft._core.raster.rle import annotation_of
+from topleft._core.raster.rle import annotation_of, measured
 from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
 from topleft.typing import RuleOption
 
@@ -49,21 +52,29 @@ its area and its box.
 
 def run_mask(options: argparse.Namespace) -> int:
     """Write masks or labels of the polygons in a file."""
-    pictures = load_polygons(options.file, has_crowds=not options.no_crowds, layer=options.layer)
-    if options.image is not None:
-        pictures = [p for p in pictures if options.image in (p.name, f"{p.folder}/{p.name}")]
-        if not pictures:
-            raise UsageError(f"--image {options.image}: {options.file} has no image of that name")
+    with listening() as lacks:
+        pictures = load_polygons(
+            options.file, has_crowds=not options.no_crowds, layer=options.layer, image=options.image
+        )
+    complain_of_lacks(lacks)
+    if options.image is not None and not pictures:
+        raise UsageError(f"--image {options.image}: {options.file} has no image of that name")
     if Path(options.out).suffix.lower() == ".json":
-        return write_annotations(pictures, options)
+        write_annotations(pictures, options)
+    else:
+        write_pictures(pictures, options)
+    return FAILED if lacks else 0
+
+
+def write_pictures(pictures: list[PolygonPicture], options: argparse.Namespace) -> None:
+    """Write the mask or the labels of each picture."""
     if len(pictures) > 1 and "{name}" not in options.out and "{index}" not in options.out:
         raise UsageError(f"{options.file} has {len(pictures)} images: -o needs {{name}}, or --image chooses one")
     if Path(options.out).suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
     if options.nodata is not None and options.labels is None:
         raise UsageError("--nodata is for --labels: a mask is 0 where nothing is")
-    status, paths = 0, paths_of(pictures, options.out)
-    for path, picture in zip(paths, pictures, strict=True):
+    for path, picture in zip(paths_of(pictures, options.out), pictures, strict=True):
         path.parent.mkdir(parents=True, exist_ok=True)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", UserWarning)
@@ -74,36 +85,30 @@ def run_mask(options: argparse.Namespace) -> int:
             path.with_name(f"{path.name}.legend.json").write_text(json.dumps(legend, indent=1, ensure_ascii=False))
         for one in caught:
             complain(f"{picture.name}: {one.message}")
-        if picture.n_skipped:
-            complain(f"{picture.name}: {picture.n_skipped} objects are no polygons and were left out")
-            status = FAILED
-    return status
 
 
-def write_annotations(pictures: list[PolygonPicture], options: argparse.Namespace) -> int:
-    """Write run lengths of the objects of all pictures as annotations of COCO."""
+def write_annotations(pictures: list[PolygonPicture], options: argparse.Namespace) -> None:
+    """Write run lengths of the objects of all pictures as annotations of COCO; a file of COCO keeps the rest."""
     if options.labels is not None or options.sampling != Sampling.CENTER:
         raise UsageError(f"-o {options.out}: run lengths are of masks, without --labels and --sampling")
-    status, images = 0, []
-    annotations: list[dict[str, Any]] = []
-    for number, picture in enumerate(pictures, 1):
+    images: list[Mapping[str, Any]] = []
+    annotations: list[Mapping[str, Any]] = []
+    for picture in pictures:
         given, frame = frame_of(picture, options)
         width, height = frame.size if isinstance(frame, Grid) else frame
-        rles = encode_polygons(given, frame, options.rule, owners=picture.owners)
-        own = picture.objects[0].get("image_id", number) if picture.objects else number
-        named = {"id": own, "file_name": (Path(picture.folder) / picture.name).as_posix()}
-        images.append(named | {"width": width, "height": height})
-        for said, rle in zip(picture.objects, rles, strict=True):
-            category = said.get("category_id")
-            made = annotation_of(rle, len(annotations) + 1, own, category if isinstance(category, int) else 1)
-            others = {name: value for name, value in said.items() if name not in (*made, "category")}
-            annotations.append(made | {"iscrowd": said.get("iscrowd", 0)} | ({"attributes": others} if others else {}))
-        if picture.n_skipped:
-            complain(f"{picture.name}: {picture.n_skipped} objects are no polygons and were left out")
-            status = FAILED
-    content = {"images": images, "annotations": annotations, "categories": categories_of(pictures)}
-    write_json(Path(options.out), content)
-    return status
+        images.append(picture.image or {"id": 1, "file_name": picture.name, "width": width, "height": height})
+        rles = encode_polygons(given, frame, options.rule, owners=picture.owners)  # none of the last without polygons
+        for said, own, part, rle in zip_longest(picture.objects, picture.annotations, picture.parts, rles):
+            if own is not None:
+                annotations.append({"iscrowd": 0, **own, **measured(rle)} if len(part.counts) else own)
+            elif len(part.counts):
+                category = said.get("category_id")
+                made = annotation_of(rle, len(annotations) + 1, 1, category if isinstance(category, int) else 1)
+                others = {name: value for name, value in said.items() if name not in ("id", "category_id", "iscrowd")}
+                made["iscrowd"] = said.get("iscrowd", 0)
+                annotations.append(made | ({"attributes": others} if others else {}))
+    content = (pictures and pictures[0].content) or {"categories": categories_of(pictures)}
+    write_json(Path(options.out), {**content, "images": images, "annotations": annotations})
 
 
 def categories_of(pictures: list[PolygonPicture]) -> list[dict[str, Any]]:
@@ -157,18 +162,18 @@ def labels_of(picture: PolygonPicture, name: str) -> tuple[npt.NDArray[np.int32]
     """Return the number of each object, and the word of each number."""
     if name == "index":
         return np.arange(1, len(picture.objects) + 1, dtype=np.int32), {}
-    values = [said.get(name) for said in picture.objects]
-    if values and all(isinstance(value, str) for value in values):
-        words, which = np.unique(np.array(values), return_inverse=True)
-        return (which + 1).astype(np.int32), dict(enumerate(words.tolist(), 1))
-    numbers = []
-    for i, value in enumerate(values):
+    values, labels = picture.values(name), np.zeros(len(picture.objects), np.int32)
+    if values and all(isinstance(value, str) for value in values.values()):
+        words, which = np.unique(np.array(list(values.values())), return_inverse=True)
+        labels[list(values)] = which + 1
+        return labels, dict(enumerate(words.tolist(), 1))
+    for i, value in values.items():
         if not isinstance(value, (int, float)) or not 0 <= value < 2**31 or value != int(value):
             raise UsageError(
                 f"--labels {name}: object {i} of {picture.name} has {value!r}, not a whole number from 0 on"
             )
-        numbers.append(int(value))
-    return np.array(numbers, np.int32), {}
+        labels[i] = int(value)
+    return labels, {}
 
 
 def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[Any, Frame]:

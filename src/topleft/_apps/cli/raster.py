@@ -11,12 +11,21 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from topleft._apps.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, add_command, positive, size, subpixel_bits
+from topleft._apps.cli.arguments import (
+    FAILED,
+    SUBPIXEL_BITS_HELP,
+    UsageError,
+    add_command,
+    positive,
+    size,
+    subpixel_bits,
+)
 from topleft._apps.cli.render import client_of
-from topleft._apps.cli.report import complain
+from topleft._apps.cli.report import complain, complain_of_lacks
 from topleft._apps.tiles.tiles import Tiles, tiles
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import grid_around
+from topleft._core.base.notes import listening
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
 from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, load_polygons
@@ -68,7 +77,7 @@ def run_raster(options: argparse.Namespace) -> int:
     if options.nodata is not None and not (is_tiff or options.values is not None):
         raise UsageError("--nodata is for --values and .tif: other pixels without triangles are -1, NaN or 0")
     try:
-        with ExitStack() as stack:
+        with ExitStack() as stack, listening() as lacks:
             raster = raster_of(options)
             n_workers = options.threads or available_threads()
             client = None if options.dask is None else client_of(options.dask, n_workers, stack)
@@ -84,7 +93,8 @@ def run_raster(options: argparse.Namespace) -> int:
     if not (written.n_drawn or written.n_kept):
         shape = "polygon" if raster.is_of_polygons else "triangle"
         complain(f"no {shape} of {options.mesh} lies within {options.out}: all of it is blank")
-    return 0
+    complain_of_lacks(lacks)
+    return FAILED if lacks and raster.is_of_polygons else 0
 
 
 def write(raster: Tiles, path: Location, options: argparse.Namespace, client: Any) -> Written:
@@ -126,11 +136,11 @@ def raster_of_polygons(options: argparse.Namespace) -> Tiles:
     more_options: dict[str, Any] = {} if options.subpixel_bits == 8 else {"subpixel_bits": options.subpixel_bits}
     if options.values is not None:
         kind = "fill"
-        said = [row.get(options.values) for row in picture.objects]
-        if not all(isinstance(value, int | float) for value in said):
-            i = next(i for i, value in enumerate(said) if not isinstance(value, int | float))
-            raise UsageError(f"--values {options.values}: object {i} of {options.mesh} has {said[i]!r}, no number")
-        values = np.array(said)
+        said = picture.values(options.values)
+        for i, value in said.items():
+            if not isinstance(value, int | float):
+                raise UsageError(f"--values {options.values}: object {i} of {options.mesh} has {value!r}, no number")
+        values = np.array([said.get(i, 0) for i in range(len(picture.objects))])
         holds = values.dtype.kind in "bi" and (not values.size or np.abs(values).max() < 2**31)
         more_options["values"] = values.astype(np.int32 if holds else np.float64)[picture.owners]
     elif kind == "labels":

@@ -124,7 +124,12 @@ def encode_ids(ids: NDArray[Any], labels: ArrayLike, *, compressed: bool) -> lis
 
 
 def annotation_of(rle: dict[str, Any], own: int, image: int, category: int) -> dict[str, Any]:
-    """Return the annotation of COCO of an object with run lengths, its area and box (left, top, width, height)."""
+    """Return the annotation of COCO of an object with run lengths."""
+    return {"id": own, "image_id": image, "category_id": category, "iscrowd": 0} | measured(rle)
+
+
+def measured(rle: dict[str, Any]) -> dict[str, Any]:
+    """Return the members of an annotation that run lengths give: area, box (left, top, width, height), themselves."""
     height = rle["size"][0]
     ends = np.cumsum(
         read_counts(rle["counts"]) if isinstance(rle["counts"], str) else np.array(rle["counts"], np.int64)
@@ -138,8 +143,7 @@ def annotation_of(rle: dict[str, Any], own: int, image: int, category: int) -> d
             top, bottom = 0, height - 1
         box = [left, top, right + 1 - left, bottom + 1 - top]
     area = int((last + 1 - first).sum())
-    names = {"id": own, "image_id": image, "category_id": category, "iscrowd": 0}
-    return names | {"area": area, "bbox": box, "segmentation": rle}
+    return {"area": area, "bbox": box, "segmentation": rle}
 
 
 def read_counts(text: str) -> I64:

@@ -1,6 +1,7 @@
 """Reads polygons from files: GeoJSON, annotations in the format of COCO, and vector files by pyogrio or fiona.
 
-Input: a path. Output: for each picture its polygons, by objects, and the properties of each object.
+Input: a path. Output: for each picture its polygons, by objects, and the properties of each object. An object that
+cannot be read keeps its place, without polygons, and is told.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -17,8 +19,12 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.georeference import WGS84
+from topleft._core.base.notes import Notes, tell
 from topleft._core.raster.rle import read_counts
 from topleft.errors import MeshError, MissingPackageError
+
+BROKEN = (KeyError, TypeError, AttributeError, IndexError, ValueError, OverflowError)
+"""Errors of content in which something is missing or of a wrong kind."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,9 @@ class ObjectRings:
     points: npt.NDArray[np.float64]  # (N, 2)
     lengths: npt.NDArray[np.int64]  # points of each ring
     counts: npt.NDArray[np.int64]  # rings of each polygon
+
+
+NO_RINGS = ObjectRings(np.empty((0, 2)), *np.zeros((2, 0), np.int64))
 
 
 @dataclass(frozen=True)
@@ -40,12 +49,18 @@ class PolygonPicture:
     crs: str | None = None  # of the plane, if it is known
     parts: list[ObjectRings] = field(default_factory=list)  # of each object
     objects: list[Mapping[str, Any]] = field(default_factory=list)  # the properties of each
-    n_skipped: int = 0  # objects that are no polygons
+    annotations: list[Mapping[str, Any]] = field(default_factory=list)  # of each in a file of COCO
+    image: Mapping[str, Any] = field(default_factory=dict)  # the entry of COCO
+    content: Mapping[str, Any] = field(default_factory=dict)  # the file of COCO
 
     def add(self, parts: ObjectRings, said: Mapping[str, Any]) -> None:
         """Add an object of several polygons."""
         self.parts.append(parts)
         self.objects.append(said)
+
+    def values(self, name: str) -> dict[int, Any]:
+        """Return a property of each object that has polygons."""
+        return {i: self.objects[i].get(name) for i, part in enumerate(self.parts) if len(part.counts)}
 
     @property
     def polygons(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -65,31 +80,48 @@ VECTOR_SUFFIXES = (".fgb", ".gml", ".gpkg", ".kml", ".parquet", ".shp", ".sqlite
 
 
 def load_polygons(
-    path: str | os.PathLike[str], *, has_crowds: bool = True, layer: str | None = None
+    path: str | os.PathLike[str], *, has_crowds: bool = True, layer: str | None = None, image: str | None = None
 ) -> list[PolygonPicture]:
     """Return the polygons of a GeoJSON or a vector file, one picture, or of COCO annotations, one for each image.
 
     Without `has_crowds` annotations of COCO that are crowds are left out. `layer` is that of a vector file, its first
-    one unless given.
+    one unless given. `image` chooses images of COCO by a name, or a folder and a name, without the end.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
         raise MeshError(f"{str(path)!r} is {'a folder' if path.is_dir() else 'a pipe or a device'}, not a file")
-    is_vector = path.suffix.lower() in VECTOR_SUFFIXES
+    is_vector, notes = path.suffix.lower() in VECTOR_SUFFIXES, Notes(str(path))
     try:
         content = _vector_content(path, layer) if is_vector else json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
         raise MeshError(f"cannot read {str(path)!r}: {error}") from None
     try:
         if isinstance(content, dict) and isinstance(content.get("annotations"), list):
-            return _coco(content, has_crowds=has_crowds)
-        if isinstance(content, dict) and isinstance(content.get("type"), str):
-            return [_geojson(content, path.stem)]
+            pictures = _coco(content, notes, has_crowds=has_crowds, chosen=image)
+        elif isinstance(content, dict) and isinstance(content.get("type"), str):
+            pictures = [_geojson(content, path.stem, notes)] if image in (None, path.stem) else []
+        else:
+            raise ContentError("it is neither GeoJSON nor annotations in the format of COCO")
     except ContentError as error:
         raise MeshError(f"cannot read {str(path)!r}: {error}") from None
-    except (KeyError, TypeError, AttributeError, IndexError, ValueError, OverflowError) as error:
+    except BROKEN as error:
         raise MeshError(f"cannot read {str(path)!r}: something is missing or of a wrong kind ({error!r})") from None
-    raise MeshError(f"cannot read {str(path)!r}: it is neither GeoJSON nor annotations in the format of COCO")
+    tell(notes.lines, stacklevel=2)
+    return pictures
+
+
+class ContentError(ValueError):
+    """A contradiction in a file, or in an object: then without its name."""
+
+
+@contextmanager
+def leaving_out(what: str, notes: Notes) -> Iterator[None]:
+    """Note an object that is broken, in place of an error."""
+    try:
+        yield
+    except BROKEN as error:
+        reason = str(error) if isinstance(error, ContentError) else f"is broken ({error!r})"
+        notes.add("objects left out", f"{what} {reason}")
 
 
 def _vector_content(path: Path, layer: str | None) -> dict[str, Any]:
@@ -126,62 +158,61 @@ def _fiona_content(path: Path, layer: str | None) -> dict[str, Any]:
         raise MeshError(f"cannot read {str(path)!r}: {' '.join(str(error).split())}") from None
 
 
-def _coco(content: Mapping[str, Any], *, has_crowds: bool) -> list[PolygonPicture]:
+def _coco(content: Mapping[str, Any], notes: Notes, *, has_crowds: bool, chosen: str | None) -> list[PolygonPicture]:
     images = {image["id"]: image for image in content["images"]}
     if len(images) < len(content["images"]):
         ids = [image["id"] for image in content["images"]]
         raise ContentError(f"{sum(ids.count(i) > 1 for i in images)} ids of images stand more than once")
     names = {category["id"]: category.get("name") for category in content.get("categories", [])}
-    found: dict[Any, list[Any]] = {key: [] for key in images}
-    for annotation in content["annotations"]:
-        if (image_id := annotation["image_id"]) not in found:
-            raise ContentError(f"annotation {annotation.get('id')!r} is of image {image_id!r}, which is not there")
-        if has_crowds or not annotation.get("iscrowd"):
-            found[image_id].append(annotation)
-    pictures = []
+    pictures: dict[Any, PolygonPicture] = {}
     for key, image in images.items():
         file_name = str(image.get("file_name") or key)
-        if "\0" in file_name or Path(file_name).stem in ("", "..") or ".." in Path(file_name).parts:
+        name, folder = Path(file_name).stem, Path(file_name).parent.as_posix()
+        if "\0" in file_name or name in ("", "..") or ".." in Path(file_name).parts:
             raise ContentError(f"image {key!r} has the file name {file_name!r}, which is none within a folder")
-        size = int(image["width"]), int(image["height"])
-        drawn = [(a, _coco_parts(a.get("segmentation"), size, a.get("id"))) for a in found[key]]
-        folder, n_skipped = Path(file_name).parent.as_posix(), sum(parts is None for _, parts in drawn)
-        picture = PolygonPicture(Path(file_name).stem, size, folder, n_skipped=n_skipped)
-        for annotation, parts in drawn:
-            if parts is not None:
-                picture.add(parts, {**annotation, "category": names.get(annotation.get("category_id"))})
-        pictures.append(picture)
-    return pictures
+        if chosen in (None, name, f"{folder}/{name}"):
+            with leaving_out(f"image {key!r}", notes):
+                size = int(image["width"]), int(image["height"])
+                pictures[key] = PolygonPicture(name, size, folder, image=image, content=content)
+    for i, annotation in enumerate(content["annotations"]):
+        what = f"annotation {annotation.get('id', i) if isinstance(annotation, dict) else i}"
+        picture, parts, said = None, NO_RINGS, {}
+        with leaving_out(what, notes):
+            key = annotation["image_id"]
+            if key not in images:
+                raise ContentError(f"is of image {key!r}, which is not there")
+            if key in pictures and (has_crowds or not annotation.get("iscrowd")):
+                picture = pictures[key]
+                said = {**annotation, "category": names.get(annotation.get("category_id"))}
+                parts = _coco_parts(annotation.get("segmentation"), picture, what, notes)
+        if picture is not None:
+            picture.add(parts, said)
+            picture.annotations.append(annotation)
+    return list(pictures.values())
 
 
-def _coco_parts(segmentation: Any, size: tuple[int, int], name: object) -> ObjectRings | None:
-    """Return the polygons of a segmentation: flat rings, or run lengths; None if it is neither."""
-    if isinstance(segmentation, list):
-        return _joined([[_pairs(flat)] for flat in segmentation], f"annotation {name}")
+def _coco_parts(segmentation: Any, picture: PolygonPicture, what: str, notes: Notes) -> ObjectRings:
+    """Return the polygons of a segmentation: flat rings, or run lengths."""
     if isinstance(segmentation, dict) and "counts" in segmentation:
         height, width = (int(n) for n in segmentation["size"])
-        if (width, height) != size:
-            raise ContentError(f"annotation {name} is of {width}x{height} pixels, its image of {size[0]}x{size[1]}")
+        if (width, height) != picture.size:
+            raise ContentError(f"is of {width}x{height} pixels, its image of {'x'.join(map(str, picture.size or ()))}")
         counts = segmentation["counts"]
-        lengths = _read_counts(counts, name) if isinstance(counts, str) else np.asarray(counts, np.int64).reshape(-1)
+        lengths = _read_counts(counts) if isinstance(counts, str) else np.asarray(counts, np.int64).reshape(-1)
         if (lengths < 0).any():
-            raise ContentError(f"annotation {name} has a run length of {lengths.min()} pixels")
+            raise ContentError(f"has a run length of {lengths.min()} pixels")
         if lengths.sum() != width * height:
-            raise ContentError(f"annotation {name} has run lengths of {lengths.sum()} pixels, not {width * height}")
+            raise ContentError(f"has run lengths of {lengths.sum()} pixels, not {width * height}")
         return _rectangles(lengths, height)
-    return None
+    return _joined([[_pairs(flat)] for flat in segmentation] if isinstance(segmentation, list) else [], what, notes)
 
 
-class ContentError(ValueError):
-    """A contradiction in a file."""
-
-
-def _read_counts(text: str, name: object) -> npt.NDArray[np.int64]:
+def _read_counts(text: str) -> npt.NDArray[np.int64]:
     """Return run lengths from a string, as pycocotools writes it."""
     try:
         return read_counts(text)
     except ValueError as error:
-        raise ContentError(f"annotation {name} has {error}") from None
+        raise ContentError(f"has {error}") from None
 
 
 def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> ObjectRings:
@@ -210,33 +241,40 @@ def _rectangles(lengths: npt.NDArray[np.int64], height: int) -> ObjectRings:
 
 
 def _pairs(flat: list[float]) -> list[tuple[float, float]]:
+    if len(flat) % 2:
+        raise ContentError(f"has a ring of {len(flat)} numbers")
     return [(float(x), float(y)) for x, y in zip(flat[::2], flat[1::2], strict=True)]
 
 
-def _joined(polygons: list[list[list[tuple[float, float]]]], what: str) -> ObjectRings:
-    """Return polygons from the rings of each."""
-    rings = list(chain.from_iterable(polygons))
+def _joined(polygons: list[list[list[tuple[float, float]]]], what: str, notes: Notes) -> ObjectRings:
+    """Return polygons from the rings of each; a ring of fewer than three points covers nothing and is left out."""
+    for ring in chain.from_iterable(polygons):
+        if len(ring) < 3:
+            notes.add("rings left out", f"{what} has a ring of {len(ring)} points")
+    kept = [[ring for ring in rings if len(ring) > 2] for rings in polygons if rings and len(rings[0]) > 2]
+    if not kept:
+        raise ContentError("has no polygons")
+    rings = list(chain.from_iterable(kept))
     points = np.array(list(chain.from_iterable(rings)), np.float64).reshape(-1, 2)
     if not np.isfinite(points).all():
-        raise ContentError(f"{what} has a coordinate of {points[~np.isfinite(points)][0]}")
-    lengths, counts = (np.array([len(one) for one in of], np.int64) for of in (rings, polygons))
+        raise ContentError(f"has a coordinate of {points[~np.isfinite(points)][0]}")
+    lengths, counts = (np.array([len(one) for one in of], np.int64) for of in (rings, kept))
     return ObjectRings(points, lengths, counts)
 
 
-def _geojson(content: Mapping[str, Any], name: str) -> PolygonPicture:
-    features = content["features"] if content["type"] == "FeatureCollection" else [content]
+def _geojson(content: Mapping[str, Any], name: str, notes: Notes) -> PolygonPicture:
     picture = PolygonPicture(name, None)
-    n_skipped = 0
-    for i, feature in enumerate(features):
-        is_feature = feature["type"] == "Feature"
-        geometry = feature["geometry"] if is_feature else feature
-        parts = list(_parts(geometry)) if geometry else []
-        if parts:
-            said = {**(feature.get("properties") or {}), "id": feature.get("id")} if is_feature else {}
-            picture.add(_joined(parts, f"feature {i}"), said)
-        else:
-            n_skipped += 1
-    return replace(picture, n_skipped=n_skipped, crs=_crs_of(content, picture))
+    for i, feature in enumerate(content["features"] if content["type"] == "FeatureCollection" else [content]):
+        said: dict[str, Any] = {}
+        parts = NO_RINGS
+        with leaving_out(f"feature {i}", notes):
+            is_feature = feature["type"] == "Feature"
+            if is_feature:
+                said = {**(feature.get("properties") or {}), "id": feature.get("id")}
+            geometry = feature["geometry"] if is_feature else feature
+            parts = _joined(list(_parts(geometry)) if geometry else [], f"feature {i}", notes)
+        picture.add(parts, said)
+    return replace(picture, crs=_crs_of(content, picture))
 
 
 def _crs_of(content: Mapping[str, Any], picture: PolygonPicture) -> str | None:
