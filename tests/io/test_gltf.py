@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import warnings
 
@@ -174,32 +175,72 @@ def test_gltf_third_set_of_texture_coordinates_of_a_material_is_told(tmp_path):
     assert mesh.materials[0].emission_texture is None
 
 
-@pytest.mark.parametrize("is_there", [True, False])
-def test_gltf_buffers_compressed_by_meshopt_are_read_where_the_file_has_them_plainly(tmp_path, is_there):
-    file = GltfFile(extensionsUsed=["EXT_meshopt_compression"]).shown()
+UNREAD = [
+    "EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_texture_basisu", "KHR_materials_clearcoat",
+    "KHR_lights_punctual", "KHR_node_visibility", "KHR_animation_pointer", "KHR_xmp_json_ld", "KHR_materials_variants",
+    "EXT_mesh_features", "EXT_new", "ext_texture_webp",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("read", [tl.load, tl.load_cameras])
+@pytest.mark.parametrize("name", UNREAD)
+def test_gltf_extension_that_is_required_and_not_read_is_refused_by_name(tmp_path, name, read):
+    file = GltfFile(extensionsUsed=[name], extensionsRequired=["KHR_mesh_quantization", name]).shown()
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.raises(MeshError, match=f"it needs the extension {name}, which is not read"):
+        read(tmp_path / "a.glb")
+
+
+@pytest.mark.parametrize("name", UNREAD)
+def test_gltf_extension_that_is_used_and_not_required_is_drawn_without_it(tmp_path, name):
+    (tmp_path / "a.glb").write_bytes(GltfFile(extensionsUsed=[name]).shown().glb())
+    with warnings.catch_warnings(record=True):
+        warnings.simplefilter("always")
+        assert len(tl.load(tmp_path / "a.glb").triangles) == 1
+
+
+def compressed(file, fallback):
+    """The JSON of a file whose views name a fallback beside the bytes of EXT_meshopt_compression."""
     tree = json.loads(file.gltf())
     for view in tree["bufferViews"]:
-        view["extensions"] = {"EXT_meshopt_compression": {"buffer": 0}}
-    if not is_there:
-        del tree["buffers"][0]["uri"]
-        tree["buffers"][0]["extensions"] = {"EXT_meshopt_compression": {"fallback": True}}
+        view |= {"buffer": 1, "extensions": {"EXT_meshopt_compression": {"buffer": 0}}}
+    junk = "data:application/octet-stream;base64," + base64.b64encode(bytes(range(200))).decode()
+    tree["buffers"] = [{"byteLength": 200, "uri": junk}, {**tree["buffers"][0], **fallback}]
+    return tree
+
+
+def test_gltf_buffers_compressed_by_meshopt_are_read_where_the_file_has_them_plainly(tmp_path):
+    tree = compressed(GltfFile(extensionsUsed=["EXT_meshopt_compression"]).shown(), {})
     (tmp_path / "a.gltf").write_text(json.dumps(tree))
-    if is_there:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            assert len(tl.load(tmp_path / "a.gltf").triangles) == 1
-    else:
-        with pytest.raises(MeshError, match="its buffers are compressed by meshopt, which is not read"):
-            tl.load(tmp_path / "a.gltf")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert tl.load(tmp_path / "a.gltf").vertices.tolist() == TRIANGLE.tolist()
 
 
-def test_gltf_with_textures_of_basis_universal_is_drawn_without_them_and_told(tmp_path):
-    file = GltfFile(extensionsUsed=["KHR_texture_basisu"], extensionsRequired=["KHR_texture_basisu"])
-    file.add("textures", {"extensions": {"KHR_texture_basisu": {"source": 0}}})
-    file.add("materials", {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
-    (tmp_path / "a.glb").write_bytes(file.shown(material=0).glb())
+@pytest.mark.parametrize("suffix", ["gltf", "glb"])
+@pytest.mark.parametrize("extensions", [{"EXT_meshopt_compression": {"fallback": True}}, {}])
+def test_gltf_second_buffer_without_a_uri_is_not_the_binary_chunk(tmp_path, suffix, extensions):
+    tree = compressed(GltfFile(extensionsUsed=["EXT_meshopt_compression"]).shown(), {"extensions": extensions})
+    del tree["buffers"][0]["uri"], tree["buffers"][1]["uri"]
+    text = json.dumps(tree).encode()
+    (tmp_path / f"a.{suffix}").write_bytes(text if suffix == "gltf" else glb_of(text, bytes(range(200))))
+    only = ", but by EXT_meshopt_compression, which is not read" if extensions else ""
+    with pytest.raises(MeshError, match=rf"its buffer 'buffers\[1\]' is not there{only}$"):
+        tl.load(tmp_path / f"a.{suffix}")
+
+
+def test_gltf_with_textures_of_basis_universal_is_drawn_with_the_pictures_beside_them(tmp_path):
+    file = GltfFile(extensionsUsed=["KHR_texture_basisu"])
+    file.add("textures", {"source": file.image([[[1, 2, 3]]]), "extensions": {"KHR_texture_basisu": {"source": 9}}})
+    file.add("textures", {"extensions": {"KHR_texture_basisu": {"source": 9}}})
+    maps = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}
+    file.add("materials", {"pbrMetallicRoughness": maps})
+    uv = np.zeros((3, 2), np.float32)
+    (tmp_path / "a.glb").write_bytes(file.shown(material=0, TEXCOORD_0=uv).glb())
     with pytest.warns(MeshWarning) as told:
-        assert tl.load(tmp_path / "a.glb").materials[0].texture is None
+        (material,) = tl.load(tmp_path / "a.glb").materials
+    assert material.texture.image[0, 0].tolist() == [1, 2, 3, 255]
+    assert material.metallic_roughness_texture is None
     assert [str(one.message).partition("': ")[2] for one in told] == [
         "extensions not read: 'KHR_texture_basisu'", "textures of KHR_texture_basisu not read",
     ]  # fmt: skip
@@ -462,7 +503,6 @@ def test_gltf_what_is_not_read_is_told_once(tmp_path, tree, message):
         (b'{"asset": {"version": "3.0"}}', "its version of glTF is '3.0'"),
         (b'{"asset": {"version": "2.1", "minVersion": "2.1"}}', "it needs version '2.1' of glTF, and 2.0 is read"),
         (b'{"asset": {"version": "2.0", "minVersion": 3}}', "it needs version '3' of glTF, and 2.0 is read"),
-        (b'{"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_new"]}', "needs the extension EXT_new"),
         (b"[1, 2]", "its JSON is no object"),
         (b"[" * 100_000, "nested too deeply|broken"),
         (glb_of(b"{", b""), "broken, or not a '.gltf' file"),

@@ -139,14 +139,14 @@ class Accessors:
     def _buffer(self, index: Any) -> npt.NDArray[np.uint8]:
         row = entry(self._tree, "buffers", index)
         if index not in self._buffers:
-            content = self._blob if "uri" not in row else uri_content(row["uri"], self._source, "buffers")
-            if content is None and "uri" not in row and any("meshopt" in name for name in row.get("extensions", {})):
-                raise MeshError(
-                    f"cannot read {str(self._source.path)!r}: its buffers are compressed by meshopt, which is not read"
-                )
+            if "uri" in row:
+                content = uri_content(row["uri"], self._source, "buffers")
+            else:
+                content = self._blob if index == 0 else None  # the binary chunk is the first buffer
             if content is None:
-                name = str(row.get("uri", "in the file"))[:80]
-                raise MeshError(f"cannot read {str(self._source.path)!r}: its buffer {name!r} is not there")
+                name = str(row.get("uri", f"buffers[{index}]"))[:80]
+                but = "".join(f", but by {str(each)[:80]}, which is not read" for each in row.get("extensions", {}))
+                raise MeshError(f"cannot read {str(self._source.path)!r}: its buffer {name!r} is not there{but}")
             if len(content) < whole(row, "byteLength"):
                 raise MeshError(f"buffers[{index}] has {len(content)} of its {row['byteLength']} bytes")
             self._buffers[index] = np.frombuffer(content, np.uint8)

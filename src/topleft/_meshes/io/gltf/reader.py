@@ -51,20 +51,7 @@ WITHOUT_LOOK = (
     "KHR_xmp", "FB_ngon_", "EXT_structural_", "EXT_mesh_features", "EXT_instance_features", "KHR_physics_",
     "OMI_physics_", "KHR_materials_variants", "EXT_meshopt_compression", "KHR_meshopt_compression",
 )  # fmt: skip
-"""Beginnings of the names of extensions that do not change the look of a file."""
-
-MAY_BE_LEFT_OUT = (
-    *WITHOUT_LOOK,
-    "KHR_materials_",
-    "KHR_technique",
-    "KHR_lights_",
-    "KHR_animation_",
-    "KHR_node_",
-    "KHR_audio",
-    "EXT_lights_",
-    "KHR_texture_basisu",
-)
-"""Beginnings of the names of extensions whose lack changes the look of a file, but not its shapes."""
+"""Beginnings of the names of extensions that files may use without a note, as the look without them is right."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +74,9 @@ def read_gltf(source: InputFile) -> list[Mesh]:
     A `MeshError` if the file is broken or needs an extension that is not read.
     """
     tree, blob = _tree_and_blob(source)
-    _check_extensions(tree, source)
+    for name in tree.get("extensionsUsed", []):
+        if name not in READ_EXTENSIONS and not str(name).startswith(WITHOUT_LOOK):
+            source.notes.add("extensions not read", str(name))
     accessors = Accessors(tree, blob, source)
     if source.moment is not None:
         tree = posed(tree, accessors, source.moment, source)
@@ -138,6 +127,11 @@ def _tree_and_blob(source: InputFile) -> tuple[Tree, bytes | None]:
         raise MeshError(f"cannot read {str(source.path)!r}: its version of glTF is {version[:20]!r}, and 2.0 is read")
     if needed not in ("2.0", "2") and not needed.startswith("1."):
         raise MeshError(f"cannot read {str(source.path)!r}: it needs version {needed[:20]!r} of glTF, and 2.0 is read")
+    for name in tree.get("extensionsRequired", []):
+        if name not in READ_EXTENSIONS:
+            raise MeshError(
+                f"cannot read {str(source.path)!r}: it needs the extension {str(name)[:80]}, which is not read"
+            )
     return tree, blob
 
 
@@ -170,18 +164,6 @@ def _chunks(content: bytes, source: InputFile) -> tuple[bytes, bytes | None]:
     if text is None:
         raise MeshError("it has no JSON")
     return text, blob
-
-
-def _check_extensions(tree: Tree, source: InputFile) -> None:
-    """Raise an error for extensions that the file requires and the reader lacks, and note the others."""
-    for name in tree.get("extensionsRequired", []):
-        if name not in READ_EXTENSIONS and not str(name).startswith(MAY_BE_LEFT_OUT):
-            raise MeshError(
-                f"cannot read {str(source.path)!r}: it needs the extension {str(name)[:80]}, which is not read"
-            )
-    for name in [*tree.get("extensionsUsed", []), *tree.get("extensionsRequired", [])]:
-        if name not in READ_EXTENSIONS and not str(name).startswith(WITHOUT_LOOK):
-            source.notes.add("extensions not read", str(name))
 
 
 class _Nodes:
