@@ -37,6 +37,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.texture import Texture
+from topleft._meshes.picture import notebook
 from topleft._meshes.picture.fragments import SceneDepthLayers, SceneFragments
 from topleft._meshes.picture.render import rasterize_mesh, render
 from topleft._meshes.picture.scene_shade import shade
@@ -208,3 +209,4 @@ def __dir__() -> list[str]:
 for _name in __all__:
     if callable(globals().get(_name)):
         _publish(globals()[_name])
+notebook.register()

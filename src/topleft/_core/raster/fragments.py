@@ -214,11 +214,6 @@ class Fragments:
         height, width = self.triangle.shape
         return f"Fragments({width}x{height}, {self._n_triangles} triangles)"
 
-    def _repr_png_(self) -> bytes | None:
-        from topleft._meshes.picture.notebook import png_of_fragments  # which imports this module
-
-        return png_of_fragments(self)
-
     @property
     def triangle(self) -> NDArray[np.int32]:
         """Index of the triangle that shows in the pixel, int32 (H, W), -1 where there is none."""

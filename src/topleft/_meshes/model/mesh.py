@@ -147,11 +147,6 @@ class Mesh:
         words += [f"{len(self.materials)} material{'s' * (len(self.materials) > 1)}"] if self.materials else []
         return f"Mesh({', '.join(words)})"
 
-    def _repr_png_(self) -> bytes | None:
-        from topleft._meshes.picture.notebook import png_of_mesh  # which imports this module
-
-        return png_of_mesh(self)
-
     @property
     def bounds(self) -> F64:
         """Lower and upper corner (2, 3) float64 of the box round the triangles; unused vertices do not count.

@@ -6,15 +6,11 @@ docs/design/fields.md tells why.
 
 from __future__ import annotations
 
-import io
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
-from PIL import Image
 
 from topleft._core.base.color import id_colors
 from topleft._core.raster.fragments import Fragments
+from topleft._meshes.io import png
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.render import render
 
@@ -25,7 +21,7 @@ MAX_SIDE_PX = 1024
 
 def png_of_mesh(mesh: Mesh) -> bytes | None:
     """The three-quarter view of the mesh; `None` if there is nothing to see."""
-    return _png(render(mesh, size=MESH_SIZE)) if len(mesh.triangles) else None
+    return png.encode(render(mesh, size=MESH_SIZE)) if len(mesh.triangles) else None
 
 
 def png_of_fragments(frags: Fragments) -> bytes | None:
@@ -37,10 +33,10 @@ def png_of_fragments(frags: Fragments) -> bytes | None:
     picture = np.zeros((*ids.shape, 4), np.uint8)
     seen = ids >= 0
     picture[seen, :3], picture[seen, 3] = id_colors(ids[seen]), 255
-    return _png(picture)
+    return png.encode(picture)
 
 
-def _png(picture: npt.NDArray[Any]) -> bytes:
-    file = io.BytesIO()
-    Image.fromarray(picture).save(file, format="PNG")
-    return file.getvalue()
+def register() -> None:
+    """Give meshes and visibility buffers the method that IPython asks for a picture."""
+    Mesh._repr_png_ = png_of_mesh  # type: ignore[attr-defined]
+    Fragments._repr_png_ = png_of_fragments  # type: ignore[attr-defined]
