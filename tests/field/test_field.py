@@ -233,6 +233,17 @@ def test_grid_around_a_box_has_whole_pixels():
     assert Grid.around(([[0.1, 0], [0.4, 0], [0.1, 0.1]], [[0, 1, 2]]), pixel_size=0.1).size == (3, 1)
 
 
+def test_grid_around_a_mesh_is_that_around_its_arrays():
+    mesh = tl.Mesh([[0, 0, 1], [4, 0, 2], [0, 3, 1]], [[0, 1, 2]])
+    assert Grid.around(mesh, size=(8, 6)) == Grid.around((mesh.vertices, mesh.triangles), size=(8, 6))
+
+
+@pytest.mark.parametrize("subject", ["mesh.obj", 3, (SQUARE,)])
+def test_grid_around_what_has_no_triangles_is_refused(subject):
+    with pytest.raises(TypeError, match=r"subject must be a Mesh or \(points, triangles\), got"):
+        Grid.around(subject, size=(4, 3))
+
+
 def test_grid_around_looks_only_at_points_in_use():
     grid = Grid.around(([*SQUARE, [1e9, 1e9]], HALVES), size=(8, 6))
     assert grid.extent == (0, 4, 0, 3)

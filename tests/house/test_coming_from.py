@@ -117,7 +117,7 @@ def test_pycocotools_writes_the_same_text_and_other_borders(names):
 def test_matplotlib_interpolates_the_same_numbers(names):
     tri = pytest.importorskip("matplotlib.tri")
     triangulation = tri.Triangulation(*names["points"].T, names["triangles"])
-    grid = tl.Grid.around(triangulation, size=names["size"])
+    grid = tl.Grid.around(tl.as_mesh(triangulation), size=names["size"])
     x, y = np.meshgrid(grid.x_centers, grid.y_centers)
     theirs = tri.LinearTriInterpolator(triangulation, names["values"])(x, y).filled(np.nan)
     np.testing.assert_allclose(tl.field(triangulation, names["values"], grid), theirs, atol=1e-9)

@@ -12,8 +12,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.array_types import F64, MeshLike
-from topleft._core.base.arrays import as_array, as_number, as_real, as_size, shown
+from topleft._core.base.array_types import F64, I32
+from topleft._core.base.arrays import (
+    as_array,
+    as_checked_triangles,
+    as_number,
+    as_plane_points,
+    as_real,
+    as_size,
+    shown,
+)
 from topleft._core.base.georeference import crs_text, data_array, frame_of_raster
 from topleft._core.base.options import parse
 from topleft.typing import YOption
@@ -101,7 +109,7 @@ class Grid:
     @classmethod
     def around(
         cls,
-        subject: MeshLike,
+        subject: Any,
         *,
         size: int | tuple[int, int] | None = None,
         pixel_size: float | tuple[float, float] | None = None,
@@ -114,8 +122,8 @@ class Grid:
 
         Parameters
         ----------
-        subject : mesh
-            Any value that `as_mesh` takes; x and y of the points that its triangles use.
+        subject : Mesh or (points, triangles)
+            x and y of the points that triangles use; `as_mesh` reads other meshes.
         size : (width, height), optional
             How many pixels.
         pixel_size : float or (float, float), optional
@@ -132,9 +140,7 @@ class Grid:
             If neither or both of `size` and `pixel_size` are given, the mesh has no triangles or no area, or a number
             is outside its range.
         """
-        from topleft._meshes.field.field import extent_around  # which imports this module
-
-        found = grid_around(extent_around(subject, extent), size, pixel_size, y)
+        found = grid_around(extent_around(subject) if extent is None else extent, size, pixel_size, y)
         return replace(found, crs=crs_text(crs), nodata=nodata)
 
     @classmethod
@@ -263,6 +269,25 @@ class Grid:
         from_top = np.subtract(*ends, dtype=np.float64)  # points may be float16 or float32
         np.multiply(from_top, height / (y_max - y_min), out=pixels[:, 1])
         return pixels
+
+
+def extent_around(subject: Any) -> Extent:
+    """The box round the triangles of a mesh."""
+    pair = subject
+    if hasattr(subject, "vertices") and hasattr(subject, "triangles"):
+        pair = subject.vertices, subject.triangles
+    if not (isinstance(pair, tuple | list) and len(pair) == 2):
+        raise TypeError(f"subject must be a Mesh or (points, triangles), got {type(subject).__name__}")
+    points = as_plane_points("points", pair[0])
+    return extent_of(points, as_checked_triangles(pair[1], len(points)))
+
+
+def extent_of(points: npt.NDArray[Any], corners: I32) -> Extent:
+    """The box round the points that triangles use."""
+    if not len(corners):
+        raise ValueError("a mesh without triangles has no extent")
+    x, y = points[:, 0][corners], points[:, 1][corners]  # by column: NumPy is slow along short rows
+    return float(x.min()), float(x.max()), float(y.min()), float(y.max())
 
 
 def grid_around(

@@ -26,7 +26,7 @@ from topleft._core.base.arrays import (
     as_plane_points,
     check_real,
 )
-from topleft._core.base.grid import Extent, ExtentLike, Grid, grid_around
+from topleft._core.base.grid import Extent, ExtentLike, Grid, extent_of, grid_around
 from topleft._core.base.memory import SCRATCH
 from topleft._core.base.options import Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
@@ -247,23 +247,6 @@ def grid_of(size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption, b
             raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")
         return size
     return grid_around(box() if extent is None else extent, size, pixel_size, y)
-
-
-def extent_around(mesh: MeshLike, extent: ExtentLike | None) -> ExtentLike:
-    """The extent, or the box round a mesh where none is given."""
-    polygons = as_polygons(mesh)
-    if extent is not None:
-        return extent
-    points = as_plane_points("points", polygons.points)
-    return extent_of(points, as_checked_triangles(polygons.triangles, len(points)))
-
-
-def extent_of(points: npt.NDArray[Any], corners: I32) -> Extent:
-    """The box round the points that triangles use."""
-    if not len(corners):
-        raise ValueError("a mesh without triangles has no extent")
-    x, y = points[:, 0][corners], points[:, 1][corners]  # by column: NumPy is slow along short rows
-    return float(x.min()), float(x.max()), float(y.min()), float(y.max())
 
 
 def is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: PerOption) -> bool:

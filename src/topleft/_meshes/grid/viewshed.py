@@ -22,6 +22,7 @@ from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._meshes.field.field import height_map
+from topleft._meshes.scene.adapt import as_polygons
 
 EARTH_RADIUS = 6_370_997.0
 """Metres: that of the sphere of GDAL's curvature coefficient."""
@@ -179,8 +180,10 @@ def heights_of(terrain: Any, grid: Grid | None, pixel_size: Any) -> tuple[F64, G
         return heights, own
     if (grid is None) == (pixel_size is None):
         raise ValueError("a mesh needs either a grid or a pixel_size")
-    own = Grid.around(terrain, pixel_size=pixel_size) if grid is None else grid
-    return height_map(terrain, own), own
+    mesh = as_polygons(terrain)
+    surface = mesh.points, mesh.triangles
+    own = Grid.around(surface, pixel_size=pixel_size) if grid is None else grid
+    return height_map(surface, own), own
 
 
 def ground_at(heights: F64, at: F64) -> float:
