@@ -13,7 +13,6 @@ from hypothesis import HealthCheck, settings
 
 import topleft as tl
 from topleft._core.raster import choices
-from topleft._core.raster import costs as cost_table
 
 collect_ignore = [] if Path(__file__).parents[1].joinpath("benchmarks").is_dir() else ["studies"]
 
@@ -33,9 +32,6 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.relative_to(Path(__file__).parents[1]).as_posix() not in SLOW:
             item.add_marker(pytest.mark.quick)
-
-
-cost_table.use_costs(cost_table.Costs())  # those that ship, not those of this machine
 
 
 @pytest.fixture

@@ -13,16 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import topleft as tl
 from benchmarks.choices.scenes import Scene, scenes
-from benchmarks.choices.ways import CHOICES, THREADED, drawing
-from benchmarks.harness.arguments import Options, count, fraction, names, refuse_unknown, switch
+from benchmarks.choices.ways import CHOICES, THREADED
+from benchmarks.harness.arguments import Options, count, fraction, names, refuse_unknown
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save, forget, tell
 from benchmarks.harness.turns import digits, quartiles
-from benchmarks.harness.ways import Way, Ways, check_same_bits, take_rounds
-
-OUTPUTS = {"rasterize": ("triangle", "depth"), "coverage": ("coverage",), "overdraw": ("overdraw",), "fill": ("color",)}
+from benchmarks.harness.ways import Ways, check_same_bits, take_rounds
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,6 @@ class ChoiceOptions(Options):
     rounds: int = count(7, "--repeats", "rounds")
     seconds: float = fraction(0.002, "--seconds", "length of a turn, at least a call")
     scale: float = fraction(1.0, "--scale", "of triangles and frames", "X")
-    plans: bool = switch("--plans", "measure estimates of plans alone")
 
 
 def run_choices(options: ChoiceOptions, record: Record | None = None, save: Save = forget) -> Record:
@@ -55,19 +51,6 @@ def run_choices(options: ChoiceOptions, record: Record | None = None, save: Save
                 tell(row_text(row))
         save(with_rows(record, rows))
     return with_rows(record, rows)
-
-
-def measure_estimates(options: ChoiceOptions, record: dict[str, Any] | None) -> dict[str, Any]:
-    """Return a record with estimated and measured milliseconds of every scene, on memory that is kept."""
-    rows = []
-    for scene in chosen_scenes(options):
-        plan = tl.plan(*scene.arrays, scene.size, outputs=OUTPUTS[scene.verb], **scene.asked())
-        [took] = take_rounds([Way("", drawing(scene))], options.rounds, options.seconds, time.thread_time)
-        rows.append(
-            {"scene": scene.name, "kind": scene.kind, "verb": scene.verb, "sampling": scene.sampling,
-             "estimated_ms": digits(plan.estimated_ms), "measured_ms": digits(np.median(took))}
-        )  # fmt: skip
-    return with_rows(record, []) | {"estimates": rows}
 
 
 def chosen_scenes(options: ChoiceOptions) -> Iterator[Scene]:

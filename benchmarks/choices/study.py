@@ -1,4 +1,4 @@
-"""The study of choices: ways to draw, and estimates of plans."""
+"""The study of choices: ways to draw."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from benchmarks.report.study import Study
 
 
 def run(options: measure.ChoiceOptions, save: Save) -> Record:
-    """Measure the ways to draw, or estimates; rows of the record that are not measured stay."""
-    old = read_record(options.record)
-    return measure.measure_estimates(options, old) if options.plans else measure.run_choices(options, old, save)
+    """Measure the ways to draw; rows of the record that are not measured stay."""
+    return measure.run_choices(options, read_record(options.record), save)
 
 
 STUDY = Study(

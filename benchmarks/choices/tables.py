@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
 from benchmarks.harness.records import Record
 from benchmarks.report.tables import facts_text, table_text
 
@@ -20,7 +18,7 @@ def lines(record: Record) -> Iterator[str]:
     """The report of one record, Markdown."""
     yield facts_text(record)
     for name, text in PARTS.items():
-        if name != "choice-facts" and ("estimates" if name == "plan-estimates" else "rows") in record:
+        if name != "choice-facts":
             yield from ("", text(record))
 
 
@@ -81,32 +79,9 @@ def misses_text(record: Record) -> str:
     return table_text(["choice", "scene", "chosen", "best", "ms", "best ms", "ratio", "quartiles"], rows)
 
 
-def estimates_text(record: Record) -> str:
-    """Estimated by measured time of all scenes, for each verb: the median, the middle four fifths, the ends."""
-    groups: dict[str, list[Row]] = {}
-    for row in record["estimates"]:
-        groups.setdefault(asked_of(row), []).append(row)
-    rows = []
-    for asked, own in groups.items():
-        ordered = sorted(own, key=by_measured)
-        low, middle, high = np.percentile([by_measured(row) for row in own], [10, 50, 90])
-        ends = [
-            f"{by_measured(row):.2f} ({row['scene']}, {row['measured_ms']:.3g} ms)" for row in (ordered[0], ordered[-1])
-        ]
-        rows.append([asked, str(len(own)), f"{middle:.2f}", f"{low:.2f} to {high:.2f}", ends[0], ends[-1]])
-    head = ["verb", "scenes", "median", "four fifths", "least", "most"]
-    return table_text(head, rows)
-
-
-def by_measured(row: Row) -> float:
-    """Return the estimated by the measured time."""
-    return float(row["estimated_ms"] / row["measured_ms"])
-
-
 PARTS: Mapping[str, Callable[[Record], str]] = {
     "choice-facts": facts_text,
     "choice-summary": summary_text,
     "choice-misses": misses_text,
-    "plan-estimates": estimates_text,
 }
 """The parts of the page by their markers."""

@@ -1,4 +1,4 @@
-"""The command line: `render`, `mask`, `bop`, `bake`, `raster`, `explore`, `explain`, `calibrate`, `doctor`, `info`."""
+"""The command line: `render`, `mask`, `bop`, `bake`, `raster`, `explore`, `explain`, `doctor`, `info`."""
 
 from topleft._apps.cli import main
 

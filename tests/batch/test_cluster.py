@@ -20,7 +20,7 @@ from comparing import files_of
 from PIL import Image
 
 import topleft as tl
-from topleft._apps.batch.cluster import MESH_KEY, came_of
+from topleft._apps.batch.cluster import MESH_KEY, came_of, jobs_of_task
 from topleft._apps.cli import main
 
 distributed = pytest.importorskip("distributed", reason="the dask extra is not installed")
@@ -114,6 +114,11 @@ def test_a_task_that_was_lost_or_died_over_its_mesh_is_no_error(task, outcomes, 
     got, told = came_of(task)
     assert got == outcomes
     assert told is None if error is None else isinstance(told, error)
+
+
+@pytest.mark.parametrize(("size", "n"), [((64, 64), 64), ((1000, 1000), 11), ((4000, 4000), 1), ("large", 1)])
+def test_a_task_has_about_twelve_million_triangles_and_pixels(size, n):
+    assert jobs_of_task(tl.Job(tl.Mesh(*tl.scenes.blob(60_000)), size=size)) == n
 
 
 def test_pictures_are_those_of_one_thread(client):

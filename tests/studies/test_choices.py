@@ -23,9 +23,7 @@ TINY = bench.ChoiceOptions(rounds=1, seconds=0.0, scale=0.02)
 def record():
     """Every choice and every scene, at a fiftieth of the size."""
     pytest.importorskip("scipy")
-    found = bench.run_choices(TINY)
-    some = bench.ChoiceOptions(scenes=["mesh 1k,", "flat 20000"], rounds=1, seconds=0.0, scale=0.02)
-    return bench.measure_estimates(some, found)
+    return bench.run_choices(TINY)
 
 
 def flat_scene(size=(300, 300)):
@@ -94,14 +92,11 @@ def test_rows_replace_those_of_the_same_scene(record):
     again = bench.with_rows(record, [row])
     assert len(again["rows"]) == len(record["rows"])
     assert again["rows"][0]["ratio"] == 7.0
-    assert again["estimates"] == record["estimates"]
 
 
 def test_tables_hold_each_choice_and_scene(record):
     summary = choices_tables.summary_text(record)
     assert all(f"| {name} " in summary for name in CHOICES)
-    verbs = {(row["verb"], row["sampling"]) for row in record["estimates"]}
-    assert choices_tables.estimates_text(record).count("\n") == 1 + len(verbs) == 9
     assert "no way" in choices_tables.misses_text({"rows": []}).lower()
 
 

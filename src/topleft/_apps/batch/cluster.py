@@ -19,10 +19,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from topleft import Mesh, plan
+from topleft import Mesh
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
 from topleft._apps.batch.workers import HeldScenes, Jobs, Workers, coarser_levels_of, needs_levels, runner_of
 from topleft._apps.cluster import MOST_RESTARTS, check_workers, lost, quiet, result_of, send_again
+from topleft._core.base.arrays import as_size
 from topleft.errors import MissingPackageError
 
 MESH_KEY = "topleft-mesh"
@@ -31,8 +32,8 @@ MESH_KEY = "topleft-mesh"
 GONE = ("cancelled", "lost", "error")
 """States of the future of a mesh that is gone."""
 
-TASK_MS = 200.0
-"""How long a task should take: about a hundred times as long as handing it over."""
+TASK_ITEMS = 12_000_000
+"""Triangles and pixels of a task: about 200 ms, a hundred times as long as handing it over."""
 
 MOST_TOGETHER = 64
 UNKNOWN_TOGETHER = 4
@@ -180,7 +181,7 @@ class ClusterWorkers(Workers):
         self._send([job], promise, n_trials=n_trials)
 
     def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
-        """The number of jobs of a scene in a task, from the plan of the first one."""
+        """The number of jobs of a scene in a task, from the size of the first one."""
         key = id(job.scene)
         if key not in self._together:
             self._together[key] = jobs_of_task(job)
@@ -217,15 +218,15 @@ def told(error: BaseException) -> BaseException:
 
 
 def jobs_of_task(job: Job) -> int:
-    """How many jobs like this one take about `TASK_MS`, by the planner."""
-    if not isinstance(job.scene, Mesh) or callable(job.camera) or job.camera is None:
+    """How many jobs like this one have about `TASK_ITEMS` triangles and pixels together."""
+    if not isinstance(job.scene, Mesh):
         return UNKNOWN_TOGETHER
     try:
-        estimated = plan(job.scene, job.camera, job.size, outputs="triangle", threads=1).estimated_ms
-    except Exception:  # errors of a job appear when it is drawn
+        width, height = as_size(job.size)
+    except (TypeError, ValueError):  # raised when the job is drawn
         return 1
-    # ids and depth are a part of a picture: light, background and the file take as long again or more
-    return max(1, min(MOST_TOGETHER, int(TASK_MS / max(0.1, 3 * estimated))))
+    n_items = len(job.scene.triangles) + width * height
+    return max(1, min(MOST_TOGETHER, TASK_ITEMS // max(1, n_items)))
 
 
 def draw_on_worker(

@@ -1,4 +1,4 @@
-"""The command line: `render`, `mask`, `bop`, `bake`, `raster`, `explore`, `explain`, `calibrate`, `doctor`, `info`.
+"""The command line: `render`, `mask`, `bop`, `bake`, `raster`, `explore`, `explain`, `doctor`, `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
 --strict, a mesh lacks something of its file; 2, nothing was written, for a reason in one line on stderr.
@@ -20,7 +20,7 @@ from topleft._apps.cli.arguments import FAILED, REFUSED, RENDER_HELP, Parser, ad
 from topleft._apps.cli.bake import add_bake_command
 from topleft._apps.cli.bop import add_bop_command
 from topleft._apps.cli.doctor import add_doctor_command
-from topleft._apps.cli.explain import add_plan_commands
+from topleft._apps.cli.explain import add_explain_command
 from topleft._apps.cli.explore import add_explore_command
 from topleft._apps.cli.mask import add_mask_command
 from topleft._apps.cli.raster import add_raster_command
@@ -96,7 +96,7 @@ def _parser() -> Parser:
     parser.set_defaults(run=None)
     add_command(commands, "info", run_info, "print the version and the build")
     add_render_arguments(add_command(commands, "render", run_render, "render meshes to pictures", RENDER_HELP))
-    add_plan_commands(commands)
+    add_explain_command(commands)
     add_mask_command(commands)
     add_bop_command(commands)
     add_bake_command(commands)

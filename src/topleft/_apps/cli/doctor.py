@@ -14,7 +14,6 @@ from typing import Any
 from topleft import build_info
 from topleft._apps.cli.arguments import add_command
 from topleft._core.base.threads import available_threads
-from topleft._core.raster.costs import cache_file, load_costs
 
 #: Extras for those who change the library; their packages are not listed.
 OWN_EXTRAS = frozenset({"all", "bench", "dev", "docs", "test"})
@@ -33,7 +32,6 @@ def run_doctor(_: argparse.Namespace) -> int:
     print(f"{platform.machine()}, {available_threads()} threads; compiled by {info['compiler']}")
     for name in ("numpy", "pillow"):
         print(f"{name} {version(name)}")
-    print(f"calibration: {load_costs().source} ({cache_file()}{'' if cache_file().is_file() else ' is not there'})")
     for line in extras():
         print(line)
 

@@ -1,4 +1,4 @@
-"""`topleft explain`: how a view of a mesh is drawn, and why. `topleft calibrate`: this machine's costs of drawing."""
+"""`topleft explain`: how a view of a mesh is drawn, and why."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ from topleft._apps.cli.arguments import (
 from topleft._apps.cli.targets import MeshSource, Orbit
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.options import Sampling
-from topleft._core.raster.costs import save_costs
 from topleft.typing import CullOption
 
 
 def run_explain(options: argparse.Namespace) -> int:
-    """Print how a view of a mesh is drawn: the choice of each stage, its reason and its time."""
+    """Print how a view of a mesh is drawn: the choice of each stage and its reason."""
     mesh = MeshSource(options.mesh)()
     if isinstance(mesh, Points):
         raise UsageError(f"{options.mesh!r} holds points: plans are of triangles")
@@ -53,19 +52,8 @@ def run_explain(options: argparse.Namespace) -> int:
     return 0
 
 
-def run_calibrate(_: argparse.Namespace) -> int:
-    """Measure this machine for half a minute and keep its costs, for choices and estimates."""
-    from topleft._meshes.plan.calibrate import calibrate
-
-    costs = calibrate()
-    before, after, n = costs.tuned
-    print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual[1]:.1f}")
-    print(f"of {n} scenes not fitted, choices take {before:.3f} -> {after:.3f} times as long as the best")
-    return 0
-
-
-def add_plan_commands(commands: Any) -> None:
-    """Add both commands to the parsers of the command line."""
+def add_explain_command(commands: Any) -> None:
+    """Add the command to the parsers of the command line."""
     add = add_orbit_arguments(add_command(commands, "explain", run_explain, "tell how a mesh is drawn, and why"))
     add("mesh", metavar="MESH", help="a file or a built-in shape")
     verbs = ["rasterize", "coverage", "overdraw", "fill"]
@@ -78,4 +66,3 @@ def add_plan_commands(commands: Any) -> None:
     add("--threads", type=positive, metavar="N", help="(default: as many as pay)")
     add("--measure", action="store_true", help="draw it, and show the times of the stages")
     add("--json", action="store_true", help="numbers and sentences as JSON")
-    add_command(commands, "calibrate", run_calibrate, "measure this machine")

@@ -276,7 +276,7 @@ def pays_to_share_instances(n_triangles: int, n_rows: float) -> bool:
 def pays_to_snap_all(n_vertices: int, n_pixels: int) -> bool:
     """Tell whether all vertices of a mesh in clusters are snapped for attributes, not only those that show."""
     costs = cost_table()
-    return n_vertices * costs.transform[0] <= n_pixels * costs.seen_pixel
+    return n_vertices * costs.transform <= n_pixels * costs.seen_pixel
 
 
 def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:

@@ -1,4 +1,4 @@
-"""`plan`: the choices, costs and memory of a draw, with reasons, before it is made.
+"""`plan`: the choices and memory of a draw, with reasons, before it is made.
 
 In: the arguments of a verb. Out: a `Plan`, which explains itself, and which verbs take as `plan=` to save its work.
 """
@@ -19,7 +19,6 @@ from topleft._core.base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import Sampling, parse
 from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.costs import cost_table
 from topleft._core.raster.fill import Style, draw_fill
 from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
@@ -87,15 +86,13 @@ class Plan:
         Width and height of the picture in pixels.
     n_vertices, n_triangles : int
     stages : tuple of Stage
-        In the order of the pipeline: name, choice, why, rejected, estimated_ms.
+        In the order of the pipeline: name, choice, why, rejected.
     classes : mapping of str to int
         Triangles, or pieces of cut ones, by the way they are drawn.
     scratch_bytes, result_bytes : mapping of str to int
         Memory by name: kept from call to call, and returned.
     threads : int
         How many draw.
-    costs : str
-        The source of the estimates, and their errors.
 
     Examples
     --------
@@ -115,18 +112,12 @@ class Plan:
     scratch_bytes: Mapping[str, int]
     result_bytes: Mapping[str, int]
     threads: int
-    costs: str
     _view: View = field(repr=False)
     _triangles: NDArray[np.int32] = field(repr=False)
     _triangles_given: ArrayLike = field(repr=False)
     _arguments: tuple[Any, ...] = field(repr=False)
     _clusters: Clusters | None = field(repr=False, default=None)
     _clock: Clock = field(repr=False, default_factory=Clock)
-
-    @property
-    def estimated_ms(self) -> float:
-        """The estimated time of a call on memory that is kept, in milliseconds."""
-        return sum(stage.estimated_ms or 0.0 for stage in self.stages)
 
     @property
     def measured_ms(self) -> Mapping[str, float]:
@@ -137,14 +128,14 @@ class Plan:
         width, height = self.size
         return (
             f"<Plan: {self.verb} {width}x{height}, {self.n_triangles:,} triangles, {self.threads} thread"
-            f"{'s' * (self.threads > 1)}, about {self.estimated_ms:.2g} ms>"
+            f"{'s' * (self.threads > 1)}>"
         )
 
     def _repr_html_(self) -> str:
         return as_html(self.to_dict())
 
     def explain(self) -> str:
-        """Return a table of the stages: the choice, its reason, rejected alternatives, and the time."""
+        """Return a table of the stages: the choice, its reason, rejected alternatives, and the measured time."""
         return as_text(self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
@@ -165,8 +156,6 @@ class Plan:
             "scratch_bytes": dict(self.scratch_bytes),
             "result_bytes": dict(self.result_bytes),
             "threads": self.threads,
-            "costs": self.costs,
-            "estimated_ms": self.estimated_ms,
             "measured_ms": sum(measured.values()) if measured else None,
         }
 
@@ -272,7 +261,7 @@ def plan(
     tolerance: float = 0.0,
     **view: Unpack[ViewOptions],
 ) -> Plan:
-    """Return the plan of a draw: at each stage the choice, its reason, rejected alternatives, and the estimated time.
+    """Return the plan of a draw: at each stage the choice, its reason and the rejected alternatives.
 
     Vertices are transformed, cut and snapped as the verb does it, and triangles are counted in the code that draws
     them: the plan counts, it does not guess. It costs about as much as a draw. With
@@ -337,7 +326,6 @@ def plan(
     found = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)
     facts, own_triangles = find_facts(vertices, triangles, checked, verb, wanted, test)
     facts = replace(facts, clusters=found)
-    costs = cost_table()
     scratch, results = memory_of(facts)
     return Plan(
         verb=verb,
@@ -345,12 +333,11 @@ def plan(
         size=checked.size,
         n_vertices=facts.n_vertices,
         n_triangles=facts.n_triangles,
-        stages=(*detail, *find_stages(facts, costs)),
+        stages=(*detail, *find_stages(facts)),
         classes=MappingProxyType(dict(zip(CLASSES, (row[0] for row in facts.census), strict=True))),
         scratch_bytes=MappingProxyType(scratch),
         result_bytes=MappingProxyType(results),
         threads=max(1, facts.drawing.n_threads),
-        costs=costs.source,
         _view=checked,
         _triangles=own_triangles,
         _triangles_given=triangles,

@@ -1,6 +1,6 @@
-"""Describes a draw, stage by stage: the choice, its reason, rejected alternatives, and the estimated time.
+"""Describes a draw, stage by stage: the choice, its reason and the rejected alternatives.
 
-In: `Facts` and `Costs`. Out: `Stage`s, in the order of the pipeline.
+In: `Facts`. Out: `Stage`s, in the order of the pipeline.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from topleft._core.base.options import Sampling, Sink
 from topleft._core.base.threads import available_threads
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Route
-from topleft._core.raster.costs import CALLS, Costs, draw_features, sink_group
+from topleft._core.raster.costs import cost_table
 from topleft._meshes.lod.detail import Detail
 from topleft._meshes.plan.facts import ClusterFacts, Decided, Facts, memory_of
 from topleft.methods import METHODS
@@ -29,17 +29,14 @@ class Stage:
         The stage, its choice, and why that is enough.
     rejected : tuple of str
         Alternatives, and why they were not chosen.
-    estimated_ms : float or None
-        None: part of another stage, which is named in `timed_in`.
     timed_in : str
-        The stage that the time is measured with; its own name where it has one.
+        What is timed in a call: a part of the draw, or the stage whose time contains this one.
     """
 
     name: str
     choice: str
     why: str
     rejected: tuple[str, ...] = ()
-    estimated_ms: float | None = None
     timed_in: str = ""
 
 
@@ -54,17 +51,16 @@ SINKS = {
 }
 
 
-def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
+def find_stages(facts: Facts) -> tuple[Stage, ...]:
     """Return the stages of a call."""
-    stages = [plan_input(facts, costs), *plan_vertices(facts, costs), plan_arithmetic(facts), plan_cull(facts)]
-    stages += [plan_method(facts, costs), *plan_sink(facts, costs)]
-    stages += [plan_threads(facts, costs), plan_memory(facts, costs)]
-    n_samples = facts.view.sampling.n_samples
-    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters, n_samples, costs))
+    stages = [plan_input(facts), *plan_vertices(facts), plan_arithmetic(facts), plan_cull(facts)]
+    stages += [plan_method(facts), *plan_sink(facts)]
+    stages += [plan_threads(facts), plan_memory(facts)]
+    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters))
 
 
-def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int, costs: Costs) -> list[Stage]:
-    """Return the stages of a mesh that is drawn again, with one on the savings of its clusters, for each sample."""
+def with_clusters(stages: list[Stage], found: ClusterFacts) -> list[Stage]:
+    """Return the stages of a mesh that is drawn again, with one on the savings of its clusters."""
     if found.clusters is None:
         return [stages[0], Stage("clusters", "none", found.why_not, timed_in="method"), *stages[1:]]
     n, n_triangles = len(found.clusters), found.clusters.n_triangles
@@ -77,22 +73,15 @@ def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int, cost
     )
     choice = f"{found.n_drawn:,} of {n:,} drawn, front to back, at most {engine.CLUSTER} triangles each"
     row = Stage("clusters", choice, why, rejected, timed_in="method")
-    vertex_stages = ("transform", "clip", "snap")
-    share = found.n_drawn / max(1.0, found.n_drawn + costs.cluster_hidden * (n - found.n_drawn))
-    total = costs.cluster_test * n_samples * n / 1e6
-    scaled = []
+    changed = []
     for stage in stages:
         if stage.name == "input":
-            scaled.append(replace(stage, choice="a copy of the mesh, sorted and checked once", rejected=()))
-        elif stage.name in vertex_stages:
-            total += n_samples * (stage.estimated_ms or 0.0) * share
-            scaled.append(replace(stage, estimated_ms=None, timed_in="method"))
-        elif stage.name == "method":
-            total += (stage.estimated_ms or 0.0) * share
-            scaled.append(replace(stage, estimated_ms=total))
+            changed.append(replace(stage, choice="a copy of the mesh, sorted and checked once", rejected=()))
+        elif stage.name in ("transform", "clip", "snap"):
+            changed.append(replace(stage, timed_in="method"))
         else:
-            scaled.append(stage)
-    return [scaled[0], row, *scaled[1:]]
+            changed.append(stage)
+    return [changed[0], row, *changed[1:]]
 
 
 def plural(n: int, thing: str) -> str:
@@ -123,44 +112,39 @@ def plan_detail(found: Detail) -> Stage:
     return Stage("detail", choice, found.why, found.rejected)
 
 
-def plan_input(facts: Facts, costs: Costs) -> Stage:
+def plan_input(facts: Facts) -> Stage:
     """Tell how the caller's arrays are read."""
     reads = "read as they are" if not facts.is_vertex_copy else f"copied to contiguous {facts.point_dtype}"
     converts = facts.index_dtype not in ("int32", "uint32")
     indices = "made int32, checked on the way" if converts else "read as they are, checked while drawing"
     n = facts.n_triangles
-    threads = choices.threads_to_convert(facts.view.threads, n)
     why = f"{vertices(facts.n_vertices)} of {facts.vertex_dtype}, {plural(n, 'triangle')} of {facts.index_dtype}"
     rejected = ["a check of all indices beforehand: the pass that draws reads them anyway"]
     if converts:
         rejected = ["int64 in the kernels: twice the memory to read in each pass; pass int32, or a plan, to save this"]
-    ms = costs.call[CALLS.index(facts.verb)] / 1e6 + (costs.index * n / threads / 1e6 if converts else 0.0)
-    if facts.is_vertex_copy:
-        ms += costs.touch * 8 * facts.n_vertices * facts.n_components / 1e6
-    return Stage("input", f"vertices {reads}; indices {indices}", why, tuple(rejected), ms, "input")
+    return Stage("input", f"vertices {reads}; indices {indices}", why, tuple(rejected), "input")
 
 
-def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
+def plan_vertices(facts: Facts) -> Iterator[Stage]:
     """Tell about transform, clip and snap: one pass over the vertices, and one over cut triangles."""
     view = facts.view
     kind = "snap"
     if facts.is_clip_space:
         kind = "project" if view.transform is None else "affine" if facts.is_affine else "transform"
     threads = choices.threads_to_snap(view.threads, facts.n_vertices, facts.n_triangles)
-    ms = costs.vertex_ns(kind, facts.point_dtype) * facts.n_vertices / threads / 1e6
     if kind == "snap":
         yield Stage("transform", "none", "vertices are in pixels", timed_in="snap")
         why = "pixels have no near or far plane, and sides never cut: all sums are exact"
         yield Stage("clip", "none", why, timed_in="snap")
     else:
         yield plan_transform(facts)
-        yield plan_clip(facts, costs)
+        yield plan_clip(facts)
     if view.is_exact:
         is_taken = kind == "snap" and facts.point_dtype == "float64"
         why = f"{vertices(facts.n_vertices)} stay where they are: no pixel is wrong against the numbers of the array"
         choice = "none, float64 where it lies" if is_taken else f"none, float64, {plural(threads, 'thread')}"
         grid = ("a grid: vertices would move by up to 1/512 px at 8 sub-pixel bits",)
-        yield Stage("snap", choice, why, grid, 0.0 if is_taken else ms, "vertices")
+        yield Stage("snap", choice, why, grid, "vertices")
         return
     bits = view.subpixel_bits
     why = f"{vertices(facts.n_vertices)}, each moved by at most 1/{2 << bits} px; all that follows is integers"
@@ -168,7 +152,7 @@ def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
     if facts.are_whole and bits:
         rejected.append("0 sub-pixel bits: all vertices are whole pixels: the same picture, but no faster")
     choice = f"{plural(bits, 'sub-pixel bit')}, {plural(threads, 'thread')}"
-    yield Stage("snap", choice, why, tuple(rejected), ms, "vertices")
+    yield Stage("snap", choice, why, tuple(rejected), "vertices")
 
 
 def plan_transform(facts: Facts) -> Stage:
@@ -187,20 +171,19 @@ def plan_transform(facts: Facts) -> Stage:
     return Stage("transform", choice, why, (other,), timed_in="snap")
 
 
-def plan_clip(facts: Facts, costs: Costs) -> Stage:
+def plan_clip(facts: Facts) -> Stage:
     """Tell how many triangles are cut."""
     view = facts.view
     planes = [name for name, is_on in (("near", view.near_clip), ("far", view.far_clip)) if is_on]
     names = " and ".join(planes) + (" plane" if len(planes) == 1 else " planes") if planes else "the eye's plane"
     sides = ("the four sides of the picture: sums are exact as far as 2**60 sub-pixels, so nothing is cut there",)
     if not facts.n_clipped:
-        return Stage("clip", "none", f"no vertex lies outside of {names}", sides, 0.0, "clip")
+        return Stage("clip", "none", f"no vertex lies outside of {names}", sides, "clip")
     return Stage(
         "clip",
         f"{plural(facts.n_cut, 'triangle')} cut into {plural(facts.n_pieces, 'piece')}",
         f"{vertices(facts.n_clipped)} outside of {names}, and {plural(facts.n_beyond, 'triangle')} with them",
         sides,
-        costs.clip * (facts.n_cut + facts.n_beyond) / 1e6,
         "clip",
     )
 
@@ -264,21 +247,15 @@ METHOD_NAMES = {
 }
 
 
-def plan_method(facts: Facts, costs: Costs) -> Stage:
+def plan_method(facts: Facts) -> Stage:
     """Tell how triangles of each size find their samples."""
     view = facts.view
     n_pixels = view.size[0] * view.size[1]
-    group = sink_group(facts.drawing.sink, view.sampling)
-    times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
-    counts = draw_features(facts.census, n_pixels)
-    times *= costs.exact_times if facts.decided is not None else 1.0
-    ms = times * costs.draw_ms(group, counts, facts.drawing.n_threads, is_sliced=facts.is_sliced) if n_pixels else 0.0
     if view.sampling is Sampling.AREA:
         why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
-        return Stage("method", choice, why, ("16 samples a pixel: not exact, and slower",), ms, "draw")
+        return Stage("method", choice, why, ("16 samples a pixel: not exact, and slower",), "draw")
     parts = [text.format(facts.count(name)) for name, text in METHOD_NAMES.items() if facts.count(name)]
-    ms += costs.beyond * facts.n_beyond / 1e6  # each thread looks at all of them
     layers = facts.covered / max(1, n_pixels)
     covered = f"about {facts.covered:,.0f} samples are covered, {layers:.2g} times the {n_pixels:,} pixels"
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
@@ -290,13 +267,13 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     elif facts.is_direct and facts.n_drawn:
         parts = [f"{plural(facts.n_drawn, 'triangle')} one after the other, in painter's order"]
         rejected = ("vectors and queues of triangles: they change the order, and colours have no ids to tell it",)
-    return Stage("method", "; ".join(parts) or "nothing to draw", covered, rejected, ms, "draw")
+    return Stage("method", "; ".join(parts) or "nothing to draw", covered, rejected, "draw")
 
 
-def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
+def plan_sink(facts: Facts) -> Iterator[Stage]:
     """Tell about depth, sampling and attributes."""
     view, n_pixels = facts.view, facts.view.size[0] * facts.view.size[1]
-    yield plan_depth(facts, costs)
+    yield plan_depth(facts)
     n = view.sampling.n_samples
     names = {Sampling.CENTER: "the pixel's centre", Sampling.AREA: "exact area", Sampling.OUTER: "squares that are met",
              Sampling.INNER: "squares that are held"}  # fmt: skip
@@ -311,10 +288,9 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
         rejected = ("labels and colours from them: two passes over the picture, which pay for small triangles",)
         yield Stage("shade", "none", why, rejected, timed_in="method")
     elif facts.verb == "fill":
-        ms = costs.paint * n_pixels * n / 1e6
         why = f"at most {n_pixels:,} of about {facts.covered:,.0f} samples show"
         rejected = ("colours while drawing: hidden samples would be coloured too",)
-        yield Stage("shade", "colours from ids, once a pixel", why, rejected, ms, "shade")
+        yield Stage("shade", "colours from ids, once a pixel", why, rejected, "shade")
     elif facts.verb == "rasterize":
         wanted = [name for name in facts.outputs if name not in ("triangle", "depth", "mask")]
         choice = f"{', '.join(wanted)} from ids, when asked for" if wanted else "none"
@@ -322,7 +298,7 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
         yield Stage("shade", choice, why, ("attributes while drawing: hidden samples would have them too",))
 
 
-def plan_depth(facts: Facts, costs: Costs) -> Stage:
+def plan_depth(facts: Facts) -> Stage:
     """Tell whether samples compare depths."""
     what = SINKS[facts.drawing.sink] if facts.view.sampling is not Sampling.AREA else "a sum of areas a pixel"
     if facts.is_direct:
@@ -339,8 +315,7 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
         why = f"every vertex lies at depth {facts.common_depth:g}: {order}; one pass over {n_pixels:,} pixels writes it"
         compared = f"a comparison for each of about {facts.covered:,.0f} samples"
         rejected = (f"{compared}: planes through equal depths are equal to the bit",)
-        ms = costs.flat_pixel * n_pixels / facts.drawing.n_threads / 1e6
-        return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
+        return Stage("depth", "no test, ids alone", why, rejected, "depth")
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
     why = "depths differ" if facts.test else "no test is set, but the depth of visible triangles is returned"
     if facts.common_depth is not None:
@@ -352,10 +327,11 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
     return Stage("depth", what, why, rejected, timed_in="method")
 
 
-def plan_threads(facts: Facts, costs: Costs) -> Stage:
+def plan_threads(facts: Facts) -> Stage:
     """Tell how many threads draw, and the work of each."""
     view, n = facts.view, facts.n_triangles
     n_threads, usable = facts.drawing.n_threads, available_threads()
+    costs = cost_table()
     wake = f"waking a thread takes {costs.wake / 1e3:.0f} us"
     if view.threads is not None:
         why = f"threads={view.threads} was asked for"
@@ -377,12 +353,11 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
     return Stage("threads", f"{n_threads} bands of {-(-view.size[1] // max(1, n_threads)):,} rows", why, rejected)
 
 
-def plan_memory(facts: Facts, costs: Costs) -> Stage:
+def plan_memory(facts: Facts) -> Stage:
     """Tell which memory is allocated."""
     scratch, results = memory_of(facts)
     kept, made = sum(scratch.values()), sum(results.values())
     parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)
-    touch = f"{costs.touch * (kept + made) / 1e6:.2g} ms more for its first touch"
-    rejected = (f"fresh memory for each frame: {touch}; a Rasterizer keeps it",)
+    rejected = ("fresh memory for each frame: its first touch takes longer; a Rasterizer keeps it",)
     choice = f"{megabytes(kept)} of scratch, {megabytes(made)} of results, {megabytes(kept + made)} at most"
     return Stage("memory", choice, parts, rejected)

@@ -10,22 +10,23 @@ from typing import Any
 WIDTH = 110
 INDENT = " " * 12
 
+#: Stages whose time contains that of others.
+WHOLE = ("snap", "method")
+
 
 def as_text(plan: Mapping[str, Any]) -> str:
     """Return a plan as lines of at most 110 characters."""
     lines = [title(plan), ""]
-    lines.append(f"{'stage':<12}{'choice':<{WIDTH - 36}}{'estimated':>12}{'measured':>12}")
+    lines.append(f"{'stage':<12}{'choice':<{WIDTH - 24}}{'measured':>12}")
     for stage in plan["stages"]:
-        first, *others = wrap(stage["choice"], WIDTH - 38)
-        times = f"{milliseconds(stage['estimated_ms'], stage):>12}{milliseconds(stage['measured_ms'], None):>12}"
-        lines.append(f"{stage['name']:<12}{first:<{WIDTH - 36}}{times}".rstrip())
+        first, *others = wrap(stage["choice"], WIDTH - 26)
+        lines.append(f"{stage['name']:<12}{first:<{WIDTH - 24}}{time_of(stage):>12}".rstrip())
         lines += [INDENT + line for line in others]
         lines += paragraph("why: ", stage["why"])
         for rejected in stage["rejected"]:
             lines += paragraph("not: ", rejected)
-    total = milliseconds(plan["estimated_ms"], None)
-    lines.append(f"{'':<12}{'in all':<{WIDTH - 36}}{total:>12}{milliseconds(plan['measured_ms'], None):>12}".rstrip())
-    lines += ["", *wrap(f"choices and estimates: {plan['costs']}; on memory that is kept", WIDTH)]
+    if plan["measured_ms"] is not None:
+        lines.append(f"{'':<12}{'in all':<{WIDTH - 24}}{milliseconds(plan['measured_ms']):>12}")
     return "\n".join(lines)
 
 
@@ -50,10 +51,15 @@ def paragraph(head: str, text: str) -> list[str]:
     return [INDENT + head + first, *(INDENT + " " * len(head) + line for line in others)]
 
 
-def milliseconds(ms: float | None, stage: Mapping[str, Any] | None) -> str:
-    """Return a time, or which stage it is a part of."""
-    if ms is None:
-        return f"in {stage['timed_in']}" if stage and stage["timed_in"] else ""
+def time_of(stage: Mapping[str, Any]) -> str:
+    """Return the measured time of a stage, or which stage it is a part of."""
+    if stage["measured_ms"] is not None:
+        return milliseconds(stage["measured_ms"])
+    return f"in {stage['timed_in']}" if stage["timed_in"] in WHOLE else ""
+
+
+def milliseconds(ms: float) -> str:
+    """Return a time in a unit that fits it."""
     return f"{ms:.1f} ms" if ms >= 10 else f"{ms:.2f} ms" if ms >= 0.1 else f"{1000 * ms:.0f} us"
 
 
@@ -62,11 +68,9 @@ def as_html(plan: Mapping[str, Any]) -> str:
     rows = []
     for stage in plan["stages"]:
         rejected = "<br>".join(html.escape(text) for text in stage["rejected"])
-        cells = [stage["name"], stage["choice"], stage["why"]]
-        times = [milliseconds(stage["estimated_ms"], stage), milliseconds(stage["measured_ms"], None)]
-        rows.append("".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + f"<td>{rejected}</td>"
-                    + "".join(f"<td>{cell}</td>" for cell in times))  # fmt: skip
-    heads = "".join(f"<th>{name}</th>" for name in ("stage", "choice", "why", "not", "estimated", "measured"))
+        cells = "".join(f"<td>{html.escape(stage[name])}</td>" for name in ("name", "choice", "why"))
+        rows.append(f"{cells}<td>{rejected}</td><td>{time_of(stage)}</td>")
+    heads = "".join(f"<th>{name}</th>" for name in ("stage", "choice", "why", "not", "measured"))
     body = "".join(f"<tr>{row}</tr>" for row in rows)
     caption = f"<caption>{html.escape(title(plan))}</caption>"
     return f"<table>{caption}<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
