@@ -279,6 +279,39 @@ def test_files_and_names_in_comments_exist():
     assert not lost, "\n".join(lost)
 
 
+#: Names of other programs and formats that comments tell of, and examples of names.
+FOREIGN = {
+    "_get_mask_funcs", "_get_rasterize_funcs", "inverted_cdf", "map_Pm", "pos_clip", "read_write_model", "to_raster",
+}  # fmt: skip
+
+
+def code_without_comments(path):
+    """The text of a file without its comments, of a page its blocks of code."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix in (".md", ".rst"):
+        return "\n".join(re.findall(r"```.*?```", text, flags=re.DOTALL))
+    if path.suffix in (".c", ".h", ".js", ".mjs", ".css"):
+        return re.sub(r"/\*.*?\*/|//[^\n]*", " ", text, flags=re.DOTALL)
+    return re.sub(r'"""(?!, ).*?"""|#[^\n]*', " ", text, flags=re.DOTALL) if path in {*PYTHON, *CYTHON} else text
+
+
+def test_names_in_backticks_exist():
+    """Of comments, and of the pages for who changes things: users' pages tell of other programs."""
+    suffixes = {".c", ".h", ".py", ".pyx", ".pxi", ".js", ".mjs", ".css", ".html", ".md", ".toml", ".yml", ".json"}
+    skipped = {".git", ".venv", "build", "records"}
+    files = [path for path in ROOT.rglob("*") if not skipped & set(path.relative_to(ROOT).parts)]
+    texts = [code_without_comments(path) for path in files if path.suffix in suffixes]
+    known = set(re.findall(r"\w+", "\n".join([*texts, *(path.stem for path in files)])))
+    pages = [ROOT / "CONTRIBUTING.md", *ROOT.glob("csrc/*.md"), *(ROOT / "docs/design").glob("*.md")]
+    told = {path: "\n".join(comments_of(path)) for path in [*PYTHON, *CYTHON, *C] if "tests" not in path.parts}
+    told |= {path: re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL) for path in pages}
+    lost = []
+    for path, text in told.items():
+        names = re.findall(r"\b_?[a-z]\w+_\w+\b", " ".join(re.findall(r"`([^`\n]+)`", text)))
+        lost += [f"{short(path)}: {name}" for name in names if name not in known | FOREIGN and "NAME" not in name]
+    assert not lost, "\n".join(lost)
+
+
 @cache
 def resolves(name):
     if file_of(name):  # `topleft.torch` needs PyTorch to be imported

@@ -18,7 +18,7 @@ from topleft._meshes.plan.plan import OUTPUTS
 from topleft._meshes.windows.drawing import KINDS
 from topleft.methods import ALIASES, CLASSICS, METHODS
 
-#: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_read_from_the_types`.
+#: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_taken_and_no_others`.
 TAKEN = {
     "LayerOption": LAYERS,
     "MethodOption": [*METHODS, *ALIASES, *CLASSICS],

@@ -1,4 +1,4 @@
-"""The gate's check of units (`.ci/check_units.py`) finds symbols beside the table and slow instructions."""
+"""The gate's check of units, `check_units.py` of .ci, finds symbols beside the table and slow instructions."""
 
 import platform
 import runpy
