@@ -123,6 +123,8 @@ class Counted(KeptMemory):
         self.bytes[name] = max(self.bytes.get(name, 0), int(np.prod(shape)) * np.dtype(dtype).itemsize)
         return super().empty(name, shape, dtype)
 
+    scratch = empty
+
     def constant(self, name, n, value):
         self.bytes[name] = 4 * n
         return super().constant(name, n, value)

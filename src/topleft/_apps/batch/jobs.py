@@ -163,7 +163,7 @@ class ForeignMesh:
         return as_mesh(self.subject)
 
 
-class MeshCache:
+class LoadedMeshes:
     """Meshes that were made, or the errors that came instead: the `n` latest, shared by all threads."""
 
     def __init__(self, n: int) -> None:
@@ -202,7 +202,7 @@ class JobRunner:
     """Draws jobs; each thread in memory that it keeps from picture to picture. `n_meshes` are kept for jobs to come."""
 
     def __init__(self, n_meshes: int = 4) -> None:
-        self._cache = MeshCache(n_meshes)
+        self._cache = LoadedMeshes(n_meshes)
         self._threads = threading.local()
 
     def draw(self, jobs: Sequence[tuple[int, Job]]) -> list[Outcome]:

@@ -26,32 +26,11 @@ MIN_CHECKED_BYTES = 1 << 30
 #: in a picture of 4096x4096.
 MAX_WAITING_BYTES = 512 << 20
 
-#: Most bytes that one name of a thread's scratch keeps between module-level calls; `SCRATCH_NAMES` are all.
+#: Most bytes that one name of a thread's scratch keeps between module-level calls.
 MAX_SCRATCH_BYTES = 64 << 20
 
 #: Bands of pictures, whose memory is kept for those of the next calls.
 MOST_SPARE = 8
-
-#: Scratch that no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
-SCRATCH_NAMES = frozenset(
-    {
-        "band rows",
-        "bands",
-        "bins",
-        "covered",
-        "labels",
-        "outside",
-        "packed",
-        "points",
-        "records",
-        "sample colors",
-        "sample labels",
-        "sample mask",
-        "triangles",
-    }
-    | {"edge highs", "edge last_low", "edge starts", "edges"}
-    | {"chains", "depth of heights", "planes", "polygon points"}
-)
 
 
 class Memory(Protocol):
@@ -59,6 +38,9 @@ class Memory(Protocol):
 
     def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """Return an uninitialised array."""
+
+    def scratch(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array that no result refers to: the next call may overwrite it."""
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
         """Return n int32 that are all `value`; the caller restores it before it returns."""
@@ -70,6 +52,8 @@ class FreshMemory:
     def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:  # noqa: ARG002
         """Return an uninitialised array."""
         return empty(shape, dtype)
+
+    scratch = empty
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:  # noqa: ARG002
         """Return n int32 that are all `value`."""
@@ -93,6 +77,8 @@ class KeptMemory:
             block = self._blocks[name] = allocate(n_bytes)
         return block[:n_bytes].view(dtype).reshape(shape)
 
+    scratch = empty
+
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
         """Return n int32 that are all `value`: filled once, restored by callers."""
         block = self._constants.get(name)
@@ -107,10 +93,10 @@ class ScratchMemory(FreshMemory):
     def __init__(self) -> None:
         self.threads = threading.local()  # `kept`: of each thread
 
-    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-        """Return an uninitialised array."""
-        if name not in SCRATCH_NAMES or _size(shape, dtype) > MAX_SCRATCH_BYTES:
-            return super().empty(name, shape, dtype)
+    def scratch(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array, which the next call of the thread overwrites."""
+        if _size(shape, dtype) > MAX_SCRATCH_BYTES:
+            return empty(shape, dtype)
         return self._kept().empty(name, shape, dtype)
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
@@ -139,6 +125,10 @@ class MemoryOf:
     def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """Return an uninitialised array."""
         return self.memory.empty(f"{name} of {self.owner}", shape, dtype)
+
+    def scratch(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array that no result refers to."""
+        return self.memory.scratch(f"{name} of {self.owner}", shape, dtype)
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
         """Return n int32 that are all `value`."""

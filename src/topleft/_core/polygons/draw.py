@@ -72,7 +72,7 @@ def sort_bands(prepared: Prepared, band_rows: int) -> tuple[npt.NDArray[np.int64
     n_bands = -(-height // band_rows)
     starts = np.empty(n_bands + 2, np.int64)
     prepared.compiled.sort(band_rows, n_bands, starts, None)
-    listed: npt.NDArray[np.int32] = SCRATCH.empty("bands", (int(starts[-1]) + 1,), np.int32)
+    listed: npt.NDArray[np.int32] = SCRATCH.scratch("bands", (int(starts[-1]) + 1,), np.int32)
     prepared.compiled.sort(band_rows, n_bands, starts, listed)
     return starts, listed
 

@@ -321,7 +321,7 @@ def paint_values(
         background = int(_as_words(paint.background[None], dtype)[0])
         draw_labels(prepared, _as_words(out, dtype).reshape(height, width), own, background, str(how))
         return
-    labels: npt.NDArray[np.int32] = SCRATCH.empty("labels", (height, width), np.int32)
+    labels: npt.NDArray[np.int32] = SCRATCH.scratch("labels", (height, width), np.int32)
     draw_labels(prepared, labels, None, -1, str(how))
     table = np.concatenate([paint.table, paint.background[None]])
 

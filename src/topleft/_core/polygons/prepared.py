@@ -54,7 +54,7 @@ class Prepared:
         n_words = 0 if assume_valid else compiled.certify_words()
 
         def certify_part(first: int, end: int) -> None:
-            compiled.certify(first, end, None if assume_valid else SCRATCH.empty("chains", (n_words,), np.int64))
+            compiled.certify(first, end, None if assume_valid else SCRATCH.scratch("chains", (n_words,), np.int64))
 
         run_parts(certify_part, n, min(self.n_threads, n))
 
@@ -93,7 +93,7 @@ def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -
     """Snap the points of polygons and find their boxes."""
     points, n = rings.points, len(rings.points)
     source = engine.Source(points)
-    columns: npt.NDArray[np.int32] = memory.empty("polygon points", (2, n + engine.POLYGON_PAD), np.int32)
+    columns: npt.NDArray[np.int32] = memory.scratch("polygon points", (2, n + engine.POLYGON_PAD), np.int32)
     x, y = columns[0], columns[1]
     wide: npt.NDArray[np.int64] | None = None
     how = frame.subpixel_bits, frame.grid_bits, *frame.origin

@@ -123,7 +123,7 @@ def encode_polygons(
     found, frame = frame_of(as_rings(rings), size, (0, 0), subpixel_bits, 1, 1)  # type: ignore[arg-type]
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     table, boxes = RunTable(frame.size), prepared.compiled.boxes_px.tolist()
-    mask: npt.NDArray[np.uint8] = SCRATCH.empty("labels", frame.size[::-1], np.uint8)
+    mask: npt.NDArray[np.uint8] = SCRATCH.scratch("labels", frame.size[::-1], np.uint8)
     firsts = np.arange(len(found)) if owners is None else np.flatnonzero(np.diff(owners, prepend=-1))
     for first, end in pairwise([*firsts.tolist(), len(found)]):
         shown = [box for box in boxes[first:end] if box[0] < box[2] and box[1] < box[3]]

@@ -153,7 +153,7 @@ class ClusteredMesh(SeenBoxes):
         clusters, sink = self.clusters, target.sink
         empty = self._empty if sample == (0, 0) else self._empty.at_sample(*sample)
         room: NDArray[np.int32] = memory.empty("clusters", (3 * len(clusters) + 1,), np.int32)
-        others: NDArray[np.int32] = memory.empty("outside", (clusters.n_triangles + 1,), np.int32)
+        others: NDArray[np.int32] = memory.scratch("outside", (clusters.n_triangles + 1,), np.int32)
         may_be_hidden = sink in (Sink.NEAREST, Sink.FARTHEST)
         seen, place = self._seen(sink, first, end, empty), (target, first, end - first, room, others)
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
@@ -205,7 +205,7 @@ class ClusteredMesh(SeenBoxes):
         ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
             refuse_rows([engine.mark_vertices(array, own, len(points), is_used)], own, len(points))
-        records: NDArray[np.uint8] = memory.empty("records", (len(points) * engine.VERTEX_BYTES,), np.uint8)
+        records: NDArray[np.uint8] = memory.scratch("records", (len(points) * engine.VERTEX_BYTES,), np.uint8)
         bad, wide, clipped = source.project_blocks(is_used, self._viewport, records)
         if bad or wide or (clipped and triangles is None):
             return None

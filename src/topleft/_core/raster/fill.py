@@ -194,7 +194,7 @@ def draw_labels(
     ground = as_array("background", 0 if style.background is None else style.background)
     if ground.shape not in ((), own.shape[1:]) or not np.array_equal(ground.astype(dtype), ground):
         raise ValueError(f"background must be one {dtype}, or one for each channel, got {shown(style.background)}")
-    ids: NDArray[np.int32] = memory.empty("labels", view.size[::-1], np.int32)
+    ids: NDArray[np.int32] = memory.scratch("labels", view.size[::-1], np.int32)
     draw(memory, snapped, view, choices.drawing(view, snapped, Sink.LABEL), ids)
     if 0 in view.size or not snapped.n_triangles:
         ids[...] = -1
@@ -247,7 +247,7 @@ def fill_large_shapes(p: Painting) -> None:
 
 def paint(p: Painting) -> None:
     """Draw coloured triangles: first which triangle shows in each pixel, then its colour."""
-    labels = p.memory.empty("labels", p.pixels.shape[:2], np.int32)
+    labels = p.memory.scratch("labels", p.pixels.shape[:2], np.int32)
     drawing = choices.drawing(p.view, p.snapped, Sink.LABEL)
     draw(p.memory, p.snapped, p.view, drawing, labels)
     palette, flat, under = engine.as_bytes(p.colors), engine.as_bytes(p.pixels), p.ground_bytes
@@ -270,7 +270,7 @@ def paint_samples(p: Painting) -> None:
     if p.ground is not None:
         p = p.with_ground_laid()
     shape = len(samples.positions), *p.pixels.shape[:2]
-    labels: NDArray[np.int32] = p.memory.empty("sample labels", shape, np.int32)
+    labels: NDArray[np.int32] = p.memory.scratch("sample labels", shape, np.int32)
     draw_all_samples(samples, p.snapped, p.view, drawing.sink, labels, None, in_bands=not p.is_flat)
     if p.is_flat:
         resolve_flat(p, labels, drawing.n_threads)
@@ -288,7 +288,7 @@ def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:
         pictures, meshes = p.pixels[None], [p.snapped.mesh]
     else:
         meshes = p.samples(n_threads).meshes
-        pictures = p.memory.empty("sample colors", (n_samples, *p.pixels.shape), p.colors.dtype)
+        pictures = p.memory.scratch("sample colors", (n_samples, *p.pixels.shape), p.colors.dtype)
         pictures[...] = p.pixels
     row_bytes = (4 if p.is_u8 else 4 * p.n_channels) * p.view.size[0]
     lays_ground = p.ground is not None
@@ -312,7 +312,7 @@ def blend_picture(
     n_parts, n_channels, is_u8 = min(height, n_threads), p.n_channels, p.is_u8
     flat, palette, under = engine.as_bytes(pixels), engine.as_bytes(p.colors), p.ground_bytes
     n_packed = width * (n_parts * engine.BLENDED_ROWS if band_rows == 0 else height)
-    packed = p.memory.empty("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
+    packed = p.memory.scratch("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
     n_cells = engine.blend_cells(width)
     cells = p.memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
     code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha == "premultiplied"
@@ -350,7 +350,7 @@ def resolve_flat(p: Painting, labels: NDArray[np.int32], n_threads: int) -> None
 
 def resolve_gouraud(p: Painting, samples: SamplePass, labels: NDArray[np.int32]) -> None:
     """Write the mean of the colours at the samples, interpolated at each of them."""
-    painted = p.memory.empty("sample colors", (len(labels), *p.pixels.shape), p.colors.dtype)
+    painted = p.memory.scratch("sample colors", (len(labels), *p.pixels.shape), p.colors.dtype)
     palette, meshes = engine.as_bytes(p.colors), samples.meshes
 
     def resolve_rows(first: int, end: int) -> None:

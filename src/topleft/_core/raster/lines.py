@@ -26,10 +26,10 @@ from topleft.typing import DepthTestOption
 def list_edges(memory: Memory, snapped: Snapped) -> NDArray[np.uint64]:
     """Return the edges of the triangles that are not culled, each once: lower index + 2**32 * higher index."""
     n_vertices, n_edges = snapped.n_vertices, 3 * snapped.n_triangles
-    edges: NDArray[np.uint64] = memory.empty("edges", (n_edges,), np.uint64)
-    starts = memory.empty("edge starts", (n_vertices + 1,), np.int64)
-    last_low = memory.empty("edge last_low", (n_vertices,), np.int32)
-    highs = memory.empty("edge highs", (n_edges,), np.int32)
+    edges: NDArray[np.uint64] = memory.scratch("edges", (n_edges,), np.uint64)
+    starts = memory.scratch("edge starts", (n_vertices + 1,), np.int64)
+    last_low = memory.scratch("edge last_low", (n_vertices,), np.int32)
+    highs = memory.scratch("edge highs", (n_edges,), np.int32)
     n = engine.list_edges(snapped.mesh, starts, last_low, highs, edges)
     if n < 0:
         snapped.refuse()

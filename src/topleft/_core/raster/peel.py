@@ -235,7 +235,7 @@ def bins_of(memory: Memory, mesh: engine.SnappedMesh, view: View, band_bits: int
     """Return the triangles of each band of rows; None where every band looks at all of them."""
     if not (mesh.n_triangles and choices.can_slice(view)):
         return None
-    room = memory.empty("bins", (3, mesh.n_triangles + 16), np.int32)
+    room = memory.scratch("bins", (3, mesh.n_triangles + 16), np.int32)
     bins = engine.Bins(mesh, *view.size[::-1], reach_fx, band_bits, room)
     if bins.bad_row < 0:
         bins.fill(np.empty(bins.n_listed + 1, np.int32))

@@ -55,7 +55,7 @@ def draw(
         samples = sample_positions(view.sampling.n_samples, view.grid_bits)
     if sink in (Sink.MASK, Sink.SAMPLES):
         n_samples = 1 if samples is None else len(samples)
-        covered = memory.empty("covered", engine.Target.covered_shape(height, width, n_samples), np.uint64)
+        covered = memory.scratch("covered", engine.Target.covered_shape(height, width, n_samples), np.uint64)
     bounds = memory.empty("bounds", engine.Target.bounds_shape(height, width), np.float32) if is_bounded else None
     target = engine.Target(sink, pixels, depth, covered, samples, earlier_wins, bounds)
 
@@ -79,7 +79,7 @@ def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height:
     mesh, n = snapped.mesh, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
     starts = [n * i // n_parts for i in range(n_parts + 1)]
-    room: NDArray[np.int32] = memory.empty("outside", (n + 16 * n_parts,), np.int32)
+    room: NDArray[np.int32] = memory.scratch("outside", (n + 16 * n_parts,), np.int32)
     outside = [room[starts[i] + 16 * i : starts[i + 1] + 16 * (i + 1)] for i in range(n_parts)]
 
     def draw_own(i: int, _: int) -> tuple[int, int]:
@@ -173,7 +173,7 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
 def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.float32]:
     """Return the share of samples that triangles cover, from a mask of each sample."""
     n, shape = view.sampling.n_samples, view.size[::-1]
-    mask: NDArray[np.bool_] = memory.empty("sample mask", shape, np.bool_)
+    mask: NDArray[np.bool_] = memory.scratch("sample mask", shape, np.bool_)
     with Canvas.of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
         canvas[...] = 0.0
         for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():

@@ -56,10 +56,10 @@ class SamplePass(NamedTuple):
         """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
         height, width = shape
         band_bits = bits_of_bands(shape, n_pixels, self.n_threads)
-        room = self.memory.empty("bins", (5 if with_columns else 3, self.mesh.n_triangles + 16), np.int32)
+        room = self.memory.scratch("bins", (5 if with_columns else 3, self.mesh.n_triangles + 16), np.int32)
         bins = engine.Bins(self.mesh, height, width, int(np.abs(self.positions).max()), band_bits, room)
         if bins.bad_row < 0:
-            bins.fill(self.memory.empty("bands", (bins.n_listed + 1,), np.int32))
+            bins.fill(self.memory.scratch("bands", (bins.n_listed + 1,), np.int32))
         return bins
 
 
@@ -102,7 +102,7 @@ def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int,
     meshes, n_parts = own.meshes, max(1, min(own.n_threads, bins.n_bands))
     rooms: list[NDArray[np.int32] | None] = [None] * n_parts
     if is_far:
-        rooms = list(own.memory.empty("band rows", (n_parts, 2, (shape[1] + 16) << bins.band_bits), np.int32))
+        rooms = list(own.memory.scratch("band rows", (n_parts, 2, (shape[1] + 16) << bins.band_bits), np.int32))
 
     def draw_part(first: int, end: int) -> None:
         engine.draw_bands(meshes, targets, rooms.pop(), bins, first, end)
@@ -237,7 +237,7 @@ def draw_means(own: SamplePass, palette: engine.Palette, pixels: NDArray[Any], g
     if bins.bad_row >= 0:
         return True
     n_parts = max(1, min(own.n_threads, bins.n_bands))
-    labels = list(memory.empty("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
+    labels = list(memory.scratch("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
     n_words = (width << bins.band_bits) // 64 + 2
     covered = list(memory.empty("covered labels", (n_parts, n_words), np.uint64))
     row = None if ground is None else np.broadcast_to(ground, pixels.shape[1:]).astype(pixels.dtype)

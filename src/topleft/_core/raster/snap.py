@@ -139,7 +139,7 @@ def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, 
         native = as_triangles(triangles)
         is_checked = native.dtype == np.int64
         if is_checked:
-            room = memory.empty("triangles", native.shape, np.int32)
+            room = memory.scratch("triangles", native.shape, np.int32)
             n_threads = choices.threads_to_convert(view.threads, len(native))
             narrow_triangles(native, triangles, len(points), room, n_threads)
         indices = room if is_checked else cast("NDArray[np.int32]", native)
@@ -187,7 +187,7 @@ def snap_for_floats(memory: Memory, given: MeshArrays, view: View, *, must_check
     points, source, indices = given.points, given.source, given.triangles
     if source.is_clip_space or not len(points) or 0 in view.size:
         return None
-    taken = memory.empty("points", points.shape, np.float64)
+    taken = memory.scratch("points", points.shape, np.float64)
 
     def take_part(first: int, end: int) -> int:
         return source.take(first, end, taken, view.subpixel_bits)
@@ -220,7 +220,7 @@ def project_mesh(memory: Memory, given: MeshArrays, view: View, *, must_check: b
     """Take clip space to pixels, and cut triangles, without a snap."""
     points, source, indices = given.points, given.source, given.triangles
     n, viewport = len(points), view.engine_viewport()
-    projected = memory.empty("points", (n, engine.PLACED), np.float64)
+    projected = memory.scratch("points", (n, engine.PLACED), np.float64)
 
     def project_part(first: int, end: int) -> tuple[int, int, int]:
         return source.project(first, end, viewport, projected, None)
@@ -262,7 +262,7 @@ def take_points(memory: Memory, given: MeshArrays, n: int, *, must_check: bool) 
     is_same = points.dtype == np.float64
     if not n or (is_same and not must_check):
         return points[:n].astype(np.float64, copy=False), 0
-    taken = points if is_same else memory.empty("points", (n, points.shape[1]), np.float64)
+    taken = points if is_same else memory.scratch("points", (n, points.shape[1]), np.float64)
 
     def take_part(first: int, end: int) -> int:
         return source.take(first, end, None if is_same else taken)
@@ -281,7 +281,7 @@ def snap(
     with_depth: bool,
 ) -> SnappedVertices:
     """Transform, project and snap the first `n` vertices in one pass; a second one where some are wide."""
-    records = memory.empty("records", (n * engine.VERTEX_BYTES,), np.uint8)
+    records = memory.scratch("records", (n * engine.VERTEX_BYTES,), np.uint8)
     if not n:
         return SnappedVertices(records, None, 0, 0)
     wide: NDArray[np.int64] | None = None

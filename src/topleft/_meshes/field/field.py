@@ -309,8 +309,8 @@ def draw_heights(
 def visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     """Ids (H, W) of the triangles that show, in memory that the thread's next call overwrites."""
     snapped = snap_mesh(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
-    ids: I32 = SCRATCH.empty("labels", view.size[::-1], np.int32)
-    depth = None if sink is Sink.LABEL else SCRATCH.empty("depth of heights", ids.shape, np.float32)
+    ids: I32 = SCRATCH.scratch("labels", view.size[::-1], np.int32)
+    depth = None if sink is Sink.LABEL else SCRATCH.scratch("depth of heights", ids.shape, np.float32)
     draw(SCRATCH, snapped, view, choices.drawing(view, snapped, sink), ids, depth=depth)
     return ids
 
@@ -320,7 +320,7 @@ def fill_planes(ids: I32, points_px: F64, triangles: I32, values: F64, view: Vie
     n, n_threads = len(triangles), count_threads(view.threads, len(triangles))
     planes: F64 | None = None
     if ids.size < MAX_PIXELS_TO_LIST * n and n < MAX_LISTED_PLANES:
-        planes = SCRATCH.empty("planes", ((1 + n) * engine.PLANE_DOUBLES,), np.float64)
+        planes = SCRATCH.scratch("planes", ((1 + n) * engine.PLANE_DOUBLES,), np.float64)
     valued = engine.Valued(points_px, triangles, np.ascontiguousarray(values), planes)
     if planes is not None:
         run_parts(valued.list_planes, n, n_threads)

@@ -184,7 +184,7 @@ def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
             samples = sample_positions(n, view.grid_bits) if n > 1 else None
             shape = engine.Target.covered_shape(height, width, n)
             sink = Sink.SAMPLES if n > 1 else Sink.MASK
-            target = engine.Target(sink, canvas, None, SCRATCH.empty("covered", shape, np.uint64), samples)
+            target = engine.Target(sink, canvas, None, SCRATCH.scratch("covered", shape, np.uint64), samples)
             placed.draw([target], [(0, 0)], height)
     return result
 
@@ -192,8 +192,8 @@ def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
 def add_masks(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
     """Write the share of samples that the instances cover, from a mask of each sample."""
     n, (width, height) = view.sampling.n_samples, view.size
-    mask: NDArray[np.bool_] = SCRATCH.empty("sample mask", (height, width), np.bool_)
-    covered = SCRATCH.empty("covered", engine.Target.covered_shape(height, width, 1), np.uint64)
+    mask: NDArray[np.bool_] = SCRATCH.scratch("sample mask", (height, width), np.bool_)
+    covered = SCRATCH.scratch("covered", engine.Target.covered_shape(height, width, 1), np.uint64)
     canvas[...] = 0
     for x, y in sample_positions(n, view.grid_bits).tolist():
         placed.draw([engine.Target(Sink.MASK, mask, None, covered)], [(x, y)], height)

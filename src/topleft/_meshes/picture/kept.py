@@ -63,7 +63,8 @@ class KeptPicture:
     def draw_at_once(self, memory: Memory, mesh: Mesh, camera: Camera, view: View) -> U8 | None:
         """The same by one call of the engine; None where a vertex lies outside of a clip plane, say."""
         n, shape = len(mesh.vertices), view.size[::-1]
-        source, records = source_of(mesh.vertices, view), memory.empty("records", (n * engine.VERTEX_BYTES,), np.uint8)
+        source = source_of(mesh.vertices, view)
+        records = memory.scratch("records", (n * engine.VERTEX_BYTES,), np.uint8)
         waiting = engine.WaitingMesh(source, records, None, mesh.triangles, None, view.how, view.engine_viewport())
         lit = Lit([ShownInstance(waiting, mesh, EYE)], camera, view.size, self.options)
         ids, depth = memory.empty("triangle", shape, np.int32), memory.empty("depth", shape, np.float32)
