@@ -312,23 +312,18 @@ def test_plan_of_several_samples_tells_of_a_plane_of_each():
     assert stage(eight, "sampling").choice == "8 samples a pixel, a picture of each"
     assert eight.result_bytes == {"triangle": 8 * 4 * 320 * 240, "depth": 8 * 4 * 320 * 240}
     assert not {"bins", "bands", "samples of bands"} & set(eight.scratch_bytes)
-    frags = tl.rasterize(
-        mesh.vertices, mesh.triangles, (320, 240), transform=camera.clip_from_world((320, 240)),
-        sampling="msaa8", plan=eight,
-    )  # fmt: skip
+    frags = [tl.rasterize_mesh(mesh, camera, (320, 240), sampling="msaa8", plan=eight) for _ in range(2)][1]
     assert frags._split is None
     whole = tl.plan(mesh, camera, (1920, 1080), sampling="msaa8", cull="back")
     assert stage(whole, "clusters").choice == "none"
     assert "samples of bands" in whole.scratch_bytes
 
 
-def test_plan_of_a_mesh_draws_its_clusters_and_no_other_vertices():
+def test_plan_of_a_mesh_fits_its_pictures_and_other_vertices():
     mesh = tl.Mesh(*tl.scenes.blob(130_000))
     camera = tl.Camera.framing(mesh)
     plan = tl.plan(mesh, camera, (320, 240))
     matrix = camera.clip_from_world((320, 240))
-    assert plan.find_clusters(mesh.vertices) is mesh.clusters
-    assert plan.find_clusters(mesh.vertices * 2) is None
     for vertices in (mesh.vertices, mesh.vertices * 0.7):
         expected = tl.rasterize(vertices, mesh.triangles, (320, 240), transform=matrix)
         got = tl.rasterize(vertices, mesh.triangles, (320, 240), transform=matrix, plan=plan)

@@ -1,11 +1,9 @@
 """Clusters: what they leave out draws nothing, so every picture has the same bits with them and without."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, Drawn, flat_grid, on, small_views
+from engine_cases import ON_EACH_ISA, THREADS, Clustered, flat_grid, on, small_views
 
 import topleft as tl
 from topleft._core import engine
@@ -14,6 +12,7 @@ from topleft._core.base.options import Sink
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
+from topleft._core.raster.static_mesh import draw_static
 from topleft._core.raster.view import View
 
 SIZE = (160, 120)
@@ -66,9 +65,10 @@ def cameras(rng, n):
 
 
 def draw(mesh, clusters, depth_test="less", size=SIZE, **view):
-    plan = None if clusters is None else Drawn(clusters)
-    view = View.parse(size, {**view, "plan": plan})
-    return draw_fragments(FreshMemory(), *mesh, view, depth_test, None, None)
+    view = View.parse(size, view)
+    if clusters is None:
+        return draw_fragments(FreshMemory(), *mesh, view, depth_test, None, None)
+    return draw_static(FreshMemory(), Clustered(*mesh, clusters), view, depth_test, None, None)
 
 
 def assert_same_fragments(got, expected):
@@ -330,8 +330,7 @@ def test_out_and_background_are_as_without():
     view = View.parse(SIZE, {"transform": tl.Camera.look_at((0, 0, 3)).clip_from_world(SIZE)})
     out = np.zeros(SIZE[::-1], np.int32)[:, ::-1], np.zeros((SIZE[0], SIZE[1]), np.float32).T
     expected = draw_fragments(FreshMemory(), *mesh, view, "less", 7.0, None)
-    clustered = dataclasses.replace(view, plan=Drawn(Clusters(*mesh)))
-    got = draw_fragments(FreshMemory(), *mesh, clustered, "less", 7.0, out)
+    got = draw_static(FreshMemory(), Clustered(*mesh, Clusters(*mesh)), view, "less", 7.0, out)
     assert got.triangle is out[0]
     assert_same(out[0], expected.triangle)
     assert_same(out[1], expected.depth)

@@ -5,9 +5,10 @@ import pickle
 import subprocess
 import sys
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from strategies import soup
 import topleft as tl
 from topleft._core import engine
 from topleft._core.raster import choices
+from topleft._core.raster.clusters import Clusters
 from topleft.methods.reference.integers import ExactPicture, projected, snapped
 
 THREADS = (1, 2, 3, 8)
@@ -191,20 +193,16 @@ def mixed(rng, n, size, *, bits=8, level=True, **view):
     return soup(np.dstack([xy, z]).reshape(-1, 3), size, subpixel_bits=bits, **view)
 
 
-class Drawn:
-    """A plan that says which clusters a mesh is drawn with."""
+class Clustered(NamedTuple):
+    """A mesh that does not change, drawn from these clusters."""
 
-    def __init__(self, clusters):
-        self._clusters = clusters
+    vertices: np.ndarray
+    triangles: np.ndarray
+    clusters: Clusters
 
-    def fitted(self, view):
-        return replace(view, plan=self)
+    @property
+    def drawn_triangles(self):
+        return self.triangles
 
-    def triangles_of(self, triangles, n_vertices):
-        return self._clusters.triangles
-
-    def find_clusters(self, vertices):
-        return self._clusters
-
-    def mark(self, stage):
-        pass
+    def find_clusters(self):
+        return self.clusters

@@ -19,7 +19,6 @@ from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Drawing, Route
 from topleft._core.raster.classic import draw_classic
-from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.fragments import Fragments, GivenCorners
 from topleft._core.raster.sampling import (
     SamplePass,
@@ -256,6 +255,15 @@ class FragmentOptions(NamedTuple):
         return cls(test, background_depth, ids_out, depth_out)
 
 
+def fragment_options(
+    view: View, depth_test: DepthTestOption | None, background_depth: float | None, out: object
+) -> FragmentOptions:
+    """Check the options of `rasterize`, and that the view can have ids."""
+    view.refuse_classic("depth")
+    refuse_many(view, "rasterize")
+    return FragmentOptions.parse(depth_test, background_depth, out)
+
+
 def draw_fragments(
     memory: Memory,
     vertices: ArrayLike,
@@ -267,15 +275,23 @@ def draw_fragments(
     names: NDArray[np.int32] | None = None,
 ) -> Fragments:
     """`rasterize`, on the memory given; with `names` triangle i is called names[i], which ascend."""
-    view.refuse_classic("depth")
-    refuse_many(view, "rasterize")
-    options = FragmentOptions.parse(depth_test, background_depth, out)
+    options = fragment_options(view, depth_test, background_depth, out)
+    return draw_arrays(memory, vertices, triangles, view, options, names)
+
+
+def draw_arrays(
+    memory: Memory,
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    view: View,
+    options: FragmentOptions,
+    names: NDArray[np.int32] | None = None,
+) -> Fragments:
+    """`draw_fragments` with checked options."""
     corners = GivenCorners(vertices, triangles, view.transform, view.viewport, view.origin, view.zero_to_one)
-    frags = draw_clusters(memory, vertices, view, options)
-    if frags is not None:
-        return frags.drawn_from(corners)
     if view.sampling.n_samples > 1:  # samples are drawn from the snapped mesh on first access
         memory = MemoryOf(memory, "samples")
+    out = None if options.ids_out is None and options.depth_out is None else (options.ids_out, options.depth_out)
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     if names is not None:
         snapped = replace(snapped, mesh=snapped.mesh.named(names))
@@ -350,60 +366,6 @@ def copy_planes(ids: NDArray[np.int32], depth: NDArray[np.float32], options: Fra
 
 
 ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
-
-
-def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, options: FragmentOptions) -> Fragments | None:
-    """Draw a mesh that has clusters, or that the plan has in clusters.
-
-    None without clusters, where drawing them does not pay, or where only the mesh can name the error.
-    """
-    sink = choices.fragment_sink(options.test, has_depth=True)
-    clusters = None
-    if view.transform is None or not choices.can_cluster(view, sink):
-        return None
-    if view.plan is not None:
-        clusters = view.plan.find_clusters(vertices)
-    elif view.static is not None:
-        clusters = view.static.find_clusters()
-    if clusters is None:
-        return None
-    if not clusters.backoff.is_over():
-        return None
-    mesh = ClusteredMesh(clusters, view)
-    if not mesh.pays():
-        return None
-    if view.sampling.n_samples > 1:
-        return draw_cluster_samples(memory, mesh, view, options, sink)
-    ids, depth = buffers_of(memory, view, options)
-    bounds = memory.empty("bounds", engine.Target.bounds_shape(*ids.canvas.shape), np.float32)
-    target = engine.Target(sink, ids.canvas, depth.canvas, None, bounds=bounds)
-    if not mesh.draw(memory, target):
-        return None
-    lay_background(ids.canvas, depth.canvas, sink, options.background)
-    view.mark("draw")
-    return Fragments(ids.drawn(), depth.drawn(), mesh.part, len(clusters.points), clusters.n_triangles)
-
-
-def draw_cluster_samples(
-    memory: Memory, mesh: ClusteredMesh, view: View, options: FragmentOptions, sink: Sink
-) -> Fragments | None:
-    """Draw a mesh in clusters into a plane a sample, one after the other; None as `draw_clusters` returns it."""
-    (width, height), n = view.size, view.sampling.n_samples
-    check_fits((n, height, width), np.int32, np.float32)
-    samples = [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
-    memory = MemoryOf(memory, "samples")
-    ids, depth = planes_of(memory, view)
-    bounds = memory.empty("bounds", engine.Target.bounds_shape(height, width), np.float32)
-    for plane, z, sample in zip(ids, depth, samples, strict=True):
-        target = engine.Target(sink, plane, z, None, bounds=bounds)
-        if not mesh.draw(memory, target, sample):
-            return None
-    lay_background(ids, depth, sink, options.background)
-    view.mark("draw")
-    copy_planes(ids, depth, options)
-    clusters = mesh.clusters
-    parts = mesh.parts_of_samples(ids, samples)
-    return Fragments.of_samples(ids, depth, parts, len(clusters.points), clusters.n_triangles)
 
 
 def buffers_of(memory: Memory, view: View, options: FragmentOptions) -> tuple[Canvas, Canvas]:

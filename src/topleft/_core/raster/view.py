@@ -37,10 +37,6 @@ class Planned(Protocol):
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the checked int32 triangles, or raise an error where the plan is for others."""
 
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
-        """Return vertices and triangles in clusters, if the plan is for a mesh that does not change and has these."""
-        return None
-
     def mark(self, stage: str) -> None:  # noqa: ARG002
         """Note that a stage has ended: nothing, unless a plan measures."""
         return
@@ -48,6 +44,14 @@ class Planned(Protocol):
 
 class Static(Protocol):
     """A mesh that does not change: it has checked its triangles, and may be drawn in clusters."""
+
+    @property
+    def vertices(self) -> NDArray[Any]:
+        """Its vertices (V, 3)."""
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """Its triangles (T, 3)."""
 
     @property
     def drawn_triangles(self) -> NDArray[np.int32]:

@@ -22,6 +22,7 @@ from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.peel import DepthLayers, check_peel, draw_layers_of, peel_meshes
 from topleft._core.raster.rasterize import Canvas, FragmentOptions, draw_coverage, draw_fragments, refuse_many
 from topleft._core.raster.sampling import sample_positions, sum_areas
+from topleft._core.raster.static_mesh import draw_static
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import View, ViewOptions
 from topleft._meshes.model.material import Material
@@ -90,6 +91,8 @@ def draw_one(
     """Return the visibility buffer of the only instance; `is_split` as in `View`."""
     mesh, view = placed.scene[0].mesh, placed.view_of(0)
     view = view.but(is_split=True) if is_split and view.sampling.n_samples > 1 else view
+    if view.static is not None:
+        return draw_static(memory, view.static, view, depth_test, background_depth, out)
     return draw_fragments(memory, mesh.vertices, mesh.triangles, view, depth_test, background_depth, out)
 
 

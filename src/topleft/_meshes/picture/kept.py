@@ -16,8 +16,8 @@ from topleft._core.base.array_types import U8
 from topleft._core.base.memory import FRESH, Memory, empty
 from topleft._core.base.options import Sink
 from topleft._core.raster import choices
-from topleft._core.raster.rasterize import draw_fragments
 from topleft._core.raster.snap import source_of
+from topleft._core.raster.static_mesh import draw_static
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import View, ViewOptions
 from topleft._meshes.camera.camera import Camera
@@ -57,7 +57,7 @@ class KeptPicture:
             picture = self.draw_at_once(memory, mesh, camera, view)
             if picture is not None:
                 return picture
-        frags = draw_fragments(memory, mesh.vertices, mesh.triangles, view, "less", None, None)
+        frags = draw_static(memory, mesh, view, "less", None, None)
         return shade_by(frags, scene_of(mesh), camera, self.options)
 
     def draw_at_once(self, memory: Memory, mesh: Mesh, camera: Camera, view: View) -> U8 | None:

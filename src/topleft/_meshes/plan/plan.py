@@ -18,9 +18,9 @@ from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import Sampling, parse
-from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.fill import Style, draw_fill
 from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
+from topleft._core.raster.static_mesh import draw_static
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.lod.detail import check_tolerance, choose_detail
@@ -116,7 +116,7 @@ class Plan:
     _triangles: NDArray[np.int32] = field(repr=False)
     _triangles_given: ArrayLike = field(repr=False)
     _arguments: tuple[Any, ...] = field(repr=False)
-    _clusters: Clusters | None = field(repr=False, default=None)
+    _mesh: Mesh | None = field(repr=False, default=None)
     _clock: Clock = field(repr=False, default_factory=Clock)
 
     @property
@@ -182,6 +182,8 @@ class Plan:
             draw_coverage(memory, vertices, self._triangles_given, view, None)
         elif self.verb == "overdraw":
             draw_overdraw(memory, vertices, self._triangles_given, view, None)
+        elif self.verb == "rasterize" and self._mesh is not None:
+            draw_static(memory, self._mesh, view, depth_test, None, None)
         elif self.verb == "rasterize":
             draw_fragments(memory, vertices, self._triangles_given, view, depth_test, None, None)
         else:
@@ -241,10 +243,6 @@ class Plan:
                     f"got {others[row].tolist()}; make another with topleft.plan"
                 )
         return self._triangles
-
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
-        """Return the clusters of the mesh that the plan was made for, if these are its vertices; others may change."""
-        return self._clusters if vertices is self._arguments[0] else None
 
     def mark(self, stage: str) -> None:
         """Note that a stage has ended."""
@@ -342,7 +340,7 @@ def plan(
         _triangles=own_triangles,
         _triangles_given=triangles,
         _arguments=(vertices, depth_test),
-        _clusters=None if found is None else found.clusters,
+        _mesh=mesh,
     )
 
 
