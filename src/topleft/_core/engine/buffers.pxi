@@ -80,7 +80,7 @@ cdef class Source:
 
     def snap(self, int64_t first, int64_t end, int subpixel_bits, bint with_depth, uint8_t[::1] records,
              int64_t[:, ::1] wide or None) -> tuple[int, int, int]:
-        """Snap the pixels of vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
+        """The kernel `snap`. Returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
         if end - first == self.source.n < HELD_VERTICES:
@@ -91,10 +91,7 @@ cdef class Source:
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
     def take(self, int64_t first, int64_t end, double[:, ::1] points or None, int bits=-1) -> int:
-        """Widen the numbers of vertices [first, end) into points, or only look at them; returns how many cannot be drawn.
-
-        `bits` from 0 on: they are rounded to 2**-bits px.
-        """
+        """The kernel `take_points`."""
         cdef int64_t n_bad
         with nogil:
             n_bad = K.take_points(&self.source, first, end, bits, &points[0, 0] if points is not None else NULL)
@@ -102,10 +99,7 @@ cdef class Source:
 
     def project(self, int64_t first, int64_t end, Viewport viewport, vertices: Array,
                 int64_t[:, ::1] wide or None) -> tuple[int, int, int]:
-        """Project vertices [first, end); returns the numbers of bad, wide and clipped vertices.
-
-        `vertices`: records, into which they are snapped, or points (V, PLACED); bad and clipped ones have x NaN.
-        """
+        """The kernel `project`. `vertices`: records, or points (V, PLACED). Returns as `snap` does."""
         cdef tl_projected out = projected_to(vertices)
         cdef tl_vertex_counts counts
         out.wide = <tl_wide *>&wide[0, 0] if wide is not None else NULL
@@ -194,7 +188,7 @@ cdef class Target:
 
 
 def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices) -> int:
-    """Return the first row with an index outside ``[0, n_vertices)``, -1 if there is none."""
+    """The kernel `first_bad_row`."""
     cdef int64_t n = triangles.shape[0], row = -1
     if 0 < n < HELD_VERTICES:
         row = K.first_bad_row(&triangles[0, 0], n, n_vertices)
@@ -205,7 +199,7 @@ def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices) -> int:
 
 
 def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_t[:, ::1] out) -> int:
-    """Write the indices as int32; returns the first row with one outside ``[0, n_vertices)``, -1 if there is none."""
+    """The kernel `narrow_triangles`."""
     cdef int64_t n = triangles.shape[0], row = -1
     if 0 < n < HELD_VERTICES:
         row = K.narrow_triangles(&triangles[0, 0], n, n_vertices, &out[0, 0])
@@ -225,7 +219,7 @@ def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, in
 
 
 def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles) -> int:
-    """Return the lowest index of a vertex in use that has no fixed-point position, -1 if there is none."""
+    """The kernel `first_bad`."""
     cdef int64_t n = triangles.shape[0], n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex), found = -1
     if n and n_vertices:
         with nogil:

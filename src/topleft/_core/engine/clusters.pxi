@@ -9,10 +9,7 @@ BLOCK = VERTEX_BLOCK
 
 def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, int64_t n_vertices,
                   uint8_t[::1] is_used) -> int:
-    """Mark the blocks of VERTEX_BLOCK vertices that some triangles use; an id of -1 is of none.
-
-    Returns -1, or a triangle with an index outside [0, n_vertices).
-    """
+    """The kernel `mark_vertices`. An id of -1 is of no triangle."""
     cdef int64_t bad
     if not (ids.shape[0] and corners.shape[0]):
         return -1
@@ -56,9 +53,9 @@ def order_triangles(Source source, const int32_t[:, ::1] triangles, const double
 
 def cut_clusters(const int32_t[:, ::1] triangles, const int32_t[::1] order, int32_t[::1] seen, uint8_t[::1] clusters,
                  int32_t[::1] vertices, uint8_t[:, ::1] corners) -> tuple[int, int]:
-    """Cut sorted triangles into clusters; returns how many, and how many vertices of the mesh `vertices` then lists for them.
+    """The kernel `cut_clusters`.
 
-    `seen`: -1 for each vertex of the mesh; `clusters` has room for one a triangle, `vertices` for three.
+    Returns the numbers of clusters and of their vertices; `clusters` has room for one a triangle, `vertices` for three.
     """
     cdef int64_t n = triangles.shape[0], n_clusters = 0, n_used = 0
     if n:
@@ -69,7 +66,7 @@ def cut_clusters(const int32_t[:, ::1] triangles, const int32_t[::1] order, int3
 
 def measure_clusters(Source source, const uint8_t[:, ::1] corners, uint8_t[::1] clusters, double[:, ::1] group_boxes,
                      int64_t first, int64_t end):
-    """Measure the clusters [first, end), of whole groups, and the boxes of these."""
+    """The kernel `measure_clusters`."""
     if end > first:
         with nogil:
             K.measure_clusters(&source.source, &corners[0, 0], first, end, <tl_cluster *>&clusters[0], &group_boxes[0, 0])
@@ -120,10 +117,10 @@ cdef class ClusterView:
 
 def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, const double[:, :, ::1] matrices,
                Target target, bint is_drawn, uint8_t[::1] shown):
-    """Tell of boxes (N, 6), each under a matrix of its own (N, 4, 4), whether they may show in a picture.
+    """The kernel `find_shown`.
 
-    They do not where they lie outside of it, between samples or, if it `is_drawn`, behind its surfaces. `view`: with any
-    matrix; `mesh`: viewport, sample and culling.
+    `boxes` (N, 6), `matrices` (N, 4, 4); `view`: with any matrix; `mesh`: viewport, sample and culling; target unless
+    `is_drawn`: NULL.
     """
     cdef tl_window window = mesh.window(0, target.height, target.width)
     cdef tl_target rows = target.rows(0)

@@ -79,10 +79,7 @@ cdef class GradientView:
 
     def points_vjp(self, rast: Array, g_rast: Array, g_db: Array | None, GradientSums faces, GradientSums sums,
                    int64_t first, int64_t end) -> int:
-        """Sum up gradients of vertices from rows of those of `rast` and, unless None, of `rast_db`.
-
-        `faces`: scratch by triangle, SUMS_OF_POINTS columns. Returns the number of a triangle that does not exist, or -1.
-        """
+        """The kernel `grad_points_vjp`. `faces`: scratch by triangle, SUMS_OF_POINTS columns."""
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_points p
         cdef int64_t bad

@@ -34,7 +34,7 @@ def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, 
 
 
 def fill_columns(uint64_t[:, :, ::1] bits, int64_t first, int64_t end) -> int:
-    """Fill rows [first, end) of columns between their crossings, in place; returns how many have an odd number of them."""
+    """The kernel `fill_columns`."""
     cdef int64_t n_odd = 0
     if end > first and bits.shape[1]:
         with nogil:
@@ -43,7 +43,7 @@ def fill_columns(uint64_t[:, :, ::1] bits, int64_t first, int64_t end) -> int:
 
 
 def expand_columns(const uint64_t[:, :, ::1] bits, uint8_t[:, :, ::1] out, int64_t first, int64_t end):
-    """Write a byte for each step of rows [first, end) of columns."""
+    """The kernel `expand_columns`."""
     if end > first and bits.shape[1]:
         with nogil:
             K.expand_columns(&bits[first, 0, 0], (end - first) * bits.shape[1], bits.shape[2], out.shape[2],
@@ -51,7 +51,7 @@ def expand_columns(const uint64_t[:, :, ::1] bits, uint8_t[:, :, ::1] out, int64
 
 
 def count_columns(const uint64_t[:, :, ::1] bits, int sample_bits, float[:, :, ::1] out, int64_t first, int64_t end):
-    """Write the filled share of each voxel of rows [first, end), from 2**sample_bits samples along each axis."""
+    """The kernel `count_columns`."""
     cdef int64_t row
     if out.shape[1] and out.shape[2]:
         with nogil:
@@ -61,7 +61,7 @@ def count_columns(const uint64_t[:, :, ::1] bits, int sample_bits, float[:, :, :
 
 
 def scatter_columns(const uint64_t[:, :, ::1] bits, uint8_t[::1] out, strides: tuple[int, int, int]):
-    """Write 1 for each bit, at strides of a row, a column and a step."""
+    """The kernel `scatter_columns`."""
     cdef int64_t own[3]
     own[0], own[1], own[2] = strides
     if bits.shape[0] and bits.shape[1]:
@@ -71,7 +71,7 @@ def scatter_columns(const uint64_t[:, :, ::1] bits, uint8_t[::1] out, strides: t
 
 def touch_voxels(const double[:, ::1] points, const int32_t[:, ::1] triangles, int64_t first, int64_t end,
                  uint8_t[:, :, ::1] out):
-    """Write 1 for the voxels that triangles [first, end) meet; points in voxels."""
+    """The kernel `touch_voxels`."""
     cdef int64_t shape[3]
     shape[0], shape[1], shape[2] = out.shape[0], out.shape[1], out.shape[2]
     if end > first:
@@ -96,28 +96,28 @@ cdef class Atlas:
         self.atlas.values, self.atlas.n_values, self.atlas.per_corner = &values[0, 0], values.shape[1], per_corner
 
     def touch(self, int64_t first, int64_t end, int32_t[:, ::1] ids, float[:, ::1] squared, float[:, :, ::1] out):
-        """Give texels of rows [first, end) without an id those of triangles that meet them; `squared` is INFINITY."""
+        """The kernel `touch_texels`."""
         if end > first:
             with nogil:
                 K.touch_texels(&self.atlas, first, end, &ids[0, 0], &squared[first, 0], &out[0, 0, 0])
 
     def average(self, int64_t first, int64_t end, double[:, :, ::1] sums, float[:, ::1] most, int32_t[:, ::1] ids,
                 float[:, :, ::1] out):
-        """Write means over rows [first, end); `sums` (H, W, 1 + K) and `most` (H, W) are 0."""
+        """The kernel `average_texels`."""
         if end > first:
             with nogil:
                 K.average_texels(&self.atlas, first, end, &sums[first, 0, 0], &most[first, 0], &ids[0, 0], &out[0, 0, 0])
 
 
 def find_in_rows(const int32_t[:, ::1] ids, int64_t first, int64_t end, int reach, int16_t[:, ::1] along):
-    """Write the distance along rows [first, end) to the nearest texel with an id."""
+    """The kernel `find_in_rows`."""
     if end > first and ids.shape[1]:
         with nogil:
             K.find_in_rows(&ids[0, 0], ids.shape[1], first, end, reach, &along[0, 0])
 
 
 def find_gutter(const int16_t[:, ::1] along, int64_t first, int64_t end, int reach, int32_t[:, ::1] from_texel):
-    """Write the index of the nearest texel with an id for rows [first, end), -1 where none is within reach."""
+    """The kernel `find_gutter`."""
     cdef int32_t[::1] room = np.empty(max(1, 2 * along.shape[1]), np.int32)
     if end > first and along.shape[1]:
         with nogil:
@@ -125,7 +125,7 @@ def find_gutter(const int16_t[:, ::1] along, int64_t first, int64_t end, int rea
 
 
 def copy_texels(const int32_t[:, ::1] from_texel, int64_t first, int64_t end, texels: Array):
-    """Copy texels of rows [first, end) from where the nearest with an id are."""
+    """The kernel `copy_texels`."""
     cdef uint8_t[::1] raw = as_bytes(texels)
     cdef int64_t n = from_texel.shape[0] * from_texel.shape[1], width = from_texel.shape[1]
     if end > first and n and raw.shape[0]:
@@ -137,7 +137,7 @@ def add_taken(const int32_t[:, ::1] seen, const float[:, ::1] depth, const float
               const double[:, ::1] clip_from_object, const double[::1] eye, bint keeps_best,
               const float[:, ::1] positions, const float[:, ::1] normals, const int32_t[::1] ids, int64_t first,
               int64_t end, float[:, ::1] sums, float[::1] weights):
-    """Add a picture's colours of texels [first, end) to their sums and weights: `tl_taken`."""
+    """The kernel `add_taken`."""
     cdef tl_taken taken
     cdef int k
     taken.height, taken.width, taken.n_channels = light.shape[0], light.shape[1], light.shape[2]

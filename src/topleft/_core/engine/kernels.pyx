@@ -1,7 +1,10 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 # cython: freethreading_compatible=True
 # cython: auto_pickle=False, emit_code_comments=False, annotation_typing=False
-"""Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
+"""Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index.
+
+`csrc/kernels.h` describes the kernels: a docstring names its kernel, and adds what an array of NumPy has beyond it.
+"""
 
 from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from cpython.buffer cimport PyBUF_SIMPLE, PyBUF_STRIDED_RO, PyBuffer_Release, PyObject_GetBuffer

@@ -36,7 +36,7 @@ cdef class LensTable:
             self.lens.allowed[i] = allowed[i]
 
     def places(self, const double[:, ::1] points) -> F64:
-        """Return the places (N, 2) in the image plane at which points (N, 3) in eye space are seen."""
+        """The kernel `see_points`."""
         cdef double[:, ::1] out = np.empty((points.shape[0], 2))
         if points.shape[0]:
             with nogil:
@@ -45,7 +45,7 @@ cdef class LensTable:
 
     def bend_vertices(self, Source source, const double[:, ::1] eye_from, double near, int64_t first, int64_t end,
                       double[:, ::1] bent, float[:, ::1] records):
-        """Write vertices [first, end), as far as they lie well in the picture, moved and bent; the records of all."""
+        """The kernel `bend_vertices`."""
         cdef tl_lens lens = self.lens
         lens.near = near
         if end > first:
@@ -54,7 +54,7 @@ cdef class LensTable:
 
     def find_bent(self, const float[:, ::1] records, const int32_t[:, ::1] triangles, int64_t first, int64_t end,
                   int32_t[::1] bent, int32_t[::1] outside) -> tuple[int, int]:
-        """Write the triangles of [first, end) that may be bent, and those that cannot show; return how many."""
+        """The kernel `find_bent`."""
         cdef int64_t n_bent = 0, n_outside = 0
         if end > first:
             with nogil:

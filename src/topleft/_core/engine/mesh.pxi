@@ -4,7 +4,7 @@
 
 def vertex_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end,
                    double[:, ::1] out) -> int:
-    """Write the unit normals of vertices [first, end), the faces weighted by the angle."""
+    """The kernel `vertex_normals`."""
     cdef int64_t bad = -1
     cdef const int32_t *corners = &triangles[0, 0] if triangles.shape[0] else NULL
     if end > first:
@@ -15,7 +15,7 @@ def vertex_normals(Source source, const int32_t[:, ::1] triangles, int64_t first
 
 def face_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] out or None,
                  float[:, ::1] rows or None) -> int:
-    """Write the unit normals of triangles [first, end), float64 or rows of four float32; the other is None."""
+    """The kernel `face_normals`. One of the two outputs is None."""
     cdef int64_t bad = -1
     cdef double *wide = &out[0, 0] if out is not None and out.shape[0] else NULL
     cdef float *fours = &rows[0, 0] if rows is not None and rows.shape[0] else NULL
@@ -27,7 +27,7 @@ def face_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, 
 
 def find_turned(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, const float[:, ::1] normals,
                 const int32_t[:, ::1] row_of_corner, uint8_t[::1] is_turned) -> int:
-    """Write 1 for the triangles of [first, end) with corner normals that point to the other side, else 0."""
+    """The kernel `find_turned`."""
     cdef int64_t bad = -1
     if end > first:
         if not normals.shape[0]:
@@ -39,7 +39,7 @@ def find_turned(Source source, const int32_t[:, ::1] triangles, int64_t first, i
 
 def face_angles(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] normals,
                 double[:, ::1] angles) -> int:
-    """Write the unit normals and the angles of triangles [first, end)."""
+    """The kernel `face_angles`."""
     cdef int64_t bad = -1
     if end > first:
         with nogil:
@@ -49,7 +49,7 @@ def face_angles(Source source, const int32_t[:, ::1] triangles, int64_t first, i
 
 def cut_faces(const double[:, ::1] points, const int64_t[::1] corners, const int64_t[::1] n_corners,
               int64_t most_corners, int64_t most_steps, int64_t[:, ::1] triangles) -> int:
-    """Write the triangles of faces, one after the other, at least one; returns how many are finished."""
+    """The kernel `cut_faces`."""
     cdef int64_t[::1] room = np.empty(tl_ear_words(most_corners), np.int64)
     cdef tl_faces faces
     cdef int64_t n
@@ -92,7 +92,7 @@ cdef class Fans:
     def sum_creases(self, int64_t first, int64_t end, const int32_t[::1] starts, const int32_t[:, ::1] groups,
                     const int32_t[:, ::1] own_triangles, int64_t first_row, double[:, ::1] of_vertices,
                     double[:, ::1] of_groups, int32_t[:, ::1] row_of_corner or None):
-        """Write the normals of vertices [first, end) and of their groups, and the rows of their corners unless that is None."""
+        """The kernel `sum_creases`."""
         cdef tl_creases c
         c.starts, c.groups, c.own_triangles = &starts[0], &groups[0, 0], &own_triangles[0, 0]
         c.first_row, c.of_vertices = first_row, &of_vertices[0, 0]
@@ -104,7 +104,7 @@ cdef class Fans:
 
 
 def box_of_faces(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[::1] box) -> int:
-    """Write low and high of the corners of triangles [first, end), at least one."""
+    """The kernel `box_of_faces`."""
     cdef int64_t bad
     with nogil:
         bad = K.box_of_faces(&source.source, &triangles[0, 0], first, end, &box[0])
@@ -113,7 +113,7 @@ def box_of_faces(Source source, const int32_t[:, ::1] triangles, int64_t first, 
 
 def unit_vectors(Source vectors, const double[:, ::1] turn or None, int64_t first, int64_t end,
                  double[:, ::1] out or None, float[:, ::1] rows or None):
-    """Write vectors [first, end) as unit ones, by a matrix (3, 3) from the right or None; out as for `face_normals`."""
+    """The kernel `unit_vectors`."""
     cdef const double *matrix = &turn[0, 0] if turn is not None else NULL
     cdef double *wide = &out[0, 0] if out is not None and out.shape[0] else NULL
     cdef float *fours = &rows[0, 0] if rows is not None and rows.shape[0] else NULL
@@ -123,14 +123,14 @@ def unit_vectors(Source vectors, const double[:, ::1] turn or None, int64_t firs
 
 
 def move_points(Source points, const double[:, ::1] matrix, int64_t first, int64_t end, double[:, ::1] out):
-    """Write points [first, end) moved by the upper rows of an affine matrix (4, 4)."""
+    """The kernel `move_points`. The matrix is (4, 4)."""
     if end > first:
         with nogil:
             K.move_points(&points.source, &matrix[0, 0], first, end, &out[0, 0])
 
 
 def color_rows(const uint8_t[:, ::1] colors, int64_t first, int64_t end, float[:, ::1] rows):
-    """Write red, green and blue of colours [first, end), and 1."""
+    """The kernel `color_rows`."""
     if end > first:
         with nogil:
             K.color_rows(&colors[0, 0], colors.shape[1], first, end, &rows[0, 0])
@@ -138,9 +138,7 @@ def color_rows(const uint8_t[:, ::1] colors, int64_t first, int64_t end, float[:
 
 def group_rows(const uint32_t[:, ::1] rows, int table_bits, int32_t[::1] table, int32_t[::1] first,
                int32_t[::1] group) -> int:
-    """Write the first row of each group of equal rows, and the group of each row, of at least one; return how many groups
-    there are, or -1 if many hashes meet. `table`: 2**table_bits numbers of -1, more than there are rows.
-    """
+    """The kernel `group_rows`."""
     cdef int64_t n_groups
     with nogil:
         n_groups = K.group_rows(&rows[0, 0], rows.shape[1], rows.shape[0], table_bits, &table[0], &first[0], &group[0])
@@ -177,7 +175,7 @@ cdef class Tree:
 
     def find_nearest(self, const double[:, ::1] points, int64_t first, int64_t end, int32_t[::1] triangle,
                      double[:, ::1] at=None) -> float:
-        """Write the nearest triangle of points [first, end), and where on it; return the largest distance."""
+        """The kernel `nearest_of_points`."""
         cdef double *out = &at[0, 0] if at is not None and at.shape[0] > 0 else NULL
         cdef double largest = 0.0
         if first < end:
@@ -187,7 +185,7 @@ cdef class Tree:
 
     def find_reach(self, const double[:, ::1] points, const int32_t[:, ::1] triangles,
                    int64_t first, int64_t end, double known, double share, double least) -> tuple[float, float, int]:
-        """Return how far triangles [first, end) are at least and at most, and the most pieces that one was cut into."""
+        """The kernel `find_reach`. Returns least and most of it, and the most pieces that a triangle was cut into."""
         cdef tl_reach reach
         reach.known, reach.bound, reach.n_pieces = known, 0.0, 0
         if first < end:
@@ -198,7 +196,7 @@ cdef class Tree:
 
 def set_feet(const double[:, ::1] points, const int32_t[:, ::1] triangles, const double[:, ::1] from_points,
              const int32_t[::1] triangle, const int32_t[::1] point, double[:, ::1] at, double[::1] squared):
-    """Write where on a triangle is nearest to a point, and the squared distance, of each pair of row numbers."""
+    """The kernel `set_feet`."""
     cdef int64_t n = triangle.shape[0]
     if n:
         with nogil:

@@ -90,10 +90,7 @@ def fill_bands(meshes: Sequence[SnappedMesh], int32_t[:, ::1] labels, uint64_t[:
 
 def find_instances(const int32_t[:, ::1] ids, const int64_t[::1] first_ids, int32_t[:, ::1] out,
                    int32_t[:, ::1] boxes or None):
-    """Write which instance each id belongs to, and widen the boxes (N, 4) of those that show, unless these are None.
-
-    `first_ids`: (N + 1,), where the ids of each instance begin, and the last of all end.
-    """
+    """The kernel `find_instances`."""
     cdef int64_t n = first_ids.shape[0] - 1
     if ids.shape[0] and ids.shape[1]:
         with nogil:
@@ -103,7 +100,7 @@ def find_instances(const int32_t[:, ::1] ids, const int64_t[::1] first_ids, int3
 
 def mean_colors(painted: Array, pixels: Array, int64_t first_row, int64_t n_rows, int n_channels,
                 Transfer transfer or None):
-    """Write the mean of planes of colours (S, H, W[, C]) over rows of pixels."""
+    """The kernel `mean_colors`. Planes (S, H, W[, C])."""
     cdef const uint8_t[::1] planes = as_bytes(painted)
     cdef uint8_t[::1] flat = as_bytes(pixels)
     cdef int is_u8 = painted.dtype == np.uint8
@@ -139,10 +136,7 @@ def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_r
 def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32_t[::1] slot,
                 const double[:, :, ::1] steps, const int32_t[:, ::1] rows, const float[:, ::1] values,
                 float[:, :, ::1] out):
-    """Write the slopes of values along x and y at pixels (N,), (N, K, 2).
-
-    `slot`: of each triangle its place among the visible ones; their corners have `steps` (M, 3, 3) and `rows` (M, 3).
-    """
+    """The kernel `fill_slopes`. `steps` (M, 3, 3) and `rows` (M, 3) are those of `tl_sloped`."""
     cdef tl_sloped sloped
     cdef int64_t n = ids.shape[0]
     if n == 0 or values.shape[1] == 0:
@@ -159,9 +153,9 @@ def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32
 def fill_texels(const float[:, ::1] texels, const int64_t[:, ::1] rows, codes: tuple[int, int, int],
                 const int32_t[::1] ids, const float[:, ::1] uv, slopes: F32 | None, float background,
                 float[:, ::1] out):
-    """Write the values (N, C) of texels (., C) and their halvings, `rows` of (offset, width, height), at pixels (N,).
+    """The kernel `fill_texels`.
 
-    `codes`: of the filter and of both wraps, as in ``csrc/shading.h``; `slopes` (N, 2, 2), or None without halvings.
+    `rows` of (offset, width, height); `codes`: of the filter and of both wraps; `slopes`: or None.
     """
     cdef tl_levels levels
     cdef const float[:, :, ::1] own = slopes
@@ -179,7 +173,7 @@ def fill_texels(const float[:, ::1] texels, const int64_t[:, ::1] rows, codes: t
 
 
 def levels_seen(const int64_t[:, ::1] rows, const float[:, :, ::1] slopes, double[::1] out):
-    """Write which level of an array pixels (N,) look at; `rows` and `slopes` are those of `fill_texels`."""
+    """The kernel `levels_seen`."""
     cdef tl_levels levels
     cdef int64_t n = slopes.shape[0]
     if n:
@@ -189,7 +183,7 @@ def levels_seen(const int64_t[:, ::1] rows, const float[:, :, ::1] slopes, doubl
 
 
 def halve_rows(const float[:, ::1] level, int64_t width, int64_t height, int64_t first, int64_t end, float[:, ::1] out):
-    """Write rows [first, end) of the halving of a level (height * width, C)."""
+    """The kernel `halve_rows`."""
     if first < end and level.shape[1]:
         with nogil:
             K.halve_rows(&level[0, 0], width, height, <int>level.shape[1], first, end, &out[0, 0])
@@ -259,7 +253,7 @@ cdef class Valued:
         self.mesh.planes = &planes[0] if planes is not None else NULL
 
     def list_planes(self, int64_t first, int64_t end):
-        """Compute the planes of triangles [first, end); those of all must be there before `fill_planes`."""
+        """The kernel `list_planes`. Those of all triangles must be there before `fill_planes`."""
         with nogil:
             K.list_planes(&self.mesh, first, end)
 
@@ -345,10 +339,7 @@ def png_room(int64_t n_rows, int64_t n_bytes) -> int:
 
 def encode_rows(const uint8_t[:, ::1] pixels, const uint8_t[::1] above, int pixel_bytes, uint32_t adler,
                 uint8_t[::1] row, uint8_t[::1] out) -> tuple[int, int]:
-    """Write rows (N, B) of a PNG as a block of deflate; return how many bytes it has, and Adler-32 of what it holds.
-
-    `above`: the row before them; `row`: room for 1 + B bytes; `out`: for `png_room`.
-    """
+    """The kernel `encode_rows`. `above`: the row before them. Returns Adler-32, too."""
     cdef tl_png_rows rows
     cdef int64_t n
     rows.pixels, rows.above = &pixels[0, 0], &above[0]

@@ -15,7 +15,7 @@ def polygon_stride(int64_t width) -> int:
 
 def snap_points(Source source, int64_t first, int64_t end, int bits, int grid_bits, int64_t x_px, int64_t y_px,
                 int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx or None) -> tuple[int, int]:
-    """Snap points [first, end) to columns of coordinates from the corner; returns the numbers of bad and wide points."""
+    """The kernel `snap_points`. Returns the numbers of bad and wide points."""
     cdef int64_t[2] corner
     cdef tl_vertex_counts counts
     cdef int64_t *table = &wide_fx[0, 0] if wide_fx is not None else NULL
@@ -78,7 +78,7 @@ cdef class SnappedPolygons:
         return set
 
     def bound(self, int64_t first, int64_t end) -> int:
-        """Find the boxes of polygons [first, end); returns the largest number of edges of one."""
+        """The kernel `bound_polygons`."""
         cdef tl_polygon_box *boxes = self.box()
         cdef int64_t most
         with nogil:
@@ -131,14 +131,14 @@ cdef class SnappedPolygons:
         self.set.sample_x_fx, self.set.sample_y_fx = sample_x_fx, sample_y_fx
 
     def sort(self, int64_t band_rows, int64_t n_bands, int64_t[::1] starts, int32_t[::1] listed or None):
-        """List the polygons of each band; a first call without `listed` finds their number, starts[n_bands + 1]."""
+        """The kernel `sort_polygons`."""
         cdef tl_polygon_box *boxes = self.box()
         cdef int32_t *to = &listed[0] if listed is not None else NULL
         with nogil:
             K.sort_polygons(boxes, self.n_polygons, band_rows, n_bands, &starts[0], to)
 
     def mask_even_odd(self, int64_t polygon, uint8_t[:, ::1] out, int64_t top, int64_t bottom, int32_t[::1] bits):
-        """Write rows [top, bottom) of the mask of one polygon; `bits`: those of the rows, 0."""
+        """The kernel `mask_even_odd`. `bits`: those of the rows, 0."""
         cdef tl_polygons set = self.asking()
         with nogil:
             K.mask_even_odd(&set, polygon, self.width, top, bottom, <uint64_t *>&bits[0], &out[0, 0])
@@ -146,7 +146,7 @@ cdef class SnappedPolygons:
 
     def mask_nonzero(self, int64_t polygon, uint8_t[:, ::1] out, int64_t top, int64_t bottom, uint32_t[::1] at,
                      int32_t[::1] room, int32_t[::1] cells, uint64_t[::1] bits):
-        """Write rows [top, bottom) of the mask of a polygon by the nonzero rule; `cells`: a row, 0."""
+        """The kernel `mask_nonzero`. `cells`: a row, 0."""
         cdef tl_polygons set = self.asking()
         with nogil:
             K.mask_nonzero(&set, polygon, self.width, top, bottom, &at[0], &room[0], room.shape[0], &cells[0],

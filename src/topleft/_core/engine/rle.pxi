@@ -37,7 +37,7 @@ def list_runs(pixels: Array, box: tuple[int, int, int, int], corner: tuple[int, 
 
 def count_runs(const int64_t[:, ::1] runs, const int32_t[::1] objects, int64_t n_pixels, const int64_t[::1] starts,
                int64_t[::1] n_counts, int64_t[::1] counts):
-    """Write the counts of each object from starts[k] on: run i is of objects[i], of none where that is below 0."""
+    """The kernel `count_runs`."""
     cdef tl_rles rles
     cdef int64_t n = runs.shape[0]
     cdef int64_t[::1] ends = np.empty(n_counts.shape[0], np.int64)
@@ -51,7 +51,7 @@ def count_runs(const int64_t[:, ::1] runs, const int32_t[::1] objects, int64_t n
 
 def write_counts(const int64_t[::1] starts, int64_t[::1] n_counts, int64_t[::1] counts, int64_t[::1] text_starts,
                  uint8_t[::1] text):
-    """Write counts as text, that of object k from text_starts[k] to text_starts[k + 1]."""
+    """The kernel `write_counts`."""
     cdef tl_rles rles
     if not n_counts.shape[0]:
         return

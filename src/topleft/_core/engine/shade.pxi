@@ -423,10 +423,7 @@ cdef class ShadedScene:
 
     def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row,
               int64_t n_rows, const int32_t[::1] at=None):
-        """Write rows of the picture (H, W, 4) of a visibility buffer, as the sample at (x, y) sub-pixels from the centre sees it.
-
-        Unless given it is that which each mesh is seen from.
-        """
+        """The kernel `shade`."""
         cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
         cdef const int32_t *at_fx = &at[0] if at is not None else NULL
         if n_rows and ids.shape[1]:
@@ -439,10 +436,7 @@ cdef class ShadedScene:
 
     def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth, Split split or None,
                       uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
-        """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
-
-        `ids` and `depth`: (S, H, W), or with `split` (1, H, W), those of the first sample.
-        """
+        """The kernel `shade_samples`. `ids` and `depth`: (S, H, W), or with `split` (1, H, W)."""
         cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[2])
         cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
         cdef int64_t stride = ids.shape[1] * ids.shape[2]
@@ -456,7 +450,7 @@ cdef class ShadedScene:
             raise_if_given_up()
 
     def shade_normals(self, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row, int64_t n_rows):
-        """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
+        """The kernel `shade_normals`."""
         cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
         if n_rows and ids.shape[1]:
             with nogil:
@@ -466,7 +460,7 @@ cdef class ShadedScene:
 
 def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids,
             float[:, :, ::1] depth, bint is_peeled, int64_t first_row, int64_t n_rows):
-    """Draw alpha-tested triangles over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
+    """The kernel `cut_out`. The target is (1, H, W), or layers (K, H, W)."""
     cdef int64_t height = ids.shape[1], width = ids.shape[2]
     cdef tl_window window = mesh.window(first_row, n_rows, width)
     cdef tl_target target

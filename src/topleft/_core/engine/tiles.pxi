@@ -3,13 +3,7 @@
 
 def list_spans(tiling: tuple[int, int, int, int, int], const double[:, :, ::1] corners_px, int64_t first_triangle,
                int32_t[:, ::1] boxes, int64_t[::1] starts, int32_t[:, ::1] spans or None) -> int:
-    """Count the spans of each row of windows into starts[row + 1], or write them where spans is not None.
-
-    `boxes`, (N, 4): written by the first call, read by the second.
-
-    `tiling`: width and height of the raster, those of a window, sub-pixel bits. Returns the first triangle that cannot
-    be snapped, or -1.
-    """
+    """The kernel `list_spans`. `tiling`: width and height of the raster, those of a window, sub-pixel bits."""
     cdef tl_tiling t
     cdef int64_t bad = -1
     cdef tl_window_span *out = NULL
@@ -29,10 +23,7 @@ SHORT_SPAN = TL_SHORT_SPAN
 
 
 def sort_spans(const int32_t[:, ::1] spans, int64_t[::1] starts, int32_t[::1] out or None) -> int:
-    """Count the triangles of the windows of a row into starts[column + 1], or write them, of spans that are short.
-
-    Returns how many spans are longer than `SHORT_SPAN` windows.
-    """
+    """The kernel `sort_spans`."""
     cdef int64_t n_long = 0
     cdef const tl_window_span *first
     if spans.shape[0]:
@@ -43,7 +34,7 @@ def sort_spans(const int32_t[:, ::1] spans, int64_t[::1] starts, int32_t[::1] ou
 
 
 def count_windows(const int32_t[:, ::1] spans, const int64_t[::1] starts, int32_t[:, ::1] steps):
-    """Add spans [starts[i], starts[i + 1]) of each row to the steps of the numbers of triangles, (rows, columns + 1)."""
+    """The kernel `count_windows`."""
     cdef const tl_window_span *first
     if spans.shape[0] and steps.shape[0]:
         first = <const tl_window_span *>&spans[0, 0]
@@ -86,7 +77,7 @@ cdef class StridedMesh:
 
 def merge_fragments(int32_t[::1] ids, float[::1] depth, const int32_t[::1] other_ids, const float[::1] other_depth,
                     int32_t first_id, int rule, int64_t first, int64_t end):
-    """Merge pixels [first, end) of two visibility buffers into the first; `rule`: `tl_merge_rule`."""
+    """The kernel `merge_fragments`."""
     cdef tl_merge m
     if first >= end:
         return
@@ -97,7 +88,7 @@ def merge_fragments(int32_t[::1] ids, float[::1] depth, const int32_t[::1] other
 
 
 def name_triangles(int32_t[::1] ids, int64_t first, int64_t end, const int32_t[::1] names):
-    """Let names[1 + id] take the place of ids [first, end)."""
+    """The kernel `name_triangles`."""
     if first < end:
         with nogil:
             K.name_triangles(&ids[0], first, end, &names[0])

@@ -218,7 +218,7 @@ cdef class SnappedMesh:
         return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
 
     def drop_sides(self, const uint8_t[::1] is_single, int64_t first, int64_t end, int32_t[:, ::1] triangles):
-        """Copy triangles [first, end), those collapsed that are single-sided and turned the way that this mesh culls."""
+        """The kernel `drop_sides`."""
         if end > first:
             with nogil:
                 K.drop_sides(&self.snapped, &is_single[0], first, end, &triangles[0, 0])
@@ -350,10 +350,7 @@ cdef class SnappedMesh:
 
     def fill_large_shapes(self, pixels: Array, int64_t first_row, int64_t n_rows, colors: Array, Transfer transfer or None,
                  const uint8_t[::1] ground, const int32_t[:, ::1] samples_fx) -> int:
-        """Fill rows of (H, W[, C]) pixels with `ground` and the flat colours of triangles; of samples their mean.
-
-        Returns as `draw` does.
-        """
+        """The kernel `fill_large_shapes`."""
         cdef tl_canvas canvas
         cdef int64_t bad_row, width = pixels.shape[1]
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -371,7 +368,7 @@ cdef class SnappedMesh:
         return bad_row
 
     def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
-        """Write the weights of the three vertices of the triangle at each pixel."""
+        """The kernel `barycentric`."""
         cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
         if ids.shape[0] and ids.shape[1]:
             with nogil:
@@ -379,7 +376,7 @@ cdef class SnappedMesh:
 
     def interpolate(self, const int32_t[:, ::1] ids, const float[:, ::1] values, bint per_corner, float background,
                     float[:, :, ::1] out):
-        """Write the interpolated values at each pixel; `values` has a row per vertex, or per corner of each triangle."""
+        """The kernel `interpolate`."""
         cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
         cdef int n_values = out.shape[2]
         if ids.shape[0] and ids.shape[1] and n_values:
@@ -508,7 +505,7 @@ cdef class Split:
         return height * width + 16 * n_bands
 
     def spread_ids(self, const int32_t[:, ::1] first_ids, int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows):
-        """Write rows of the ids that the samples see, planes (S, H, W), from those that the first sees."""
+        """The kernel `spread_ids`."""
         cdef tl_split rows = self.from_row(first_row)
         cdef int64_t width = first_ids.shape[1]
         cdef int k
