@@ -43,15 +43,13 @@ from topleft._torch.checks import (
     same_dtype,
 )
 from topleft._torch.operators import (
-    draw_ids,
     each,
     halves_across,
-    interpolate_colors,
     interpolate_values,
     joined,
     look_up,
     outline,
-    points_of_ids,
+    rasterize_mesh,
     smooth,
     threads_of,
 )
@@ -200,8 +198,9 @@ def rasterize(
     """
     check_mesh(glctx, pos, tri, ranges)
     height, width = as_pair("resolution", resolution)
-    ids = draw_ids(pos.detach(), tri, ranges, height, width, glctx.threads or 0)
-    return points(glctx, pos, tri, ranges, ids, grad_db=grad_db)
+    size = height, width, glctx.threads or 0, glctx.output_db
+    rast, rast_db = rasterize_mesh(pos, tri, ranges, None, *size)
+    return rast, rast_db if grad_db else rast_db.detach()
 
 
 class DepthPeeler:
@@ -261,7 +260,9 @@ class DepthPeeler:
             self._layers = [peel(v, t, (width, height), **options) for v, t in each(pos.detach(), tri, ranges)]
         ids = torch.from_numpy(joined([layers.planes[0][k] for layers in self._layers], (height, width)))
         self._n_shown += 1
-        return points(self._context, *self._mesh, ids, grad_db=self._grad_db)
+        size = height, width, self._context.threads or 0, self._context.output_db
+        rast, rast_db = rasterize_mesh(*self._mesh, ids, *size)
+        return rast, rast_db if self._grad_db else rast_db.detach()
 
 
 def interpolate(
@@ -325,9 +326,6 @@ def interpolate(
         raise ValueError(f"rast_db must have shape {tuple(rast.shape)} when diff_attrs is given, got {got}")
     given, points_of, slopes = same_dtype(attr, (rast, len(tri)), rast_db if wanted else None)
     attrs = given if given.ndim == 3 else given[None]
-    source = source_of(rast, points_of, tri)
-    if source is not None and not wanted and attrs.dtype == torch.float32:
-        return interpolate_colors(attrs, points_of, tri, *source), attrs.new_empty((*rast.shape[:3], 0))
     out, out_da = interpolate_values(attrs, points_of, tri, slopes, wanted)
     return out, out_da
 
@@ -600,7 +598,10 @@ def render(
     height, width = as_pair("resolution", resolution)
     across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
     mesh, values = same_dtype(pos, attr if attr.ndim == 3 else attr[None])
-    options = int(as_rule(edges)), glctx.threads or 0
+    keeps = (
+        not torch.compiler.is_compiling() and torch.is_grad_enabled() and (mesh.requires_grad or values.requires_grad)
+    )
+    options = int(as_rule(edges)), glctx.threads or 0, keeps
     drawn: Tensor = draw_attributes(mesh, tri, values, across, height, width, *options)[0]
     return drawn
 
@@ -710,24 +711,6 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
     """
     check_tri(tri)
     return halves_across(tri)
-
-
-def points(
-    glctx: RasterizeContext, pos: Tensor, tri: Tensor, ranges: Tensor | None, ids: Tensor, *, grad_db: bool
-) -> tuple[Tensor, Tensor]:
-    """Return `rast` and `rast_db` of ids (B, H, W) with row 0 on top."""
-    rast, rast_db = points_of_ids(pos, tri, ids, ranges, glctx.output_db)
-    if ranges is None and rast.requires_grad and not torch.compiler.is_compiling():
-        rast.topleft_source = pos, tri
-    return rast, rast_db if grad_db else rast_db.detach()
-
-
-def source_of(rast: Tensor, used: Tensor, tri: Tensor) -> tuple[Tensor, Tensor] | None:
-    """Return the vertices and triangles that a `rast` was drawn from; None where that is not known."""
-    if torch.compiler.is_compiling() or used is not rast:
-        return None
-    source: tuple[Tensor, Tensor] | None = getattr(rast, "topleft_source", None)
-    return source if source and len(source[1]) == len(tri) else None
 
 
 def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> None:

@@ -1,7 +1,9 @@
 """`topleft.torch` as operators of PyTorch: compiled, over batches, on any memory, with any number of threads."""
 
 import hashlib
+import io
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -11,7 +13,8 @@ torch = pytest.importorskip("torch")
 
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
-from topleft._torch import operators, pictures  # noqa: E402
+from topleft._core.gradients.pictures import AttributePictures  # noqa: E402
+from topleft._torch import operators  # noqa: E402
 
 CTX = dr.RasterizeContext()
 EDGES = ("silhouette", "area", "straight-through")
@@ -79,64 +82,86 @@ def test_every_instruction_set_gives_the_same_bits(isa, edges):
     assert hashes[0] == hashes[1]
 
 
-def pulled(pos, tri, attr, rows, dtype=torch.float32, is_watched=False, size=(93, 130)):
-    """Gradients of vertices and attributes by `backward`; `rast` keeps its own where it is watched."""
-    given = [one.to(dtype, copy=True).requires_grad_() for one in (pos, attr)]
-    rast, _ = dr.rasterize(CTX, given[0], tri, size)
-    if is_watched:
-        rast.retain_grad()
-    out, _ = dr.interpolate(given[1], rast, rows)
-    (out * (1 + torch.sin(torch.arange(out.numel(), dtype=dtype)).reshape(out.shape))).sum().backward()
-    assert not is_watched or rast.grad is not None
-    return [one.grad for one in given]
-
-
-@ON_EACH_ISA
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 7])
-def test_gradients_past_rast_are_those_through_it(isa, n):
-    pos, tri, _ = sphere(2, level=2)
-    attr, rows = 100 + torch.rand(9, n, generator=torch.Generator().manual_seed(n)), tri % 9
-    with on(isa):
-        past, through = pulled(pos, tri, attr, rows), pulled(pos, tri, attr, rows, is_watched=True)
-    with on("scalar"):
-        assert all(torch.equal(a, b) for a, b in zip(past, pulled(pos, tri, attr, rows), strict=True))
-    for one, other, exact in zip(past, through, pulled(pos, tri, attr, rows, torch.float64), strict=True):
-        size = exact.abs().max()
-        assert size > 1
-        assert (one - exact).abs().max() < 1e-6 * size
-        assert (other - exact).abs().max() < 1e-6 * size
-
-
-def test_gradients_past_rast_of_clamped_pixels_are_those_of_float64():
-    at = (
-        torch.arange(-8, 9, 4) / 9 + 1 / 9
-    )  # centres of pixels, and corners of triangles but for a thousandth of a pixel
-    shift = 2e-3 / 9 * (2 * torch.rand(25, 2, generator=torch.Generator().manual_seed(1)) - 1)
-    p = torch.cartesian_prod(at, at) + shift
-    w = 1 + p[:, 1:] / 4
-    pos, corner = (
-        torch.cat([p * w, 0.2 * p[:, :1], w], 1)[None],
-        (5 * torch.arange(4)[:, None] + torch.arange(4)).reshape(-1, 1),
-    )
-    tri = torch.cat([corner + torch.tensor([0, 1, 5]), corner + torch.tensor([1, 6, 5])])
-    rast, _ = dr.rasterize(CTX, pos.double(), tri, (9, 9))
-    assert ((rast[..., :2] == 0).any(-1) & (rast[..., 3] > 0)).sum() > 10
-    attr = torch.rand(25, 2, generator=torch.Generator().manual_seed(2))
-    exact = pulled(pos, tri, attr, tri, torch.float64, size=(9, 9))
-    for one, other in zip(pulled(pos, tri, attr, tri, size=(9, 9)), exact, strict=True):
-        assert (one - other).abs().max() < 1e-6 * other.abs().max()
-
-
-def test_gradient_of_rast_is_there_for_who_asks():
+def drawn_rast(**options):
+    """Vertices that want a gradient, what they draw, and a picture of it."""
     pos, tri, colours = sphere(level=1)
     pos.requires_grad_()
     rast, _ = dr.rasterize(CTX, pos, tri, (12, 14))
-    seen = []
-    (g,) = torch.autograd.grad(dr.interpolate(colours, rast, tri)[0].sum(), rast)
-    rast.register_hook(seen.append)
-    dr.interpolate(colours, rast, tri)[0].sum().backward()
+    return pos, rast, lambda: dr.interpolate(colours, rast, tri, **options)[0].sum()
+
+
+@pytest.fixture
+def g_rast():
+    """The gradient of `rast` of `drawn_rast`."""
+    _, rast, picture = drawn_rast()
+    (g,) = torch.autograd.grad(picture(), rast)
     assert g.any()
-    assert torch.equal(seen[0], g)
+    return g
+
+
+def test_gradients_of_pos_and_of_rast_come_in_one_call(g_rast):
+    pos, rast, picture = drawn_rast()
+    of_pos, of_rast = torch.autograd.grad(picture(), [pos, rast])
+    assert of_pos.any()
+    assert torch.equal(of_rast, g_rast)
+
+
+def test_hooks_of_rast_are_called_with_its_gradient(g_rast):
+    pos, rast, picture = drawn_rast()
+    seen = []
+    rast.register_hook(seen.append)
+    rast.retain_grad()
+    picture().backward()
+    assert torch.equal(seen[0], g_rast)
+    assert torch.equal(rast.grad, g_rast)
+    assert pos.grad.any()
+
+
+@pytest.mark.parametrize("is_early", [True, False])
+def test_hooks_that_stop_the_gradient_of_rast_leave_pos_without(is_early):
+    pos, rast, picture = drawn_rast()
+    if is_early:
+        rast.register_hook(torch.zeros_like)
+    with torch.autograd.graph.save_on_cpu():
+        out = picture()
+    if not is_early:
+        rast.grad_fn.register_prehook(lambda given: tuple(one if one is None else 0 * one for one in given))
+    out.backward()
+    assert not pos.grad.any()
+
+
+def test_rast_keeps_its_gradient_where_tensors_are_saved_elsewhere(g_rast):
+    _, rast, picture = drawn_rast()
+    rast.retain_grad()
+    with torch.autograd.graph.save_on_cpu():
+        out = picture()
+    out.backward()
+    assert torch.equal(rast.grad, g_rast)
+
+
+def test_rast_that_was_detached_gives_no_gradient():
+    _, rast, picture = drawn_rast()
+    rast.detach_()
+    assert not picture().requires_grad
+
+
+def test_rast_that_was_changed_before_backward_is_refused():
+    _, rast, picture = drawn_rast()
+    out = picture()
+    with torch.no_grad():
+        rast += 0.1
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        out.backward()
+
+
+def test_rast_is_copied_and_saved_as_any_tensor():
+    _, rast, _ = drawn_rast()
+    assert not vars(rast)
+    file = io.BytesIO()
+    torch.save(rast.detach(), file)
+    assert file.tell() < rast.nbytes + 4096
+    file.seek(0)
+    assert torch.equal(torch.load(file), rast)
 
 
 def test_gradients_are_those_of_one_picture_after_the_other():
@@ -421,23 +446,62 @@ def test_render_is_the_picture_of_its_parts(edges):
     assert (dr.render(CTX, pos, tri, colours, (93, 70), edges=edges) - parts).abs().max() < 1e-6
 
 
-def test_render_twice_backward_gives_the_same_bits_and_keeps_nothing():
+def never(*_):
+    """A picture that is drawn though it need not be."""
+    raise AssertionError("drawn again")
+
+
+def test_render_twice_backward_gives_the_same_bits_by_what_was_kept(monkeypatch):
     pos, tri, colours = sphere(2)
     pos.requires_grad_()
-    kept = len(pictures.kept)
     out = dr.render(CTX, pos, tri, colours, (93, 70))
-    assert len(pictures.kept) == kept + 1
+    monkeypatch.setattr(AttributePictures, "picture", never)
     first, second = (torch.autograd.grad(out.sum(), pos, retain_graph=True)[0] for _ in range(2))
-    del out
     assert torch.equal(first, second)
-    assert len(pictures.kept) == kept
 
 
-def test_render_draws_again_where_nothing_was_kept(monkeypatch):
+def test_render_keeps_nothing_where_no_gradient_is_wanted(monkeypatch):
     pos, tri, colours = sphere(2)
-    found = drawn_gradients(pos, tri, colours)
-    monkeypatch.setattr(pictures, "kept_seen", lambda _: None)
-    assert all(torch.equal(a, b) for a, b in zip(found, drawn_gradients(pos, tri, colours), strict=True))
+    monkeypatch.setattr(AttributePictures, "pack", never)
+    with torch.no_grad():
+        out = dr.render(CTX, pos.clone().requires_grad_(), tri, colours, (93, 70))
+    assert torch.equal(out, dr.render(CTX, pos, tri, colours, (93, 70)))
+
+
+def test_render_takes_what_was_kept_from_wherever_it_was_saved(monkeypatch):
+    pos, tri, colours = sphere(2)
+    expected = drawn_gradients(pos, tri, colours)
+    pos.requires_grad_(), colours.requires_grad_()
+    with torch.autograd.graph.saved_tensors_hooks(torch.clone, torch.clone):
+        out = dr.render(CTX, pos, tri, colours, (93, 70))
+    monkeypatch.setattr(AttributePictures, "picture", never)
+    weights = torch.sin(torch.arange(out.numel(), dtype=out.dtype)).reshape(out.shape)
+    found = torch.autograd.grad((out * weights).sum(), [pos, colours])
+    assert all(torch.equal(a, b) for a, b in zip(found, expected[1:], strict=True))
+
+
+@pytest.mark.parametrize("change", [torch.zeros_like, lambda one: one + 1, lambda one: one[: len(one) // 2],
+                                    lambda one: torch.cat([one[:9], one[9:] ^ 3]), lambda one: one[:0]])  # fmt: skip
+def test_render_draws_again_where_what_it_kept_was_changed(change):
+    pos, tri, colours = sphere(2)
+
+    def pack(tensor):
+        return change(tensor) if tensor.dtype == torch.int64 else tensor
+
+    expected = drawn_gradients(pos, tri, colours)
+    with torch.autograd.graph.saved_tensors_hooks(pack, lambda tensor: tensor):
+        found = drawn_gradients(pos, tri, colours)
+    assert all(torch.equal(a, b) for a, b in zip(found, expected, strict=True))
+
+
+def test_render_of_many_pictures_at_once_mixes_none_of_them():
+    pos, tri, colours = sphere(8)
+    expected = [drawn_gradients(one[None], tri, colours)[1:] for one in pos]
+    with ThreadPoolExecutor(4) as pool:
+        for _ in range(3):
+            found = list(pool.map(lambda one: drawn_gradients(one[None], tri, colours)[1:], pos))
+            assert all(torch.equal(a, b) for one, other in zip(found, expected, strict=True)
+                       for a, b in zip(one, other, strict=True))  # fmt: skip
 
 
 def test_render_refuses_vertices_that_were_changed_before_backward():

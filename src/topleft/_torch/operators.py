@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn.utils.rnn import pad_sequence
 
 from topleft import rasterize as draw
 from topleft._core.base.arrays import as_checked_triangles
@@ -66,8 +67,8 @@ def operator(signature: str, fake: Callable[..., Any]) -> Callable[[Callable[...
         def one_by_one(info: Any, in_dims: Sequence[Any], *args: Any) -> tuple[Any, Any]:
             found = [op(*sample(args, in_dims, i)) for i in range(info.batch_size)]
             if isinstance(found[0], Tensor):
-                return torch.stack(found), 0
-            return type(found[0])(map(torch.stack, zip(*found, strict=True))), type(found[0])(0 for _ in found[0])
+                return stacked(found), 0
+            return type(found[0])(map(stacked, zip(*found, strict=True))), type(found[0])(0 for _ in found[0])
 
         op.register_vmap(one_by_one)
         return op
@@ -82,6 +83,12 @@ def sample(args: Sequence[Any], dims: Sequence[Any], i: int) -> list[Any]:
         else arg if dim is None else arg.select(dim, i)
         for arg, dim in zip(args, dims, strict=True)
     ]  # fmt: skip
+
+
+def stacked(samples: Sequence[Tensor]) -> Tensor:
+    """Return samples as one tensor; shorter ones get zeros at their ends."""
+    is_even = len({one.shape for one in samples}) == 1
+    return torch.stack(list(samples)) if is_even else pad_sequence(list(samples), batch_first=True)
 
 
 def once(*_: Any) -> None:
@@ -100,32 +107,34 @@ def tensor_of(array: Any, other: Tensor) -> Tensor:
 
 
 @operator(
-    "(Tensor pos, Tensor tri, Tensor? ranges, int height, int width, int threads) -> Tensor",
-    lambda pos, tri, ranges, height, width, threads: pos.new_empty(  # noqa: ARG005
-        (len(pos if ranges is None else ranges), height, width), dtype=torch.int32
+    "(Tensor pos, Tensor tri, Tensor? ranges, Tensor? ids, int height, int width, int threads, bool with_db)"
+    " -> (Tensor, Tensor)",
+    lambda pos, tri, ranges, ids, height, width, threads, with_db: tuple(  # noqa: ARG005
+        pos.new_empty((len(pos if ranges is None else ranges), height, width, n)) for n in (4, 4 * with_db)
     ),
 )
-def draw_ids(pos: Tensor, tri: Tensor, ranges: Tensor | None, height: int, width: int, threads: int) -> Tensor:
-    """Return which triangle of its range shows in each pixel, int32 (B, H, W), -1 for none; row 0 on top."""
+def rasterize_mesh(
+    pos: Tensor,
+    tri: Tensor,
+    ranges: Tensor | None,
+    ids: Tensor | None,
+    height: int,
+    width: int,
+    threads: int,
+    with_db: bool,
+) -> tuple[Tensor, Tensor]:
+    """Return `rast` and `rast_db` of what is drawn, or of ids (B, H, W) within each range; row 0 of ids is on top."""
     n = threads_of(threads, height * width)
-    drawn = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, ranges)]
-    return torch.from_numpy(joined(drawn, (height, width)))
-
-
-@operator(
-    "(Tensor pos, Tensor tri, Tensor ids, Tensor? ranges, bool with_db) -> (Tensor, Tensor)",
-    lambda pos, tri, ids, ranges, with_db: (  # noqa: ARG005
-        pos.new_empty((*ids.shape, 4)),
-        pos.new_empty((*ids.shape, 4 if with_db else 0)),
-    ),
-)
-def points_of_ids(pos: Tensor, tri: Tensor, ids: Tensor, ranges: Tensor | None, with_db: bool) -> tuple[Tensor, Tensor]:
-    """Return `rast` and `rast_db`."""
-    grid = grid_of(tri, ids, pos.shape[-2])
-    firsts = [0] * len(ids) if ranges is None else ranges[:, 0].tolist()
+    if ids is None:
+        pictures = [draw(v, t, (width, height), threads=n).triangle for v, t in each(pos, tri, ranges)]
+    else:
+        pictures = list(numpy_of(ids))
+    triangles = triangles_of(tri, pos.shape[-2])
+    grid = PixelGrid(triangles, len(pictures), height, width, threads_of(0, len(pictures) * height * width))
+    firsts = [0] * len(pictures) if ranges is None else ranges[:, 0].tolist()
     vertices = numpy_of(pos if ranges is None else pos[None])
-    pictures = list(zip(numpy_of(ids), firsts, strict=True))
-    rast, rast_db = tensors.points(grid, vertices, pictures, is_flipped=True, with_db=with_db)
+    drawn = list(zip(pictures, firsts, strict=True))
+    rast, rast_db = tensors.points(grid, vertices, drawn, is_flipped=True, with_db=with_db)
     return torch.from_numpy(rast), torch.from_numpy(rast_db)
 
 
@@ -182,34 +191,6 @@ def interpolate_vjp(
     given = numpy_of(attr), numpy_of(rast), numpy_of(g_out), slopes, numpy_of(g_da)
     g_attr, g_rast, g_db = tensors.values_vjp(grid, *given, wanted)
     return torch.from_numpy(g_attr), torch.from_numpy(g_rast), tensor_of(g_db, attr)
-
-
-@operator(
-    "(Tensor attr, Tensor rast, Tensor tri, Tensor pos, Tensor pos_tri) -> Tensor",
-    lambda attr, rast, tri, pos, pos_tri: attr.new_empty((*rast.shape[:3], attr.shape[2])),  # noqa: ARG005
-)
-def interpolate_colors(
-    attr: Tensor,
-    rast: Tensor,
-    tri: Tensor,
-    pos: Tensor,  # noqa: ARG001
-    pos_tri: Tensor,  # noqa: ARG001
-) -> Tensor:
-    """Return attributes, as `interpolate_values`; backward goes past `rast`, to the vertices that it was made of."""
-    return torch.from_numpy(tensors.values(grid_of(tri, rast, attr.shape[1]), numpy_of(attr), numpy_of(rast))[0])
-
-
-@operator(
-    "(Tensor attr, Tensor rast, Tensor tri, Tensor pos, Tensor pos_tri, Tensor g_out) -> (Tensor, Tensor)",
-    lambda attr, rast, tri, pos, pos_tri, g_out: (like(attr, attr), like(pos, pos)),  # noqa: ARG005
-)
-def colors_vjp(
-    attr: Tensor, rast: Tensor, tri: Tensor, pos: Tensor, pos_tri: Tensor, g_out: Tensor
-) -> tuple[Tensor, Tensor]:
-    """Return the gradients of `attr` and `pos`."""
-    grid, corners = grid_of(pos_tri, rast, pos.shape[1]), triangles_of(tri, attr.shape[1])
-    g_pos, g_attr = tensors.colors_vjp(grid, numpy_of(pos), numpy_of(attr), corners, numpy_of(rast), numpy_of(g_out))
-    return torch.from_numpy(g_attr), torch.from_numpy(g_pos)
 
 
 def look_of(
@@ -328,11 +309,11 @@ def keep_points(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> No
 
 
 def pull_points(ctx: Any, g_rast: Tensor | None, g_db: Tensor | None) -> tuple[Any, ...]:
-    """Return the gradients of what `points_of_ids` takes."""
+    """Return the gradients of what `rasterize_mesh` takes."""
     pos, tri, rast = ctx.saved_tensors
     if g_rast is None and g_db is None:
-        return (None,) * 5
-    return points_vjp(pos, tri, rast, filled(g_rast, rast.shape, rast), g_db), None, None, None, None
+        return (None,) * 8
+    return points_vjp(pos, tri, rast, filled(g_rast, rast.shape, rast), g_db), *(None,) * 7
 
 
 def keep_values(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:  # noqa: ARG001
@@ -349,30 +330,6 @@ def pull_values(ctx: Any, g_out: Tensor | None, g_da: Tensor | None) -> tuple[An
     has_da = g_da is not None and len(ctx.wanted) > 0
     g_attr, g_rast, g_db = interpolate_vjp(attr, rast, tri, rast_db, ctx.wanted, given, g_da if has_da else None)
     return g_attr, g_rast, None, g_db if has_da else None, None
-
-
-def keep_colors(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
-    """Keep what `colors_vjp` and `interpolate_vjp` take."""
-    ctx.save_for_backward(*inputs)
-
-
-def pull_colors(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
-    """Return the gradients of what `interpolate_colors` takes: of `pos`, or of `rast` where somebody looks at it."""
-    attr, rast, tri, pos, pos_tri = ctx.saved_tensors
-    if rast.retains_grad or rast._backward_hooks or not is_wanted(pos):
-        g_attr, g_rast, _ = interpolate_vjp(attr, rast, tri, None, [], g_out, None)
-        return g_attr, g_rast, None, None, None
-    g_attr, g_pos = colors_vjp(attr, rast, tri, pos, pos_tri, g_out)
-    return g_attr, None, None, g_pos, None
-
-
-def is_wanted(tensor: Tensor) -> bool:
-    """Whether the backward that runs computes the gradient of a tensor."""
-    reaches: Any = torch._C._will_engine_execute_node
-    try:
-        return bool(reaches(torch.autograd.graph.get_gradient_edge(tensor).node))
-    except RuntimeError:  # a leaf that torch.autograd.grad was asked for
-        return True
 
 
 def keep_look(ctx: Any, inputs: Sequence[Any], output: Tensor) -> None:  # noqa: ARG001
@@ -410,10 +367,9 @@ def pull_edges(ctx: Any, g_out: Tensor) -> tuple[Any, ...]:
     return g_color, None, g_pos if ctx.boost == 1 else ctx.boost * g_pos, None, [None] * 3, None, None
 
 
-points_of_ids.register_autograd(pull_points, setup_context=keep_points)
+rasterize_mesh.register_autograd(pull_points, setup_context=keep_points)
 interpolate_values.register_autograd(pull_values, setup_context=keep_values)
-interpolate_colors.register_autograd(pull_colors, setup_context=keep_colors)
 look_up.register_autograd(pull_look, setup_context=keep_look)
 smooth.register_autograd(pull_edges, setup_context=keep_edges)
-for vjp in (points_vjp, interpolate_vjp, colors_vjp, look_up_vjp, smooth_vjp):
+for vjp in (points_vjp, interpolate_vjp, look_up_vjp, smooth_vjp):
     vjp.register_autograd(once)

@@ -5,39 +5,17 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from topleft import rasterize as draw
-from topleft._core.gradients.pictures import AttributePictures, Seen
+from topleft._core.gradients.pictures import AttributePictures
 from topleft._core.gradients.tensors import EdgeRule, PixelGrid
 from topleft._torch.operators import joined, like, numpy_of, once, operator, threads_of, triangles_of
-
-#: The sizes of pictures and what they show, by the address of the ids, for as long as these live.
-kept: dict[int, tuple[list[Any], list[tuple[Seen, int]]]] = {}
-
-
-def sizes_of(pictures: AttributePictures) -> list[Any]:
-    """Return the shapes of the arrays of pictures."""
-    return [one.shape for one in (pictures.ids, pictures.pos, pictures.attr, pictures.grid.tri)]
-
-
-def keep_seen(pictures: AttributePictures, seen: list[tuple[Seen, int]]) -> None:
-    """Keep what pictures show for as long as their ids."""
-    ids = pictures.ids
-    if seen and ids.size:
-        kept[ids.ctypes.data] = sizes_of(pictures), seen
-        weakref.finalize(ids if ids.base is None else ids.base, kept.pop, ids.ctypes.data, None)
-
-
-def kept_seen(pictures: AttributePictures) -> list[tuple[Seen, int]] | None:
-    """Return what pictures show, None where the ids are a copy."""
-    sizes, seen = kept.get(pictures.ids.ctypes.data, (None, None))
-    return seen if sizes == sizes_of(pictures) else None
 
 
 def grid_of_mesh(pos: Tensor, tri: Tensor, attr: Tensor, size: tuple[int, int], threads: int) -> PixelGrid:
@@ -76,36 +54,56 @@ def squares(
 
 
 @operator(
-    "(Tensor pos, Tensor tri, Tensor attr, Tensor across, int height, int width, int rule, int threads)"
-    " -> (Tensor, Tensor)",
-    lambda pos, tri, attr, across, height, width, rule, threads: (  # noqa: ARG005
+    "(Tensor pos, Tensor tri, Tensor attr, Tensor across, int height, int width, int rule, int threads, bool keeps)"
+    " -> (Tensor, Tensor, Tensor)",
+    lambda pos, tri, attr, across, height, width, rule, threads, keeps: (  # noqa: ARG005
         pos.new_empty((len(pos), height, width, attr.shape[2])),
         pos.new_empty((len(pos), height, width), dtype=torch.int32),
+        pos.new_empty(0, dtype=torch.int64),
     ),
 )
 def draw_attributes(
-    pos: Tensor, tri: Tensor, attr: Tensor, across: Tensor, height: int, width: int, rule: int, threads: int
-) -> tuple[Tensor, Tensor]:
-    """Return pictures of attributes with smooth silhouettes, and their ids."""
+    pos: Tensor,
+    tri: Tensor,
+    attr: Tensor,
+    across: Tensor,
+    height: int,
+    width: int,
+    rule: int,
+    threads: int,
+    keeps: bool,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return pictures of attributes with smooth silhouettes, their ids, and for backward what they show, if it is kept.
+
+    It has as many words as the picture needs, so it is not kept where sizes are to be known before: compiled.
+    """
     pictures = draw_pictures(pos, tri, attr, across, (height, width), rule, threads)
     drawn, seen = pictures.picture()
-    keep_seen(pictures, seen)
-    return torch.from_numpy(drawn), torch.from_numpy(pictures.ids)
+    words = pictures.pack(seen) if keeps else np.empty(0, np.int64)
+    return torch.from_numpy(drawn), torch.from_numpy(pictures.ids), torch.from_numpy(words)
 
 
 @operator(
-    "(Tensor pos, Tensor tri, Tensor attr, Tensor ids, Tensor across, int rule, int threads, Tensor g_out)"
-    " -> (Tensor, Tensor)",
-    lambda pos, tri, attr, ids, across, rule, threads, g_out: (like(pos, pos), like(attr, attr)),  # noqa: ARG005
+    "(Tensor pos, Tensor tri, Tensor attr, Tensor ids, Tensor words, Tensor across, int rule, int threads,"
+    " Tensor g_out) -> (Tensor, Tensor)",
+    lambda pos, tri, attr, ids, words, across, rule, threads, g_out: (like(pos, pos), like(attr, attr)),  # noqa: ARG005
 )
 def draw_attributes_vjp(
-    pos: Tensor, tri: Tensor, attr: Tensor, ids: Tensor, across: Tensor, rule: int, threads: int, g_out: Tensor
+    pos: Tensor,
+    tri: Tensor,
+    attr: Tensor,
+    ids: Tensor,
+    words: Tensor,
+    across: Tensor,
+    rule: int,
+    threads: int,
+    g_out: Tensor,
 ) -> tuple[Tensor, Tensor]:
     """Return the gradients of `pos` and `attr`."""
     grid = grid_of_mesh(pos, tri, attr, (ids.shape[1], ids.shape[2]), threads)
     arrays = (numpy_of(one) for one in (across.to(torch.int32), pos, ids, attr))
     pictures = AttributePictures(grid, EdgeRule(rule), *arrays)
-    g_pos, g_attr = pictures.vjp(numpy_of(g_out), kept_seen(pictures))
+    g_pos, g_attr = pictures.vjp(numpy_of(g_out), pictures.unpack(numpy_of(words)))
     return torch.from_numpy(g_pos), torch.from_numpy(g_attr)
 
 
@@ -124,18 +122,18 @@ def pull_squares(ctx: Any, g_loss: Tensor, *_: Any) -> tuple[Any, ...]:
 
 def keep_pictures(ctx: Any, inputs: Sequence[Any], output: Sequence[Tensor]) -> None:
     """Keep what `draw_attributes_vjp` takes."""
-    pos, tri, attr, across, _, _, ctx.rule, ctx.threads = inputs
+    pos, tri, attr, across, _, _, ctx.rule, ctx.threads, _ = inputs
     ctx.set_materialize_grads(False)
-    ctx.mark_non_differentiable(output[1])
-    ctx.save_for_backward(pos, tri, attr, output[1], across)
+    ctx.mark_non_differentiable(*output[1:])
+    ctx.save_for_backward(pos, tri, attr, *output[1:], across)
 
 
-def pull_pictures(ctx: Any, g_out: Tensor | None, _: None) -> tuple[Any, ...]:
+def pull_pictures(ctx: Any, g_out: Tensor | None, *_: Any) -> tuple[Any, ...]:
     """Return the gradients of what `draw_attributes` takes."""
     if g_out is None:
-        return (None,) * 8
+        return (None,) * 9
     g_pos, g_attr = draw_attributes_vjp(*ctx.saved_tensors, ctx.rule, ctx.threads, g_out)
-    return g_pos, None, g_attr, None, None, None, None, None
+    return g_pos, None, g_attr, *(None,) * 6
 
 
 squares.register_autograd(pull_squares, setup_context=keep_squares)

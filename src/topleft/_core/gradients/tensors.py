@@ -192,34 +192,6 @@ def values_vjp(
     return g_attr, g_rast, g_db
 
 
-def row_columns(n: int) -> int:
-    """Return how many columns sums of `n` attributes have: the kernels add four, of which three are attributes."""
-    return 3 * -(-n // 3) + 1
-
-
-def colors_vjp(
-    grid: PixelGrid, pos: Array, attr: Array, corners: NDArray[np.int32], rast: Array, g_out: Array
-) -> tuple[Array, Array]:
-    """Return the gradients of `pos` and `attr`, float32, in one pass: what `values_vjp` and `points_vjp` give.
-
-    `corners` (T, 3) are the rows of `attr` that triangles have.
-    """
-    check_counted("attr", attr.shape[1:])
-    g_pos, g_attr = np.zeros(pos.shape, pos.dtype), np.zeros(attr.shape, attr.dtype)
-    views = grid.views(pos)
-
-    n_columns = engine.SUMS_OF_POINTS + engine.SUMS_OF_THREE * (max(0, attr.shape[2] - 1) // 3)
-    of_rows = Sums(attr.shape[1], row_columns(attr.shape[2]), 3)
-    room = Room(grid.bands.n_px, (Sums(pos.shape[1], 4, 3), of_rows, Sums(len(grid.tri), n_columns, 1)))
-
-    def work(band: Band, sums: list[engine.GradientSums]) -> int:
-        i, (points, rows, faces) = band.picture, sums
-        return views[i].colors_vjp(of(attr, i), corners, rast[i], g_out[i], (faces, points, rows), band.first, band.end)
-
-    grid.refuse(grid.bands.add_up(room, work, [(g_pos,), (g_attr,)]))
-    return g_pos, g_attr
-
-
 def check_texture(
     check: Callable[..., None], tex: Any, uv: Any, uv_da: Any, bias: Any, boundary_mode: str, more: Sequence[Any] = ()
 ) -> None:
