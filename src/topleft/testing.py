@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import coverage, fill, overdraw, rasterize, save_image
 from topleft._core.base.arrays import as_array, as_number, as_path, shown
-from topleft._core.engine import isa_available, isa_in_use, use_isa
+from topleft.annex.pictures import isa_available, isa_in_use, use_isa
 
 __all__ = ["HARD_SCENES", "assert_same_picture", "check_instruction_sets", "hard_scenes", "words_of"]
 

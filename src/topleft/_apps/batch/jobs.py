@@ -21,9 +21,8 @@ from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.notes import listening, tell
 from topleft._core.base.options import check_layers
 from topleft._core.base.remote import Location, as_location, location_of
-from topleft._meshes.io.layer_files import layer_paths, save_layers
-from topleft._meshes.picture.layers import draw_layers
-from topleft._meshes.picture.view_layers import gbuffer_of
+from topleft.annex.files import layer_paths, save_layers
+from topleft.annex.pictures import draw_layers, gbuffer_of
 from topleft.typing import LayerOption
 
 CameraMaker = Callable[[Any, tuple[int, int]], Camera]

@@ -19,7 +19,7 @@ from topleft._apps.batch.jobs import Job
 from topleft._core.base.array_types import I32, MeshLike
 from topleft._core.base.arrays import as_count, shown
 from topleft._core.base.defaults import DEFAULT_SIZE
-from topleft._meshes.camera.camera import CameraLike, as_camera
+from topleft.annex.pictures import CameraLike, as_camera
 from topleft.typing import CullOption
 
 

@@ -20,8 +20,7 @@ from typing import Any
 from topleft import Level, Levels, Mesh, Scene
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
 from topleft._core.base.arrays import as_size
-from topleft._meshes.lod.levels import keep_levels
-from topleft._meshes.lod.simplify import levels_of
+from topleft.annex.pictures import keep_levels, levels_of
 from topleft.errors import MissingPackageError
 
 Jobs = Sequence[tuple[int, Job]]

@@ -20,7 +20,7 @@ from topleft._core.base.defaults import (
     THREE_QUARTER_DEG,
 )
 from topleft._core.base.options import LAYER_NAMES, Sampling, check_layers
-from topleft._meshes.io.limits.budget import LIMITS
+from topleft.annex.files import LIMITS
 from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
 from topleft.typing import CullOption, ShadingOption

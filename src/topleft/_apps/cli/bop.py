@@ -14,7 +14,7 @@ from topleft import Camera, Mesh, ObjectMasks, Scene, load, object_masks, save_i
 from topleft._apps.cli.arguments import UsageError, add_command, add_scale, number, positive, size, within
 from topleft._apps.cli.report import write_json
 from topleft._core.base.array_types import Array
-from topleft._meshes.model.pose import as_pose
+from topleft.annex.pictures import as_pose
 from topleft.errors import MeshError
 
 BOP_HELP = """\

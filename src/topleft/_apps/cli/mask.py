@@ -23,9 +23,7 @@ from topleft._core.base.defaults import MAX_CROSSINGS, SUFFIXES
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.notes import listening
 from topleft._core.base.options import Sampling
-from topleft._core.polygons.rle import encode_polygons
-from topleft._core.raster.rle import annotation_of, measured
-from topleft._meshes.io.polygon_files import PolygonPicture, load_polygons
+from topleft.annex.files import PolygonPicture, annotation_of, encode_polygons, load_polygons, measured
 from topleft.typing import RuleOption
 
 DEFAULT_SIDE = 1024

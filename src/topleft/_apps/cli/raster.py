@@ -28,9 +28,8 @@ from topleft._core.base.grid import grid_around
 from topleft._core.base.notes import listening
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
-from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, load_polygons
-from topleft._meshes.windows.blocks import triangles_of
-from topleft._meshes.windows.raster import WINDOW, extent_of
+from topleft.annex.files import VECTOR_SUFFIXES, load_polygons
+from topleft.annex.windows import WINDOW, extent_of, triangles_of
 from topleft.typing import RasterKindOption
 
 if TYPE_CHECKING:

@@ -24,8 +24,7 @@ from topleft._core.base.defaults import DEFAULT_CREASE, DEFAULT_POINT_SIZE, SUFF
 from topleft._core.base.options import Sampling
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.whole_file import remove_stale_parts
-from topleft._meshes.io.limits.budget import LIMITS
-from topleft._meshes.io.references import read_picture
+from topleft.annex.files import LIMITS, read_picture
 from topleft.errors import MeshError, MissingPackageError
 from topleft.scenes import SHAPES, shape
 

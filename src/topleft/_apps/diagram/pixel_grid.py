@@ -17,7 +17,7 @@ from topleft._core.base.arrays import as_array, as_checked_triangles, as_count, 
 from topleft._core.base.color import ColorLike, as_color, id_colors
 from topleft._core.base.options import Sampling, parse_sampling
 from topleft._core.base.whole_file import write_whole
-from topleft._core.raster.sampling import sample_positions
+from topleft.annex.pictures import sample_positions
 from topleft.errors import ImageError
 from topleft.typing import SamplingOption
 

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import Mesh, as_mesh, failure_scenes, scenes
 from topleft._apps.explore.session import Content
 from topleft._core.base.arrays import as_checked_triangles, as_size, as_vertices
-from topleft._meshes.io.limits.budget import Budget
-from topleft._meshes.io.limits.npy import arrays_of
+from topleft.annex.files import Budget, arrays_of
 from topleft.errors import MeshError
 
 MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000

@@ -27,7 +27,8 @@ from topleft._core.base.array_types import U8
 from topleft._core.base.arrays import as_number
 from topleft._core.base.color import Color, as_color
 from topleft._core.base.options import check_choice
-from topleft._meshes.camera.matrices import (
+from topleft.annex.files import png
+from topleft.annex.pictures import (
     FRAMING_MARGIN,
     bounding_sphere,
     box_corners,
@@ -36,7 +37,6 @@ from topleft._meshes.camera.matrices import (
     sine_of_tangent,
     tangent,
 )
-from topleft._meshes.io import png
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
 from topleft.typing import CullOption, SamplesOption, UpOption

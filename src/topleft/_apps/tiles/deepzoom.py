@@ -22,7 +22,7 @@ from topleft._core.base.array_types import U8, Array
 from topleft._core.base.arrays import as_count, check_progress, shown
 from topleft._core.base.color import id_colors
 from topleft._core.base.remote import as_location
-from topleft._meshes.io.png import encode
+from topleft.annex.files import png
 
 if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles
@@ -39,7 +39,7 @@ class DeepZoomStore(TileStore):
 
     def encoded(self, pixels: Array) -> bytes:
         """Return a tile as it is stored."""
-        return encode(pixels)
+        return png.encode(pixels)
 
     def decoded(self, content: bytes) -> Array:
         """Return the pixels of a tile."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from topleft import Grid
 from topleft._core.base.array_types import Array
 from topleft._core.base.grid import ExtentLike
-from topleft._meshes.windows.raster import INDEX_BYTES, WINDOW, WindowedRaster
+from topleft.annex.windows import INDEX_BYTES, WINDOW, WindowedRaster
 from topleft.typing import RasterKindOption, TiffCompressionOption, YOption, ZarrCompressionOption
 
 if TYPE_CHECKING:

@@ -1,0 +1,26 @@
+"""Reads and writes files as the command line does: PNG, layers, polygons and masks, within limits of memory."""
+
+from topleft._core.polygons.rle import encode_polygons
+from topleft._core.raster.rle import annotation_of, measured
+from topleft._meshes.io import png
+from topleft._meshes.io.layer_files import layer_paths, save_layers
+from topleft._meshes.io.limits.budget import LIMITS, Budget
+from topleft._meshes.io.limits.npy import arrays_of
+from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, PolygonPicture, load_polygons
+from topleft._meshes.io.references import read_picture
+
+__all__ = [
+    "LIMITS",
+    "VECTOR_SUFFIXES",
+    "Budget",
+    "PolygonPicture",
+    "annotation_of",
+    "arrays_of",
+    "encode_polygons",
+    "layer_paths",
+    "load_polygons",
+    "measured",
+    "png",
+    "read_picture",
+    "save_layers",
+]

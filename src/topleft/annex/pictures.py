@@ -1,0 +1,40 @@
+"""Prepares and draws pictures step by step: cameras, poses, levels, samples, layers, instruction sets."""
+
+from topleft._core.engine import isa_available, isa_in_use, use_isa
+from topleft._core.raster.sampling import sample_positions
+from topleft._meshes.camera.camera import CameraLike, as_camera
+from topleft._meshes.camera.matrices import (
+    FRAMING_MARGIN,
+    bounding_sphere,
+    box_corners,
+    ends_to_frame,
+    orbit_view,
+    sine_of_tangent,
+    tangent,
+)
+from topleft._meshes.lod.levels import keep_levels
+from topleft._meshes.lod.simplify import levels_of
+from topleft._meshes.model.pose import as_pose
+from topleft._meshes.picture.layers import draw_layers
+from topleft._meshes.picture.view_layers import gbuffer_of
+
+__all__ = [
+    "FRAMING_MARGIN",
+    "CameraLike",
+    "as_camera",
+    "as_pose",
+    "bounding_sphere",
+    "box_corners",
+    "draw_layers",
+    "ends_to_frame",
+    "gbuffer_of",
+    "isa_available",
+    "isa_in_use",
+    "keep_levels",
+    "levels_of",
+    "orbit_view",
+    "sample_positions",
+    "sine_of_tangent",
+    "tangent",
+    "use_isa",
+]
