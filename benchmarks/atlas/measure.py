@@ -15,10 +15,11 @@ from typing import Any
 from numpy.typing import NDArray
 
 from benchmarks.atlas.depth import DEPTH_FAMILIES, measure_depth
+from benchmarks.atlas.faults import Exact, draw_counts, draw_labels, find_faults
 from benchmarks.atlas.maps import Faults, tabulate
 from benchmarks.harness.arguments import refuse_unknown
 from benchmarks.harness.records import Record, tell
-from topleft._apps.explore.race import PRODUCTION, Entry, Exact, draw_counts, draw_labels, entries, find_faults
+from topleft._apps.explore.race import PRODUCTION, Entry, entries
 from topleft.scene_families import FAMILIES, Family, walk
 
 SCHEMA = 1

@@ -1,7 +1,8 @@
 """Live pictures: `live.json` has the states of the explorer that stand over still pictures, by the pictures' names.
 
 A Sphinx extension: it writes the explorer beside the site's pages, for static/live.js, where the kernels of WebAssembly
-are built (`python packaging/wasm.py`). `python docs/site/live.py` draws the still pictures, docs/images/NAME.svg.
+are built (`python packaging/wasm.py`). `python docs/site/live.py` saves the still pictures, docs/images/NAME.svg, from
+the explorer in Chromium.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ import json
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
+from topleft import explore
 from topleft._apps.explore.content import content_of
-from topleft._apps.explore.export import grid
-from topleft._apps.explore.state import parse_state
 from topleft._apps.explore.static import write_static
 from topleft.errors import MissingPackageError
 
@@ -24,13 +25,19 @@ TABLE = Path(__file__).with_name("live.json")
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 
 
-def draw_stills(folder: Path) -> list[Path]:
-    """Draw what each picture shows before it is touched."""
-    drawn = []
-    for name, one in json.loads(TABLE.read_text(encoding="utf-8")).items():
-        drawn.append(folder / f"{name}.svg")
-        grid(parse_state(one["state"]), str(drawn[-1]))
-    return drawn
+def save_stills(folder: Path) -> None:
+    """Save what each picture shows before it is touched."""
+    from playwright.sync_api import sync_playwright
+
+    with explore(wait=False, browser=False) as explorer, sync_playwright() as running:
+        page = running.chromium.launch(executable_path=shutil.which("chromium")).new_page()
+        for name, one in json.loads(TABLE.read_text(encoding="utf-8")).items():
+            page.goto("about:blank")
+            page.goto(f"{explorer.url}#pixels={quote(json.dumps(one['state']))}")
+            page.wait_for_function("() => document.querySelector('.explorer').app?.parts.pixels.drawn")
+            with page.expect_download() as download:
+                page.get_by_role("button", name="SVG").click()
+            download.value.save_as(folder / f"{name}.svg")
 
 
 def write_explorer(app: Sphinx, error: Exception | None) -> None:
@@ -56,4 +63,4 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 if __name__ == "__main__":
-    draw_stills(IMAGES)
+    save_stills(IMAGES)

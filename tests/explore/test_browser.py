@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from node_page import NODE, NodePage
 
 playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
@@ -17,10 +18,13 @@ from topleft._apps.explore.content import scene as scene_of  # noqa: E402
 from topleft._apps.explore.handlers import answer  # noqa: E402
 from topleft._apps.explore.messages import split  # noqa: E402
 from topleft._apps.explore.notebook import markup  # noqa: E402
-from topleft._apps.explore.session import Content, Session  # noqa: E402
+from topleft._apps.explore.session import Session  # noqa: E402
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium"),
+    pytest.mark.skipif(NODE is None, reason="node is not installed"),
+]
 
 DESKTOP, PHONE = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
 STATE = "document.querySelector('.explorer').app.parts.pixels.state()"
@@ -85,21 +89,21 @@ def state_of(page):
 
 
 def check_pictures(page):
-    """Compare each picture, pixel by pixel, with what the library draws of the state; returns the owners."""
+    """Compare each picture, pixel by pixel, with what the page makes of the state in node; returns the owners."""
     page.wait_for_function(QUIET)
-    state = state_of(page)
-    reply = answer(Session(Content()), {"id": 1, "do": "pixels.draw", "state": state})
+    drawing = NodePage()
+    panels, _ = drawing.draw(state_of(page))
+    drawing.close()
     shown = page.evaluate("[...document.querySelectorAll('[data-key]')].map((one) => one.dataset.key)")
-    assert shown == [panel["key"] for panel in reply.header["panels"]]
+    assert shown == [*panels]
     for key in shown:
         height, width, data = page.evaluate(PIXELS, key)
         pixels = np.array(data, np.uint8).reshape(height, width, 4)
-        wanted = reply.arrays[key]
+        wanted = panels[key]["picture"]
         is_seen = wanted[..., 3] > 0
         assert (pixels[..., 3] == wanted[..., 3]).all()
         assert (np.abs(pixels[is_seen].astype(int) - wanted[is_seen]) <= (wanted[is_seen][:, 3:] < 255) * 128).all()
-    assert "a" in shown
-    return reply.arrays["a_owners"]
+    return panels["a"]["owners"]
 
 
 def grip(page, i, key="a"):
@@ -349,8 +353,8 @@ def test_page_works_in_the_cell_of_a_notebook(page):
     content = content_of([[1, 1], [12, 3], [2, 9]], [[0, 1, 2]], (14, 11))
     session = Session(content)
 
-    def ask(question):
-        header, parts = split(answer(session, {**question, "parts": []}))
+    def ask(question, given):
+        header, parts = split(answer(session, {**question, "parts": [memoryview(bytes(part)) for part in given]}))
         return [header, [list(part) for part in parts]]
 
     page.expose_function("askPython", ask)
@@ -364,8 +368,8 @@ def test_page_works_in_the_cell_of_a_notebook(page):
           const model = {
             get: () => markup,
             on: (_, heard) => { hear = heard; },
-            send: async (header) => {
-              const [answer, parts] = await window.askPython(header);
+            send: async (header, _, given) => {
+              const [answer, parts] = await window.askPython(header, given.map((part) => [...part]));
               hear(answer, parts.map(odd));
             },
           };
@@ -382,7 +386,7 @@ def test_page_works_in_the_cell_of_a_notebook(page):
 
 
 def test_window_is_zoomed_and_moved_and_shown_whole_again(page):
-    """Wheel and keys zoom round a place, Shift and the mouse move: each time Python draws the window anew."""
+    """Wheel and keys zoom round a place, Shift and the mouse move: each time the window is drawn anew."""
     whole = state_of(page)
     box = page.locator('[data-key="a"] svg').bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)

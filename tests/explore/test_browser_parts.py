@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from node_page import NODE, NodePage
 from PIL import Image
 
 playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
@@ -16,9 +17,7 @@ pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install
 
 import topleft as tl  # noqa: E402
 from topleft._apps.explore.mesh_view import HANDLERS, MeshView  # noqa: E402
-from topleft._apps.explore.race import HANDLERS as RACE  # noqa: E402
 from topleft._apps.explore.session import Content, Session  # noqa: E402
-from topleft._apps.explore.trace import trace  # noqa: E402
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium")
@@ -76,6 +75,15 @@ def steps_page(chromium, explorer):
     with opened(chromium, explorer, "#steps=" + json.dumps({"scene": "two-triangles", "method": "edge"})) as page:
         page.wait_for_function(f"() => {PART}.steps.state().step === 0")
         yield page
+
+
+@pytest.fixture(scope="module")
+def node_page():
+    if NODE is None:
+        pytest.skip("node is not installed")
+    found = NodePage()
+    yield found
+    found.close()
 
 
 def canvas_of(page, where):
@@ -235,12 +243,12 @@ def test_steps_end_in_the_picture_of_the_method(steps_page):
     ]
     for method in ("edge", "bresenham_scanline"):
         page.get_by_label("method").last.select_option(method)
-        made = trace(state["vertices"], state["triangles"], tuple(state["size"]), method=method)
-        page.wait_for_function(f"() => document.querySelector('[data-panel=steps] input').max === '{len(made.steps)}'")
+        counts = tl.overdraw(state["vertices"], state["triangles"], tuple(state["size"]), method=method)
+        page.wait_for_function(f"() => {PART}.steps.state().method === '{method}' && {PART}.steps.state().step === 0")
         page.get_by_role("button", name="Last").click()
         shown = canvas_of(page, ".magnified canvas")
-        assert np.array_equal(shown[..., 3] == 255, made.counts > 0)
-        assert np.array_equal((shown[..., 0] == 213) & (shown[..., 3] == 255), made.counts > 1)
+        assert np.array_equal(shown[..., 3] == 255, counts > 0)
+        assert np.array_equal((shown[..., 0] == 213) & (shown[..., 3] == 255), counts > 1)
 
 
 def test_steps_go_on_and_back_by_keys(steps_page):
@@ -281,14 +289,15 @@ def test_steps_play_and_pause(steps_page):
 # ---- Race -----------------------------------------------------------------------------------------------------------
 
 
-def test_race_marks_the_pixels_that_are_wrong(chromium, explorer):
+def test_race_marks_the_pixels_that_are_wrong(chromium, explorer, node_page):
     link = "#race=" + json.dumps({"family": "sliver", "positions": [2], "seed": 1})
     with opened(chromium, explorer, link) as page:
         page.wait_for_function(f"() => {PART}.race.drawn > 0")
-        told, arrays = RACE["race.draw"](Session(Content()), {"family": "sliver", "positions": [2], "seed": 1})
+        told = node_page.call("race.js", "race", {"family": "sliver", "positions": [2], "seed": 1})
         shown = page.evaluate("[...document.querySelectorAll('.race figure')].map((one) => one.title)")
         assert shown == [row["title"] for row in told["rows"]]
-        for k, wanted in enumerate(arrays["pictures"]):
+        for k, pixels in enumerate(told["pictures"]):
+            wanted = np.array(pixels).reshape(64, 64, 4)
             marked = canvas_of(page, f".race figure:nth-child({k + 1}) canvas")
             assert np.array_equal(marked[wanted[..., 3] == 255], wanted[wanted[..., 3] == 255])
         drawn = page.evaluate(f"{PART}.race.drawn")

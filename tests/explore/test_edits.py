@@ -1,16 +1,8 @@
-"""Edits of triangles on the page: edits.js by node, its states drawn by Python."""
-
-import json
-import shutil
-import subprocess
-from importlib.resources import files
+"""Edits of triangles on the page: edits.js by node, its states drawn by the page."""
 
 import pytest
+from node_page import NODE, NodePage
 
-from topleft._apps.explore.handlers import answer
-from topleft._apps.explore.session import Content, Session
-
-NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
 SQUARE = {"vertices": [[1.5, 1.5], [9.5, 1.5], [1.5, 9.5], [9.5, 9.5]], "triangles": [[0, 1, 2], [1, 3, 2]]}
@@ -23,28 +15,26 @@ EDITS = {
 
 
 @pytest.fixture(scope="module")
-def edited():
-    page = files("topleft._apps.explore").joinpath("page", "edits.js").as_uri()
-    code = f"""import {{edited}} from "{page}";
-    const edits = {json.dumps(EDITS)};
-    for (const name in edits) edits[name] = edited(...edits[name]);
-    console.log(JSON.stringify(edits));
-    """
-    done = subprocess.run([NODE, "--input-type=module", "-e", code], capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
+def page():
+    found = NodePage()
+    yield found
+    found.close()
 
 
-def counts_of(state):
-    reply = answer(Session(Content()), {"do": "pixels.draw", "id": 1, "state": state})
-    assert "error" not in reply.header
-    return reply.arrays["a_counts"]
+@pytest.fixture(scope="module")
+def edited(page):
+    return {name: page.call("tools", "edited", *edit) for name, edit in EDITS.items()}
 
 
-def test_edit_makes_a_state_that_can_be_drawn(edited):
+def counts_of(page, state):
+    return page.draw(state)[0]["a"]["counts"]
+
+
+def test_edit_makes_a_state_that_can_be_drawn(page, edited):
     n = {name: len(found["triangles"]) for name, found in edited.items()}
     assert n == {"add": 3, "split": 4, "flip": 2, "remove": 1, "add to nothing": 1, "remove nothing": 0}
     for found in edited.values():
-        counts_of(SQUARE | {name: found[name] for name in ("vertices", "triangles")})
+        counts_of(page, SQUARE | {name: found[name] for name in ("vertices", "triangles")})
 
 
 def test_edit_of_a_triangle_leaves_the_others_and_their_vertices(edited):
@@ -54,6 +44,6 @@ def test_edit_of_a_triangle_leaves_the_others_and_their_vertices(edited):
     assert edited["add"]["triangle"] == 2
 
 
-def test_split_triangle_covers_the_same_pixels(edited):
+def test_split_triangle_covers_the_same_pixels(page, edited):
     split = SQUARE | {name: edited["split"][name] for name in ("vertices", "triangles")}
-    assert (counts_of(split) == counts_of(SQUARE)).all()
+    assert (counts_of(page, split) == counts_of(page, SQUARE)).all()

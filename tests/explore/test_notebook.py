@@ -28,12 +28,14 @@ def test_widget_answers_and_returns_the_vertices_that_were_moved():
     widget.send = lambda header, parts: sent.append((header, parts))
     assert widget.vertices.tolist() == VERTICES
     moved = [[2.0, 2], [7, 1], [1, 7]]
-    state = {"vertices": moved, "triangles": TRIANGLES, "size": [8, 8]}
-    widget._answer(None, {"do": "pixels.draw", "id": 1, "state": state}, [])
+    parts = [np.array(moved).tobytes(), np.array(TRIANGLES, np.int32).tobytes()]
+    question = {"n_components": 2, "size": [8, 8], "origin": ["0", "0"], "drawings": [{"triangles": 1}]}
+    widget._answer(None, {"do": "engine.draw", "id": 1, **question}, parts)
     header, parts = sent.pop()
-    owners = header["arrays"]["a_owners"]
+    owners = header["arrays"]["shown0"]
     shown = np.frombuffer(parts[owners["part"]], owners["dtype"]).reshape(owners["shape"])
-    assert (shown == tl.rasterize(moved, TRIANGLES, 8).triangle).all()
+    assert (shown[..., 0] == tl.rasterize(moved, TRIANGLES, 8).triangle).all()
+    widget._answer(None, {"do": "pixels.moved", "id": 2, "vertices": moved}, [])
     assert widget.vertices.tolist() == moved
 
 

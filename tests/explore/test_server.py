@@ -27,7 +27,10 @@ from topleft._apps.explore import server as module  # noqa: E402
 from topleft._apps.explore.open import open_page  # noqa: E402
 from topleft._apps.explore.server import Server  # noqa: E402
 
-SQUARE = {"vertices": [[1, 1], [7, 1], [1, 7]], "triangles": [[0, 1, 2]], "size": [8, 8]}
+TRIANGLE = {"n_components": 2, "size": [8, 8], "origin": ["0", "0"], "drawings": [{"triangles": 1}]}
+PARTS = [memoryview(np.array(rows, kind).tobytes()) for rows, kind in (
+    ([[1, 1], [7, 1], [1, 7]], np.float64), ([[0, 1, 2]], np.int32),
+)]  # fmt: skip
 
 
 @pytest.fixture
@@ -54,8 +57,8 @@ def connect(server, token=None, origin=True, **more):
     return sockets.connect(url, origin=origin, max_size=None, compression=None, **more)
 
 
-def ask(page, name, **given):
-    page.send(pack({"do": name, "id": 1, **given}, []))
+def ask(page, name, parts=(), **given):
+    page.send(pack({"do": name, "id": 1, **given}, [*parts]))
     return answer_of(page.recv(timeout=20))
 
 
@@ -154,10 +157,10 @@ def post(server, frame, name="ask/1", token=None, **headers):
 
 
 @pytest.mark.parametrize(
-    "question", [{"do": "hello"}, {"do": "pixels.export", "state": SQUARE, "kind": "png"}, {"do": "no"}, {}]
+    "question", [{"do": "hello"}, {"do": "pixels.export", **TRIANGLE, "kind": "code"}, {"do": "no"}, {}]
 )
 def test_post_is_answered_as_a_socket_is(server, question):
-    frame = pack({"id": 1, **question}, [])
+    frame = pack({"id": 1, **question}, PARTS)
     with connect(server) as page:
         page.send(frame)
         assert post(server, frame) == (200, page.recv(timeout=20))
@@ -242,11 +245,16 @@ def test_huge_header_is_refused(server):
 
 
 def test_enormous_and_broken_scenes_are_refused(server):
-    wrong = {"size": [10**9, 10**9]}, {"vertices": [[0, 0]] * 5000}, {"triangles": [[0, 1, 7]]}, {"vertices": None}
+    wrong = [
+        {"size": [10**9, 10**9]}, {"size": [257, 1]}, {"copies": 10**9}, {"copies": -1}, {"n_components": 5},
+        {"origin": ["x", 0]}, {"drawings": [{"triangles": 2}]}, {"drawings": [{"triangles": 0}]},
+        {"drawings": [{}]}, {"drawings": 3},
+    ]  # fmt: skip
     with connect(server) as page:
         for one in wrong:
-            assert ask(page, "pixels.draw", state=SQUARE | one)["error"]
-        assert ask(page, "pixels.draw", state=SQUARE)["panels"]
+            assert "fault" not in ask(page, "engine.draw", PARTS, **TRIANGLE | one)["error"]
+        assert ask(page, "engine.draw", PARTS, **TRIANGLE | {"origin": [str(10**30), "0"]})["drawings"][0]["refused"]
+        assert "seconds" in ask(page, "engine.draw", PARTS, **TRIANGLE)["drawings"][0]
 
 
 # Its end
@@ -269,7 +277,7 @@ def test_explore_serves_meanwhile_and_returns_the_vertices_that_were_moved(capsy
     assert explorer.vertices.tolist() == [[1, 1], [7, 1], [1, 7]]
     with explorer, connect(explorer._server) as page:
         moved = [[2, 2], [7, 1], [1, 7]]
-        ask(page, "pixels.draw", state=SQUARE | {"vertices": moved})
+        ask(page, "pixels.moved", vertices=moved)
         assert explorer.vertices.tolist() == moved
 
 

@@ -1,28 +1,19 @@
-"""The page that needs no Python: each of its answers is the one that Python gives, to the bit."""
+"""Both engines of the page, Python and the kernels in WebAssembly: the same questions, the same answers to the bit."""
 
-import base64
-import json
-import shutil
-import subprocess
-from importlib.resources import files
-from pathlib import Path
+import re
 from typing import get_args
 
 import numpy as np
 import pytest
+from node_page import NODE, PAGE, NodePage
 
 from topleft._apps.explore.content import SCENES, content_of_name, scene
-from topleft._apps.explore.handlers import answer
-from topleft._apps.explore.messages import split
-from topleft._apps.explore.session import Content, Session
+from topleft._apps.explore.session import Content
 from topleft._apps.explore.static import N_SEEDS, SETS, write_static
-from topleft._apps.explore.trace import TRACED
-from topleft.methods import CLASSICS
+from topleft.methods import CLASSICS, METHODS
 from topleft.scene_families import FAMILIES
 from topleft.typing import SamplingOption
 
-NODE = shutil.which("node")
-PAGE = files("topleft._apps.explore").joinpath("page")
 HAS_KERNELS = all(PAGE.joinpath(f"topleft-{name}.wasm").is_file() for name in SETS)
 pytestmark = [
     pytest.mark.skipif(not HAS_KERNELS, reason="no kernels for WebAssembly: python packaging/wasm.py"),
@@ -50,26 +41,28 @@ def folder(tmp_path_factory):
     return made
 
 
-def asker(folder, name):
-    """What asks the page with the kernels of one set."""
-
-    def asked(questions):
-        command = [NODE, str(Path(__file__).with_name("ask_static.mjs")), str(folder), name]
-        done = subprocess.run(command, input=json.dumps(questions), capture_output=True, text=True, check=True)
-        return json.loads(done.stdout)
-
-    return asked
+@pytest.fixture(scope="module")
+def served():
+    """The page whose engine is Python."""
+    found = NodePage()
+    yield found
+    found.close()
 
 
-@pytest.fixture(params=SETS)
-def ask(request, folder):
-    return asker(folder, request.param)
+@pytest.fixture(scope="module", params=SETS)
+def static(request, folder):
+    """The page whose engine is a worker with the kernels of an instruction set."""
+    found = NodePage(folder, request.param)
+    yield found
+    found.close()
 
 
-@pytest.fixture
-def ask_one(folder):
+@pytest.fixture(scope="module")
+def static_one(folder):
     """For what no instruction set changes: one of them."""
-    return asker(folder, SETS[0])
+    found = NodePage(folder, SETS[0])
+    yield found
+    found.close()
 
 
 def random_states():
@@ -93,30 +86,43 @@ def random_states():
     return found
 
 
-def without_times(header):
-    """A header without what differs from call to call, and from page to page."""
-    text = json.loads(json.dumps(header))
-    for panel in text.get("panels", ()):
-        panel["facts"] = [fact for fact in panel["facts"] if fact[2] != "of the call that draws it"]
-    return text
+def without_times(value):
+    """A result without what differs from call to call."""
+    if isinstance(value, dict):
+        return {name: without_times(one) for name, one in value.items() if name != "seconds"}
+    if isinstance(value, list):
+        return [without_times(one) for one in value if not (isinstance(one, list) and one[2:] == [OF_THE_CALL])]
+    return value
 
 
-def check(ask, questions):
-    """Ask both sides, and compare headers and bytes."""
-    replies = ask(questions)
-    for question, reply in zip(questions, replies, strict=True):
-        header, parts = split(answer(Session(Content()), {"id": 1, "parts": [], **question}))
-        bytes_drawn = [base64.b64decode(part) for part in reply.pop("bytes")]
-        reply.pop("memory")
-        reply = {"arrays": {}, **reply}
-        assert without_times(reply) == without_times(header), question
-        assert bytes_drawn == [bytes(part) for part in parts], question
-    assert len(replies) == len(questions)
+OF_THE_CALL = "of the call that draws it"
 
 
-def test_pixels_of_random_states_are_those_of_python(ask):
-    questions = [{"do": "pixels.draw", "state": state} for state in random_states()]
-    check(ask, questions)
+def told(page, *call):
+    try:
+        return without_times(page.call(*call, is_hashed=True))
+    except ValueError as error:
+        return str(error)
+
+
+def check(one, two, *call):
+    """Ask both sides."""
+    mine, theirs = told(one, *call), told(two, *call)
+    assert mine == theirs, call
+    return mine
+
+
+def check_drawn(one, two, state):
+    """Compare the pictures of a state with what is written over them, and the arrays of the engine."""
+    methods = [state.get("method", "auto"), state.get("other") or "edge"]
+    methods += ["exact"] if state.get("sampling") != "area" else []
+    check(one, two, "tools", "draw", state, methods)
+    check(one, two, "pixels.js", "drawPixels", state)
+
+
+def test_pixels_of_random_states_are_the_same(served, static):
+    for state in random_states():
+        check_drawn(served, static, state)
 
 
 def small_states():
@@ -132,112 +138,107 @@ def small_states():
         }  # fmt: skip
 
 
-def test_exact_areas_and_squares_are_those_of_python(ask_one):
-    check(
-        ask_one,
-        [
-            {"do": "pixels.draw", "state": state}
-            for state in [*small_states(), *(FAR | {"sampling": s, "exact": True} for s in SAMPLINGS[5:])]
-        ],
-    )
+def test_areas_and_squares_are_the_same(served, static_one):
+    for state in [*small_states(), *(FAR | {"sampling": s, "exact": True} for s in SAMPLINGS[5:])]:
+        check_drawn(served, static_one, state)
 
 
-def test_pixels_of_each_scene_are_those_of_python(ask):
-    states = [scene(name) for name in SCENES]
-    check(ask, [{"do": "pixels.draw", "state": state} for state in states])
-    check(ask, [{"do": "pixels.scene", "name": "single-point"}, {"do": "pixels.draw", "state": FAR}])
+def test_pixels_of_each_scene_are_the_same(served, static):
+    for name in SCENES:
+        check_drawn(served, static, scene(name))
+    check_drawn(served, static, FAR)
+    assert static.call("tools", "ask", "pixels.scene", {"name": "single-point"})["state"] == scene("single-point")
 
 
-def test_reasons_of_pixels_are_those_of_python(ask):
-    rng, questions = np.random.default_rng(5), []
+def test_reasons_of_pixels_are_the_same(served, static):
+    rng = np.random.default_rng(5)
     for state in [SQUARE, DEEP, FAR, *random_states()]:
-        if state.get("look") == "wireframe":
-            continue
         n = int(state["sampling"][4:]) if state.get("sampling", "").startswith("msaa") else 1
-        for _ in range(4):
+        for _ in range(2):
             pixel = [int(rng.integers(0, side)) for side in state["size"]]
-            question = {"do": "pixels.probe", "state": state, "pixel": pixel, "sample": int(rng.integers(0, n))}
-            questions += [question, question | {"method": "exact"}]
-    check(ask, questions)
+            question = {"state": state, "pixel": pixel, "sample": int(rng.integers(0, n))}
+            for more in ({}, {"method": "exact"}):
+                assert "rows" in check(served, static, "probe.js", "probe", question | more)
 
 
-def steps_of(state, method, bits=8):
-    """The question of how a method draws a state."""
-    taken = {name: state[name] for name in ("vertices", "triangles", "size", "origin") if name in state}
-    return {"do": "steps.trace", **taken, "method": method, "subpixel_bits": bits}
+TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
 
 
-def test_steps_of_each_method_are_those_of_python(ask_one):
+def check_steps(one, two, state, method, bits=8):
+    return check(one, two, "steps.js", "recorded", state, method, bits)
+
+
+def test_steps_of_each_method_are_the_same(served, static_one):
     states = [one for one in random_states() if len(one["triangles"]) < 12][:1]
     states = [DEEP, *(one | {"size": [min(n, 24) for n in one["size"]]} for one in states)]
-    check(ask_one, [steps_of(one, method, (8, 0, 4)[i % 3]) for method in TRACED for i, one in enumerate(states)])
+    for method in TRACED:
+        for i, state in enumerate(states):
+            assert "steps" in check_steps(served, static_one, state, method, (8, 0, 4)[i % 3])
 
 
-def test_steps_of_far_vertices_and_windows_are_those_of_python(ask_one):
-    scenes = [name for name in SCENES if name.startswith(("far", "large"))][:6]
-    check(
-        ask_one, [steps_of(scene(name), method) for name in scenes for method in ("edge", "scanline", "row_crossing")]
-    )
+def test_steps_of_far_vertices_and_windows_are_the_same(served, static_one):
+    for name in [name for name in SCENES if name.startswith(("far", "large"))][:6]:
+        for method in ("edge", "scanline", "row_crossing"):
+            check_steps(served, static_one, scene(name), method)
 
 
-def test_sentences_of_steps_that_are_refused_are_those_of_python(ask_one):
-    whole = SQUARE | {"vertices": [[0, 0], [900, 0], [0, 900], [900, 900]], "size": [900, 900]}
-    far = SQUARE | {"vertices": [[1.5, 2**52], [9.5, 1.5], [1.5, 9.5], [9.5, 9.5]]}
-    questions = [steps_of(SQUARE, "auto"), steps_of(SQUARE, "best"), steps_of(SQUARE | {"size": [2000, 3]}, "edge")]
-    questions += [steps_of(whole, "edge"), steps_of(whole, "point_in_triangle"), steps_of(far, "edge", 16)]
-    check(ask_one, [*questions, steps_of(far, "edge"), steps_of(far, "lerp_scanline")])
+WHOLE = SQUARE | {"vertices": [[0, 0], [900, 0], [0, 900], [900, 900]], "size": [256, 256]}
+VERY_FAR = SQUARE | {"vertices": [[1.5, 2**52], [9.5, 1.5], [1.5, 9.5], [9.5, 9.5]]}
 
 
-def race_of(family, share, i):
-    """The question of a race of a family, from its mildest value, 0, to its harshest, 1."""
-    positions = [round(share * (len(axis.values) - 1)) for axis in FAMILIES[family].axes]
-    return {"do": ("race.draw", "race.column")[i % 2], "family": family, "positions": positions, "seed": i % N_SEEDS}
+@pytest.mark.parametrize(
+    ("state", "method", "bits", "message"),
+    [
+        (SQUARE, "auto", 8, "method must be a walker or a classic to be traced, got 'auto'"),
+        (SQUARE, "best", 8, "method must be one of auto, edge"),
+        (WHOLE, "edge", 8, "a trace must have 40000 steps at most"),
+        (WHOLE, "point_in_triangle", 8, "a trace must have 40000 steps at most"),
+        (VERY_FAR, "edge", 16, "vertices must lie within 2..46 pixels of 0 with 16 sub-pixel bits"),
+        (VERY_FAR, "edge", 8, "vertices must lie within 2..60 sub-pixels of 0 to be traced"),
+        (VERY_FAR, "lerp_scanline", 8, "vertices must lie within"),
+    ],
+)
+def test_steps_are_refused_with_the_same_sentence(served, static_one, state, method, bits, message):
+    assert re.match(message, check_steps(served, static_one, state, method, bits))
 
 
-def test_races_are_those_of_python(ask_one):
+def test_races_are_the_same(served, static_one):
     harsh = ["far", "far", "far-sliver", "sliver", "edge", "edge"]
-    races = [race_of(name, share, i + k) for i, name in enumerate(FAMILIES) for k, share in enumerate((0, 0.5))]
-    check(ask_one, [*races, *(race_of(name, 1, i) for i, name in enumerate(harsh))])
+    cases = [(name, share, i + k) for i, name in enumerate(FAMILIES) for k, share in enumerate((0, 0.5))]
+    for family, share, i in [*cases, *((name, 1, i) for i, name in enumerate(harsh))]:
+        positions = [round(share * (len(axis.values) - 1)) for axis in FAMILIES[family].axes]
+        view = {"family": family, "positions": positions, "seed": i % N_SEEDS}
+        check(served, static_one, "race.js", ("race", "raceColumn")[i % 2], view)
 
 
-def test_sentences_of_races_that_are_refused_are_those_of_python(ask_one):
-    bad = [{"family": "none", "positions": [1]}, {"family": "fan", "positions": [1, 2]}]
-    check(ask_one, [{"do": "race.draw", **one} for one in bad])
+@pytest.mark.parametrize("view", [{"family": "none", "positions": [1]}, {"family": "fan", "positions": [1, 2]}])
+def test_races_are_refused_with_the_same_sentence(served, static_one, view):
+    assert "got" in check(served, static_one, "race.js", "race", view | {"seed": 0})
 
 
-def test_window_far_away_is_that_of_python(ask):
+def test_window_far_away_is_the_same(served, static):
     far = 2**50
     state = SQUARE | {"vertices": [[x + far, y - far] for x, y in SQUARE["vertices"]], "origin": [far, -far]}
-    check(ask, [{"do": "pixels.draw", "state": state | more} for more in ({"exact": True}, {"subpixel_bits": "exact"})])
+    for more in ({"exact": True}, {"subpixel_bits": "exact"}, {"subpixel_bits": 16}, {"method": "zigzag"}):
+        check_drawn(served, static, state | more)
 
 
-BAD_STATES = [
-    {"size": [300, 2]}, {"size": [1.5, 2]}, {"size": 3}, {"origin": [2**60, 0]},
-    {"vertices": [[1, 2], [3, 4, 5], [0, 0]]},
-    {"vertices": [[1, 2], [3, 1e300], [0, 0], [1, 1]]}, {"vertices": 7}, {"vertices": [["a", 1]] * 4},
-    {"subpixel_bits": 17}, {"subpixel_bits": "all"}, {"sampling": "msaa3"}, {"cull": "both"}, {"depth_test": "equal"},
-    {"winding": "left"}, {"look": "nice"}, {"triangles": [[0, 1, 4]]}, {"triangles": [[0, 1, 2]] * 1001},
-    {"vertices": [[0, 0]] * 3001}, {"method": "best"}, {"color": 3}, {"exact": 1},
-    {"subpixel_bits": 16, "vertices": [[2**51 + 0.5, 0], [3, 1], [0, 0], [1, 1]]},
-]  # fmt: skip
+def test_vertices_beyond_the_range_are_refused_with_the_same_sentence(served, static):
+    check_drawn(served, static, FAR | {"subpixel_bits": 16, "vertices": [[2**51 + 0.5, 0], [3, 1], [0, 0], [1, 1]]})
 
 
-@pytest.mark.parametrize("i", range(0, len(BAD_STATES), 6))
-def test_sentences_of_bad_states_are_those_of_python(ask, i):
-    questions = [{"do": "pixels.draw", "state": SQUARE | bad} for bad in BAD_STATES[i : i + 6]]
-    check(ask, [*questions, {"do": "pixels.draw", "state": {"size": [1, 1]}}, {"do": "pixels.draw", "state": []}])
+def test_memory_stays_as_it_is_however_often_a_scene_is_drawn(static):
+    n_bytes = []
+    for _ in range(40):
+        static.call("pixels.js", "drawPixels", random_states()[4])
+        n_bytes.append(static.call("tools", "memory"))
+    assert n_bytes[-1] == n_bytes[1]
 
 
-def test_memory_stays_as_it_is_however_often_a_scene_is_drawn(ask):
-    replies = ask([{"do": "pixels.draw", "state": random_states()[4]}] * 40)
-    assert replies[-1]["memory"] == replies[1]["memory"]
-
-
-def test_question_without_memory_is_refused_and_the_next_one_is_answered(ask):
-    question = {"do": "pixels.draw", "state": SQUARE}
-    full, last = ask([question | {"is_full": True}, question])
-    assert full["error"] == "not enough memory"
-    assert "error" not in last
+def test_question_without_memory_is_refused_and_the_next_one_is_answered(static):
+    with pytest.raises(ValueError, match="not enough memory"):
+        static.call("tools", "drawFull", SQUARE)
+    assert static.draw(SQUARE)[0]["a"]["n"] > 0
 
 
 def test_mesh_is_refused_with_a_sentence(tmp_path):

@@ -1,20 +1,18 @@
-"""Writes what a state shows: PNG, SVG, Python code that draws the same, a test case."""
+"""Writes what the page draws: PNG, SVG, Python code that draws the same, a test case; and the plan of it."""
 
 from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft import plan, rasterize
 from topleft._apps.diagram.pixel_grid import pixel_grid
-from topleft._apps.explore.pixels import EXACT, draw, picture
+from topleft._apps.explore.engine import MethodDrawing, drawings_of
 from topleft._apps.explore.session import Reply, Request, Session
-from topleft._apps.explore.state import PixelState, parse_state
 from topleft.methods import CLASSICS
-from topleft.typing import SamplesOption
 
 MAX_FILE_SIDE_PX = 2048
 MAX_CELL_PX = 32
@@ -22,17 +20,20 @@ SIGNS = ".0123456789abcdefghijklmnopqrstuvwxyz"
 
 
 def export(_: Session, request: Request) -> Reply:
-    """Return a file of a state, as bytes: its name, its type, its content."""
-    state = parse_state(request.get("state"))
+    """Return a file of a drawing, as bytes: its name, its type, its content; the third part is the picture."""
+    (drawing,) = drawings_of(request)
     kind = request.get("kind")
     if kind == "code":
-        return as_file("explored.py", "text/x-python", code(state).encode())
+        return as_file("explored.py", "text/x-python", code(drawing).encode())
     if kind == "test":
-        return as_file("test_explored.py", "text/x-python", test_case(state).encode())
+        return as_file("test_explored.py", "text/x-python", test_case(drawing).encode())
     if kind in ("png", "svg"):
+        if len(request["parts"]) < 3:
+            raise ValueError("a file needs a picture, got none: the method draws none")
+        pixels = np.frombuffer(request["parts"][2], np.uint8).reshape(*drawing.size[::-1], 4)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, f"explored.{kind}")
-            grid(state, str(path))
+            write_grid(drawing, pixels, path)
             return as_file(path.name, {"png": "image/png", "svg": "image/svg+xml"}[kind], path.read_bytes())
     raise ValueError(f"kind must be one of 'png', 'svg', 'code', 'test', got {str(kind)[:20]!r}")
 
@@ -42,78 +43,76 @@ def as_file(name: str, kind: str, content: bytes) -> Reply:
     return Reply({"name": name, "type": kind}, {"content": content})
 
 
-def grid(state: PixelState, path: str) -> None:
-    """Write the first picture, magnified, with the edges over it."""
-    shown = picture(state, draw(state, state.method))
-    points = state.vertices[:, :2] - state.origin
-    sampling: Any = state.sampling if state.sampling in get_args(SamplesOption) else None
-    cell = max(1, min(MAX_CELL_PX, MAX_FILE_SIDE_PX // max(state.size)))
-    dots = sampling if cell >= 8 else None
-    pixel_grid(shown, points, state.triangles, sampling=dots, cell=cell, edge_color="#1d2733", path=path)
+def write_grid(drawing: MethodDrawing, pixels: NDArray[np.uint8], path: Path) -> None:
+    """Write a picture (H, W, 4), magnified, with the edges over it."""
+    cell = max(1, min(MAX_CELL_PX, MAX_FILE_SIDE_PX // max(drawing.size)))
+    sampling = None if cell < 8 or drawing.is_coverage else drawing.options.get("sampling", "center")
+    points = drawing.vertices[:, :2] - drawing.options["origin"]
+    pixel_grid(pixels, points, drawing.triangles, sampling=sampling, cell=cell, edge_color="#1d2733", path=path)
 
 
-def code(state: PixelState) -> str:
+def code(drawing: MethodDrawing) -> str:
     """Return a program that draws the same.
 
     Its `owners` are what `draw` gives, (H, W) or (H, W, S), or the coverage (H, W) of areas and squares.
     """
-    lines = ["import numpy as np", "", "import topleft as tl", "", *arrays(state), *call(state)]
-    name = "coverage" if is_coverage(state) else "owners"
-    shown = f"{name}[..., 0]" if state.sampling.startswith("msaa") and state.method not in CLASSICS else name
-    sampled = "" if is_coverage(state) else ', sampling="center"'
-    size = f"{state.size[0]}, {state.size[1]}"
+    lines = ["import numpy as np", "", "import topleft as tl", "", *arrays(drawing), *call(drawing)]
+    name = "coverage" if drawing.is_coverage else "owners"
+    shown = f"{name}[..., 0]" if "msaa" in drawing.options.get("sampling", "") else name
+    sampled = "" if drawing.is_coverage else ', sampling="center"'
+    size, points = f"{drawing.size[0]}, {drawing.size[1]}", f"vertices[:, :2] - {drawing.options['origin']}"
     lines += [
-        f"print({name}.shape, int(({name} {'> 0' if is_coverage(state) else '>= 0'}).sum()))",
+        f"print({name}.shape, int(({name} {'> 0' if drawing.is_coverage else '>= 0'}).sum()))",
         f"# The window of {size} pixels, magnified:",
-        f'tl.pixel_grid({shown}, vertices[:, :2] - {state.origin}, triangles{sampled}, path="explored.svg")',
+        f'tl.pixel_grid({shown}, {points}, triangles{sampled}, path="explored.svg")',
     ]
     return "\n".join(lines) + "\n"
 
 
-def is_coverage(state: PixelState) -> bool:
-    """Whether a picture knows coverage alone."""
-    return state.options(state.method).get("sampling") in ("area", "outer", "inner")
-
-
-def arrays(state: PixelState) -> list[str]:
+def arrays(drawing: MethodDrawing) -> list[str]:
     """The lines that make the arrays: numbers as they are, to the last bit."""
-    points = [f"    {row!r}," for row in state.vertices.tolist()]
-    corners = [f"    {row!r}," for row in state.triangles.tolist()]
-    columns = state.vertices.shape[1]
+    points = [f"    {row!r}," for row in drawing.vertices.tolist()]
+    corners = [f"    {row!r}," for row in drawing.triangles.tolist()]
+    columns = drawing.vertices.shape[1]
     return [
         "vertices = np.array([", *points, f"], np.float64).reshape(-1, {columns})",
         "triangles = np.array([", *corners, "], np.int32).reshape(-1, 3)",
     ]  # fmt: skip
 
 
-def call(state: PixelState) -> list[str]:
-    """The lines that draw."""
-    options = state.options(state.method)
-    given = "".join(f", {name}={value!r}" for name, value in options.items() if (name, value) != ("method", "auto"))
-    size = f"({state.size[0]}, {state.size[1]})"
-    if is_coverage(state):
+def call(drawing: MethodDrawing) -> list[str]:
+    """The lines that draw, without options that are the usual ones."""
+    usual = {"origin": (0, 0), "method": "auto", "subpixel_bits": 8, "sampling": "center", "cull": "none"}
+    options = {name: value for name, value in drawing.options.items() if value != usual[name]}
+    given = "".join(f", {name}={value!r}" for name, value in options.items())
+    size = f"({drawing.size[0]}, {drawing.size[1]})"
+    if drawing.is_coverage:
         return [f"coverage = tl.coverage(vertices, triangles, {size}{given})"]
-    if state.method in CLASSICS:
+    if drawing.options["method"] in CLASSICS:
         return [
             "numbers = np.arange(len(triangles), dtype=np.float32)[:, None]",
             f"drawn = tl.fill(vertices, triangles, numbers, {size}, background=[-1.0]{given})",
             "owners = drawn[..., 0].astype(np.int32)",
         ]
-    tested = f', depth_test="{state.depth_test}"' if state.has_depth and state.depth_test != "less" else ""
-    which = "samples_triangle" if state.sampling.startswith("msaa") else "triangle"
+    is_tested = drawing.vertices.shape[1] == 3 and drawing.depth_test != "less"
+    tested = f', depth_test="{drawing.depth_test}"' if is_tested else ""
+    which = "samples_triangle" if "sampling" in options else "triangle"
     return [f"owners = tl.rasterize(vertices, triangles, {size}{tested}{given}).{which}"]
 
 
-def test_case(state: PixelState) -> str:
+def test_case(drawing: MethodDrawing) -> str:
     """Return a test that holds a method to the exact picture, which stands in it."""
-    if state.sampling != "center":
+    if drawing.options.get("sampling", "center") != "center":
         raise ValueError("a test case is of pixel centres: choose the sampling 'center'")
-    exact = draw(state, EXACT).owners[..., 0]
+    options = {**drawing.options, "method": "auto", "subpixel_bits": "exact"}
+    exact = rasterize(
+        drawing.vertices, drawing.triangles, drawing.size, depth_test=drawing.depth_test, **options
+    ).triangle
     lines = ["import numpy as np", "", "import topleft as tl", ""]
     lines += ["# What must show, a sign a pixel: none, or the triangle's number in base 36, z also for those beyond."]
     lines += [f'SIGNS = "{SIGNS}"', "EXPECTED = [", *(f'    "{row}",' for row in rows_of(exact)), "]", "", ""]
     lines += ["def test_picture_is_the_exact_one():"]
-    lines += [f"    {line}" for line in (*arrays(state), *call(state))]
+    lines += [f"    {line}" for line in (*arrays(drawing), *call(drawing))]
     lines += ['    assert ["".join(SIGNS[min(i, 35) + 1] for i in row) for row in owners] == EXPECTED']
     return "\n".join(lines) + "\n"
 
@@ -123,4 +122,14 @@ def rows_of(owners: NDArray[np.int32]) -> list[str]:
     return ["".join(SIGNS[min(i, 35) + 1] for i in row) for row in owners.tolist()]
 
 
-HANDLERS = {"pixels.export": export}
+def explain(_: Session, request: Request) -> Reply:
+    """Return the plan of a drawing, in words."""
+    (drawing,) = drawings_of(request)
+    if classic := CLASSICS.get(drawing.options["method"]):
+        return Reply({"text": f"{classic.name}: {classic.summary}.\n{classic.source}.\n\nA classic needs no plan."})
+    outputs = "coverage" if drawing.is_coverage else "triangle"
+    found = plan(drawing.vertices, drawing.triangles, drawing.size, outputs=outputs, **drawing.options)
+    return Reply({"text": found.explain()})
+
+
+HANDLERS = {"pixels.export": export, "pixels.plan": explain}

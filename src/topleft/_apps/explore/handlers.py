@@ -7,12 +7,18 @@ from __future__ import annotations
 
 import sys
 import traceback
-from typing import Any
+from typing import Any, get_args
 
-from topleft._apps.explore import export, mesh_view, pixels, probe, race, trace
-from topleft._apps.explore.content import SCENES, scene, scene_groups
+import numpy as np
+
+from topleft._apps.explore import engine, export, mesh_view, race
+from topleft._apps.explore.content import MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES, SCENES, scene, scene_groups
 from topleft._apps.explore.session import Handler, Reply, Request, Session
 from topleft.errors import TopleftError
+from topleft.methods import CLASSICS, METHODS
+from topleft.methods.classics.classic_kernels import list_kinds
+from topleft.methods.reference.sampling import SAMPLE_POSITIONS
+from topleft.typing import CullOption, DepthTestOption, SamplingOption
 
 
 def hello(session: Session, _: Request) -> Reply:
@@ -27,17 +33,47 @@ def hello(session: Session, _: Request) -> Reply:
             "pixels": given,
             "scenes": SCENES,
             "groups": scene_groups(),
-            "methods": pixels.methods(),
+            "methods": methods(),
+            "samples": SAMPLE_POSITIONS,
+            "kinds": list_kinds(),
+            "race": race.lists(),
+            "words": {"sampling": get_args(SamplingOption), "cull": get_args(CullOption),
+                      "depth_test": get_args(DepthTestOption)},
+            "limits": {"max_side_px": MAX_SIDE_PX, "max_triangles": MAX_TRIANGLES, "max_vertices": MAX_VERTICES,
+                       "max_steps": engine.MAX_STEPS},
         }
-    )
+    )  # fmt: skip
+
+
+def methods() -> list[dict[str, Any]]:
+    """All methods, as the page lists them."""
+    return [
+        {"name": one.name, "summary": one.summary, "source": one.source, "is_classic": one.name in CLASSICS,
+         "has_bits": one.has_subpixel_bits, "is_integer": one.claims.integer_vertices}
+        for one in (*METHODS.values(), *CLASSICS.values())
+    ]  # fmt: skip
+
+
+def take_scene(_: Session, request: Request) -> Reply:
+    """Return a named scene as a state."""
+    return Reply({"state": scene(str(request.get("name")))})
+
+
+def take_vertices(session: Session, request: Request) -> Reply:
+    """Keep the vertices that a page has moved."""
+    vertices = np.array(request["vertices"], np.float64)
+    if vertices.size and (vertices.ndim != 2 or vertices.shape[1] not in (2, 3)):
+        raise ValueError(f"vertices must have a row of two or three numbers each, got shape {vertices.shape}")
+    session.content.moved = vertices if vertices.size else vertices.reshape(0, 2)
+    return Reply({})
 
 
 HANDLERS: dict[str, Handler] = {
     "hello": hello,
-    **pixels.HANDLERS,
-    **probe.HANDLERS,
+    "pixels.scene": take_scene,
+    "pixels.moved": take_vertices,
+    **engine.HANDLERS,
     **export.HANDLERS,
-    **trace.HANDLERS,
     **mesh_view.HANDLERS,
     **race.HANDLERS,
 }

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from topleft import Mesh
 
 SCRIPTS = (
-    "line.js", "elements.js", "edits.js", "mesh_part.js", "pixels_part.js", "race_part.js", "steps_part.js",
-    "explore.js",
+    "line.js", "elements.js", "edits.js", "numbers.js", "colors.js", "engine.js", "state.js", "exact.js", "pixels.js",
+    "probe.js", "steps.js", "race.js", "mesh_part.js", "pixels_part.js", "race_part.js", "steps_part.js", "explore.js",
 )  # fmt: skip
 """The modules of the page, each behind those that it imports."""
 

@@ -1,5 +1,5 @@
-// The exact picture of areas and of conservative coverage without Python: what methods/reference draws by fractions, in
-// whole numbers of any length. In: a state. Out: how much of each pixel triangles cover, and how many.
+// The exact picture of areas and of conservative coverage, in whole numbers of any length.
+// In: a state. Out: how much of each pixel triangles cover, and how many.
 
 import {cross, quotient, rint, wholeOf} from "./numbers.js";
 

@@ -1,6 +1,5 @@
-// The page of the explorer. It asks for everything that is drawn, and draws no triangle by itself: pictures are arrays of
-// pixels that come from the library, by Python or, in a page that was written with --export, by a worker with the same
-// kernels; lines and handles are laid over them.
+// The page of the explorer. It draws no triangle by itself: what methods draw comes from the engine (engine.js), Python or, in
+// a page that was written with --export, a worker with the same kernels; lines and handles are laid over the pixels.
 
 import {notebookLine, socketLine, workerLine} from "./line.js";
 import {meshPart} from "./mesh_part.js";

@@ -115,7 +115,7 @@ function postLine(onLost) {
 // A page without Python: a worker answers.
 export async function workerLine(onLost, root) {
   const worker = new Worker(new URL(root.dataset.worker, document.baseURI), {type: "module"});
-  const line = new Line((header) => worker.postMessage(header), onLost);
+  const line = new Line((header, parts) => worker.postMessage({...header, parts}), onLost);
   worker.onmessage = ({data: [header, parts]}) => line.hear(withArrays(header, parts));
   worker.onerror = (event) => (event.preventDefault?.(), line.lose(event.message));
   return line;

@@ -30,17 +30,9 @@ export function quotient(n, d) {
   return (n < 0n ? -1 : 1) * Number(bits) * 2 ** -shift;
 }
 
-// Python's "{:.6g}": a number in the middle between two is rounded to the even one, where JavaScript's go away from 0.
-export function sixDigits(x) {
-  if (x === 0) return "0";
-  const [exact, power] = Math.abs(x).toExponential(60).split("e"), digits = exact.replace(".", "");
-  let head = Number(digits.slice(0, 6)), exponent = Number(power);
-  if (digits[6] > "5" || (digits[6] === "5" && (head % 2 || /[1-9]/.test(digits.slice(7))))) head++;
-  if (head === 1e6) (head = 1e5), exponent++;
-  const sign = x < 0 ? "-" : "", text = String(head);
-  if (exponent >= -4 && exponent < 6) return sign + String(Number(`${text}e${exponent - 5}`));
-  return `${sign}${Number(`${text[0]}.${text.slice(1)}`)}e${exponent < 0 ? "-" : "+"}${String(Math.abs(exponent)).padStart(2, "0")}`;
-}
+// A number in at most six digits.
+export const sixDigits = (x) => x.toPrecision(6).replace(/(\.\d*?)0+(?=e|$)/, "$1").replace(/\.(?=e|$)/, "");
+
 // A float64 as Python writes it.
 export function asFloat(x) {
   const [digits, power] = x.toExponential().split("e"), exponent = Number(power);

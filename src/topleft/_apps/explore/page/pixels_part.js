@@ -3,18 +3,17 @@
 import {edited} from "./edits.js";
 import {make, svg, sceneOptions, download, paint} from "./elements.js";
 import {newest} from "./line.js";
+import {askAbout, drawPixels} from "./pixels.js";
+import {probe} from "./probe.js";
+import {EXACT, STATE_DEFAULTS} from "./state.js";
 
-const PIXEL_DEFAULTS = {
-  origin: [0, 0], method: "auto", other: "", exact: false, subpixel_bits: 8, sampling: "center", cull: "none",
-  depth_test: "less", winding: "as given", look: "owners",
-};
 const MOVES = {
   ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
   a: [-1, 0], d: [1, 0], w: [0, -1], s: [0, 1],
 };
 const EDIT_KEYS = {n: "add", p: "split", r: "flip", Delete: "remove", z: "undo", "]": "forward", "[": "back"};
 
-// A state is what Python draws: vertices, triangles, a window, methods and rules (PixelState in state.py).
+// A state is what is drawn: vertices, triangles, a window, methods and rules (state.js).
 export function pixelsPart(app, panel) {
   const part = {state: () => state, scene: () => state, drawn: null, enter, restore, views: new Map()};
   const find = (what) => panel.querySelector(what), findAll = (what) => [...panel.querySelectorAll(what)];
@@ -31,7 +30,8 @@ export function pixelsPart(app, panel) {
   const redraw = newest(async () => {
     const asked = state;
     try {
-      show(await app.line.ask("pixels.draw", {state: asked}));
+      const [pictures] = await Promise.all([drawPixels(app.line, app.hello, asked), app.line.ask("pixels.moved", {vertices: asked.vertices})]);
+      show(pictures);
       if (isRefused) app.say("");
       isRefused = false;
     } catch (error) {
@@ -43,11 +43,11 @@ export function pixelsPart(app, panel) {
     part.onDrawn?.();
   });
   const explain = newest(async () => {
-    if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state}).catch(told))?.text ?? "";
+    if (plan.open) plan.lastChild.textContent = (await askAbout(app.line, app.hello, state, "pixels.plan").catch(told))?.text ?? "";
   });
   const look = newest(async () => {
-    const method = {b: state.other, exact: "exact"}[probed] || state.method;
-    if (pixel) tell(await app.line.ask("pixels.probe", {state, pixel, sample, method}).catch(({message}) => ({sentences: [message]})));
+    const method = {b: state.other, exact: EXACT}[probed] || state.method;
+    if (pixel) tell(await probe(app.line, app.hello, {state, pixel, sample, method}).catch(({message}) => ({sentences: [message]})));
   });
 
   // Every change goes through here: `remember` lets Z take it back.
@@ -63,7 +63,7 @@ export function pixelsPart(app, panel) {
     [past, corner, chosen] = [[], null, 0];
     [pixel, probed] = [given.size.map((n) => n >> 1), given.other ? "b" : "a"];
     whole = {size: given.size, origin: given.origin ?? [0, 0]};
-    change({...PIXEL_DEFAULTS, ...given}, false);
+    change({...STATE_DEFAULTS, ...given}, false);
   }
   async function takeScene(name) {
     const before = state, {state: scene} = await app.line.ask("pixels.scene", {name});
@@ -76,7 +76,7 @@ export function pixelsPart(app, panel) {
 
   // -- the window --
 
-  // Shows `factor` times as much round a place of the picture, which stays where it is; Python draws it anew.
+  // Shows `factor` times as much round a place of the picture, which stays where it is; it is drawn anew.
   const MOST_SIDE = 256, LEAST_SIDE = 4;
   function zoom(factor, [x, y] = state.size.map((n, k) => state.origin[k] + n / 2)) {
     const size = state.size.map((n) => Math.max(LEAST_SIDE, Math.min(MOST_SIDE, Math.round(n * factor))));
@@ -114,21 +114,21 @@ export function pixelsPart(app, panel) {
 
   // -- the pictures --
 
-  function show({panels: shown, arrays, samples: at}) {
+  function show({panels: shown, samples: at}) {
     const isNew = samples.length !== at.length;
     samples = at;
     for (const [key, {figure}] of part.views) {
       if (!shown.some((one) => one.key === key)) figure.remove(), part.views.delete(key);
     }
-    for (const {key, title, notes, facts, legend, refused} of shown) {
+    for (const {key, title, notes, facts, legend, refused, picture, owners, counts} of shown) {
       if (!part.views.has(key)) part.views.set(key, view(key));
       const one = part.views.get(key), text = facts.map(([words, kind, title = ""]) => make(`span.${kind}`, {title}, words));
-      Object.assign(one, {owners: arrays[`${key}_owners`], counts: arrays[`${key}_counts`]});
+      Object.assign(one, {owners, counts, picture});
       one.caption.replaceChildren(make("b", {}, title), make("span", {}, notes), make("div", {}, text));
       one.legend.replaceChildren(...legend.map(([color, words]) =>
         make("span", {}, make("i", {style: `background:${color}`}), words)), make("span.bad", {}, refused));
-      one.box.hidden = !arrays[key];
-      if (arrays[key]) paint(one.canvas, arrays[key]);
+      one.box.hidden = !picture;
+      if (picture) paint(one.canvas, picture);
       panels.append(one.figure);
     }
     const wanted = JSON.stringify([shown.map(({key}) => key), state.size]);
@@ -395,7 +395,8 @@ export function pixelsPart(app, panel) {
   for (const one of findAll("[data-save]")) {
     one.onclick = async () => {
       try {
-        const {name, type, arrays} = await app.line.ask("pixels.export", {state, kind: one.dataset.save});
+        const {picture} = part.views.get("a"), kind = one.dataset.save;
+        const {name, type, arrays} = await askAbout(app.line, app.hello, state, "pixels.export", {kind}, picture ? [picture] : []);
         download(name, arrays.content, type);
       } catch (error) {
         told(error);

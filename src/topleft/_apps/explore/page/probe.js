@@ -1,8 +1,11 @@
-// Why a pixel is whose, without Python: what probe.py answers, in whole numbers of any length.
+// Says why a pixel is whose: edge values, top and left edges, the owner, who else could be, depth and barycentrics.
+// In: a state, a pixel of its window, which sample of it. Out: a sentence or two, and a row for each triangle near by. All is
+// computed in whole numbers of any length; what a method makes of the pixel is drawn by the engine.
 
-import {SINK} from "./kernels.js";
+import {drawScene} from "./engine.js";
 import {abs, cross, dyadic, quotient, rint, sixDigits} from "./numbers.js";
-import {bitsOf, checkReach, parseState, refuse, Refusal} from "./state.js";
+import {colorOf, css} from "./colors.js";
+import {drawingOf, parseState, refuse} from "./state.js";
 
 const MAX_ROWS = 6, MAX_DRAWN = 64;
 const gcd = (a, b) => b ? gcd(b, a % b) : abs(a);
@@ -40,7 +43,7 @@ function verdicts(state, pixel, sample, bits) {
 
 // The depth of the plane at the sample, as a fraction.
 function depthOf(state, numbers, edges, area) {
-  if (!state.has_depth) return null;
+  if (state.n_components < 3) return null;
   const z = numbers.map((i) => dyadic(state.vertices[i][2])), k = Math.max(...z.map(([, power]) => power));
   const sum = edges.reduce((total, {value}, i) => total + value * (z[i][0] << BigInt(k - z[i][1])), 0n);
   return [sum, area << BigInt(k)];
@@ -49,7 +52,7 @@ function depthOf(state, numbers, edges, area) {
 // The triangle that shows: the nearest depth as float32 has it, else the one that is drawn last.
 function winner(covered, state) {
   const inOrder = [...covered].sort((a, b) => a.triangle - b.triangle);
-  if (!state.has_depth) return inOrder.at(-1) ?? null;
+  if (state.n_components < 3) return inOrder.at(-1) ?? null;
   const near = (one) => (state.depth_test === "less" ? -1 : 1) * Math.fround(quotient(...one.depth));
   return inOrder.reduce((best, one) => best === null || near(one) > near(best) ? one : best, null);
 }
@@ -71,27 +74,22 @@ function sentences(state, found, owner, [x, y], k) {
   if (covered.length > 1 && owner) {
     const others = covered.filter((one) => one !== owner).map((one) => one.triangle);
     const listed = `${others.length === 1 ? "triangle" : "triangles"} ${others.slice(0, 4).join(", ")}${others.length > 4 ? " and others" : ""}`;
-    told.push(`Triangle ${owner.triangle} shows because ${state.has_depth ? "it is nearer" : "it is drawn last"}; ${listed} ${covered.length === 2 ? "is" : "are"} hidden.`);
+    told.push(`Triangle ${owner.triangle} shows because ${state.n_components > 2 ? "it is nearer" : "it is drawn last"}; ${listed} ${covered.length === 2 ? "is" : "are"} hidden.`);
   }
   return told;
 }
 
-// How often a classic draws a pixel for each triangle, [triangle, times]; null when that cannot be told.
-function drawnBy(kernels, data, state, place, method) {
-  if (state.triangles.length > MAX_DRAWN) return null;
-  const points = Float64Array.from(state.vertices.flat()), bits = bitsOf(state, method, data), found = [];
-  for (const [i, row] of state.triangles.entries()) {
-    const scene = {points, n_components: state.has_depth ? 3 : 2, triangles: Int32Array.from(row)};
-    try {
-      checkReach({...state, triangles: [row]}, method, bits, data);
-    } catch (error) {
-      if (error instanceof Refusal) return null;
-      throw error;
-    }
-    const [times] = kernels.classic(data.classics[method], scene, bits, SINK.count, place, [1, 1]);
-    if (times) found.push([i, times]);
-  }
-  return found;
+// How often each classic draws a pixel for each triangle, [triangle, times]; null where that cannot be told.
+async function timesDrawn(line, hello, state, origin, classics) {
+  const {points, n_components, corners} = state, n = state.triangles.length;
+  if (n > MAX_DRAWN || !classics.length) return classics.map(() => null);
+  const rows = Array.from({length: n}, (_, i) => corners.slice(3 * i, 3 * i + 3));
+  const drawings = classics.flatMap((method) => rows.map((triangles) => ({...drawingOf(state, method, hello), triangles})));
+  const drawn = await drawScene(line, {points, n_components, size: [1, 1], origin}, drawings);
+  return classics.map((_, k) => {
+    const own = drawn.slice(n * k, n * k + n);  // a vertex beyond the range of a classic: nothing is told of it
+    return own.some(({refused}) => refused) ? null : own.flatMap(({counts: [times]}, i) => times ? [[i, times]] : []);
+  });
 }
 
 // What a classic makes of the pixel, beside the exact rule.
@@ -107,22 +105,21 @@ function classicStory(method, times, owner) {
   return `${method} draws it ${n === 1 ? "once" : `${n} times`}, for ${drawn}; ${rule}.`;
 }
 
-export function probe(kernels, data, {state: given, pixel, sample = 0, method: asked}) {
-  const state = parseState(given, data), method = asked ?? state.method, bits = method === "exact" ? "exact" : bitsOf(state, method, data);
-  if (!pixel.every((at, k) => at >= 0 && at < state.size[k])) {
-    refuse(`pixel must lie in the window of (${state.size.join(", ")}), got ${pixel.join(", ")}`);
-  }
-  const found = verdicts(state, pixel, data.samples[state.n_samples][sample], bits);
+export async function probe(line, hello, {state: given, pixel, sample = 0, method: asked}) {
+  const state = parseState(given, hello), method = asked ?? state.method, {subpixel_bits: bits} = drawingOf(state, method, hello);
+  const positions = hello.samples[state.n_samples];
+  if (!pixel.every((at, k) => at >= 0 && at < state.size[k])) refuse(`pixel must lie in the window of ${state.size.join(" x ")}, got ${pixel.join(", ")}`);
+  const found = verdicts(state, pixel, positions[sample], bits);
   const place = pixel.map((at, k) => at + state.origin[k]), owner = winner(found.filter((one) => one.isCovered), state);
   const rows = found.slice(0, MAX_ROWS).map((one) => ({
     triangle: one.triangle,
-    color: data.triangle_colors[one.triangle % data.triangle_colors.length],
+    color: css(colorOf(one.triangle)),
     verdict: one === owner ? "owner" : one.isCovered ? "hidden" : one.isTouched ? "on its edge" : "outside",
     edges: one.edges.map((edge) => ({ends: named(edge), kind: edge.kind, value: number(edge.value, one.d), exact: fraction(edge.value, one.d)})),
     depth: one.depth && number(...one.depth),
     weights: one.edges.map(({value}) => number(value, one.area)).join(", "),
   }));
-  const classics = [...new Set([method, state.method, state.other])].filter((name) => name in data.classics);
-  const stories = classics.map((name) => classicStory(name, drawnBy(kernels, data, state, place, name), owner)).filter(Boolean);
-  return {header: {pixel: place, sentences: [...sentences(state, found, owner, place, sample), ...stories], owner: owner?.triangle ?? -1, rows, n_more: Math.max(0, found.length - MAX_ROWS)}};
+  const classics = [...new Set([method, state.method, state.other])].filter((name) => hello.methods.some((one) => one.name === name && one.is_classic));
+  const times = await timesDrawn(line, hello, state, place, classics), stories = classics.map((name, k) => classicStory(name, times[k], owner)).filter(Boolean);
+  return {pixel: place, sentences: [...sentences(state, found, owner, place, sample), ...stories], owner: owner?.triangle ?? -1, rows, n_more: Math.max(0, found.length - MAX_ROWS)};
 }

@@ -2,19 +2,20 @@
 
 import {make, group, row, button, choose, keyOf, paint} from "./elements.js";
 import {newest} from "./line.js";
+import {FAULTS, race, raceColumn} from "./race.js";
 
 export function racePart(app, panel) {
   const view = {family: "fan", positions: [3], seed: 0}, part = {state: () => view, enter, restore, drawn: 0};
   const stage = make("div.stage.race"), sliders = make("div"), what = make("p"), chart = make("table.chart"), by = make("p.hint"), side = make("div.side");
-  let known = null, racers = [], mapped = "";
+  const {race: known} = app.hello;
+  let racers = [], mapped = "";
 
   const draw = newest(async () => {
-    const told = await app.line.ask("race.draw", view).catch((error) => void app.say(error.message, true));
+    const told = await race(app.line, app.hello, view).catch((error) => void app.say(error.message, true));
     if (!told) return;
-    const {pictures} = told.arrays, shape = pictures.shape.slice(1), n = pictures.length / racers.length;
     racers.forEach(({canvas, count, figure}, k) => {
       const {text, title, bad} = told.rows[k];
-      paint(canvas, Object.assign(pictures.slice(k * n, (k + 1) * n), {shape}));
+      paint(canvas, told.pictures[k]);
       Object.assign(count, {textContent: text, className: bad === 0 ? "good" : "bad"});
       figure.title = title;
     });
@@ -32,10 +33,10 @@ export function racePart(app, panel) {
     mapped = wanted;
     by.textContent = `Wrong pixels, in % of those that an edge meets, by ${axis.what}. A dot: with gaps.`;
     const head = axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i))));
-    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...head)), make("tbody", {}, ...known.methods.map((name) =>
+    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...head)), make("tbody", {}, ...known.entries.map(({name}) =>
       make("tr", {}, make("th", {scope: "row"}, name), ...head.map(() => make("td"))))));
     for (let i = 0; i < axis.steps.length; i++) {
-      const column = await app.line.ask("race.column", {...view, positions: [...others, i]}).catch(() => null);
+      const column = await raceColumn(app.line, app.hello, {...view, positions: [...others, i]}).catch(() => null);
       if (mapped !== wanted || !column) return;
       column.cells.forEach(({text, color, kind, title}, k) => {
         const cell = Object.assign(chart.tBodies[0].rows[k].cells[i + 1], {textContent: text, title});
@@ -63,16 +64,15 @@ export function racePart(app, panel) {
     redraw();
   }
   function build() {
-    const seed = make("input", {type: "number", min: 0, max: (known.n_seeds ?? 100) - 1, value: view.seed, onchange: () => (view.seed = Math.min(seed.max, Math.max(0, seed.valueAsNumber | 0)), redraw())});
+    const seed = make("input", {type: "number", min: 0, max: known.n_seeds - 1, value: view.seed, onchange: () => (view.seed = Math.min(seed.max, Math.max(0, seed.valueAsNumber | 0)), redraw())});
     const families = Object.keys(known.families).map((name) => [name]);
-    side.replaceChildren(group("Race", choose("family", families, view.family, take), what, sliders, row("seed", seed), make("div.legend", {}, ...keyOf(known.key))));
+    side.replaceChildren(group("Race", choose("family", families, view.family, take), what, sliders, row("seed", seed), make("div.legend", {}, ...keyOf(FAULTS))));
     take(view.family);
   }
-  async function enter() {
+  function enter() {
     if (panel.firstChild) return;
     panel.append(make("div.layout.wide", {}, stage, side, group("Chart", by, make("div.scroll", {tabIndex: 0}, chart))));
-    known = await app.line.ask("race.families");
-    racers = known.methods.map((name) => {
+    racers = known.entries.map(({name}) => {
       const canvas = make("canvas"), count = make("span");
       return {canvas, count, figure: make("figure", {}, canvas, make("figcaption", {}, name.replace(/[_/]/g, "$&\u200b"), count))};
     });

@@ -1,26 +1,22 @@
-// The part Steps without Python: what trace.py answers. The kernels tell their steps; here they are put into words.
+// Puts the steps of a method into words. In: what the engine tells, words of int64 as steps.h of the classics describes them.
+// Out: each step with the numbers that decide it, and what they have changed by.
 
-import {asFloat, sixDigits} from "./numbers.js";
-import {takeScene} from "./pixels.js";
-import {bitsOf, checkMethod, checkReach, refuse} from "./state.js";
+import {traceScene} from "./engine.js";
+import {sixDigits} from "./numbers.js";
+import {refuse} from "./state.js";
 
-const isNumber = (value) => typeof value === "bigint" || typeof value === "number";
+const isNumeric = (value) => typeof value === "bigint" || typeof value === "number";
 
-// Python's "{:.6g}" and "{:+.6g}".
-function real(x) {
-  if (!Number.isFinite(x)) return Number.isNaN(x) ? "nan" : x < 0 ? "-inf" : "inf";
-  return Object.is(x, -0) ? "-0" : sixDigits(x);
-}
-const textOf = (value) => Array.isArray(value) ? value.map(textOf).join(", ") : typeof value === "bigint" ? `${value}` : real(value);
+const textOf = (value) => Array.isArray(value) ? value.map(textOf).join(", ") : typeof value === "bigint" ? `${value}` : sixDigits(value);
 function changeOf(before, value) {
-  if (!isNumber(before) || !isNumber(value)) return "";
-  const text = real(Number(value - before));
+  if (!isNumeric(before) || !isNumeric(value)) return "";
+  const text = sixDigits(Number(value - before));
   return text.startsWith("-") ? text : `+${text}`;
 }
 
 // The steps in a stream of words, as steps.h of the classics describes it.
 function* stepsOf({n, words}, kinds) {
-  const reals = new Float64Array(words.buffer);
+  const reals = new Float64Array(words.buffer, words.byteOffset, words.length);
   for (let at = 0, i = 0; i < n; i++) {
     const [kind, triangle, x, y, last, isDrawn] = Array.from(words.subarray(at, at + 6), Number), [name, side, isReal, numbers] = kinds[kind];
     at += 6;
@@ -43,31 +39,22 @@ function sentenceOf({name, side, triangle, x, y, last, isDrawn, values}) {
   }
 }
 
-export function trace(kernels, data, {vertices, triangles, size, origin = [0, 0], method, subpixel_bits: bits = 8}) {
-  const {kinds, methods, about, max_steps: most, max_side_px: side, max_triangles: many} = data.steps;
-  checkMethod(method, data);
-  if (!methods.includes(method)) refuse(`method must be one of ${methods.map((name) => `'${name}'`).join(", ")} to be traced, got '${method}'`);
-  if (Math.max(...size) > side || triangles.length > many) {
-    refuse(`a trace must have ${side} pixels a side and ${many} triangles at most, got (${size.join(", ")}) and ${triangles.length}`);
-  }
-  const classic = data.classics[method], state = {vertices: vertices.map((row) => row.slice(0, 2)), triangles, subpixel_bits: bits, sampling: "center"};
-  const own = bitsOf(state, method, data), scene = {points: Float64Array.from(state.vertices.flat()), n_components: 2, triangles: Int32Array.from(triangles.flat())};
-  if (classic) checkReach(state, method, own, data);
-  else {
-    kernels.within(() => takeScene(kernels, {...state, origin, size}, {...scene, points: scene.points.slice(), bits: own}));
-    const far = Math.max(0, ...triangles.flat().flatMap((i) => state.vertices[i]).map(Math.abs)) * 2 ** own;
-    if (far >= 2 ** 60) refuse(`vertices must lie within 2**60 sub-pixels of 0 to be traced, got ${sixDigits(far)}`);
-  }
-  const walk = {number: data.n_classics, form: ["edge", "scanline"].indexOf(method)};
-  const found = kernels.trace(classic ?? walk, scene, own, origin, size, most);
-  if (!found) refuse(`a trace must have ${most} steps at most: draw fewer triangles, or a smaller picture`);
+// Promises {size, steps, outlines, counts} of a method that draws a state: steps are lists [x, y, last, is drawn, triangle, kind,
+// sentence, values].
+export async function recorded(line, {kinds, methods}, {vertices, triangles, size, origin = [0, 0]}, name, bits) {
+  const method = methods.find((one) => one.name === name) ?? refuse(`method must be one of ${methods.map((one) => one.name).join(", ")}, got ${name}`);
+  const points = Float64Array.from(vertices.flatMap(([x, y]) => [x, y])), subpixel_bits = method.is_classic && !method.has_bits ? 8 : bits;
+  const {n, arrays} = await traceScene(line, {points, size, origin}, {triangles: Int32Array.from(triangles.flat()), method: name, subpixel_bits});
   const before = {}, steps = [];
-  for (const step of stepsOf(found, kinds)) {
+  for (const step of stepsOf({n, words: arrays.words}, kinds)) {
     const key = `${step.name} ${step.triangle}`, last = before[key] ?? {};
-    const values = Object.entries(step.values).filter(([name]) => name !== "is_inside").map(([name, value]) => [name, textOf(value), changeOf(last[name], value)]);
+    const values = Object.entries(step.values).filter(([word]) => word !== "is_inside").map(([word, value]) => [word, textOf(value), changeOf(last[word], value)]);
     steps.push([step.x, step.y, step.last, step.isDrawn, step.triangle, step.name, sentenceOf(step), values]);
     before[key] = step.values;
   }
-  const outlines = triangles.map((row) => row.map((i) => state.vertices[i].map((x, k) => asFloat(x - origin[k])).join(",")).join(" "));
-  return {header: {size, steps, about: about[method], methods, outlines}, arrays: {counts: [found.counts, [size[1], size[0]]]}};
+  const outlines = triangles.map((row) => row.map((i) => [0, 1].map((k) => vertices[i][k] - origin[k]).join(",")).join(" "));
+  return {size, steps, outlines, counts: arrays.counts};
 }
+
+// What is said of a method.
+export const aboutOf = ({summary, source}) => `${summary[0].toUpperCase()}${summary.slice(1)}. ${source}.`;

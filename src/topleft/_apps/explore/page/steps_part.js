@@ -2,6 +2,7 @@
 
 import {make, svg, group, row, choose, sceneOptions, keyOf, paint} from "./elements.js";
 import {newest} from "./line.js";
+import {aboutOf, recorded} from "./steps.js";
 
 // Colours of triangles, and of what is drawn again: Okabe and Ito's, which all eyes tell apart.
 const OWNERS = [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167]], TWICE = [213, 94, 0];
@@ -66,14 +67,13 @@ export function stepsPart(app, panel) {
     try {
       const drawn = app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels;
       const scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : drawn;
-      const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view, [width, height] = size;
+      const {method, subpixel_bits} = view, [width, height] = scene.size;
       const asked = JSON.stringify([view.scene, method, subpixel_bits]);
       if (!trace) told.textContent = "The steps are being recorded.";
-      trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
+      trace = await recorded(app.line, app.hello, scene, method, subpixel_bits);
       if (asked !== JSON.stringify([view.scene, view.method, view.subpixel_bits])) return;  // a link has come in between
-      methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
       methods.value = method;
-      about.textContent = trace.about;
+      about.textContent = aboutOf(app.hello.methods.find(({name}) => name === method));
       over.setAttribute("viewBox", `0 0 ${width} ${height}`);
       over.replaceChildren(...["halo", "edges"].flatMap((name) => trace.outlines.map((points) => svg("polygon", {class: name, points}))), now);
       for (const [name, value] of Object.entries({width, height})) over.parentNode.style.setProperty(`--${name}`, value);
@@ -88,7 +88,8 @@ export function stepsPart(app, panel) {
   const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: null}), record());
   const scenes = choose("scene", [["", "that of Pixels"]], "", set("scene"));
   scenes.lastChild.append(...sceneOptions(app));
-  const chosen = choose("method", [["edge"]], "edge", set("method")), methods = chosen.lastChild;
+  const traced = app.hello.methods.flatMap(({name}) => name === "auto" ? [] : [[name]]);
+  const chosen = choose("method", traced, "edge", set("method")), methods = chosen.lastChild;
   const bits = choose("sub-pixel bits", [[0], [1], [2], [4], [8], [12], [16]], 8, set("subpixel_bits", Number));
   const press = (event) => {
     const act = Object.values(actions).find(([, key]) => key === (event.shiftKey ? "Shift+" : "") + event.key)?.[2];
