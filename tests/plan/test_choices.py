@@ -313,7 +313,7 @@ def guess_of(vertices, size, **view):
     """What a scene in pixels seems to hold: triangles in the picture, layers, and rows."""
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     checked = View.parse(size, view)
-    return snap_mesh(KeptMemory(), vertices, triangles, checked, with_depth=False, out=None).mesh.guess_seen(*size)
+    return snap_mesh(KeptMemory(), vertices, triangles, checked, with_depth=False, out=None).work
 
 
 def test_guess_counts_triangles_in_the_picture():

@@ -31,9 +31,9 @@ def scenes(view):
     for n, seen, layers, rows, scatter in product(
         COUNTS[::3], (1.0, 0.06), (0.01, 0.3, 2.0, 30.0), (1.0, 4.2, 4.4, 40.0), (0.0, 0.4, 1.0)
     ):
-        guess = (seen * n, layers, min(rows * seen * n, layers * view.size[0] * view.size[1]))
-        mesh = SimpleNamespace(guess_seen=lambda *_, g=guess: g, guess_scatter=lambda _, s=scatter: s)
-        yield SimpleNamespace(mesh=mesh, n_triangles=n, n_vertices=n // 2, has_depth=True)
+        work = (seen * n, layers, min(rows * seen * n, layers * view.size[0] * view.size[1]))
+        mesh = SimpleNamespace(guess_scatter=lambda _, s=scatter: s)
+        yield SimpleNamespace(mesh=mesh, work=work, n_triangles=n, n_vertices=n // 2, has_depth=True)
 
 
 def surveys():

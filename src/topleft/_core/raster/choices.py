@@ -145,7 +145,7 @@ def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
     n_pixels = view.size[0] * view.size[1]
     if n_pixels <= costs.near_pixels:
         row_ns, pixel_ns = min(row_ns, costs.near_row), min(pixel_ns, costs.near_pixel)
-    _, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
+    _, n_layers, n_rows = snapped.work
     drawn_ns = row_ns * n_rows + n_pixels * (sample_ns * n_layers + pixel_ns)
     return float(costs.work_triangle * snapped.n_triangles + view.sampling.n_samples * drawn_ns)
 
@@ -308,7 +308,7 @@ def first_depth(points: NDArray[Any], *, has_depth: bool) -> float:
 def pays_without_depth(snapped: Snapped, view: View) -> bool:
     """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are."""
     costs, n_pixels = cost_table(), view.size[0] * view.size[1]
-    _, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
+    _, n_layers, n_rows = snapped.work
     compared_ns = costs.compared_sample * n_layers * n_pixels
     if n_pixels > costs.near_pixels:
         compared_ns += costs.compared_row * n_rows
@@ -351,7 +351,7 @@ def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
         return False
     if n == 0 or not can_slice(view):
         return False
-    n_seen, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
+    n_seen, n_layers, n_rows = snapped.work
     if is_area:
         return costs.area_pixel * n_pixels + costs.area_row * n_rows > costs.area_triangle * n
     n_covered = n_layers * n_pixels
@@ -376,7 +376,7 @@ def pays_to_sort_labels(view: View, snapped: Snapped, n_threads: int) -> bool:
     costs, n_pixels = cost_table(), view.size[0] * view.size[1]
     if n_threads > 1 or 4 * n_pixels * view.sampling.n_samples > costs.label_planes:
         return True
-    n_seen, n_layers, _ = snapped.mesh.guess_seen(*view.size)
+    n_seen, n_layers, _ = snapped.work
     return n_layers * n_pixels >= costs.label_pixels * n_seen
 
 
@@ -386,7 +386,7 @@ def pays_to_bound(view: View, snapped: Snapped, sink: Sink) -> bool:
     is_kept = sink in (Sink.NEAREST, Sink.FARTHEST) and view.sampling is Sampling.CENTER and not view.is_exact
     if not is_kept or width < costs.bound_columns or snapped.n_triangles > costs.bound_triangles:
         return False
-    _, n_layers, n_rows = snapped.mesh.guess_seen(width, height)
+    _, n_layers, n_rows = snapped.work
     return n_layers * width * height >= costs.bound_span * max(1.0, n_rows)
 
 
@@ -404,7 +404,7 @@ def rows_to_blend(view: View, snapped: Snapped, row_bytes: int, *, lays_ground: 
     n_rows = max(1, int(costs.blend_bytes) // row_bytes)
     if n_rows >= height:
         return height
-    _, n_layers, n_triangle_rows = snapped.mesh.guess_seen(width, height)
+    _, n_layers, n_triangle_rows = snapped.work
     n_covered = n_layers * width * height
     again_ns = n_triangle_rows * costs.blended_row + n_covered * costs.blended_pixel
     ground_ns = min(n_covered, width * height) * costs.blended_pixel if lays_ground else 0.0
@@ -437,6 +437,40 @@ def route(view: View, snapped: Snapped, test: DepthTestOption | None, *, wants_d
     else:
         found = Route.DEPTH
     return found, drawing(view, snapped, sink)
+
+
+class FillRoute(Enum):
+    """How `fill` draws a mesh."""
+
+    NOTHING = "no triangle, or no pixel"
+    SHAPES = "row by row: a few large triangles"
+    BLENDED_SHAPES = "row by row, mixed with the colours below"
+    BLENDED = "triangle by triangle, in their order"
+    SAMPLES = "labels of the samples, then colours of the pixels"
+    LABELS = "labels, then colours"
+
+
+def fill_route(
+    view: View, snapped: Snapped, colors: NDArray[Any], *, is_flat: bool, is_mixed: bool, has_ground: bool
+) -> FillRoute:
+    """Return how `fill` draws a mesh; `is_mixed`: with the colours below, `has_ground`: over one colour."""
+    if not snapped.n_triangles or 0 in view.size:
+        return FillRoute.NOTHING
+    shapes = blends_large_shapes if is_mixed else fills_large_shapes
+    if has_ground and shapes(snapped, view, colors, is_flat=is_flat):
+        return FillRoute.BLENDED_SHAPES if is_mixed else FillRoute.SHAPES
+    if is_mixed or is_direct(snapped, view, colors.dtype, is_flat=is_flat):
+        return FillRoute.BLENDED
+    return FillRoute.SAMPLES if view.sampling.n_samples > 1 else FillRoute.LABELS
+
+
+def lays_ground(found: FillRoute, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+    """Tell whether a way to fill gives pixels without a triangle their colour, too."""
+    if found is FillRoute.BLENDED:
+        return colors.itemsize == 1 and view.sampling.n_samples == 1
+    if found in (FillRoute.SAMPLES, FillRoute.LABELS):
+        return is_flat and (found is FillRoute.LABELS or can_slice(view))
+    return found is not FillRoute.NOTHING
 
 
 def can_split(view: View, n_triangles: int) -> bool:
@@ -489,8 +523,7 @@ def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bo
     """
     if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1 or view.is_exact:
         return False
-    n_seen, _, _ = snapped.mesh.guess_seen(*view.size)
-    costs = cost_table()
+    costs, (n_seen, _, _) = cost_table(), snapped.work
     return n_seen * costs.direct_triangle <= view.size[0] * view.size[1] * costs.paint
 
 

@@ -19,6 +19,7 @@ from topleft._core.base.memory import Memory
 from topleft._core.base.options import Sampling, Sink, parse
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
+from topleft._core.raster.choices import FillRoute
 from topleft._core.raster.classic import fill_classic
 from topleft._core.raster.rasterize import Canvas, draw, draw_all_samples
 from topleft._core.raster.sampling import SAMPLE_GRID_BITS, SamplePass, draw_means, sample_positions
@@ -138,28 +139,15 @@ def draw_fill(
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         painting = Painting(memory, snapped, view, palette, canvas, transfer, is_flat, ground)
-        is_drawn = bool(canvas.size and snapped.n_triangles)
-        is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
-        has_samples = view.sampling.n_samples > 1
-        can_lay = is_drawn and is_blended and painting.is_u8 and not has_samples
-        can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_slice(view)))
-        if blending.is_needed:
-            is_large_shapes = is_drawn and choices.blends_large_shapes(snapped, view, palette, is_flat=is_flat)
-        else:
-            is_large_shapes = is_drawn and choices.fills_large_shapes(snapped, view, palette, is_flat=is_flat)
-        if ground is not None and not (can_lay or is_large_shapes):
+        route = choices.fill_route(
+            view, snapped, palette, is_flat=is_flat, is_mixed=blending.is_needed, has_ground=ground is not None
+        )
+        if ground is not None and not choices.lays_ground(route, view, palette, is_flat=is_flat):
             painting = painting.with_ground_laid()
-        is_large_shapes = is_large_shapes and painting.ground is not None
-        if not is_drawn:
-            pass
-        elif is_large_shapes and not blending.is_needed:
-            fill_large_shapes(painting)
-        elif is_blended:
-            blend(painting, blending, is_large_shapes=is_large_shapes)
-        elif has_samples:
-            paint_samples(painting)
-        else:
-            paint(painting)
+        if route in (FillRoute.BLENDED, FillRoute.BLENDED_SHAPES):
+            blend(painting, blending, is_large_shapes=route is FillRoute.BLENDED_SHAPES)
+        elif route is not FillRoute.NOTHING:
+            ROUTES[route](painting)
     view.mark("shade")
     return result
 
@@ -276,6 +264,9 @@ def paint_samples(p: Painting) -> None:
         resolve_flat(p, labels, drawing.n_threads)
     else:
         resolve_gouraud(p, samples, labels)
+
+
+ROUTES = {FillRoute.SHAPES: fill_large_shapes, FillRoute.SAMPLES: paint_samples, FillRoute.LABELS: paint}
 
 
 def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:

@@ -6,7 +6,7 @@ Or takes it as it is: vertices in pixels as float64, which no grid moves.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, NoReturn, cast
 
 import numpy as np
@@ -51,7 +51,18 @@ class Snapped:
     given: MeshArrays
     records: NDArray[np.uint8]  # `tl_vertex` in csrc
     pieces: engine.Pieces | None
+    size: tuple[int, int]  # of the view, pixels
     can_slice: bool = True  # whether threads can each take some of the triangles
+    _work: tuple[float, float, float] | None = field(default=None, init=False, repr=False)
+
+    @property
+    def work(self) -> tuple[float, float, float]:
+        """What a draw will meet, guessed when the first choice asks: see `SnappedMesh.guess_seen`."""
+        work = self._work
+        if work is None:
+            work = self.mesh.guess_seen(*self.size)
+            object.__setattr__(self, "_work", work)
+        return work
 
     @property
     def n_vertices(self) -> int:
@@ -179,7 +190,7 @@ def snap_input(memory: Memory, given: MeshArrays, view: View, *, with_depth: boo
     def made(triangles: NDArray[np.int32], how: RasterState) -> engine.SnappedMesh:
         return engine.SnappedMesh(source, records, wide, triangles, pieces, how, viewport)
 
-    return Snapped(without_sides(made, indices if n else indices[:0], view), given, records, pieces)
+    return Snapped(without_sides(made, indices if n else indices[:0], view), given, records, pieces, view.size)
 
 
 def snap_for_floats(memory: Memory, given: MeshArrays, view: View, *, must_check: bool) -> Snapped | None:
@@ -253,7 +264,7 @@ def exact_mesh(
         return engine.SnappedMesh(given.source, NO_RECORDS, None, triangles, None, how, viewport, exact=exact)
 
     mesh = without_sides(made, triangles, view)
-    return Snapped(mesh, given, NO_RECORDS, None, can_slice=pieces is None)
+    return Snapped(mesh, given, NO_RECORDS, None, view.size, can_slice=pieces is None)
 
 
 def take_points(memory: Memory, given: MeshArrays, n: int, *, must_check: bool) -> tuple[NDArray[np.float64], int]:
