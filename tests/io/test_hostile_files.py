@@ -161,8 +161,6 @@ def folder(tmp_path):
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_load_of_mutated_files_ends_in_a_mesh_or_one_line(folder, kind):
-    if kind == "collada":
-        pytest.importorskip("collada", reason="needs pycollada, of the extra formats")
     name, variant = FORMATS[kind]
     picture = (folder / "a.png").read_bytes()
     path = folder / ("a.obj" if kind in ("mtl", "png") else name)

@@ -491,7 +491,7 @@ def main() -> int:
     parser.add_argument("asked", nargs="*", metavar="FORMAT[:PART[:PART]]", default=list(FORMATS))
     parser.add_argument("--bytes", type=int, default=MOST_BYTES, help="of a file, before it is read")
     options = parser.parse_args()
-    for module in ("trimesh", "collada", "lxml.etree", "networkx", "PIL.Image"):
+    for module in ("trimesh", "lxml.etree", "networkx", "PIL.Image"):
         try:
             __import__(module)
         except ImportError:

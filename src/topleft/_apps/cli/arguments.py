@@ -28,7 +28,7 @@ from topleft.typing import CullOption, ShadingOption
 FAILED, REFUSED = 1, 2
 """Exit status: a part of the work failed; nothing could be done."""
 
-UP_HELP = "the axis that points up: z for most CAD, print, scan and map files; never guessed (default y)"
+UP_HELP = "the axis that points up: z for most CAD, print, scan and map files (default: as COLLADA says, else y)"
 
 SUBPIXEL_BITS_HELP = "vertices snap to 2^-N pixels, 0 to 16, or stay where they are: exact (default 8)"
 
@@ -265,7 +265,7 @@ def add_orbit_arguments(parser: Any) -> Callable[..., Any]:
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
     add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
     add("--ortho", action="store_true", help="no perspective")
-    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
+    add("--up", choices=["y", "z"], help=UP_HELP)
     return add
 
 

@@ -76,7 +76,7 @@ def read_texture(path: str) -> Texture:
     return Texture(read_picture(path))
 
 
-def read_environment(text: str, up: str) -> Environment:
+def read_environment(text: str, up: str | None) -> Environment:
     """The light from all around of a colour, two colours, or the picture of a file."""
     from PIL import ImageColor
 

@@ -43,6 +43,7 @@ from topleft._meshes.camera.matrices import (
     perspective_matrix,
     points_to_frame,
     split_matrix,
+    up_of,
     view_matrix,
 )
 from topleft._meshes.model.mesh import Mesh
@@ -615,7 +616,7 @@ class Camera:
         azimuth_deg: float = THREE_QUARTER_DEG[0],
         elevation_deg: float = THREE_QUARTER_DEG[1],
         fov_y_deg: float = DEFAULT_FOV_Y_DEG,
-        up: UpOption = "y",
+        up: UpOption | None = None,
         ortho: bool = False,
         aspect: float = 1.0,
         fit: FitOption = "sphere",
@@ -632,8 +633,8 @@ class Camera:
             0 is level, 90 looks straight down. Degrees, -90 to 90.
         fov_y_deg : float
             Field of view from bottom to top, degrees. Sets the distance from which `ortho` is seen, too.
-        up : {"y", "z"}
-            The axis of the world that points up.
+        up : {"y", "z"}, optional
+            The axis of the world that points up: that of a mesh, else y, unless given.
         ortho : bool
             Without perspective.
         aspect : float
@@ -654,7 +655,7 @@ class Camera:
         parse(FitOption, "fit", fit)
         points = None if fit == "sphere" else box_corners(ends) if fit == "box" else points_to_frame(framed)
         angles = azimuth_deg, elevation_deg, fov_y_deg
-        fills = fit == "silhouette"
+        fills, up = fit == "silhouette", up_of(framed) if up is None else up
         matrices = framing_matrices(ends, points, angles, up=up, ortho=ortho, aspect=aspect, fills=fills)
         return cls(*matrices, aspect=1.0)
 
@@ -706,5 +707,5 @@ def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: 
         raise ValueError("there is nothing to frame: the mesh has no triangles")
     width, height = size
     aspect = width / height if width > 0 and height > 0 else 1.0
-    angles = *THREE_QUARTER_DEG, DEFAULT_FOV_Y_DEG
-    return Camera(*framing_matrices(subject.extreme_points(), None, angles, aspect=aspect), aspect=1.0)
+    angles, up = (*THREE_QUARTER_DEG, DEFAULT_FOV_Y_DEG), up_of(subject)
+    return Camera(*framing_matrices(subject.extreme_points(), None, angles, up=up, aspect=aspect), aspect=1.0)

@@ -40,6 +40,11 @@ def as_framed(subject: MeshLike | Scene | npt.ArrayLike) -> Framed:
     return as_real("subject", subject)
 
 
+def up_of(subject: Framed) -> UpOption:
+    """The axis that points up unless something else is asked for: that of a mesh, else y."""
+    return subject.up if isinstance(subject, Mesh) else "y"
+
+
 def points_to_frame(subject: Framed) -> F64:
     """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points."""
     if isinstance(subject, Points):

@@ -18,7 +18,7 @@ from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count
 from topleft._core.base.defaults import THREE_QUARTER_DEG
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.camera.matrices import Framed, as_framed, bounding_sphere, ends_to_frame
+from topleft._meshes.camera.matrices import Framed, as_framed, bounding_sphere, ends_to_frame, up_of
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import FitOption, UpOption
 
@@ -73,7 +73,7 @@ def turntable(
     12
     """
     n = as_count("n", n)
-    sphere = _looked_at(subject, framing.get("fit", "sphere"))
+    sphere = _looked_at(subject, framing)
     return [
         Camera.framing(sphere, azimuth_deg=azimuth_deg + 360 * i / n, elevation_deg=elevation_deg, **framing)
         for i in range(n)
@@ -115,7 +115,7 @@ def viewpoints(subject: MeshLike | Scene | npt.ArrayLike, n: int, **framing: Unp
     True
     """
     n = as_count("n", n)
-    sphere = _looked_at(subject, framing.get("fit", "sphere"))
+    sphere = _looked_at(subject, framing)
     height = 1 - (2 * np.arange(n) + 1) / n
     return [
         Camera.framing(sphere, azimuth_deg=i * GOLDEN_ANGLE_DEG % 360, elevation_deg=elevation_deg, **framing)
@@ -123,10 +123,11 @@ def viewpoints(subject: MeshLike | Scene | npt.ArrayLike, n: int, **framing: Unp
     ]
 
 
-def _looked_at(subject: MeshLike | Scene | npt.ArrayLike, fit: str) -> Framed:
-    """The subject of all cameras, converted once; for its sphere two points with the same sphere."""
+def _looked_at(subject: MeshLike | Scene | npt.ArrayLike, framing: FramingOptions) -> Framed:
+    """The subject of all cameras, converted once; for its sphere two points with the same sphere, and its axis."""
     framed = as_framed(subject)
-    if fit != "sphere":
+    framing.setdefault("up", up_of(framed))
+    if framing.get("fit", "sphere") != "sphere":
         return framed
     center, radius = bounding_sphere(ends_to_frame(framed))
     return np.stack([center - [radius, 0, 0], center + [radius, 0, 0]])

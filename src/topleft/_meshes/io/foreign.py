@@ -1,10 +1,6 @@
-"""Reads formats without a reader here by trimesh: 3MF, COLLADA and others.
+"""Reads formats without a reader here by trimesh: 3MF, STEP and others.
 
-Input: a file, unchecked. Output: `Mesh` parts, placed. trimesh cuts polygons of COLLADA into fans, which reach
-beyond concave ones, and leaves out geometries of controllers and of materials that are missing: so its XML is made
-simpler before.
-
-Based on: Khronos Group, "COLLADA 1.4.1 Specification", 2008.
+Input: a file, unchecked. Output: `Mesh` parts, placed.
 """
 
 from __future__ import annotations
@@ -17,25 +13,17 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
-from urllib.parse import unquote
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
 
 import numpy as np
-import numpy.typing as npt
 
-from topleft._core.base.array_types import Array
-from topleft._core.base.notes import Notes
 from topleft._meshes.io.limits.archives import check_zip
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.limits.walks import walks
-from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text
+from topleft._meshes.io.references import Cloud, InputFile
 from topleft._meshes.model.from_trimesh import Textures, placed
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
-from topleft._meshes.model.polygons import triangulate
 from topleft.errors import MeshError, MissingPackageError
 
 NO_TRIANGLES = {
@@ -52,7 +40,7 @@ UNBOUNDED = {
 """Formats without a budget: whoever trusts the file reads it by meshio, and gives its points and triangles."""
 
 PACKAGES = {
-    ".3mf": "lxml networkx", ".dae": "pycollada lxml networkx", ".xaml": "lxml networkx",
+    ".3mf": "lxml networkx", ".xaml": "lxml networkx",
     ".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm",
 }  # fmt: skip
 """Formats that trimesh reads by packages of their own."""
@@ -75,11 +63,6 @@ BINARY_DXF = b"AutoCAD Binary DXF"
 NODES_OF_TRIMESH = 4
 """Nodes of glTF that take as long as one that trimesh reads: 0.2 ms."""
 
-SKINS = "skins and morph targets drawn as they were modelled"
-
-OF_NUMBERS = frozenset({"float_array", "float", "color", "matrix", "translate", "rotate", "scale", "lookat"})
-"""Elements that hold numbers which need not be whole."""
-
 
 def read_by_trimesh(source: InputFile) -> list[Mesh]:
     """The meshes of a file, in its order."""
@@ -91,13 +74,13 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
     _refuse_unreadable(source, suffix)
     try:
         with quiet():
-            scene, double_sided = _scene(trimesh, source, suffix)
-            parts = [_sided(part, double_sided) for part in _parts(scene, source)]
+            source.content()  # which is counted
+            parts = list(_parts(trimesh.load_scene(str(source.path), process=False), source))
     except NotImplementedError:
         if suffix in CONVERTERS:
             told = CONVERTERS[suffix].format(name=source.path.stem, suffix=source.path.suffix)
             raise MeshError(f"cannot read {str(source.path)!r}: there is no reader of {suffix}; {told}") from None
-        readable = " ".join(sorted(trimesh.available_formats() | {"obj", "ply", "stl", "gltf", "glb"}))
+        readable = " ".join(sorted(trimesh.available_formats() | {"dae", "obj", "ply", "stl", "gltf", "glb"}))
         raise MeshError(
             f"cannot read {str(source.path)!r}: format {source.path.suffix!r} is none of {readable}"
         ) from None
@@ -224,43 +207,6 @@ class Model3MF:
                 self.elsewhere.append((name, path))
 
 
-def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | None]:
-    """The meshes that trimesh reads of a file, and whether all materials have two sides; None if each says so itself.
-
-    COLLADA is read after its polygons have been cut; trimesh does not read the sides of its materials.
-    """
-    content = source.content()
-    if suffix != ".dae":
-        del content  # which is counted
-        return trimesh.load_scene(str(source.path), process=False), None
-
-    class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
-        def get(self, name: str) -> bytes:
-            content = source.picture_content(unquote(name))
-            if content is None:
-                raise FileNotFoundError(name)
-            return content
-
-    simple, double_sided = simplified(content, source.notes, source.budget)
-    _note_missing_pictures(content, source)
-    scene = trimesh.load_scene(io.BytesIO(simple), file_type="dae", resolver=Beside(str(source.path)), process=False)
-    return scene, double_sided
-
-
-def _sided(mesh: Mesh, double_sided: bool | None) -> Mesh:
-    """The mesh with materials of two sides, or of one; None: as they are."""
-    if double_sided is None:
-        return mesh
-    return replace(mesh, materials=tuple(replace(one, double_sided=double_sided) for one in mesh.materials))
-
-
-def _note_missing_pictures(content: bytes, source: InputFile) -> None:
-    """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out silently."""
-    names = re.findall(rb"<init_from>\s*(?:<ref>)?\s*([^<\s][^<]*\.[A-Za-z]{3,4})\s*<", content)
-    for name in names:
-        source.find(unquote(name.decode("utf-8", errors="replace")).removeprefix("file://"), "textures")
-
-
 def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
     """The meshes of a trimesh scene, in its order, placed."""
     textures: Textures = {}
@@ -294,178 +240,3 @@ def quiet() -> Iterator[None]:
             yield
     finally:
         logger.removeHandler(handler)
-
-
-def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, bool]:
-    """The file with triangles alone, and whether its materials have two sides: unless all say that they have one."""
-    budget.spend("max_lines", content.count(b"<") - content.count(b"</"))
-    try:
-        root = ElementTree.fromstring(content)
-    except ElementTree.ParseError as error:
-        raise MeshError(f"it is no XML: {error}") from error
-    space = root.tag.partition("}")[0] + "}" if root.tag.startswith("{") else ""
-    named = {row.get("id"): row for row in root.iter() if row.get("id")}
-    for row in root.iter():
-        if row.text and "," in row.text and row.tag[len(space) :] in OF_NUMBERS:  # some programs write decimal commas
-            row.text = row.text.replace(",", ".")
-    positions: dict[Element, Array] = {}
-    for mesh in root.iter(f"{space}mesh"):
-        for kind in ("polylist", "polygons"):
-            for row in mesh.findall(f"{space}{kind}"):
-                _cut(row, space, named, positions, notes)
-        if mesh.find(f"{space}lines") is not None or mesh.find(f"{space}linestrips") is not None:
-            notes.add("lines not drawn")
-    for node in list(root.iter(f"{space}node")):
-        for row in node.findall(f"{space}instance_controller"):
-            _uncontrol(row, space, named, notes)
-    for bound in list(root.iter(f"{space}technique_common")):
-        kept = []  # `remove` would search all rows for each
-        for row in bound:
-            if row.tag != f"{space}instance_material" or _is_material(row.get("target", ""), space, named):
-                kept.append(row)
-            else:
-                notes.add("materials that are not there", row.get("target", "")[1:])
-        bound[:] = kept
-    if root.find(f"{space}library_animations/{space}animation") is not None:
-        notes.add("animations not played: everything is at rest")
-    _check_walks(root, space, named, budget)
-    return ElementTree.tostring(root), _has_two_sides(root, space, notes)
-
-
-def _has_two_sides(root: Element, space: str, notes: Notes) -> bool:
-    """Whether materials are drawn from both sides: unless all effects say 0."""
-    effects = list(root.iter(f"{space}effect"))
-    n_single = sum(row.findtext(f".//{space}double_sided", "").strip() == "0" for row in effects)
-    if 0 < n_single < len(effects):
-        notes.add("materials of one side among others drawn from both sides")
-    return n_single == 0 or n_single < len(effects)
-
-
-def _check_walks(root: Element, space: str, named: dict[str | None, Element], budget: Budget) -> None:
-    """Count nodes and triangles that the scene places, and put nodes before those that name them, for pycollada."""
-    nodes: dict[str | None, list[Element]] = defaultdict(list)
-    for node in root.iter(f"{space}node"):
-        nodes[node.get("id")].append(node)
-    below: dict[Element, list[Element]] = {}
-    for parent in [*root.iter(f"{space}visual_scene"), *root.iter(f"{space}node")]:
-        below[parent] = [
-            child
-            for row in parent
-            for child in (nodes.get(row.get("url", "")[1:], []) if row.tag == f"{space}instance_node" else [row])
-            if row.tag in (f"{space}instance_node", f"{space}node")
-        ]
-    scene = root.find(f"{space}scene/{space}instance_visual_scene")
-    shown = None if scene is None else named.get(scene.get("url", "")[1:])
-    found = walks(below, [] if shown is None else [shown])
-    own: dict[Element, tuple[int, int]] = {}
-    n_nodes = n_triangles = 0
-    for node, (n, _) in found.items():
-        n_nodes += n
-        for row in node.findall(f"{space}instance_geometry"):
-            geometry = named.get(row.get("url", "")[1:])
-            if geometry is not None:
-                own[geometry] = own[geometry] if geometry in own else _counts(geometry, space)
-                n_nodes += n * (own[geometry][0] + sum(1 for _ in row.iter(f"{space}instance_material")))
-                n_triangles += n * own[geometry][1]
-    budget.spend("max_nodes", NODES_OF_TRIMESH * n_nodes)
-    budget.check("max_triangles", n_triangles)
-    places = {node: i for i, node in enumerate(found)}
-    for library in root.findall(f"{space}library_nodes"):
-        library[:] = sorted((node for node in library if node in places), key=lambda node: -places[node])
-
-
-def _counts(geometry: Element, space: str) -> tuple[int, int]:
-    """How many lists of triangles a geometry has, and how many triangles; no fewer than pycollada makes."""
-    n_lists = n_triangles = 0
-    for kind in ("triangles", "trifans", "tristrips"):
-        for row in geometry.iter(f"{space}{kind}"):
-            n_lists += 1
-            stride = 1 + max((int(one.get("offset", 0)) for one in row.findall(f"{space}input")), default=0)
-            n_corners = sum(len((one.text or "").split()) for one in row.findall(f"{space}p")) // stride
-            n_triangles += n_corners // 3 if kind == "triangles" else n_corners
-    return n_lists, n_triangles
-
-
-def _is_material(target: str, space: str, named: dict[str | None, Element]) -> bool:
-    """Whether there is a material with an effect; one of another file may be there."""
-    if not target.startswith("#"):
-        return True
-    material = named.get(target[1:])
-    effect = None if material is None else material.find(f"{space}instance_effect")
-    return effect is not None and effect.get("url", "")[1:] in named
-
-
-def _cut(row: Element, space: str, named: dict[str | None, Element], known: dict[Element, Array], notes: Notes) -> None:
-    """Make triangles of polygons, in place."""
-    inputs = row.findall(f"{space}input")
-    stride = 1 + max((int(one.get("offset", 0)) for one in inputs), default=0)
-    vertex = next((one for one in inputs if one.get("semantic") == "VERTEX"), None)
-    if vertex is None or row.find(f"{space}ph") is not None:
-        notes.add("polygons with holes not read" if vertex is not None else "polygons without vertices not read")
-        row[:] = [one for one in row if one.tag != f"{space}ph"]
-        if vertex is None:
-            return
-    lists = [one.text or "" for one in row.findall(f"{space}p")]
-    corners = _whole(" ".join(lists))
-    if row.tag == f"{space}polylist":
-        n_corners = _whole(row.findtext(f"{space}vcount"))
-    else:
-        n_corners = np.array([len(one.split()) // stride for one in lists], np.int64)
-    if (n_corners < 0).any() or int(n_corners.sum()) * stride != len(corners):
-        raise MeshError(f"a list of polygons has {len(corners)} numbers for {int(n_corners.sum())} corners")
-    corners = corners.reshape(-1, stride)
-    positions = _positions(vertex, space, named, known)
-    triangles, _ = triangulate(positions, corners[:, int(vertex.get("offset", 0))], n_corners)
-    row[:] = [one for one in row if one.tag not in (f"{space}p", f"{space}vcount")]
-    row.tag = f"{space}triangles"
-    row.set("count", str(len(triangles)))
-    ElementTree.SubElement(row, f"{space}p").text = " ".join(map(str, corners[triangles.ravel()].ravel().tolist()))
-
-
-def _positions(vertex: Element, space: str, named: dict[str | None, Element], known: dict[Element, Array]) -> Array:
-    """The positions (V, 3) that an input of vertices names; each source is read once."""
-    vertices = named.get(vertex.get("source", "")[1:])
-    rows = [] if vertices is None else vertices.findall(f"{space}input")
-    source = next((named.get(one.get("source", "")[1:]) for one in rows if one.get("semantic") == "POSITION"), None)
-    if source is None:
-        raise MeshError("polygons name positions that are not there")
-    if source in known:
-        return known[source]
-    accessor = source.find(f"{space}technique_common/{space}accessor")
-    stride = 3 if accessor is None else int(accessor.get("stride", 1))
-    start = 0 if accessor is None else int(accessor.get("offset", 0))
-    numbers = numbers_of_text((source.findtext(f"{space}float_array") or "").encode())[start:]
-    if not 2 <= stride <= 64:
-        raise MeshError(f"positions have {stride} numbers")
-    known[source] = numbers[: len(numbers) // stride * stride].reshape(-1, stride)[:, :3]
-    return known[source]
-
-
-def _whole(text: str | None) -> npt.NDArray[np.int64]:
-    return numbers_of_text((text or "").encode(), np.int64)
-
-
-def _uncontrol(row: Element, space: str, named: dict[str | None, Element], notes: Notes) -> None:
-    """Put the geometry of a controller where the controller is, in place."""
-    notes.add(SKINS)
-    matrix: str | None = None
-    url = row.get("url", "")
-    for _ in range(len(named)):  # a skin may move the result of a morph
-        controller = named.get(url[1:])
-        if controller is None or controller.tag != f"{space}controller":
-            break
-        kind = next((each for each in controller if each.tag in (f"{space}skin", f"{space}morph")), None)
-        if kind is None:
-            return
-        matrix = kind.findtext(f"{space}bind_shape_matrix") or matrix
-        url = kind.get("source", "")
-    row.tag = f"{space}instance_geometry"
-    row.set("url", url)
-    row[:] = [one for one in row if one.tag != f"{space}skeleton"]
-    if matrix:  # the row becomes a node, with itself in it
-        inner = Element(row.tag, row.attrib)
-        inner[:] = row[:]
-        row.clear()
-        row.tag = f"{space}node"
-        ElementTree.SubElement(row, f"{space}matrix").text = matrix
-        row.append(inner)

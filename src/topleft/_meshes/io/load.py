@@ -53,7 +53,7 @@ def load(
     max_unpacked_bytes: int | None = None,
     scale: float = 1.0,
 ) -> Mesh | Points:
-    r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh and meshio others.
+    r"""A mesh read from a file: OBJ, PLY, STL, OFF, COLLADA, glTF and GLB; by trimesh and meshio others.
 
     Parameters
     ----------
@@ -212,6 +212,10 @@ def _parts(source: InputFile) -> list[Mesh]:
             from topleft._meshes.io.stl_off import read_off
 
             return read_off(source)
+        case ".dae":
+            from topleft._meshes.io.collada import read_collada
+
+            return read_collada(source)
         case suffix if suffix in ARCHIVE_SUFFIXES:
             from topleft._meshes.io.limits.archives import unpacked
 

@@ -91,7 +91,7 @@ def _mesh(
         if normals is not None and len(normals) != len(positions):
             normals = np.resize(normals, (len(positions), 3))
     else:
-        first, at = _distinct(names)
+        first, at = distinct(names)
         vertices = used[first, 0]
         uv_at, normal_at = used[first, 1], used[first, 2]
     own_uv = own_normals = None
@@ -106,7 +106,7 @@ def _mesh(
     )  # fmt: skip
 
 
-def _distinct(names: list[I64]) -> tuple[I64, I64]:
+def distinct(names: list[I64]) -> tuple[I64, I64]:
     """Rows of different names, in the order of their first use, and which of them each row has."""
     key = names[0].copy()
     for name in names[1:]:

@@ -401,5 +401,6 @@ def level_mesh(corners: Corners, original: Mesh) -> Mesh:
         material_of_triangle=rows,
         crease=original.crease,
         color_interpolation=original.color_interpolation,
+        up=original.up,
         **corners.attributes,
     )

@@ -46,14 +46,14 @@ def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     vertices = np.concatenate([part.vertices for part in parts])
     triangles = np.concatenate([part.triangles + np.int32(start) for part, start in zip(parts, starts, strict=True)])
-    colors, mixed = None, _interpolation_of(parts)
+    colors, mixed, up = None, _interpolation_of(parts), parts[0].up
     if any(part.colors is not None for part in parts):
         colors = np.concatenate([_rgba(part) for part in parts])
     uv, uv1 = _joined_uv(parts, "uv"), _joined_uv(parts, "uv1")
     materials, rows = _joined_materials(parts)
     if all(part.normals is not None for part in parts):
         normals = np.concatenate([part.vertex_normals() for part in parts])
-        return Mesh(vertices, triangles, normals, colors, uv, materials, rows, uv1, color_interpolation=mixed)
+        return Mesh(vertices, triangles, normals, colors, uv, materials, rows, uv1, color_interpolation=mixed, up=up)
     own_normals: npt.NDArray[Any] | None = None
     if crease == NO_CREASE and (colors is not None or uv is not None):
         # Vertices of two colours, or on both sides of a seam, stay two, and still share a normal.
@@ -64,7 +64,7 @@ def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:
     own_normals, uv, uv1 = (None if array is None else array[first] for array in (own_normals, uv, uv1))
     colors = None if colors is None else colors[first]
     own = vertices[first], group[triangles], own_normals, colors, uv, materials, rows, uv1
-    return Mesh(*own, crease=crease, color_interpolation=mixed)
+    return Mesh(*own, crease=crease, color_interpolation=mixed, up=up)
 
 
 def _joined_materials(parts: list[Mesh]) -> tuple[tuple[Material, ...], npt.NDArray[np.int32] | None]:

@@ -23,7 +23,7 @@ from topleft._meshes.model.cache import MeshCache
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
 from topleft._meshes.model.texture import Texture
-from topleft.typing import EncodingOption
+from topleft.typing import EncodingOption, UpOption
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
@@ -63,6 +63,8 @@ class Mesh:
         at one place count as one for the normals.
     color_interpolation : {"srgb", "linear"}
         Whether colours are linear between vertices in their sRGB numbers, or in their light, as glTF has it.
+    up : {"y", "z"}
+        The axis that points up in views of the mesh for which nothing else is asked.
 
     Raises
     ------
@@ -96,6 +98,7 @@ class Mesh:
     uv1: F32 | None = None
     crease: float = NO_CREASE
     color_interpolation: EncodingOption = "srgb"
+    up: UpOption = "y"
 
     is_in_parts: ClassVar[bool] = False
     """Whether only some of the triangles are drawn, see `drawn_triangles`."""
@@ -114,6 +117,7 @@ class Mesh:
             uv1: npt.ArrayLike | None = None,
             crease: float = NO_CREASE,
             color_interpolation: EncodingOption = "srgb",
+            up: UpOption = "y",
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -135,6 +139,7 @@ class Mesh:
                 keep(self, name, read_only(_uv_array(name, getattr(self, name), len(vertices))))
         keep(self, "crease", as_crease(self.crease))
         parse(EncodingOption, "color_interpolation", self.color_interpolation)
+        parse(UpOption, "up", self.up)
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
