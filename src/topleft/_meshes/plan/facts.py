@@ -78,7 +78,6 @@ class Facts:
     is_clip_space: bool
     is_affine: bool
     are_whole: bool  # vertices in pixels are whole numbers
-    n_wide: int  # vertices beyond 2**30 sub-pixels
     n_clipped: int  # vertices outside of a clip plane
     n_cut: int  # triangles that a plane cuts and that are drawn as pieces
     n_pieces: int
@@ -186,7 +185,6 @@ def find_facts(
         is_clip_space=source.is_clip_space,
         is_affine=source.is_affine,
         are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
-        n_wide=int((is_special & (xy[:, 1] == 1)).sum()),
         n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
         n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]
         n_pieces=len(pieces) if pieces else 0,
