@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import contextlib
 import gzip
 import io
 import json
@@ -324,12 +325,68 @@ def test_load_of_an_archive_without_a_mesh_or_broken_is_told(tmp_path):
         tl.load(tmp_path / "a.zip")
 
 
+def lines_and_triangle(file):
+    line = {**file.primitive(), "mode": 1}
+    file.node(mesh=file.mesh(line, file.primitive(), line))
+
+
+def two_nodes_of_a_mesh(file):
+    mesh = file.mesh(file.primitive(), file.primitive())
+    file.node(mesh=mesh), file.node(mesh=mesh)
+
+
+def sparse_target(file, n_set=1):
+    at, new = file.view(bytes(n_set)), file.view(bytes(12 * n_set))
+    sparse = {"count": n_set, "indices": {"bufferView": at, "componentType": 5121}, "values": {"bufferView": new}}
+    row = file.add("accessors", {"componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse})
+    file.node(mesh=file.mesh(file.primitive(targets=[{"POSITION": row}]), weights=[1]))
+
+
+@pytest.mark.parametrize(
+    ("write", "option", "n"),
+    [
+        (two_nodes_of_a_mesh, "max_nodes", 2 + 4),  # primitives read, and placed
+        (lines_and_triangle, "max_nodes", 3 + 3),
+        (sparse_target, "max_nodes", 1 + 1 + 1 + 1),  # primitive read, target, sparse accessor, primitive placed
+        (sparse_target, "max_unpacked_bytes", 36 + 36 + 12),  # zeros, their copy, what is set in it
+        (lambda file: sparse_target(file, 100), "max_unpacked_bytes", 36 + 36 + 1200),
+        (lambda file: file.shown(QUAD, [0, 1, 2, 2, 2, 2, 3], mode=5), "max_triangles", 5),
+        (lambda file: file.shown(QUAD, [0] * 9, mode=5), "max_triangles", 7),
+    ],
+)
+def test_gltf_parts_spend_the_budget_as_often_as_they_are_read(tmp_path, write, option, n):
+    file = GltfFile()
+    write(file)
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.raises(MeshError, match=f"has {n} .* more than the {n - 1} of {option}"):
+        tl.load(tmp_path / "a.glb", **{option: n - 1})
+    with warnings.catch_warnings(), contextlib.suppress(MeshError):  # a file of no triangles
+        warnings.simplefilter("ignore")
+        tl.load(tmp_path / "a.glb", **{option: n})
+
+
+def test_gltf_cameras_spend_the_budget(tmp_path):
+    file = GltfFile(cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}])
+    file.tree["nodes"] = [{"camera": 0}] * 32_769
+    (tmp_path / "a.glb").write_bytes(file.shown().glb())
+    with pytest.raises(MeshError, match="has 32769 parts"):
+        tl.load_cameras(tmp_path / "a.glb")
+
+
+def test_gltf_of_too_many_primitives_is_refused_before_the_first_is_read(tmp_path):
+    file = GltfFile()
+    file.node(mesh=file.mesh(*[{"attributes": {"POSITION": 7}}] * 20_000))  # there is no accessor of that index
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.raises(MeshError, match="has 40000 parts"):
+        tl.load(tmp_path / "a.glb")
+
+
 LIMITED = {
     "max_vertices": ("a.obj", 3, "has 4 vertices, more than the 3 of max_vertices"),
     "max_triangles": ("a.obj", 1, "triangles, more than the 1 of max_triangles"),
     "max_lines": ("a.obj", 2, "lines and elements, more than the 2 of max_lines"),
     "max_bytes": ("a.obj", 10, "bytes with the files that it names, more than the 10 of max_bytes"),
-    "max_nodes": ("a.glb", 4, r"has 5 parts .*, more than the 4 of max_nodes"),
+    "max_nodes": ("a.glb", 4, r"has 10 parts .*, more than the 4 of max_nodes"),
 }
 
 

@@ -13,6 +13,9 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="fork and limits
 
 PAIRS = """
     glb:vertices:indices glb:instances:nodes glb:nodes:stored_indices glb:nodes:joints glb:views:pixels
+    glb:primitives:degenerate glb:primitives:colors glb:sparse:set_rows glb:targets:stored_vertices glb:nodes:targets
+    glb:channels:targets glb:channels:stored_keys glb:animations:channels glb:nodes:cameras glb:lines:nodes
+    glb:overlapping:influences glb:nodes:skins
     obj:spellings:libraries obj:names:pixels obj:uses:materials collada:doubled:lists collada:shared:polygons
     3mf:doubled:triangles 3mf:elsewhere:triangles zip:bytes:shift tar:bytes:members gz:bytes:lines bz2:bytes:lines
     packed_ply:strip:pixels levels:other:levels

@@ -63,7 +63,9 @@ GLTF = {
     "nodes": 300_000, "primitives": 100_000, "instances": 200_000_000, "stored_instances": 1_000_000,
     "targets": 200_000, "joints": 300_000, "influences": 50_000, "vertices": 200_000_000, "stored_vertices": 1_600_000,
     "indices": 600_000_000, "stored_indices": 4_000_000, "materials": 60_000, "textures": 60_000, "images": 60_000,
-    "views": 60_000, "pixels": 1 << 26, "skins": 60_000,
+    "views": 60_000, "pixels": 1 << 26, "skins": 60_000, "overlapping": 4_900_000, "colors": 1_600_000,
+    "degenerate": 4_900_000, "lines": 200_000, "cameras": 300_000, "sparse": 60_000, "set_rows": 400_000,
+    "animations": 60_000, "channels": 60_000, "keys": 200_000_000, "stored_keys": 1_600_000,
 }  # fmt: skip
 """The most of each part that is tried; those that are not stored cost no bytes."""
 
@@ -71,7 +73,12 @@ GLTF = {
 def glb(n: Sizes) -> Files:
     file = GltfFile()
     n_vertices = max(3, n["vertices"], n["stored_vertices"])
-    if n["vertices"] > 1:
+    if n["overlapping"] > 1:  # rows of four bytes, each a byte behind the one before
+        n_vertices = n["overlapping"]
+        view = file.view(bytes(n_vertices + 3), byteStride=1)
+        own = {"bufferView": view, "componentType": 5121, "count": n_vertices}
+        position = file.add("accessors", {**own, "type": "VEC3"})
+    elif n["vertices"] > 1:
         position = file.add("accessors", {"componentType": 5126, "count": n["vertices"], "type": "VEC3"})
     else:
         stored = np.zeros((n_vertices, 3), np.uint8)
@@ -82,12 +89,25 @@ def glb(n: Sizes) -> Files:
         row["indices"] = file.add("accessors", {"componentType": 5125, "count": n["indices"], "type": "SCALAR"})
     else:
         row["indices"] = file.accessor(np.resize(np.uint8([0, 1, 2]), max(3, n["stored_indices"])))
+    if n["degenerate"] > 1:
+        row["indices"] = file.accessor(np.zeros(n["degenerate"], np.uint8))
+    if n["colors"] > 1:
+        stored = np.zeros((n["colors"], 3), np.uint8)
+        row["attributes"] = {"POSITION": file.accessor(stored), "COLOR_0": file.accessor(stored)}
     if n["targets"] > 1:
         row["targets"] = [{"POSITION": position}] * n["targets"]
+    if n["sparse"] > 1 or n["set_rows"] > 1:
+        at, new = file.accessor(np.zeros(n["set_rows"], np.uint8)), file.accessor(np.zeros((n["set_rows"], 3), "f4"))
+        places = {"bufferView": file.tree["accessors"][at]["bufferView"], "componentType": 5121}
+        values = {"bufferView": file.tree["accessors"][new]["bufferView"]}
+        sparse = {"count": n["set_rows"], "indices": places, "values": values}
+        accessor = {"componentType": 5126, "count": n_vertices, "type": "VEC3", "sparse": sparse}
+        row["targets"] = [{"POSITION": file.add("accessors", accessor)} for _ in range(n["sparse"])]
     node = {"mesh": 0}
     if n["joints"] > 1 or n["skins"] > 1 or n["influences"] > 1:
-        at = file.add("accessors", {"componentType": 5121, "count": n_vertices, "type": "VEC4"})
-        share = file.add("accessors", {"componentType": 5121, "count": n_vertices, "type": "VEC4", "normalized": True})
+        own = own if n["overlapping"] > 1 else {"componentType": 5121, "count": n_vertices}
+        at = file.add("accessors", {**own, "type": "VEC4"})
+        share = file.add("accessors", {**own, "type": "VEC4", "normalized": n["overlapping"] == 1})
         for k in range(n["influences"]):
             row["attributes"] |= {f"JOINTS_{k}": at, f"WEIGHTS_{k}": share}
         file.tree["skins"] = [{"joints": [0] * n["joints"]}] * n["skins"]
@@ -116,8 +136,26 @@ def glb(n: Sizes) -> Files:
     primitives = [row] * n["primitives"]
     if "materials" in file.tree:
         primitives = [{**row, "material": i % len(file.tree["materials"])} for i in range(n["primitives"])]
-    file.tree["meshes"] = [{"primitives": primitives, "weights": [1] * n["targets"]}]
+    primitives += [{"attributes": {"POSITION": position}, "mode": 1}] * (n["lines"] - 1)
+    n_targets = len(row.get("targets", ()))
+    file.tree["meshes"] = [{"primitives": primitives, "weights": [1] * n_targets}]
     file.tree["nodes"] = [{**node, "skin": i % n["skins"]} if "skin" in node else node for i in range(n["nodes"])]
+    if n["cameras"] > 1:
+        file.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}]
+        file.tree["nodes"] += [{"camera": 0}] * n["cameras"]
+    if n["animations"] > 1 or n["channels"] > 1 or n["keys"] > 1 or n["stored_keys"] > 1:
+        n_keys = max(n["keys"], n["stored_keys"])
+        rows = {"componentType": 5121, "count": n_keys, "type": "SCALAR"}
+        keys = file.add("accessors", rows) if n["keys"] > 1 else file.accessor(np.zeros(n_keys, np.uint8))
+        path = "weights" if n_targets else "translation"
+        values = {**rows, "count": n_keys * (n_targets or 3)}
+        sampler = {"input": keys, "output": file.add("accessors", values)}
+        file.tree["nodes"] += [{"mesh": 0} if n_targets else {}] * n["channels"]
+        clip = {
+            "samplers": [sampler],
+            "channels": [{"sampler": 0, "target": {"node": i, "path": path}} for i in range(n["channels"])],
+        }
+        file.tree["animations"] = [clip] * n["animations"]
     return {"a.glb": file.glb()}
 
 
@@ -444,6 +482,10 @@ def read(path: Path) -> int:
             Levels.load(path, tl.Mesh(QUAD, [(0, 1, 2)]))
         else:
             tl.load(path)
+            if b'"cameras"' in path.read_bytes():
+                tl.load_cameras(path)
+            if b'"animations"' in path.read_bytes():
+                tl.load(path, time=0, clip="all")
     except MissingPackageError as error:
         print("  ", str(error)[:150], flush=True)
         return WITHOUT

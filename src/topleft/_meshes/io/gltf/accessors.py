@@ -107,16 +107,16 @@ class Accessors:
             self._source.budget.spend("max_unpacked_bytes", n * n_columns * dtype.itemsize)
             values = np.zeros((n, n_columns), dtype)
         if sparse is not None:
-            self._source.budget.spend("max_nodes", 1)  # reading a sparse accessor takes as long as reading a primitive
             places = sparse["indices"]
             n_set = whole(sparse, "count")
             at_dtype = np.dtype(DTYPES[places["componentType"]])
             at = self._rows(places["bufferView"], whole(places, "byteOffset", 0), n_set, 1, at_dtype, 0)
             source = sparse["values"]
             new = self._rows(source["bufferView"], whole(source, "byteOffset", 0), n_set, n_columns, dtype, 0)
+            self._source.budget.spend("max_nodes", 1)  # reading a sparse accessor takes as long as reading a primitive
+            self._source.budget.spend("max_unpacked_bytes", values.nbytes + new.nbytes)  # several may share a view
             if n_set and int(at.max()) >= n:
                 raise MeshError(f"accessors[{index}] sets row {int(at.max())} of {n}")
-            self._source.budget.spend("max_unpacked_bytes", values.nbytes)
             values = values.copy()
             values[at[:, 0].astype(np.intp)] = new
         if not row.get("normalized"):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -268,8 +268,12 @@ class _Reader:
 
     def parts(self) -> Iterator[Mesh]:
         """The primitives of all nodes, placed."""
-        for index in self._nodes.shown():
-            node = entry(self._tree, "nodes", index)
+        nodes = {i: entry(self._tree, "nodes", i) for i in self._nodes.shown()}
+        meshes = [node["mesh"] for node in nodes.values() if "mesh" in node]
+        sizes = {mesh: len(entry(self._tree, "meshes", mesh)["primitives"]) for mesh in meshes}
+        # Reading a primitive takes as long as placing it: too many are refused before the first is read.
+        self._source.budget.check("max_nodes", sum(sizes.values()) + sum(sizes[mesh] for mesh in meshes))
+        for index, node in nodes.items():
             if "mesh" not in node:
                 continue
             mesh = entry(self._tree, "meshes", node["mesh"])
@@ -349,7 +353,7 @@ class _Reader:
         is_shared = not has_targets and skin is None
         if is_shared and key in self._shapes:
             return self._shapes[key]
-        self._source.budget.spend("max_nodes", 1)  # to read a shape takes as long as to place it
+        self._source.budget.spend("max_nodes", 1)
         attributes = primitive["attributes"]
         mode = primitive.get("mode", TRIANGLES)
         if mode not in (TRIANGLES, STRIP, FAN):
@@ -367,7 +371,10 @@ class _Reader:
             values |= self._morphed(values, primitive["targets"], weights)
         if skin is not None:
             values |= self._skinned(values, attributes, skin)
-        shape = _shape_of(values, triangles_of(corners, mode), uv_sets)
+        triangles = triangles_of(corners, mode)
+        if mode == STRIP:  # triangles that are left out take time, too
+            self._source.budget.spend("max_triangles", max(0, len(corners) - 2 - len(triangles)))
+        shape = _shape_of(values, triangles, uv_sets)
         if is_shared:
             self._shapes[key] = shape
         return shape
@@ -506,15 +513,14 @@ def triangles_of(corners: Array, mode: int) -> Array:
 def _shape_of(values: dict[str, Array], triangles: Array, uv_sets: tuple[int, int]) -> _Shape | None:
     if not len(triangles):
         return None
-    positions, colors = values["POSITION"], values.get("COLOR_0")
     uv, uv1 = (f"TEXCOORD_{number}" for number in uv_sets)
     for name, n_columns in (("POSITION", (3,)), ("NORMAL", (3,)), ("COLOR_0", (3, 4)), (uv, (2,)), (uv1, (2,))):
         if name in values and values[name].shape[1] not in n_columns:
             raise MeshError(f"{name} has {values[name].shape[1]} numbers a vertex")
-    if colors is not None:
-        colors = _light_of_colors(colors)
-    shape = _Shape(positions, triangles, values.get("NORMAL"), colors, values.get(uv), values.get(uv1))
-    return shape if shape.normals is not None else _flat(shape)
+    normals, colors = values.get("NORMAL"), values.get("COLOR_0")
+    shape = _Shape(values["POSITION"], triangles, normals, colors, values.get(uv), values.get(uv1))
+    shape = _flat(shape) if normals is None else shape  # first, as it leaves out the colours of unused vertices
+    return shape if shape.colors is None else replace(shape, colors=_light_of_colors(shape.colors))
 
 
 def _light_of_colors(colors: Array) -> Array:
