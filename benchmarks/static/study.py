@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import copy
 import math
-import sys
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
@@ -31,9 +30,10 @@ from benchmarks.harness.ways import Draw, Picture, Way, check_same_bits, take_ro
 from benchmarks.report.study import Study
 from benchmarks.static import tables
 from benchmarks.static.scenes import StaticScene, scenes
+from topleft._core.raster import static_mesh
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
-from topleft._meshes.picture import instances, rounds
+from topleft._meshes.picture import placed
 
 WHOLE = {"pays_to_cluster": False}
 FORCED = {
@@ -111,9 +111,8 @@ def counting(counts: ClusterCounts) -> Iterator[None]:
             counts.n_turned_here += round(n * (seen.back + seen.front))
             return super().draw_rows(*arguments, **options)
 
-    rasterize = sys.modules["topleft._core.raster.rasterize"]  # not the verb of the same name
     with ExitStack() as patched:
-        for module in (rasterize, instances, rounds):
+        for module in (static_mesh, placed):
             patched.enter_context(patch.object(module, "ClusteredMesh", CountedScene))
         yield
 

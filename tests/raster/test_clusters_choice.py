@@ -9,10 +9,10 @@ from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh, Survey
 from topleft._core.raster.clusters import Backoff, Clusters
 from topleft._core.raster.view import View
-from topleft._meshes.picture import rounds
-from topleft._meshes.picture.buffers import rasterize_shot
-from topleft._meshes.picture.instances import PlacedScene, scene_through
-from topleft._meshes.picture.rounds import count_layers, survey_instances
+from topleft._meshes.picture import draw_scene
+from topleft._meshes.picture.draw_scene import count_layers, survey_instances
+from topleft._meshes.picture.holes import draw_visible
+from topleft._meshes.picture.placed import Placed
 from topleft._meshes.picture.shot import Shot
 
 SIZE = (160, 120)
@@ -78,7 +78,7 @@ def test_mesh_of_several_samples_is_drawn_from_clusters_where_they_pay(force):
     mesh = tl.Mesh(*FINE)
     mesh.note_drawn()
     for cull, in_planes in (("none", True), ("back", False)):
-        frags = rasterize_shot(Shot.of(mesh, CAMERA, SIZE), sampling="msaa4", cull=cull)
+        frags = draw_visible(Shot.of(mesh, CAMERA, SIZE), sampling="msaa4", cull=cull)
         assert (frags._split is None) == in_planes
         expected = tl.rasterize(*FINE, SIZE, transform=MATRIX, sampling="msaa4", cull=cull)
         assert (frags.samples_triangle == expected.samples_triangle).all()
@@ -137,11 +137,11 @@ def test_box_about_the_eye_is_no_layer():
 
 def test_survey_of_instances_weighs_them_by_their_triangles():
     scene = standing([(0, 0, 0), (500, 0, 0)], tl.Mesh(*FINE))
-    placed = PlacedScene(scene_through(scene, CAMERA, SIZE), View.parse(SIZE, {}), with_depth=True)
+    placed = Placed.parse(Shot.of(scene, CAMERA, SIZE), {})
     assert survey_instances(placed).outside == 0.5
     small = tl.Mesh(*as_floats(*tl.scenes.blob(100_000)))
     both = tl.Scene([*scene[:1], (small, scene[1].transform)])
-    placed = PlacedScene(scene_through(both, CAMERA, SIZE), View.parse(SIZE, {}), with_depth=True)
+    placed = Placed.parse(Shot.of(both, CAMERA, SIZE), {})
     share = len(small.triangles) / both.n_triangles
     assert survey_instances(placed).outside == pytest.approx(share, abs=1e-12)  # a quotient of sums of doubles
 
@@ -177,8 +177,8 @@ def test_instances_of_few_triangles_are_drawn_whole_in_small_pictures(size, n_tr
 def test_scene_asks_before_it_draws_clusters(monkeypatch, force):
     scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
     drawn = []
-    draw = rounds.draw_round
-    monkeypatch.setattr(rounds, "draw_round", lambda *a, **k: drawn.append(1) or draw(*a, **k))
+    draw = draw_scene.draw_round
+    monkeypatch.setattr(draw_scene, "draw_round", lambda *a, **k: drawn.append(1) or draw(*a, **k))
     camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
     for layers, n_drawn in ((3.0, 1), (100.0, 0)):
         drawn.clear()

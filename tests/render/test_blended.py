@@ -8,10 +8,11 @@ import shading_reference as reference
 from comparing import assert_same
 
 import topleft as tl
-from topleft._core.base.memory import SCRATCH
+from topleft._core.base.memory import FRESH, SCRATCH
 from topleft._core.raster.peel import peel_meshes
 from topleft._meshes.picture.blended import blended_masks
-from topleft._meshes.picture.buffers import draw_nearest, place
+from topleft._meshes.picture.draw_scene import draw_ids
+from topleft._meshes.picture.placed import Placed
 from topleft._meshes.picture.shade import ShadingOptions
 from topleft._meshes.picture.shot import Shot
 
@@ -172,10 +173,10 @@ def test_every_sample_sees_all_layers_of_small_triangles():
     assert (count[inner] == 4).sum() > 1000
     many = tl.render(mesh, camera, size, background=(0, 0, 0, 0), sampling="msaa4")[..., 3]
     assert (np.abs(many[inner].astype(int) - alpha[inner]) > 1).mean() < 1e-3
-    placed, view = place(Shot.of(tl.Scene([knot]), camera, size), {"sampling": "msaa4"})
-    frags, snapped = draw_nearest(placed, view), [placed.snap(0)]
-    for k, at in enumerate(frags.positions):
-        ids, depth = peel_meshes(SCRATCH, [snapped], view, 16, is_farthest=False, at_fx=at)
+    placed = Placed.parse(Shot.of(tl.Scene([knot]), camera, size), {"sampling": "msaa4"})
+    frags, snapped = draw_ids(FRESH, placed), [placed.snap(0)]
+    for k, at in enumerate(placed.positions):
+        ids, depth = peel_meshes(SCRATCH, [snapped], placed.view, 16, is_farthest=False, at_fx=at)
         assert_same(ids[0], frags.drawn_planes[0][k])
         assert_same(depth[0], frags.drawn_planes[1][k])
 

@@ -1,6 +1,7 @@
 """Pictures of a mesh whose options are kept, and drawn by one call of the engine: as its stages make them."""
 
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,3 +99,15 @@ def test_mesh_dies_with_what_its_pictures_keep():
     gone = weakref.ref(mesh)
     del mesh
     assert gone() is None
+
+
+def test_options_that_are_kept_hold_for_cameras_with_and_without_a_lens():
+    sides = [tl.Material((200, 0, 0)), tl.Material((0, 0, 200), double_sided=False)]
+    rows = np.arange(len(BALL[1]), dtype=np.int32) % 2
+    straight = tl.Camera.look_at((0.3, 0.1, 0.2), (5, 1, 0.3), near=0.01)  # the lens cuts triangles about the eye
+    cameras = replace(straight, lens=tl.FisheyeLens()), straight
+
+    kept = tl.Mesh(*BALL, materials=sides, material_of_triangle=rows)
+    for camera in (*cameras, *cameras):
+        fresh = tl.Mesh(*BALL, materials=sides, material_of_triangle=rows)
+        assert np.array_equal(tl.render(kept, camera, SIZE), tl.render(fresh, camera, SIZE))

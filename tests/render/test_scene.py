@@ -14,11 +14,12 @@ from topleft._core.base.color import srgb_tables
 from topleft._core.raster import choices
 from topleft._core.raster.snap import Snapped
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.picture import buffers, instances, rounds, shade
+from topleft._meshes.picture import draw_scene, placed, shade
+from topleft._meshes.picture.draw_scene import split_rows
 from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.render import rasterize_mesh
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene import scene as placed
+from topleft._meshes.scene import scene as scenes
 from topleft.methods.reference.sampling import mean
 
 
@@ -61,7 +62,7 @@ def test_scene_samples_are_those_of_the_mesh_of_all(isa, sampling):
 
 @pytest.mark.parametrize("n_vertices", [1, 100, 1 << 20])
 def test_scene_any_number_of_instances_at_once_is_the_same(monkeypatch, n_vertices):
-    monkeypatch.setattr(instances, "VERTICES_AT_ONCE", n_vertices)
+    monkeypatch.setattr(placed, "VERTICES_AT_ONCE", n_vertices)
     scene = many(3)
     assert_same_as_joined(rasterize_mesh(scene, CAMERA, SIZE), tl.rasterize(*joined(scene), SIZE), scene)
     for sampling in ("center", "msaa4", "outer", "inner"):
@@ -339,8 +340,8 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
     mask_options = {"threads": 3, "sampling": ["center", "outer", "msaa4"][seed % 3]}
     mask = tl.silhouette(tl.Scene(standing), camera, (60, 40), **mask_options)
     force(pays_to_cluster=True, pays_to_draw_instances=True, pays_to_share_instances=True)
-    monkeypatch.setattr(rounds, "ROUND", int(rng.choice([1, 4])))
-    for module in (placed, instances, buffers):
+    monkeypatch.setattr(draw_scene, "ROUND", int(rng.choice([1, 4])))
+    for module in (scenes, placed, draw_scene):
         monkeypatch.setattr(module, "INT32_MAX", most_ids)
     with on(isa):
         found = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)
@@ -366,22 +367,22 @@ def test_bands_of_instances_share_the_rows(height, n, monkeypatch):
     at = np.tile(np.eye(4), (10, 1, 1))
     at[:, 1, 3], at[:, 2, 3] = np.repeat([-2, -2, 0, 1, 90], 2), np.tile([0, 20], 5)
     standing = [tl.Instance(BALLS[0], matrix) for matrix in at]
-    seen = buffers.place(Shot.of(tl.Scene(standing), camera, (60, height)), {})[0]
+    seen = placed.Placed.parse(Shot.of(tl.Scene(standing), camera, (60, height)), {})
     with choices.forced(scene_triangles=0, scene_rows=0):
         for some in (range(10), (0, 2), (8,), (1, 3, 5), (4, 4, 4)):
-            tops = seen.split_rows(np.array(some), height, n)
+            tops = split_rows(seen, np.array(some), n)
             assert tops[0] == 0
             assert tops[-1] == height
             assert len(tops) == n + 1
             assert min(np.diff(tops)) >= 1
         if n == 2:
-            assert seen.split_rows(np.arange(0, 8, 2), height, n)[1] in range(20, 30)  # two at -2, one in the middle
-        monkeypatch.setattr(instances, "MOST_PIXELS_OF_PART", 60 * height - 1)  # what a mask counts ends there
-        assert seen.split_rows(np.arange(0, 8, 2), height, n) == [height * k // n for k in range(n + 1)]
-        monkeypatch.setattr(instances, "MOST_PIXELS_OF_PART", 60 * height)
+            assert split_rows(seen, np.arange(0, 8, 2), n)[1] in range(20, 30)  # two at -2, one in the middle
+        monkeypatch.setattr(draw_scene, "MOST_PIXELS_OF_PART", 60 * height - 1)  # what a mask counts ends there
+        assert split_rows(seen, np.arange(0, 8, 2), n) == [height * k // n for k in range(n + 1)]
+        monkeypatch.setattr(draw_scene, "MOST_PIXELS_OF_PART", 60 * height)
     for name, least in (("scene_rows", height), ("scene_triangles", 701)):  # a fifth of that high
         with choices.forced(**{"scene_triangles": 0, "scene_rows": 0, name: least}):
-            assert seen.split_rows(np.arange(0, 8, 2), height, n) == [0, height]
+            assert split_rows(seen, np.arange(0, 8, 2), n) == [0, height]
 
 
 @pytest.mark.parametrize("instance", [3, b"cube", (CUBE,), None, [CUBE, CUBE], tl.Scene([CUBE])])

@@ -10,7 +10,7 @@ from engine_cases import ON_EACH_ISA, on
 from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
-from topleft._meshes.picture import instances, transparent
+from topleft._meshes.picture import placed, transparent
 
 
 @ON_EACH_ISA
@@ -37,14 +37,14 @@ def test_layers_of_a_scene_are_those_of_the_mesh_of_all(isa, options):
 def test_layers_of_a_scene_of_a_few_instances_at_a_time_are_the_same(monkeypatch, n_vertices):
     scene = many(3)
     expected = tl.visible_layers(scene, CAMERA, SIZE, layers=5)
-    monkeypatch.setattr(instances, "VERTICES_AT_ONCE", n_vertices)
+    monkeypatch.setattr(placed, "VERTICES_AT_ONCE", n_vertices)
     got = tl.visible_layers(scene, CAMERA, SIZE, layers=5)
     assert_same(got.id, expected.id)
     assert_same(got.depth, expected.depth)
 
 
 def test_layers_of_a_scene_take_the_memory_of_a_few_instances(monkeypatch):
-    monkeypatch.setattr(instances, "VERTICES_AT_ONCE", 1)
+    monkeypatch.setattr(placed, "VERTICES_AT_ONCE", 1)
     sphere = tl.Mesh(*tl.scenes.icosphere(5))
 
     def peak(n):

@@ -10,7 +10,9 @@ from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
 from topleft._core import engine
-from topleft._meshes.picture import instances
+from topleft._meshes.picture import draw_scene
+from topleft._meshes.picture import placed as placed_scenes
+from topleft._meshes.picture.placed import Placed
 
 TURNED = {"none": "none", "back": "front", "front": "back"}
 
@@ -69,7 +71,7 @@ def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, m
 
     with on(isa):
         joined = pictures()
-        monkeypatch.setattr(instances, "TRIANGLES_AT_ONCE", 0)
+        monkeypatch.setattr(placed_scenes, "TRIANGLES_AT_ONCE", 0)
         for found, expected in zip(joined, pictures(), strict=True):
             assert_same(found, expected)
     assert len(np.unique(joined[0])) > 100
@@ -78,7 +80,7 @@ def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, m
 @ON_EACH_ISA
 @pytest.mark.parametrize("seed", range(40))
 def test_scene_is_drawn_as_its_instances_alone(isa, seed, monkeypatch):
-    monkeypatch.setattr(instances, "FIRST_ROUND", 2)
+    monkeypatch.setattr(draw_scene, "FIRST_ROUND", 2)
     rng = np.random.default_rng(seed)
     scene, camera = random_scene(rng), cases.random_camera(rng, lens=0)
     options = {
@@ -114,17 +116,17 @@ def wall_before_balls():
 @pytest.mark.parametrize("depth_test", ["less", "greater", None])
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
 def test_instances_that_cannot_show_are_not_snapped(depth_test, sampling, monkeypatch):
-    monkeypatch.setattr(instances, "FIRST_ROUND", 2)
+    monkeypatch.setattr(draw_scene, "FIRST_ROUND", 2)
     snapped = []
-    snap_all = instances.PlacedScene.snap_all
-    monkeypatch.setattr(instances.PlacedScene, "snap_all",
+    snap_all = Placed.snap_all
+    monkeypatch.setattr(Placed, "snap_all",
                         lambda self, some: snapped.extend(some.tolist()) or snap_all(self, some))  # fmt: skip
     camera, size = tl.Camera.look_at((0, 0, 8)), (64, 64)
     options = {"sampling": sampling, "depth_test": depth_test}
     frags = tl.rasterize_mesh(wall_before_balls(), camera, size, **options)
     n_drawn = {"less": 4, "greater": 10, None: 13}[depth_test]
     assert len(snapped) == n_drawn
-    monkeypatch.setattr(instances.PlacedScene, "shown", lambda self, some, *_, **__: some)
+    monkeypatch.setattr(draw_scene, "find_shown", lambda scene, some, *_, **__: some)
     whole = tl.rasterize_mesh(wall_before_balls(), camera, size, **options)
     assert len(snapped) == n_drawn + 13
     assert_same(np.asarray(frags.samples_id), np.asarray(whole.samples_id))

@@ -12,7 +12,7 @@ from engine_cases import ON_EACH_ISA, on
 import topleft as tl
 from topleft._core.base.color import id_colors, srgb_tables
 from topleft._core.raster.cluster_draw import ClusteredMesh
-from topleft._meshes.picture.buffers import rasterize_shot
+from topleft._meshes.picture.holes import draw_visible
 from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
 from topleft._meshes.picture.shot import Shot
 from topleft.methods.reference.sampling import mean
@@ -40,7 +40,7 @@ def test_picture_is_the_same_from_planes_of_samples(force, isa, shading, size):
     with on(isa):
         for camera, n in ((None, 4), (square, 2), (square, 16)):
             camera = camera or tl.Camera.framing(KNOT)
-            frags = rasterize_shot(Shot.of(KNOT, camera, size), sampling=f"msaa{n}", threads=3)
+            frags = draw_visible(Shot.of(KNOT, camera, size), sampling=f"msaa{n}", threads=3)
             from_lists = tl.shade(frags, KNOT, camera, lights=lights, **look)
             assert frags._split is not None
             assert frags.samples_depth.shape[-1] == n
@@ -50,9 +50,9 @@ def test_picture_is_the_same_from_planes_of_samples(force, isa, shading, size):
 
 def test_samples_of_a_small_picture_are_kept_one_by_one():
     cube = Shot.of(tl.Mesh(*tl.scenes.cube()), None, (150, 150))
-    assert rasterize_shot(cube, sampling="msaa4")._split is None
-    assert rasterize_shot(cube, sampling="msaa8")._split is not None
-    assert rasterize_shot(Shot.of(KNOT, None, (150, 150)), sampling="msaa8")._split is None
+    assert draw_visible(cube, sampling="msaa4")._split is None
+    assert draw_visible(cube, sampling="msaa8")._split is not None
+    assert draw_visible(Shot.of(KNOT, None, (150, 150)), sampling="msaa8")._split is None
 
 
 @pytest.mark.parametrize("look", [{}, {"shading": "ids"}, {"cutoff": 0.5}, {"edges": True}, {"cull": "back"}])

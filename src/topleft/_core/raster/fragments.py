@@ -187,6 +187,11 @@ class Fragments:
         if self.corners is not None:
             self.drawn_from(self.corners)
 
+    @property
+    def drawn_planes(self) -> tuple[NDArray[Any], NDArray[np.float32]]:
+        """Ids and depth of all samples as they were drawn, (S, H, W); drawn now, if they were not."""
+        return self._sampled()[1] or (self.id[None], self.depth[None])
+
     def _whole(self, ids: NDArray[Any]) -> NDArray[Any]:
         """Return the ids of drawn triangles as `.id` has them: the same, unless a lens cuts triangles into parts."""
         return ids
@@ -208,7 +213,7 @@ class Fragments:
         if self._split is not None:
             found = self._split
             return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.drawn.positions))
-        return SeenSamples.of(*(self._sampled()[1] or (self.id[None], self.depth[None])))
+        return SeenSamples.of(*self.drawn_planes)
 
     def __repr__(self) -> str:
         height, width = self.triangle.shape

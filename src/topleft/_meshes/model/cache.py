@@ -14,8 +14,8 @@ import numpy.typing as npt
 if TYPE_CHECKING:  # types of the fields alone: pictures fill them
     from topleft._meshes.model.material import Material
     from topleft._meshes.picture.holes import Cut
-    from topleft._meshes.picture.kept import KeptPicture
     from topleft._meshes.picture.look import ShadingMesh, Surface
+    from topleft._meshes.picture.render import PictureOptions
 
 Value = TypeVar("Value")
 
@@ -56,8 +56,8 @@ class MeshCache:
         """The mesh as shading kernels read it."""
         self.stretched: dict[bytes, ShadingMesh] = {}
         """Stretched copies by the bytes of their matrix; all go where they pass `MOST_STRETCHED` vertices."""
-        self.pictures: dict[tuple[Hashable, ...], KeptPicture | None] = {}
-        """Checked options of pictures, `MOST_KEPT` at most; None for those of several passes."""
+        self.pictures: dict[tuple[Hashable, ...], PictureOptions] = {}
+        """Checked options of pictures of the mesh alone, `MOST_KEPT` at most."""
         self.surfaces: ByMaterial[Surface] = ByMaterial()
         self.cuts: ByMaterial[Cut | None] = ByMaterial()
         """The materials with holes and their triangles."""

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,18 +23,13 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32, U8
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
-from topleft._core.raster.fragments import SeenSamples
+from topleft._core.raster.fragments import Fragments, SeenSamples
 from topleft._core.raster.peel import peel_meshes
-from topleft._core.raster.view import View
-from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
-from topleft._meshes.picture.buffers import place
-from topleft._meshes.picture.fragments import SceneFragments, shown_of
-from topleft._meshes.picture.holes import Mask, cuts_of, draw_solid
-from topleft._meshes.picture.instances import PlacedScene
+from topleft._meshes.picture.fragments import shown_of
+from topleft._meshes.picture.placed import Mask, Placed
 from topleft._meshes.picture.shade import Lit, ShadingOptions, ShownInstance
-from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
 
 BLENDING = ("smooth", "flat", "unlit")
@@ -88,42 +82,28 @@ def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | 
     return None if all(mask is None for mask in masks) else masks
 
 
-def transparent_pass(shot: Shot, options: ShadingOptions, view_options: dict[str, Any]) -> TransparentPass | None:
-    """The pass of a picture's blended triangles; None where all of it is opaque."""
-    masks = blended_masks(shot.scene, options)
-    if masks is None:
-        return None
-    shot.scene.check_counted("a scene that something shows through")
-    placed, view = place(shot, view_options, material=options.material)
-    if placed.bent is not None:  # the parts that a lens makes of the triangles
-        masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
-    return TransparentPass(placed, view, masks, shot.camera, options)
+def lay_blended(
+    picture: U8, solid: Fragments, placed: Placed, masks: Sequence[Mask | None], options: ShadingOptions
+) -> None:
+    """Lay the visible blended triangles over the picture of the opaque ones; masks are those of drawn triangles."""
+    if 0 not in placed.view.size:
+        TransparentPass(placed, masks, options).lay_over(picture, solid)
 
 
 class TransparentPass:
-    """A scene with blended triangles: the opaque ones are drawn first, then these are laid over them."""
+    """The blended triangles of a scene, which are laid over the opaque ones."""
 
-    def __init__(
-        self, placed: PlacedScene, view: View, masks: Sequence[Mask | None], camera: Camera, options: ShadingOptions
-    ) -> None:
-        self.whole, self.view, self.masks, self.camera = placed, view, masks, camera
+    def __init__(self, placed: Placed, masks: Sequence[Mask | None], options: ShadingOptions) -> None:
+        self.placed, self.view, self.masks, self.camera = placed, placed.view, masks, placed.camera
+        self.scene = placed.whole  # which has the triangles that ids count
         self.under = options
         self.options = replace(options, background=CLEAR, shows_opacity=True)
 
-    @property
-    def scene(self) -> Scene:
-        """The scene with the triangles that ids count."""
-        return self.whole.whole
-
-    def draw_opaque(self) -> SceneFragments:
-        """The visibility buffer of the opaque triangles."""
-        return draw_solid(self.whole, self.view, self.camera, cuts_of(self.scene, self.under.material), self.masks)
-
     @cached_property
-    def blended(self) -> PlacedScene:
+    def blended(self) -> Placed:
         """The blended triangles alone."""
         inverse = [None if mask is None else ~mask for mask in self.masks]
-        return self.whole.of(collapsed(self.whole.scene, inverse, keeps_others=False))
+        return self.placed.with_scene(collapsed(self.placed.scene, inverse, keeps_others=False))
 
     @cached_property
     def snapped(self) -> list[engine.SnappedMesh]:
@@ -134,7 +114,7 @@ class TransparentPass:
     def lit(self) -> Lit:
         """The same, ready to be shaded."""
         some = [i for i, mask in enumerate(self.masks) if mask is not None]
-        bent, first_ids = self.whole.bent, self.whole.first_ids
+        bent, first_ids = self.placed.bent, self.placed.first_ids
         shown = []
         for i, one in zip(some, self.snapped, strict=True):
             mesh = self.scene[i].mesh if bent is None else bent[i].mesh_of(self.scene[i].mesh)
@@ -142,11 +122,9 @@ class TransparentPass:
             shown.append(ShownInstance(one, mesh, own.transform, int(first_ids[i]), own.material))
         return Lit(shown, self.camera, self.view.size, self.options)
 
-    def lay_over(self, picture: U8, frags: SceneFragments) -> None:
+    def lay_over(self, picture: U8, frags: Fragments) -> None:
         """Lay the visible blended triangles over the picture of the opaque ones."""
-        if 0 in self.view.size:
-            return
-        positions = frags.positions
+        positions = self.placed.positions
         opaque = Lit(shown_of(frags, self.scene), self.camera, self.view.size, self.under)
         layers = [self.peel(frags, k) for k in range(len(positions))]
         is_seen = np.logical_or.reduce([ids[0] >= 0 for ids, _ in layers])
@@ -165,11 +143,11 @@ class TransparentPass:
         picture[at[0], at[1], :3] = srgb_tables()[1][steps]
         picture[at[0], at[1], 3] = np.rint(alpha * np.float32(255 / len(positions))).astype(np.uint8)
 
-    def peel(self, frags: SceneFragments, k: int) -> tuple[npt.NDArray[np.int32], F32]:
+    def peel(self, frags: Fragments, k: int) -> tuple[npt.NDArray[np.int32], F32]:
         """The layers of a sample that nothing opaque hides, planes (K, H, W) of ids and depths."""
-        there, nearest = (planes[k] for planes in frags.drawn_planes)
+        (there, nearest), at = (planes[k] for planes in frags.drawn_planes), self.placed.positions[k]
         for n in (LAYERS, MOST_LAYERS):
-            ids, depth = peel_meshes(SCRATCH, [self.snapped], self.view, n, is_farthest=False, at_fx=frags.positions[k])
+            ids, depth = peel_meshes(SCRATCH, [self.snapped], self.view, n, is_farthest=False, at_fx=at)
             for own_ids, own_depth in zip(ids, depth, strict=True):
                 if not (own_ids >= 0).any():
                     break

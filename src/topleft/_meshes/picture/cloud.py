@@ -57,6 +57,16 @@ def draw_cloud(
     return draw_points(FRESH, positions, sizes, cloud.shape, view)
 
 
+def render_cloud(
+    cloud: Points, camera: Camera, size: tuple[int, int], view: dict[str, Any], options: ShadingOptions, *, edges: bool
+) -> U8:
+    """The picture (H, W, 4) of a cloud, as `render` draws it."""
+    if edges:
+        raise ValueError("points have no edges")
+    frags = draw_cloud(cloud, camera, size, **view)
+    return shade_cloud(frags, cloud, camera, options)
+
+
 def draw_share(cloud: Points, camera: Camera, size: tuple[int, int], **options: Any) -> npt.NDArray[Any]:
     """Where points are, (H, W): bool, or of several samples a pixel the share, float32; options as for `draw_cloud`."""
     frags = draw_cloud(cloud, camera, size, **options)

@@ -27,7 +27,7 @@ from topleft._meshes.picture.shade import ShownInstance
 from topleft._meshes.scene.scene import Instance, Scene, counted_ranges
 
 if TYPE_CHECKING:
-    from topleft._meshes.picture.instances import PlacedScene
+    from topleft._meshes.picture.placed import Placed
 
 Ids = NDArray[np.int32] | NDArray[np.int64]
 """Ids of the triangles of all instances: int64 where int32 does not count them."""
@@ -170,7 +170,7 @@ class SceneFragments(InstanceIds, Fragments):
     _whole_scene: Fragments | None = None
 
     def __init__(
-        self, ids: Ids, depth: NDArray[np.float32], placed: PlacedScene, positions: Sequence[tuple[int, int]]
+        self, ids: Ids, depth: NDArray[np.float32], placed: Placed, positions: Sequence[tuple[int, int]]
     ) -> None:
         """Take drawn planes (S, H, W), and where their samples lie."""
         self._given = ids, depth
@@ -395,7 +395,7 @@ class SceneDepthLayers(InstanceIds, DepthLayers):
     [0, 0]
     """
 
-    def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], placed: PlacedScene) -> None:
+    def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], placed: Placed) -> None:
         """Take planes (K, H, W)."""
         self.planes = ids, depth
         self.placed = placed

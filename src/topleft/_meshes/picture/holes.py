@@ -15,27 +15,22 @@ from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, I32
-from topleft._core.base.memory import FRESH, Memory
+from topleft._core.base.memory import Memory
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import Rasterizer
-from topleft._core.raster.view import View
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_holes
 from topleft._meshes.picture.bend import BentMesh
-from topleft._meshes.picture.buffers import draw_nearest, lent, place, rasterize_shot
-from topleft._meshes.picture.fragments import SceneFragments
-from topleft._meshes.picture.instances import PlacedScene
+from topleft._meshes.picture.draw_scene import draw_ids
 from topleft._meshes.picture.look import ShadingInputs, Surface
+from topleft._meshes.picture.placed import Mask, Placed
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene, collapsed
-
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,34 +93,28 @@ def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
 def draw_visible(
     shot: Shot, rasterizer: Rasterizer | None = None, material: Material | None = None, **options: Any
 ) -> Fragments:
-    """The visibility buffer without the holes of materials (or this one); options as for `rasterize_shot`."""
-    cuts = cuts_of(shot.scene, material)
-    if not any(cuts):
-        return rasterize_shot(shot, rasterizer, material, **options)
-    shot.scene.check_counted("a scene with holes in its materials")
-    with lent(rasterizer if shot.is_mesh else None, shot.size) as memory:
-        return draw_solid(*place(shot, options, material=material), shot.camera, cuts, memory=memory)
+    """The visibility buffer without the holes of materials (or this one); options as those of a `View`."""
+    with shot.memory(rasterizer) as memory:
+        return draw_solid(memory, Placed.parse(shot, options, material), cuts_of(shot.scene, material))
 
 
 def draw_solid(
-    placed: PlacedScene,
-    view: View,
-    camera: Camera,
-    cuts: Sequence[Cut | None],
-    masks: Sequence[Mask | None] | None = None,
-    *,
-    memory: Memory = FRESH,
-) -> SceneFragments:
-    """The visibility buffer of a placed scene, without holes, and without the triangles of masks.
+    memory: Memory, placed: Placed, cuts: Sequence[Cut | None], masks: Sequence[Mask | None] | None = None
+) -> Fragments:
+    """The visibility buffer of a placed scene without holes, and without the triangles of masks.
 
     First all triangles without holes are drawn, then, instance by instance, the others.
     """
-    holed = holed_instances(placed.whole, cuts, camera, placed.bent)
-    solid = draw_nearest(placed.of(solid_scene(placed.scene, holed, masks)), view, memory=memory)
+    if masks is None and not any(cuts):
+        return draw_ids(memory, placed)
+    way = "with holes in its materials" if masks is None else "that something shows through"
+    placed.whole.check_counted(f"a scene {way}")
+    holed = holed_instances(placed.whole, cuts, placed.camera, placed.bent)
+    solid = draw_ids(memory, placed.with_scene(solid_scene(placed.scene, holed, masks)), is_split=False)
     ids, depth = cast("tuple[I32, F32]", solid.drawn_planes)
-    for k, at in enumerate(solid.positions if ids.size else ()):
-        draw_holed(placed, holed, ids[k : k + 1], depth[k : k + 1], at=at, threads=view.threads)
-    return placed.fragments(ids, depth, solid.positions)
+    for k, at in enumerate(placed.positions if ids.size else ()):
+        draw_holed(placed, holed, ids[k : k + 1], depth[k : k + 1], at=at, threads=placed.view.threads)
+    return placed.fragments(ids, depth, placed.positions)
 
 
 def holed_instances(
@@ -160,7 +149,7 @@ def inputs_of(scene: engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple
 
 
 def draw_holed(
-    placed: PlacedScene,
+    placed: Placed,
     holed: Sequence[MaskedInstance],
     ids: I32,
     depth: F32,

@@ -6,33 +6,92 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal, Unpack, cast
 
 import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
-from topleft._core.base.array_types import MeshLike
+from topleft._core import engine
+from topleft._core.base.array_types import U8, MeshLike
 from topleft._core.base.arrays import as_size
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.base.defaults import DEFAULT_SIZE
+from topleft._core.base.memory import Memory, empty
+from topleft._core.base.options import Sink
+from topleft._core.raster import choices
 from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.rasterize import refuse_many
+from topleft._core.raster.snap import source_of
 from topleft._core.raster.verbs import Rasterizer
-from topleft._core.raster.view import WindowOptions
+from topleft._core.raster.view import View, ViewOptions, WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
-from topleft._meshes.picture.blended import blended_masks, transparent_pass
-from topleft._meshes.picture.buffers import rasterize_shot
-from topleft._meshes.picture.cloud import draw_cloud, shade_cloud
+from topleft._meshes.picture.blended import blended_masks, lay_blended
+from topleft._meshes.picture.cloud import draw_cloud, render_cloud
+from topleft._meshes.picture.draw_scene import draw_ids
 from topleft._meshes.picture.edges import draw_all_edges
-from topleft._meshes.picture.fragments import SceneFragments
-from topleft._meshes.picture.holes import draw_visible
-from topleft._meshes.picture.kept import kept_picture
+from topleft._meshes.picture.holes import Cut, cuts_of, draw_solid
+from topleft._meshes.picture.placed import Mask, Placed
 from topleft._meshes.picture.scene_shade import shade_by
-from topleft._meshes.picture.shade import LookOptions, ShadingOptions
+from topleft._meshes.picture.shade import NUMBERS, Lit, LookOptions, ShadingOptions, ShownInstance
 from topleft._meshes.picture.shot import Shot
-from topleft._meshes.scene.scene import Scene
+from topleft._meshes.scene.scene import EYE, Scene
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
+
+MOST_KEPT = 64
+"""Options that are kept of a mesh or a scene: by size, look and sides."""
+
+
+@dataclass(frozen=True, eq=False)
+class PictureOptions:
+    """The checked options of `render` for one subject, size and look. Kept with the subject, they hold no mesh."""
+
+    view: View
+    look: ShadingOptions
+    cuts: Sequence[Cut | None]
+    """The materials with holes of each instance."""
+    blended: Sequence[Mask | None] | None
+    """The blended triangles of each instance; None where there are none."""
+    mesh_view: View | None
+    """The view of a mesh alone, with the sides that it shows."""
+
+    @classmethod
+    def of(cls, shot: Shot, view: dict[str, Any], look: dict[str, Any]) -> PictureOptions:
+        """Return the checked options of a shot, kept with its subject unless a value may change.
+
+        Those of a mesh in parts of several levels are not kept: other choices of parts share its cache.
+        """
+        subject = shot.scene[0].mesh if shot.is_mesh else shot.scene
+        if shot.is_mesh and shot.scene[0].mesh.is_in_parts:
+            return cls.parse(shot, view, look)
+        try:
+            kinds = *map(type, look["color"]), None, *map(type, look["background"])  # (1.0, 0, 0) is red
+            values = *view.values(), *look.values()
+            key = shot.size, *look, *values, *map(type, values), *kinds
+            found = subject.cache.pictures.get(key)
+        except TypeError:  # a list, say
+            return cls.parse(shot, view, look)
+        if found is None:
+            found = cls.parse(shot, view, look)
+            if len(subject.cache.pictures) >= MOST_KEPT:
+                subject.cache.pictures.clear()
+            subject.cache.pictures[key] = found
+        return found
+
+    @classmethod
+    def parse(cls, shot: Shot, options: dict[str, Any], shading: dict[str, Any]) -> PictureOptions:
+        """Check the options."""
+        look = ShadingOptions.parse(**shading)
+        view = View.parse(shot.size, cast(ViewOptions, options))
+        refuse_many(view, "rasterize")
+        scene, mesh_view = shot.scene, None
+        if shot.is_mesh:  # as a camera without a lens sees it
+            placed = Placed(scene, scene, shot.camera, EYE, view, is_mesh=True, material=look.material)
+            mesh_view = placed.view_of(0).but(transform=None, static=None)
+        return cls(view, look, cuts_of(scene, look.material), blended_masks(scene, look), mesh_view)
 
 
 class RasterizeOptions(WindowOptions, total=False):
@@ -125,27 +184,49 @@ def render(
     view: dict[str, Any] = {"cull": cull, "sampling": sampling, "subpixel_bits": subpixel_bits, "threads": threads}
     given: dict[str, Any] = {"shading": shading, "color": color, "background": background, "threads": threads, **look}
     shot = Shot.of(mesh, camera, size)
-    is_whole = type(tolerance) is float and not (tolerance or edges)
-    if shot.is_mesh and is_whole and shot.camera.lens is None:
-        kept = kept_picture(shot.subject, shot.size, view, given)
-        if kept is not None:
-            return kept.draw(shot.subject, shot.camera, rasterizer)
-    options = ShadingOptions.parse(**given)
     if shot.cloud is not None:
+        return render_cloud(shot.cloud, shot.camera, shot.size, view, ShadingOptions.parse(**given), edges=edges)
+    options = PictureOptions.of(shot, view, given)
+    if not (type(tolerance) is float and tolerance == 0):
+        in_parts = not edges and options.blended is None
+        shot = shot.within(tolerance, in_parts=in_parts, cull=cull, material=options.look.material)
+        options = PictureOptions.of(shot, view, given)
+    with shot.memory(rasterizer) as memory:
+        placed = Placed.of(shot, options.view, options.look.material, mesh_view=options.mesh_view)
+        picture = None if edges else draw_at_once(memory, placed, options)
+        if picture is not None:
+            return picture
+        masks = None if options.blended is None else placed.masks_as_drawn(options.blended)
+        solid = draw_solid(memory, placed, options.cuts, masks)
+        picture = shade_by(solid, shot.scene, shot.camera, options.look)
+        if masks is not None:
+            lay_blended(picture, solid, placed, masks, options.look)
         if edges:
-            raise ValueError("points have no edges")
-        return shade_cloud(draw_cloud(shot.cloud, shot.camera, shot.size, **view), shot.cloud, shot.camera, options)
-    in_parts = not is_whole and not edges and blended_masks(shot.scene, options) is None
-    shot = shot.within(tolerance, in_parts=in_parts, cull=cull, material=options.material)
-    blended = transparent_pass(shot, options, view)
-    frags = draw_visible(shot, rasterizer, options.material, **view) if blended is None else blended.draw_opaque()
-    scene, camera = shot.scene, shot.camera
-    picture = shade_by(frags, scene, camera, options)
-    if blended is not None:
-        blended.lay_over(picture, cast(SceneFragments, frags))
-    if edges:
-        draw_all_edges(picture, frags, scene, camera, options, cull=cull)
+            draw_all_edges(picture, solid, shot.scene, shot.camera, options.look, cull=cull)
     return picture
+
+
+def draw_at_once(memory: Memory, placed: Placed, options: PictureOptions) -> U8 | None:
+    """The picture of a small opaque mesh by one call of the engine; None of others, and where a vertex is clipped, say.
+
+    Ids and depth lie in this memory.
+    """
+    look = options.look
+    if not placed.is_plain_mesh or look.mode in NUMBERS or options.blended is not None or any(options.cuts):
+        return None
+    mesh, view = placed.scene[0].mesh, placed.view_of(0)
+    n = len(mesh.triangles)
+    if mesh.is_in_parts or not choices.draws_at_once(view, n):
+        return None
+    if choices.pays_to_cluster_shaded(n) and not mesh.is_drawn_whole():
+        return None
+    n_bytes, shape = len(mesh.vertices) * engine.VERTEX_BYTES, view.size[::-1]
+    source, records = source_of(mesh.vertices, view), memory.scratch("records", (n_bytes,), np.uint8)
+    waiting = engine.WaitingMesh(source, records, None, mesh.triangles, None, view.how, view.engine_viewport())
+    lit = Lit([ShownInstance(waiting, mesh, EYE)], placed.camera, view.size, look)
+    ids, depth = memory.empty("triangle", shape, np.int32), memory.empty("depth", shape, np.float32)
+    picture = empty((*shape, 4), np.uint8)
+    return picture if lit.scene.draw(engine.Target(Sink.NEAREST, ids, depth, None), picture) else None
 
 
 def rasterize_mesh(
@@ -200,4 +281,8 @@ def rasterize_mesh(
         return draw_cloud(shot.cloud, shot.camera, shot.size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     shot = shot.within(tolerance, in_parts=True, cull=cull, **window)
-    return rasterize_shot(shot, rasterizer, is_split=False, cull=cull, threads=threads, **view)
+    depth_test, background_depth = view.pop("depth_test", "less"), view.pop("background_depth", None)
+    out = view.pop("out", None) if shot.is_mesh else None
+    with shot.memory(rasterizer) as memory:
+        placed = Placed.parse(shot, {"cull": cull, "threads": threads, **view})
+        return draw_ids(memory, placed, depth_test, background_depth, out, is_split=False)

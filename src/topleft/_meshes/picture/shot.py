@@ -5,11 +5,14 @@ Input: whatever a picture takes: a mesh, a scene, points, a path, a camera or no
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
 from topleft._core.base.array_types import MeshLike
-from topleft._core.base.arrays import as_size
+from topleft._core.base.arrays import as_size, shown
+from topleft._core.base.memory import FRESH, Memory
+from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
 from topleft._meshes.lod.detail import detailed
 from topleft._meshes.model.points import Points
@@ -17,6 +20,8 @@ from topleft._meshes.scene.scene import IN_PLACE, Scene, as_meshes, as_subject, 
 
 NOTHING = Scene([IN_PLACE])
 """The scene of a cloud, which has points alone."""
+
+UNSHARED: AbstractContextManager[Memory] = nullcontext(FRESH)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,19 @@ class Shot:
             return cls(NOTHING, subject, seen_by, checked)
         scene = scene_of(subject)
         return cls(scene, None, seen_by, checked, is_mesh=scene is not subject)
+
+    def memory(self, rasterizer: Rasterizer | None) -> AbstractContextManager[Memory]:
+        """Give the memory of a `Rasterizer` of a mesh's size, which draws nothing else meanwhile, or fresh memory.
+
+        Fragments refer to their inputs, so fresh memory is not drawn into again.
+        """
+        if rasterizer is None or not self.is_mesh:
+            return UNSHARED
+        if not isinstance(rasterizer, Rasterizer):
+            raise TypeError(f"rasterizer must be a Rasterizer or None, got {shown(rasterizer)}")
+        if rasterizer.size != self.size:
+            raise ValueError(f"rasterizer must have the size {self.size}, got {rasterizer.size}")
+        return rasterizer._lent
 
     @property
     def subject(self) -> Any:

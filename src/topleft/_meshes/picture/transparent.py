@@ -16,13 +16,15 @@ from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_count
 from topleft._core.base.color import WHITE, ColorLike, as_color
 from topleft._core.base.defaults import DEFAULT_SIZE
+from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.composite import composite
-from topleft._core.raster.peel import DepthLayers
+from topleft._core.raster.peel import DepthLayers, check_peel, draw_layers_of, peel_meshes
 from topleft._core.raster.view import WindowOptions
 from topleft._meshes.camera.camera import Camera, CameraLike
-from topleft._meshes.picture.buffers import peel_shot
+from topleft._meshes.model.material import Material
 from topleft._meshes.picture.fragments import SceneDepthLayers
 from topleft._meshes.picture.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
+from topleft._meshes.picture.placed import Placed
 from topleft._meshes.picture.scene_shade import shade
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
@@ -126,9 +128,28 @@ def solid_layers(shot: Shot, cuts: Sequence[Cut | None], *, threads: int | None,
     found = cast("SceneDepthLayers", peel_shot(solid, threads=threads, **options))
     if 0 in shot.size:
         return found
-    whole = SceneDepthLayers(*found.planes, found.placed.of(shot.scene))
+    whole = SceneDepthLayers(*found.planes, found.placed.with_scene(shot.scene))
     draw_holed(whole.placed, holed, *whole.planes, is_peeled=True, threads=threads)
     return whole
+
+
+def peel_shot(
+    shot: Shot,
+    *,
+    layers: int = 4,
+    depth_test: DepthTestOption = "less",
+    material: Material | None = None,
+    **options: Any,
+) -> DepthLayers:
+    """The nearest layers of a shot; options as those of `peel`, without `transform`."""
+    shot.scene.check_counted("a scene that is peeled")
+    placed = Placed.parse(shot, options, material)
+    if shot.is_mesh:
+        mesh = shot.scene[0].mesh
+        return draw_layers_of(mesh.vertices, mesh.triangles, placed.view_of(0), layers, depth_test)
+    n, is_farthest = check_peel(placed.view, layers, depth_test)
+    planes = peel_meshes(SCRATCH, placed.meshes(), placed.view, n, is_farthest=is_farthest)
+    return SceneDepthLayers(*planes, placed)
 
 
 def check_straight(camera: Camera) -> None:

@@ -7,7 +7,7 @@ that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property, partial
 from html import escape
@@ -32,6 +32,7 @@ from topleft._meshes.scene.adapt import as_mesh, is_mesh_like
 
 if TYPE_CHECKING:
     from topleft._meshes.picture.holes import Cut
+    from topleft._meshes.picture.render import PictureOptions
 
 EYE = np.eye(4)
 
@@ -146,6 +147,8 @@ class SceneCache:
         self.mesh_list: tuple[engine.MeshList, npt.NDArray[np.int64]] | None = None
         self.sides: dict[tuple[int, bool], tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]] = {}
         """By `cull` and whether materials decide: the `tl_cull` of each instance unless mirrored, which are mixed."""
+        self.pictures: dict[tuple[Hashable, ...], PictureOptions] = {}
+        """Checked options of pictures, `MOST_KEPT` at most."""
         self.cuts: ByMaterial[list[Cut | None]] = ByMaterial()
         """The materials with holes of each instance."""
         self.blended: ByMaterial[list[npt.NDArray[np.bool_] | None]] = ByMaterial()
