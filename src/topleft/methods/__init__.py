@@ -10,7 +10,7 @@ twins/       draws as the classics do, in Python
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
@@ -102,26 +102,15 @@ class Method:
 
 EXACT = Claims(exact=True, watertight=True, top_left=True, sub_pixel=True)
 
-METHODS = {
-    method.name: method
-    for method in (
-        Method("auto", "the cheaper of edge and scanline for each triangle", "", EXACT, 0),
-        Method(
-            "edge",
-            "integer edge functions, stepped by additions, one test a sample",
-            "J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988",
-            EXACT,
-            1,
-        ),
-        Method(
-            "scanline",
-            "row ends by one floor division an edge, then stepped quotient and remainder",
-            "J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965",
-            EXACT,
-            2,
-        ),
-    )
-}
+# fmt: off
+METHODS = {method.name: method for method in (
+    Method("auto", "the cheaper of edge and scanline for each triangle", "", EXACT, 0),
+    Method("edge", "integer edge functions, stepped by additions, one test a sample",
+           "J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988", EXACT, 1),
+    Method("scanline", "row ends by one floor division an edge, then stepped quotient and remainder",
+           "J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965", EXACT, 2),
+)}
+# fmt: on
 
 ALIASES = {"topleft": "auto"}
 """Further words of ``method=``: the library by its name, in tables beside other methods."""
@@ -139,131 +128,51 @@ INT_LIMIT = 2.0**29
 #: A Bresenham line is walked from its top, so this bounds the time that one triangle can take.
 WALK_LIMIT = 2.0**21
 
-CLASSICS = {
-    method.name: method
-    for method in (
-        Method(
-            "point_in_triangle",
-            "three cross products for every pixel of the bounding box, edges included",
-            TUTORIAL_3,
-            Claims(exact=True, watertight=True, integer_vertices=True, overdraws_shared_edges=True),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "point_in_triangle/top-left",
-            "the same, one unit off the edges that are neither top nor left",
-            TUTORIAL_3,
-            Claims(exact=True, watertight=True, top_left=True, integer_vertices=True),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "edge_increment",
-            "integer edge functions of sub-pixel vertices, stepped by additions",
-            GIESEN,
-            EXACT,
-            limit=INT_LIMIT,
-            has_subpixel_bits=True,
-        ),
-        Method(
-            "edge_increment/integer",
-            "the same for vertices on whole pixels",
-            GIESEN,
-            Claims(exact=True, watertight=True, top_left=True, integer_vertices=True),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "edge_increment/bottom-right",
-            "the same with top and left edges left out",
+#: The claims that several classics share.
+ON_WHOLE_PIXELS = Claims(exact=True, watertight=True, top_left=True, integer_vertices=True)
+EDGES_INCLUDED = Claims(exact=True, watertight=True, integer_vertices=True, overdraws_shared_edges=True)
+EDGES_TWICE = Claims(integer_vertices=True, overdraws_shared_edges=True)
+CLOSED = Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True)
+FLOATS = Claims(sub_pixel=True, overdraws_shared_edges=True)
+
+integer, walked = partial(Method, limit=INT_LIMIT), partial(Method, limit=WALK_LIMIT)
+snapped = partial(integer, has_subpixel_bits=True)
+
+# fmt: off
+CLASSICS = {method.name: method for method in (
+    integer("point_in_triangle", "three cross products for every pixel of the bounding box, edges included",
+            TUTORIAL_3, EDGES_INCLUDED),
+    integer("point_in_triangle/top-left", "the same, one unit off the edges that are neither top nor left",
+            TUTORIAL_3, ON_WHOLE_PIXELS),
+    snapped("edge_increment", "integer edge functions of sub-pixel vertices, stepped by additions", GIESEN, EXACT),
+    integer("edge_increment/integer", "the same for vertices on whole pixels", GIESEN, ON_WHOLE_PIXELS),
+    snapped("edge_increment/bottom-right", "the same with top and left edges left out",
             "K. Dyrkorn, A fast and precise triangle rasterizer, 2022",
-            Claims(exact=True, watertight=True, sub_pixel=True),
-            limit=INT_LIMIT,
-            has_subpixel_bits=True,
-        ),
-        Method(
-            "zigzag",
-            "stepped edge functions, turning round at the triangle's sides",
-            PINEDA,
-            EXACT,
-            limit=INT_LIMIT,
-            has_subpixel_bits=True,
-        ),
-        Method(
-            "bresenham_scanline",
-            "two Bresenham lines from the top down, outermost pixels, spans with both ends",
-            TUTORIAL_2,
-            Claims(integer_vertices=True, overdraws_shared_edges=True),
-            limit=WALK_LIMIT,
-        ),
-        Method(
-            "bresenham_scanline/top-left",
-            "the same with the first pixel of each run, without right ends and last rows",
-            TUTORIAL_2,
-            Claims(integer_vertices=True, overdraws_shared_edges=True),
-            limit=WALK_LIMIT,
-        ),
-        Method(
-            "bresenham_scanline/wireframe",
-            "the outlines of the flat triangles that the fill is made of",
-            TUTORIAL_2,
-            Claims(integer_vertices=True, overdraws_shared_edges=True),
-            limit=WALK_LIMIT,
-        ),
-        Method(
-            "lerp_scanline",
+            Claims(exact=True, watertight=True, sub_pixel=True)),
+    snapped("zigzag", "stepped edge functions, turning round at the triangle's sides", PINEDA, EXACT),
+    walked("bresenham_scanline", "two Bresenham lines from the top down, outermost pixels, spans with both ends",
+           TUTORIAL_2, EDGES_TWICE),
+    walked("bresenham_scanline/top-left",
+           "the same with the first pixel of each run, without right ends and last rows", TUTORIAL_2, EDGES_TWICE),
+    walked("bresenham_scanline/wireframe", "the outlines of the flat triangles that the fill is made of",
+           TUTORIAL_2, EDGES_TWICE),
+    integer("lerp_scanline",
             "the long and a short edge interpolated in float32 a row, truncated, spans with both ends",
-            SOKOLOV,
-            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "lerp_scanline/plus-one",
-            "the same with one more in the heights of the short edges, and the last row",
-            SOKOLOV,
-            Claims(integer_vertices=True, overdraws_shared_edges=True),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "row_crossing",
-            "each row asks the three edges for their crossing in float32, rounded; least to greatest",
-            WYLIE,
-            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "row_crossing/zero-area-test",
-            "the same without triangles that have no area",
-            WYLIE,
-            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "row_crossing/cull-back",
-            "the same without area or back faces",
-            WYLIE,
-            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="counter-clockwise"),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "row_crossing/cull-front",
-            "the same without area or front faces",
-            WYLIE,
-            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="clockwise"),
-            limit=INT_LIMIT,
-        ),
-        Method(
-            "float_barycentric",
-            "three float32 weights for every pixel centre of the bounding box, edges included",
-            FENG,
-            Claims(sub_pixel=True, overdraws_shared_edges=True),
-        ),
-        Method(
-            "float_barycentric/float64",
-            "the same in float64",
-            FENG,
-            Claims(sub_pixel=True, overdraws_shared_edges=True),
-        ),
-    )
-}
+            SOKOLOV, CLOSED),
+    integer("lerp_scanline/plus-one", "the same with one more in the heights of the short edges, and the last row",
+            SOKOLOV, EDGES_TWICE),
+    integer("row_crossing", "each row asks the three edges for their crossing in float32, rounded; least to greatest",
+            WYLIE, CLOSED),
+    integer("row_crossing/zero-area-test", "the same without triangles that have no area", WYLIE, CLOSED),
+    integer("row_crossing/cull-back", "the same without area or back faces",
+            WYLIE, replace(CLOSED, winding="counter-clockwise")),
+    integer("row_crossing/cull-front", "the same without area or front faces",
+            WYLIE, replace(CLOSED, winding="clockwise")),
+    Method("float_barycentric", "three float32 weights for every pixel centre of the bounding box, edges included",
+           FENG, FLOATS),
+    Method("float_barycentric/float64", "the same in float64", FENG, FLOATS),
+)}
+# fmt: on
 
 
 def find_method(name: object) -> Method:
