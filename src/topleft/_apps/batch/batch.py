@@ -430,7 +430,7 @@ def _is_done(job: Job) -> bool:
     """Return whether all files of a job are there and not empty; errors of a job appear when it is drawn."""
     try:
         files = job.files
-    except ValueError:
+    except (TypeError, ValueError):
         return False
     return bool(files) and all(map(is_whole, files))
 

@@ -23,7 +23,6 @@ from topleft import Mesh
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
 from topleft._apps.batch.workers import HeldScenes, Jobs, Workers, coarser_levels_of, needs_levels, runner_of
 from topleft._apps.cluster import MOST_RESTARTS, check_workers, lost, quiet, result_of, send_again
-from topleft._core.base.arrays import as_size
 from topleft.errors import MissingPackageError
 
 MESH_KEY = "topleft-mesh"
@@ -222,7 +221,7 @@ def jobs_of_task(job: Job) -> int:
     if not isinstance(job.scene, Mesh):
         return UNKNOWN_TOGETHER
     try:
-        width, height = as_size(job.size)
+        width, height = job.checked.size
     except (TypeError, ValueError):  # raised when the job is drawn
         return 1
     n_items = len(job.scene.triangles) + width * height

@@ -11,8 +11,9 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent, save_image
 from topleft._core.base.array_types import Array, MeshLike
@@ -26,6 +27,14 @@ from topleft.annex.pictures import draw_layers, gbuffer_of
 from topleft.typing import LayerOption
 
 CameraMaker = Callable[[Any, tuple[int, int]], Camera]
+
+
+class Checked(NamedTuple):
+    """The arguments of a job that are checked before any work."""
+
+    layers: tuple[str, ...]
+    files: tuple[Location, ...]
+    size: tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +108,16 @@ class Job:
         ValueError
             If there is no such layer.
         """
-        if self.destination is None:
-            return ()
-        path = location_of(self.destination)
-        return tuple(dict.fromkeys(layer_paths(path, check_layers(self.layers) or ("color",)).values()))
+        return self.checked.files
+
+    @cached_property
+    def checked(self) -> Checked:
+        """The layers, files and size, checked at the first use; a pickle takes them along. Raises as `files` does."""
+        layers = check_layers(self.layers)
+        files: tuple[Location, ...] = ()
+        if self.destination is not None:
+            files = tuple(dict.fromkeys(layer_paths(location_of(self.destination), layers or ("color",)).values()))
+        return Checked(layers, files, as_size(self.size))
 
     @property
     def name(self) -> str:
@@ -220,13 +235,11 @@ class JobRunner:
 
     def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
-        layers = check_layers(job.layers)
-        files = job.files  # before any work: raises for an unknown format
+        layers, files, size = job.checked  # before any work: raises for an unknown format
         for file in files:
             if isinstance(file, Path) and not file.parent.is_dir():
                 file.parent.mkdir(parents=True, exist_ok=True)
         scene = self._scene(job.scene, job.scale)
-        size = as_size(job.size)
         camera = job.camera(scene, size) if callable(job.camera) else job.camera
         options = {"threads": 1, **job.options}
         if callable(options.get("background")):

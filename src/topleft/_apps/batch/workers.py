@@ -19,7 +19,6 @@ from typing import Any
 
 from topleft import Level, Levels, Mesh, Scene
 from topleft._apps.batch.jobs import Job, JobRunner, Outcome
-from topleft._core.base.arrays import as_size
 from topleft.annex.pictures import keep_levels, levels_of
 from topleft.errors import MissingPackageError
 
@@ -133,7 +132,7 @@ class BorrowedThreads(Workers):
         Few jobs go one by one, so that no thread draws the last four while the others have nothing to do.
         """
         try:
-            width, height = as_size(job.size)
+            width, height = job.checked.size
         except (TypeError, ValueError):  # errors of a job appear when it is drawn
             return 1
         return max(1, min(MOST_OF_A_THREAD, (n_left or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
