@@ -32,9 +32,8 @@ typedef struct {
     int64_t n, n_columns;
 } tl_grad_sums;
 
-/* The numbers that a triangle sums up of where pixels lie, or of three attributes; and of each three attributes more.
- * And attributes of float32 that are computed in float32. */
-enum { TL_SUMS_OF_POINTS = 16, TL_SUMS_OF_THREE = 12, TL_FEW_COLUMNS = 4 };
+/* The numbers that a triangle sums up of where pixels lie; attributes of float32 that are computed in float32. */
+enum { TL_SUMS_OF_POINTS = 16, TL_FEW_COLUMNS = 4 };
 
 /* Gradients of where pixels lie in triangles.  g_db may be NULL. */
 typedef struct {
@@ -53,15 +52,6 @@ typedef struct {
     void *out, *out_da; /* (height, width, n_columns), (height, width, 2 n_wanted) or NULL */
     void *g_rast, *g_rast_db;
 } tl_grad_values;
-
-/* Attributes of float32 backward, at once to the vertices: `out` of values is a gradient, its last two are NULL. */
-typedef struct {
-    tl_grad_values values;
-    const int32_t *corners; /* (n_triangles, 3): the row of the attributes of each corner */
-    tl_grad_sums *faces; /* by triangle, TL_SUMS_OF_POINTS columns and TL_SUMS_OF_THREE for each three more: scratch */
-    tl_grad_sums *vertices, *attr; /* may be the same: those of attributes begin at first_column */
-    int64_t first_column;
-} tl_grad_colors;
 
 /* A texture with its halvings, and where it is looked at.  Backward `out` is a gradient, and the last are written. */
 typedef struct {

@@ -41,7 +41,6 @@
 #include "blend/blend.c"
 #include "blend/fill_shapes.c"
 #include "grad/area_vjp.c"
-#include "grad/colors.c"
 #include "grad/edges.c"
 #include "grad/pictures.c"
 #include "grad/outline.c"

@@ -403,9 +403,6 @@ TL_KERNEL(int64_t, grad_values, const tl_grad_view *view, const tl_grad_values *
 /* Their gradients: sums by row of attributes, and those of `rast` and `rast_db`. */
 TL_KERNEL(int64_t, grad_values_vjp, const tl_grad_view *view, const tl_grad_values *values, tl_grad_sums *sums)
 
-/* The sums of both by vertex and by row of attributes at once, of float32. */
-TL_KERNEL(int64_t, grad_colors_vjp, const tl_grad_view *view, const tl_grad_colors *colors)
-
 /* A texture at the pixels of a band. */
 TL_KERNEL(void, grad_texels, const tl_grad_view *view, const tl_grad_texture *texture)
 

@@ -144,7 +144,8 @@ TL_INLINE vm step_walks(pair_walks *w, int64_t i, int is_last, walker_lanes *at)
     w->n_failed += vi_compress(w->failed + w->n_failed, fails, at->pair);
     m = vm_and(m, has_edge);
     const vi other = vi_gather(m, w->edges->across, vi_add(vi_add(at->id, vi_add(at->id, at->id)), edge.corner));
-    vm ends = vi_gt(vi_set1(0), other);
+    const vi most = vi_set1((int32_t)(3 * w->view->n_triangles));
+    vm ends = vm_or(vi_gt(vi_set1(0), other), vm_and_not(m, vi_gt(most, other))); /* `across` may have changed */
     for (int k = 0; k < 3; k++)
         ends = vm_or(ends, vm_and(bits_set(outline, 1 << k), vi_eq(edge.corner, vi_set1(k))));
     ends = is_last ? m : vm_and(m, ends);

@@ -261,24 +261,12 @@ static double finish_row(const picture_pass *p, int64_t row)
     return 0.0;
 }
 
-static tl_grad_colors colors_of(const picture_pass *p)
-{
-    const tl_grad_picture *l = p->l;
-    return (tl_grad_colors){
-        .values = {.attr = l->attr, .n_attr = l->n_attr, .n_columns = l->n_columns, .out = as_picture(p)},
-        .corners = p->view->tri,
-        .faces = l->faces,
-        .vertices = l->vertices,
-        .attr = l->vertices,
-        .first_column = TL_FEW_COLUMNS};
-}
-
 TL_ONCE void backward_clamped_run(const picture_pass *p, int64_t r, int64_t row, int64_t n_pixels)
 {
     const pixel_run run = run_of_face(p, r, row, n_pixels);
-    tl_grad_colors colors = colors_of(p);
-    colors.values.rast = points_of_clamped(p, &run);
-    backward_clamped(p->view, &colors, &run);
+    const tl_grad_values values = {
+        .attr = p->l->attr, .n_columns = p->l->n_columns, .rast = points_of_clamped(p, &run), .out = as_picture(p)};
+    backward_clamped(p, &values, &run);
 }
 
 /* Adds the gradients of a row to the sums of its faces.  `ahead` may be NULL. */
@@ -308,25 +296,13 @@ TL_INLINE void backward_row(const picture_pass *p, int64_t row, const float *ahe
                 const run_plane plane = plane_of_face(three, x, y);
                 const float *g = gradients + n_columns * (column + first) + c;
                 vq4 sums[2];
-                sum_up_pixels(&plane, 0, g, (int)(n_pixels - first), n_columns - c < 3 ? (int)(n_columns - c) : 3,
-                              n_columns, 1, sums);
+                sum_up_pixels(&plane, g, (int)(n_pixels - first), n_columns - c < 3 ? (int)(n_columns - c) : 3,
+                              n_columns, sums);
                 add_three_moments(three + THREE_SUMS, vqd_from_vq(vq4_fold(sums[0])), vqd_from_vq(vq4_fold(sums[1])), x,
                                   y);
             }
         }
     }
-}
-
-/* Ends a band: from sums of faces to those of corners. */
-static void finish_faces(const picture_pass *p)
-{
-    const tl_grad_colors colors = colors_of(p);
-    const face_places places = {.moments = place_of_three(0) + THREE_SUMS,
-                                .stride = TL_SUMS_OF_FACE,
-                                .column = p->column,
-                                .row = p->row,
-                                .corners = p->corners};
-    finish_colors(p->view, &colors, &places);
 }
 
 /* Rows drawn, finished, led back, one after the other, each in its place: what its pairs move waits until those of the

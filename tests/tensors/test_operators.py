@@ -14,6 +14,7 @@ torch = pytest.importorskip("torch")
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
 from topleft._core.gradients.pictures import AttributePictures  # noqa: E402
+from topleft._core.gradients.tensors import as_rule  # noqa: E402
 from topleft._torch import operators  # noqa: E402
 
 CTX = dr.RasterizeContext()
@@ -162,6 +163,20 @@ def test_rast_is_copied_and_saved_as_any_tensor():
     assert file.tell() < rast.nbytes + 4096
     file.seek(0)
     assert torch.equal(torch.load(file), rast)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("rule", EDGES)
+@pytest.mark.parametrize("other", [2**31 - 1, -(2**31), 10**9])
+def test_what_lies_across_edges_may_change_once_the_outline_is_known(isa, rule, other):
+    pos, tri, colours = sphere(level=2)
+    rast, _ = dr.rasterize(CTX, pos, tri, (40, 50))
+    color, _ = dr.interpolate(colours, rast, tri)
+    across = dr.antialias_construct_topology_hash(tri)
+    outline = [torch.full_like(across, other), *operators.outline(pos, tri, across, 40, 50)]
+    with on(isa):
+        out = operators.smooth(color, rast, pos, tri, outline, int(as_rule(rule)), 1.0)
+    assert torch.isfinite(out).all()
 
 
 def test_gradients_are_those_of_one_picture_after_the_other():

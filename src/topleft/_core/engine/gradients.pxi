@@ -2,7 +2,6 @@
 
 MOST_LEVELS = TL_MOST_LEVELS
 SUMS_OF_POINTS = TL_SUMS_OF_POINTS
-SUMS_OF_THREE = TL_SUMS_OF_THREE
 IDS_ROOM = TL_IDS_ROOM
 HEAD_OF_FACE = TL_HEAD_OF_FACE
 SUMS_OF_FACE = TL_SUMS_OF_FACE
@@ -110,26 +109,6 @@ cdef class GradientView:
         v.g_rast, v.g_rast_db = <void *>first_of(arrays[4]), <void *>first_of(arrays[5])
         with nogil:
             bad = K.grad_values_vjp(&view, &v, &sums.sums)
-        return bad
-
-    def colors_vjp(self, attr: Array, const int32_t[:, ::1] corners, rast: Array, g_out: Array,
-                   sums: tuple[GradientSums, GradientSums, GradientSums], int64_t first, int64_t end) -> int:
-        """Sum up gradients of vertices and of attributes (V, K) from those of a picture. Returns as `points_vjp` does.
-
-        `corners` (T, 3): rows of attributes. `sums`: scratch by triangle, SUMS_OF_POINTS columns, SUMS_OF_THREE more for
-        each three attributes after the third; by vertex; by row of `attr`.
-        """
-        cdef tl_grad_view view = self.rows(first, end)
-        cdef tl_grad_colors c
-        cdef GradientSums faces = sums[0], vertices = sums[1], rows = sums[2]
-        cdef int64_t bad
-        memset(&c, 0, sizeof(c))
-        c.values.attr, c.values.n_attr, c.values.n_columns = first_of(attr), attr.shape[0], attr.shape[1]
-        c.values.rast, c.values.out = first_of(rast), <void *>first_of(g_out)
-        c.corners = &corners[0, 0] if corners.shape[0] else NULL
-        c.faces, c.vertices, c.attr = &faces.sums, &vertices.sums, &rows.sums
-        with nogil:
-            bad = K.grad_colors_vjp(&view, &c)
         return bad
 
     def texels(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...], int64_t first,
