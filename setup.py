@@ -1,5 +1,6 @@
-"""Build `topleft._core.engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and
-the classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's default instruction set.
+"""Build `topleft._core.engine.kernels`: one Cython unit, one dispatcher, and the units of `csrc/unit_*.c` for each
+instruction set; and the classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's
+default instruction set.
 
 Everything that is not about compiling stands in `pyproject.toml`. What the engine declares of csrc, and its types for
 type checkers, are made by `packaging/bindings.py`. setuptools gives all sources of an extension the same
@@ -59,6 +60,8 @@ FLAGS_CYTHON = [
     "-O1", "-g0", "-ffp-contract=off", "-fno-fast-math", "-fvisibility=hidden", "-fno-lto",
     "-Wno-unused-function", "-Wno-unused-parameter", "-Wno-missing-field-initializers", "-Wno-cast-function-type",
 ]  # fmt: skip
+# The kernels of other units, which a unit includes with what it needs of their files. `csrc/kernels.c` has all.
+FLAGS_UNIT = ["-Wno-unused-function"]
 # The classics do their arithmetic in the unit that Cython makes, from their headers.
 FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-fno-math-errno"]
 # For findings of a sanitizer: where they are, and integers whose overflow the language does not define.
@@ -100,7 +103,7 @@ __m512i probe(__m512i a, __mmask64 m) { return _mm512_mask_mullo_epi64(_mm512_lz
 
 @dataclass(frozen=True)
 class Isa:
-    """A kernel unit, `csrc/isa_<name>.c`, on one target: a macro of the target's compilers, flags, a text to try."""
+    """An instruction set on one target: a macro of the target's compilers, flags of its units, a text to try."""
 
     name: str
     target: str
@@ -144,6 +147,15 @@ def digest(*parts: object) -> str:
 def files_in(folder: str, *suffixes: str) -> list[Path]:
     """Return the files in and below a folder that end in one of the suffixes, sorted."""
     return sorted(path for path in (ROOT / folder).rglob("*") if path.suffix in suffixes)
+
+
+def with_includes(path: Path, found: dict[Path, None]) -> dict[Path, None]:
+    """Add a file of csrc and all that it includes, which are named from that folder."""
+    if path not in found:
+        found[path] = None
+        for name in re.findall(r'^#include "([^"]+)"', path.read_text(encoding="utf-8"), re.MULTILINE):
+            with_includes(ROOT / "csrc" / name, found)
+    return found
 
 
 def make_once(target: Path, key: str, make) -> None:
@@ -263,8 +275,12 @@ class BuildTopleft(build_ext):
             told = [flag for flag in [*self.compiler.compiler_so[1:], *unit_flags] if "/" not in flag]
             macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
 
-        units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in reversed(flags.items())]
-        units.append((ext, FLAGS_CYTHON, []))
+        units = [(ext, FLAGS_CYTHON, [])]
+        for name, unit_flags in reversed(flags.items()):
+            for source in sorted((ROOT / "csrc").glob("unit_*.c")):
+                own_macros = [("TL_ISA", name), ("TL_UNIT", source.stem.removeprefix("unit_"))]
+                own_macros += [("TL_USE_SIMD128", "1")] * (name == "simd128")
+                units.append((source, unit_flags + FLAGS_UNIT, own_macros))
         return [*units, (ROOT / "csrc/dispatch.c", FLAGS_C, macros)]
 
     def classic_units(self, ext: Extension) -> list[tuple[Path | Extension, list[str], list[tuple[str, str]]]]:
@@ -333,11 +349,10 @@ class BuildTopleft(build_ext):
         own_headers = [] if folder.is_relative_to(ROOT / "csrc") else files_in(str(folder.relative_to(ROOT)), ".h")
         if isinstance(source, Extension):
             source = self.cython(source)
-        target = self.temp / (source.stem + ".o")
+        target = self.temp / f"{'_'.join([source.stem, *filter(None, [dict(macros).get('TL_ISA')])])}.o"
         is_ours = source.is_relative_to(ROOT / "csrc")  # other units include the headers of the contract alone
-        contract = [*sorted((ROOT / "csrc").glob("*.h")), ROOT / "csrc/base/integers.h"]
-        headers = files_in("csrc", ".c", ".h") if is_ours else [*contract, *own_headers]
-        sources = [source, *headers]
+        headers = with_includes(source if is_ours else ROOT / "csrc/dispatch.h", {})
+        sources = [source, *headers, *own_headers]
 
         def make() -> None:
             with tempfile.TemporaryDirectory(dir=self.temp) as folder:

@@ -1,4 +1,4 @@
-"""Check kernels compiled for x86-64, `check_units.py OBJECT...`: nothing visible but the table, no slow instruction.
+"""Check kernels compiled for x86-64, `check_units.py OBJECT...`: one visible function, no slow instruction.
 
 Reads with `nm` and `objdump`. An instruction is slow if a processor that people own runs it as microcode:
 `llvm-mca -mcpu=znver1 -instruction-info` gives it a latency of 100. Nothing here needs such a processor.
@@ -27,11 +27,11 @@ FORBIDDEN = (
 END = "once a row, its last vector: a whole store would leave the row"
 #: Masked stores that stay, by function, with the reason; AVX-512 has masked stores without that price.
 ALLOWED = {
-    "draw_*": "samples at the end of the buffer, where a whole vector has no room; `has_room` takes blends before it",
-    "put_*": "as `draw_*`: the sinks that `draw_rows` and `draw_middle` call",
-    "walk_wide": "as `draw_*`",
-    "peel_lanes": "as `draw_*`",
-    "count_spans": "as `draw_*`",
+    "draw*": "samples at the end of the buffer, where a whole vector has no room; `has_room` takes blends before it",
+    "put_*": "as `draw*`: the sinks that `draw_rows` and `draw_middle` call",
+    "walk_wide": "as `draw*`",
+    "peel_lanes": "as `draw*`",
+    "count_spans": "as `draw*`",
     "clear": END,
     "fill_rows_of_shapes": END,
     "lay_rows": END,
@@ -74,18 +74,18 @@ def slow_code(path: Path, isa: str) -> list[str]:
     return list(found)
 
 
-def extra_symbols(path: Path, isa: str) -> list[str]:
-    """Return a line if an object defines more than its table: symbols of a wider set could answer for the baseline."""
+def extra_symbols(path: Path) -> list[str]:
+    """Return a line if a unit defines more than its function: symbols of a wider set could answer for the baseline."""
     text = subprocess.run(["nm", "-g", "--defined-only", str(path)], capture_output=True, text=True, check=True).stdout
     names = [line.split()[-1] for line in text.splitlines()]
-    return [] if names == [f"tl_kernels_{isa}"] else [f"{path.name} must define tl_kernels_{isa} alone, got {names}"]
+    wanted = f"tl_set_{path.stem.removeprefix('unit_')}"
+    return [] if names == [wanted] else [f"{path.name} must define {wanted} alone, got {names}"]
 
 
 def main(paths: list[Path]) -> None:
     problems = []
     for path in paths:
-        isa = path.stem.removeprefix("isa_")
-        problems += [*extra_symbols(path, isa), *slow_code(path, isa)]
+        problems += [*extra_symbols(path), *slow_code(path, path.stem.rpartition("_")[2])]
     if problems:
         sys.exit("\n".join(problems))
 

@@ -1,6 +1,6 @@
-/* CPU probe and choice of the kernel unit: a name in, a kernel table out.
+/* CPU probe and choice of an instruction set: a name in, a kernel table out.
  *
- * setup.py defines TL_HAVE_<ISA> for each unit that it links, TL_FLAGS_<ISA> and TL_VERSION. Nothing here is kept
+ * setup.py defines TL_HAVE_<ISA> for each set that it links, TL_FLAGS_<ISA> and TL_VERSION. Nothing here is kept
  * between calls; which table is in use is the caller's to remember. */
 #include "dispatch.h"
 
@@ -27,37 +27,45 @@
 #define TL_FLAGS_AVX512 ""
 #endif
 
-extern const tl_kernels tl_kernels_scalar;
+/* The functions of unit.h, which set the kernels of a unit. */
+#define TL_DECLARE(unit, isa) void tl_set_##unit##_##isa(tl_kernels *kernels);
+#define TL_CALL(unit, isa) tl_set_##unit##_##isa(kernels);
+#define TL_UNITS(f, isa) f(raster, isa) f(pixels, isa) f(blend, isa) f(shade, isa) f(polygons, isa) f(grad, isa)
+#define TL_SET(isa)           \
+    TL_UNITS(TL_DECLARE, isa) \
+    static void set_##isa(tl_kernels *kernels) { TL_UNITS(TL_CALL, isa) }
+
+TL_SET(scalar)
 #ifdef TL_HAVE_SIMD128
-extern const tl_kernels tl_kernels_simd128;
-#define TL_TABLE_SIMD128 (&tl_kernels_simd128)
+TL_SET(simd128)
+#define TL_SET_SIMD128 set_simd128
 #else
-#define TL_TABLE_SIMD128 NULL
+#define TL_SET_SIMD128 NULL
 #endif
 #ifdef TL_HAVE_AVX2
-extern const tl_kernels tl_kernels_avx2;
-#define TL_TABLE_AVX2 (&tl_kernels_avx2)
+TL_SET(avx2)
+#define TL_SET_AVX2 set_avx2
 #else
-#define TL_TABLE_AVX2 NULL
+#define TL_SET_AVX2 NULL
 #endif
 #ifdef TL_HAVE_AVX512
-extern const tl_kernels tl_kernels_avx512;
-#define TL_TABLE_AVX512 (&tl_kernels_avx512)
+TL_SET(avx512)
+#define TL_SET_AVX512 set_avx512
 #else
-#define TL_TABLE_AVX512 NULL
+#define TL_SET_AVX512 NULL
 #endif
 
 typedef struct {
     const char *name;
     const char *flags;
-    const tl_kernels *kernels; /* NULL: not built */
+    void (*set)(tl_kernels *kernels); /* NULL: not built */
 } tl_isa_unit;
 
 static const tl_isa_unit UNITS[TL_N_ISA] = {
-    [TL_ISA_SCALAR] = {"scalar", TL_FLAGS_SCALAR, &tl_kernels_scalar},
-    [TL_ISA_SIMD128] = {"simd128", TL_FLAGS_SIMD128, TL_TABLE_SIMD128},
-    [TL_ISA_AVX2] = {"avx2", TL_FLAGS_AVX2, TL_TABLE_AVX2},
-    [TL_ISA_AVX512] = {"avx512", TL_FLAGS_AVX512, TL_TABLE_AVX512},
+    [TL_ISA_SCALAR] = {"scalar", TL_FLAGS_SCALAR, set_scalar},
+    [TL_ISA_SIMD128] = {"simd128", TL_FLAGS_SIMD128, TL_SET_SIMD128},
+    [TL_ISA_AVX2] = {"avx2", TL_FLAGS_AVX2, TL_SET_AVX2},
+    [TL_ISA_AVX512] = {"avx512", TL_FLAGS_AVX512, TL_SET_AVX512},
 };
 
 #if defined(__x86_64__)
@@ -113,7 +121,7 @@ const char *tl_isa_name(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UNI
 
 const char *tl_isa_flags(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].flags : ""; }
 
-int tl_isa_built(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA && UNITS[i_isa].kernels != NULL; }
+int tl_isa_built(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA && UNITS[i_isa].set != NULL; }
 
 int tl_isa_available(int i_isa)
 {
@@ -127,12 +135,15 @@ int tl_isa_available(int i_isa)
     }
 }
 
-const tl_kernels *tl_kernels_for(const char *name)
+int tl_set_kernels(const char *name, tl_kernels *kernels)
 {
     for (int i = 0; i < TL_N_ISA; i++)
-        if (strcmp(UNITS[i].name, name) == 0)
-            return tl_isa_available(i) ? UNITS[i].kernels : NULL;
-    return NULL;
+        if (strcmp(UNITS[i].name, name) == 0 && tl_isa_available(i)) {
+            kernels->isa = UNITS[i].name;
+            UNITS[i].set(kernels);
+            return 1;
+        }
+    return 0;
 }
 
 const char *tl_compiler(void)

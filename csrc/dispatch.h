@@ -19,8 +19,8 @@ int tl_isa_available(int i_isa);
 /* The compiler flags of a unit, "" when it was not built. */
 const char *tl_isa_flags(int i_isa);
 
-/* The kernels of an available instruction set, NULL for any other name. */
-const tl_kernels *tl_kernels_for(const char *name);
+/* Sets a table to the kernels of an instruction set; 0 unless it is available, and the table is as it was. */
+int tl_set_kernels(const char *name, tl_kernels *kernels);
 
 /* The compiler of this binary, for example "gcc 12.2.0", and the version it was compiled as. */
 const char *tl_compiler(void);

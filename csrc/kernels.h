@@ -1,11 +1,20 @@
 /* The kernels of an instruction set: TL_KERNEL(result, name, parameters ...), which is a member of the table at the end
- * of topleft.h, and its value in kernels.c.  Part of the contract of topleft.h. */
+ * of topleft.h.  A section has the kernels of a unit, which unit_*.c includes and the build compiles by itself; where
+ * TL_KERNELS_OF is defined, it alone is read.  Part of the contract of topleft.h. */
 #include "topleft.h" /* read by itself: the types */
+
+#define TL_UNIT_raster 1
+#define TL_UNIT_pixels 2
+#define TL_UNIT_blend 3
+#define TL_UNIT_shade 4
+#define TL_UNIT_polygons 5
+#define TL_UNIT_grad 6
 
 #ifndef TL_KERNEL
 #define TL_KERNEL(result, name, ...)
 #endif
 
+#if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_raster
 /* The pixels of vertices [first, end) to snapped vertices.  z is read when with_depth and n_components = 3. `wide` may
  * be NULL: wide vertices are then counted, and the caller comes again with a table. */
 TL_KERNEL(tl_vertex_counts, snap, const tl_source *source, int64_t first, int64_t end, int subpixel_bits,
@@ -83,10 +92,6 @@ TL_KERNEL(int64_t, take_points, const tl_source *source, int64_t first, int64_t 
 TL_KERNEL(int64_t, count_classes, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
           tl_census *census)
 
-/* The depth of n pixels, one for all triangles: `depth` where there is an id, `background` elsewhere.  The ids are
- * xored with `flip` first. */
-TL_KERNEL(void, set_flat_depth, int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out)
-
 /* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they may
  * be a few too many.  Returns as `draw_mesh` does; the window as for a share of a part. */
 TL_KERNEL(int64_t, bin, const tl_snapped *snapped, const tl_window *window, int32_t reach_fx, int band_bits,
@@ -98,6 +103,62 @@ TL_KERNEL(void, list_bins, const tl_bins *bins, int64_t n_bands, int64_t *starts
 
 /* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach. */
 TL_KERNEL(void, find_columns, const tl_bins *bins, int64_t n_bands, int32_t *columns)
+
+/* The exact area that the triangles of a slice, from its first on, cover of each pixel, their sum; the window has fewer
+ * than 2^31 cells.  Returns as `draw_mesh` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
+TL_KERNEL(int64_t, draw_area, const tl_snapped *snapped, const tl_window *window, const tl_slice *slice,
+          const tl_area *target)
+
+/* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
+TL_KERNEL(void, set_inverse_w, const tl_source *source, const float *rows, int64_t first, int64_t end, float *out)
+
+/* Copies triangles [first, end).  A single-sided one turned the way that the mesh culls is collapsed to a point; if a
+ * plane cuts it, so are its pieces, in place.  The result is drawn with any cull. */
+TL_KERNEL(void, drop_sides, const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
+          int32_t *triangles)
+
+/* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
+ * triangle.  Returns the first row with an index outside the vertices, or -1. */
+TL_KERNEL(int64_t, list_edges, const tl_snapped *snapped, const tl_edge_scratch *scratch, uint64_t *edges,
+          int64_t *n_edges)
+
+/* Clears the window's pixels and draws lines. */
+TL_KERNEL(void, draw_lines, const tl_edges *lines, const tl_window *window, const tl_line_target *target)
+
+/* Clears the window's pixels and draws points: ids and depth, NEAREST or FARTHEST; at equal depth the lower id. */
+TL_KERNEL(void, draw_cloud, const tl_cloud *cloud, const tl_window *window, const tl_target *target)
+
+/* The windows that n triangles, corners (n, 3, 2) in pixels, may touch.  With out = NULL sets `boxes`, adds to
+ * starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be snapped, or -1.
+ * Otherwise writes the spans of each row from starts[row] on, which is then where they end, by the boxes. */
+TL_KERNEL(int64_t, list_spans, const tl_tiling *tiling, const double *corners_px, int64_t n, int64_t first_triangle,
+          tl_window_box *boxes, int64_t *starts, tl_window_span *out)
+
+/* The triangles of the windows of a row, of n spans of at most TL_SHORT_SPAN windows.  With out = NULL adds to
+ * starts[column + 1] how many a window has.  Otherwise writes them from starts[column] on, which is then where they
+ * end.  Returns how many spans are longer. */
+TL_KERNEL(int64_t, sort_spans, const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out)
+
+/* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to the differences of triangle counts from window to
+ * window: rows of n_columns + 1 numbers. */
+TL_KERNEL(void, count_windows, const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
+          int32_t *steps)
+
+/* The corners of n triangles, those from `first` on unless `which` names them: their rows, one after the other. Returns
+ * the first that names a vertex that does not exist, or -1. */
+TL_KERNEL(int64_t, take_corners, const tl_corners *mesh, const int32_t *which, int64_t first, int64_t n, void *out)
+
+/* Pixels [first, end) of two visibility buffers into the first. */
+TL_KERNEL(void, merge_fragments, const tl_merge *merge, int64_t first, int64_t end)
+
+/* Ids [first, end) become names[1 + id]. */
+TL_KERNEL(void, name_triangles, int32_t *ids, int64_t first, int64_t end, const int32_t *names)
+#endif
+
+#if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_pixels
+/* The depth of n pixels, one for all triangles: `depth` where there is an id, `background` elsewhere.  The ids are
+ * xored with `flip` first. */
+TL_KERNEL(void, set_flat_depth, int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out)
 
 /* Writes rows of a picture of that width, from their first number on, past the caches. */
 TL_KERNEL(void, lay_rows, const tl_laid_rows *rows, int32_t *to, int64_t width)
@@ -128,19 +189,6 @@ TL_KERNEL(void, write_counts, const tl_rles *rles, int64_t *text_starts, uint8_t
 /* A band of rows as a block of deflate that ends at a byte, and Adler-32 of the bytes so far; `row` has room for
  * 1 + n_bytes, `out` for tl_png_room.  Returns how many bytes it has. */
 TL_KERNEL(int64_t, encode_rows, const tl_png_rows *rows, uint8_t *row, uint32_t *adler, uint8_t *out)
-
-/* The exact area that the triangles of a slice, from its first on, cover of each pixel, their sum; the window has fewer
- * than 2^31 cells.  Returns as `draw_mesh` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
-TL_KERNEL(int64_t, draw_area, const tl_snapped *snapped, const tl_window *window, const tl_slice *slice,
-          const tl_area *target)
-
-/* Blends the colours of triangles into the canvas in their order.  Returns as `draw_mesh` does. */
-TL_KERNEL(int64_t, blend, const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
-
-/* Fills the canvas, its ground not NULL, with the flat colours of a few triangles: tl_is_large_shapes. 2^sample_bits
- * samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as `draw_mesh` does. */
-TL_KERNEL(int64_t, fill_large_shapes, const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
-          const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer)
 
 /* 1/w of vertices [first, end) of clip space, for tl_vertex_set; nothing of it is checked. */
 TL_KERNEL(void, inverse_ws, const tl_source *source, int64_t first, int64_t end, double *out)
@@ -186,9 +234,29 @@ TL_KERNEL(void, mean_colors, const void *colors, int sample_bits, int64_t stride
 /* The composite of the layers of n pixels. */
 TL_KERNEL(void, composite, const tl_composite *layers, int64_t n, void *pixels)
 
-/* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
-TL_KERNEL(void, set_inverse_w, const tl_source *source, const float *rows, int64_t first, int64_t end, float *out)
+/* Per pixel of `ids` (rows of window->width): the value of its point, float32 or float64.  No shading is read. */
+TL_KERNEL(void, fill_points, const tl_shaded_scene *scene, const tl_window *window, const tl_points *points,
+          const int32_t *ids, void *out)
 
+/* The planes of triangles [first, end); the one of no triangle, with first = 0. */
+TL_KERNEL(void, list_planes, const tl_valued *mesh, int64_t first, int64_t end)
+
+/* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or
+ * float64. */
+TL_KERNEL(void, fill_planes, const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out)
+#endif
+
+#if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_blend
+/* Blends the colours of triangles into the canvas in their order.  Returns as `draw_mesh` does. */
+TL_KERNEL(int64_t, blend, const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
+
+/* Fills the canvas, its ground not NULL, with the flat colours of a few triangles: tl_is_large_shapes. 2^sample_bits
+ * samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as `draw_mesh` does. */
+TL_KERNEL(int64_t, fill_large_shapes, const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
+          const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer)
+#endif
+
+#if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_shade
 /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity; as the sample sees it
  * that lies at_fx = (x, y) sub-pixels from the centre, NULL: that which each mesh is seen from. */
 TL_KERNEL(void, shade, const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
@@ -205,38 +273,13 @@ TL_KERNEL(void, shade_samples, const tl_shaded_scene *scene, const tl_window *wi
  * NORMALS. */
 TL_KERNEL(void, shade_normals, const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, float *out)
 
-/* Per pixel of `ids` (rows of window->width): the value of its point, float32 or float64.  No shading is read. */
-TL_KERNEL(void, fill_points, const tl_shaded_scene *scene, const tl_window *window, const tl_points *points,
-          const int32_t *ids, void *out)
-
 /* Draws n alpha-tested triangles over a target, NEAREST or PEEL, of all others; the window as for a share of a part,
  * and fewer than 2^31 pixels. */
 TL_KERNEL(void, cut_out, const tl_snapped *snapped, const tl_window *window, const tl_view *view,
           const tl_shading *shading, const int32_t *triangles, int64_t n, const tl_target *target)
+#endif
 
-/* Copies triangles [first, end).  A single-sided one turned the way that the mesh culls is collapsed to a point; if a
- * plane cuts it, so are its pieces, in place.  The result is drawn with any cull. */
-TL_KERNEL(void, drop_sides, const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
-          int32_t *triangles)
-
-/* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
- * triangle.  Returns the first row with an index outside the vertices, or -1. */
-TL_KERNEL(int64_t, list_edges, const tl_snapped *snapped, const tl_edge_scratch *scratch, uint64_t *edges,
-          int64_t *n_edges)
-
-/* Clears the window's pixels and draws lines. */
-TL_KERNEL(void, draw_lines, const tl_edges *lines, const tl_window *window, const tl_line_target *target)
-
-/* Clears the window's pixels and draws points: ids and depth, NEAREST or FARTHEST; at equal depth the lower id. */
-TL_KERNEL(void, draw_cloud, const tl_cloud *cloud, const tl_window *window, const tl_target *target)
-
-/* The planes of triangles [first, end); the one of no triangle, with first = 0. */
-TL_KERNEL(void, list_planes, const tl_valued *mesh, int64_t first, int64_t end)
-
-/* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or
- * float64. */
-TL_KERNEL(void, fill_planes, const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out)
-
+#if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_polygons
 /* Unit normals (n_vertices, 3) of the vertices [first, end): the faces round a vertex count by the angle there, in
  * their order; 0 where nothing is left.  This one and the next three return -1, or a row with an index outside the
  * vertices. */
@@ -362,32 +405,44 @@ TL_KERNEL(void, label_polygons, const tl_polygons *polygons, const tl_label_job 
 /* Exact shares of pixels.  Returns how many polygons of the job are finished: fewer than all when the table is full. */
 TL_KERNEL(int64_t, share_polygons, const tl_polygons *polygons, const tl_share_job *job)
 
-/* The windows that n triangles, corners (n, 3, 2) in pixels, may touch.  With out = NULL sets `boxes`, adds to
- * starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be snapped, or -1.
- * Otherwise writes the spans of each row from starts[row] on, which is then where they end, by the boxes. */
-TL_KERNEL(int64_t, list_spans, const tl_tiling *tiling, const double *corners_px, int64_t n, int64_t first_triangle,
-          tl_window_box *boxes, int64_t *starts, tl_window_span *out)
+/* Rows [first, end) of an atlas, (rows of) width texels.  Where an id is -1, that of the nearest triangle that meets
+ * the texel, and its values there; `squared` has a number a texel of these rows, INFINITY.  Or means over covered
+ * areas: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */
+TL_KERNEL(void, touch_texels, const tl_atlas *atlas, int64_t first, int64_t end, int32_t *ids, float *squared,
+          float *out)
+TL_KERNEL(void, average_texels, const tl_atlas *atlas, int64_t first, int64_t end, double *sums, float *most,
+          int32_t *ids, float *out)
 
-/* The triangles of the windows of a row, of n spans of at most TL_SHORT_SPAN windows.  With out = NULL adds to
- * starts[column + 1] how many a window has.  Otherwise writes them from starts[column] on, which is then where they
- * end.  Returns how many spans are longer. */
-TL_KERNEL(int64_t, sort_spans, const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out)
+/* The nearest texel with an id, within `reach` < TL_NO_TEXEL: along rows; then by Euclid, its index or -1, with room
+ * for 2 * width numbers; and texels [first, end) of n_bytes copied from there. */
+TL_KERNEL(void, find_in_rows, const int32_t *ids, int64_t width, int64_t first, int64_t end, int reach, int16_t *along)
+TL_KERNEL(void, find_gutter, const int16_t *along, int64_t width, int64_t height, int64_t first, int64_t end, int reach,
+          int32_t *room, int32_t *from)
+TL_KERNEL(void, copy_texels, const int32_t *from, int64_t first, int64_t end, int64_t n_bytes, uint8_t *texels)
 
-/* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to the differences of triangle counts from window to
- * window: rows of n_columns + 1 numbers. */
-TL_KERNEL(void, count_windows, const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
-          int32_t *steps)
+/* Adds a picture's colours of texels [first, end), at positions, with normals and ids (-1: none), to sums and
+ * weights. */
+TL_KERNEL(void, add_taken, const tl_taken *taken, const float *positions, const float *normals, const int32_t *ids,
+          int64_t first, int64_t end, float *sums, float *weights)
 
-/* The corners of n triangles, those from `first` on unless `which` names them: their rows, one after the other. Returns
- * the first that names a vertex that does not exist, or -1. */
-TL_KERNEL(int64_t, take_corners, const tl_corners *mesh, const int32_t *which, int64_t first, int64_t n, void *out)
+/* Rows [first, end) of how high above the ground something is seen; NaN where there is no ground, or too far. */
+TL_KERNEL(void, view_heights, const tl_terrain *terrain, int64_t first, int64_t end, double *out)
 
-/* Pixels [first, end) of two visibility buffers into the first. */
-TL_KERNEL(void, merge_fragments, const tl_merge *merge, int64_t first, int64_t end)
+/* Columns of tl_crossings: filled by the even-odd rule in place, where the number of odd ones is returned; a byte or a
+ * share of each voxel, n_steps a column; each bit at strides of a row, a column and a step. */
+TL_KERNEL(int64_t, fill_columns, uint64_t *bits, int64_t n_columns, int64_t n_words)
+TL_KERNEL(void, expand_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out)
+TL_KERNEL(void, count_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps,
+          int sample_bits, float *out)
+TL_KERNEL(void, scatter_columns, const uint64_t *bits, int64_t n_rows, int64_t n_columns, int64_t n_words,
+          const int64_t *strides, uint8_t *out)
 
-/* Ids [first, end) become names[1 + id]. */
-TL_KERNEL(void, name_triangles, int32_t *ids, int64_t first, int64_t end, const int32_t *names)
+/* Writes 1 for the voxels of a grid of a shape that triangles [first, end) meet; points are in voxels. */
+TL_KERNEL(void, touch_voxels, const double *points, int64_t n_points, const int32_t *triangles, int64_t first,
+          int64_t end, const int64_t *shape, uint8_t *out)
+#endif
 
+#if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_grad
 /* Where the pixels of a band lie in the triangles that they show: `ids` is its picture's lowest row, -1 for none, the
  * next one stands `step` numbers on, and first_id is added.  rast_db may be NULL. */
 TL_KERNEL(void, grad_points, const tl_grad_view *view, const int32_t *ids, int64_t step, int64_t first_id, void *rast,
@@ -424,41 +479,6 @@ TL_KERNEL(double, grad_picture, const tl_grad_view *view, tl_grad_picture *pictu
 
 /* The gradients of vertices from those of areas. */
 TL_KERNEL(void, grad_area, const tl_grad_area *area)
-
-/* Rows [first, end) of an atlas, (rows of) width texels.  Where an id is -1, that of the nearest triangle that meets
- * the texel, and its values there; `squared` has a number a texel of these rows, INFINITY.  Or means over covered
- * areas: `sums` has 1 + n_values numbers a texel of these rows, `most` one, all 0. */
-TL_KERNEL(void, touch_texels, const tl_atlas *atlas, int64_t first, int64_t end, int32_t *ids, float *squared,
-          float *out)
-TL_KERNEL(void, average_texels, const tl_atlas *atlas, int64_t first, int64_t end, double *sums, float *most,
-          int32_t *ids, float *out)
-
-/* The nearest texel with an id, within `reach` < TL_NO_TEXEL: along rows; then by Euclid, its index or -1, with room
- * for 2 * width numbers; and texels [first, end) of n_bytes copied from there. */
-TL_KERNEL(void, find_in_rows, const int32_t *ids, int64_t width, int64_t first, int64_t end, int reach, int16_t *along)
-TL_KERNEL(void, find_gutter, const int16_t *along, int64_t width, int64_t height, int64_t first, int64_t end, int reach,
-          int32_t *room, int32_t *from)
-TL_KERNEL(void, copy_texels, const int32_t *from, int64_t first, int64_t end, int64_t n_bytes, uint8_t *texels)
-
-/* Adds a picture's colours of texels [first, end), at positions, with normals and ids (-1: none), to sums and
- * weights. */
-TL_KERNEL(void, add_taken, const tl_taken *taken, const float *positions, const float *normals, const int32_t *ids,
-          int64_t first, int64_t end, float *sums, float *weights)
-
-/* Rows [first, end) of how high above the ground something is seen; NaN where there is no ground, or too far. */
-TL_KERNEL(void, view_heights, const tl_terrain *terrain, int64_t first, int64_t end, double *out)
-
-/* Columns of tl_crossings: filled by the even-odd rule in place, where the number of odd ones is returned; a byte or a
- * share of each voxel, n_steps a column; each bit at strides of a row, a column and a step. */
-TL_KERNEL(int64_t, fill_columns, uint64_t *bits, int64_t n_columns, int64_t n_words)
-TL_KERNEL(void, expand_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out)
-TL_KERNEL(void, count_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps,
-          int sample_bits, float *out)
-TL_KERNEL(void, scatter_columns, const uint64_t *bits, int64_t n_rows, int64_t n_columns, int64_t n_words,
-          const int64_t *strides, uint8_t *out)
-
-/* Writes 1 for the voxels of a grid of a shape that triangles [first, end) meet; points are in voxels. */
-TL_KERNEL(void, touch_voxels, const double *points, int64_t n_points, const int32_t *triangles, int64_t first,
-          int64_t end, const int64_t *shape, uint8_t *out)
+#endif
 
 #undef TL_KERNEL

@@ -1,6 +1,6 @@
 /* The functions that lower files call of higher ones, and all of them: a sink is compiled into the walkers and into the
  * lanes, so that inner loops have it as a constant, and two sinks are rooms of their own.  A file that includes this
- * and draws for such a sink must be compiled together with the file that defines it, as kernels.c does. */
+ * and draws for such a sink must be compiled together with the file that defines it: they are in one unit. */
 #ifndef TL_HOOKS_H
 #define TL_HOOKS_H
 

@@ -15,19 +15,21 @@ import numpy as np
 
 include "contract.pxi"  # the declarations of csrc's headers: packaging/bindings.py makes it
 
-# The kernels in use. Scalar until `isa.py` has chosen: never NULL.
-cdef const tl_kernels *K = tl_kernels_for(b"scalar")
+# The kernels of each instruction set that was in use, and of that which is. Scalar until `isa.py` has chosen: never NULL.
+cdef tl_kernels tables[TL_N_ISA]
+cdef const tl_kernels *K = &tables[TL_ISA_SCALAR]
 cdef str isa_name = "scalar"
+tl_set_kernels(b"scalar", &tables[TL_ISA_SCALAR])
 
 
 def use_isa(name: str) -> None:
     """Let all further calls run on the kernels of one available instruction set."""
     global K, isa_name
-    cdef bytes key = name.encode()
-    cdef const tl_kernels *kernels = tl_kernels_for(key)
-    if kernels == NULL:
+    if name not in isa_available():
         raise ValueError(f"instruction set must be one of {', '.join(isa_available())}, got {name!r}")
-    K, isa_name = kernels, name
+    cdef tl_kernels *table = &tables[isa_built().index(name)]
+    tl_set_kernels(name.encode(), table)
+    K, isa_name = table, name
 
 
 def isa_in_use() -> str:

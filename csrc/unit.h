@@ -1,0 +1,25 @@
+/* The end of each unit.  The build compiles it with TL_UNIT and TL_ISA, its name and that of the set: it then
+ * defines one function, which puts the unit's kernels into a table, and no other symbol: no code of a wider set answers
+ * for the baseline.  Without them it is a part of kernels.c. */
+#include "topleft.h"
+
+#ifdef TL_UNIT
+#define TL_JOIN(a, b, c) a##b##c
+#define TL_JOINED(a, b, c) TL_JOIN(a, b, c)
+#define TL_KERNELS_OF TL_JOINED(TL_UNIT_, TL_UNIT, )
+
+/* Sinks of hooks.h for which no kernel of this unit draws. */
+#if defined(TL_HOOKS_H) && !defined(TL_MIX_SHAPES_C)
+static void mix_run(struct blend_state *b, int64_t at, int64_t n) { (void)b, (void)at, (void)n, __builtin_trap(); }
+#endif
+#if defined(TL_HOOKS_H) && !defined(TL_ROW_SPANS_C)
+static void note_span(struct span_table *t, int64_t at, int64_t n) { (void)t, (void)at, (void)n, __builtin_trap(); }
+#endif
+
+void TL_JOINED(tl_set_, TL_UNIT, TL_JOINED(_, TL_ISA, ))(tl_kernels *kernels);
+void TL_JOINED(tl_set_, TL_UNIT, TL_JOINED(_, TL_ISA, ))(tl_kernels *kernels)
+{
+#define TL_KERNEL(result, name, ...) kernels->name = name;
+#include "kernels.h"
+}
+#endif
