@@ -8,23 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from topleft._core.base.array_types import Array
 from topleft._core.base.georeference import xarray_module
+from topleft.annex.windows import WindowedRaster
 from topleft.errors import MissingPackageError
-
-if TYPE_CHECKING:
-    from topleft._apps.tiles.tiles import Tiles
 
 
 @dataclass(frozen=True)
 class WindowJob:
     """A window to be drawn elsewhere: its triangles are taken out of the mesh when it is sent."""
 
-    raster: Tiles
+    raster: WindowedRaster
     row: int
     column: int
 
@@ -46,7 +44,7 @@ def run_job(job: Callable[[], Any]) -> Any:
     return job()
 
 
-def dask_array_of(raster: Tiles) -> Any:
+def dask_array_of(raster: WindowedRaster) -> Any:
     """`Tiles.to_dask`."""
     try:
         import dask.array as da
@@ -69,7 +67,7 @@ def dask_array_of(raster: Tiles) -> Any:
     return da.Array(graph, name, chunks, meta=np.empty((0,) * len(raster.shape), raster.dtype))
 
 
-def data_array_of(raster: Tiles) -> Any:
+def data_array_of(raster: WindowedRaster) -> Any:
     """`Tiles.to_xarray`."""
     xr, nodata = xarray_module(), raster.painter.nodata
     if raster.grid is None:

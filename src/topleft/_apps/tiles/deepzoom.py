@@ -11,21 +11,19 @@ import io
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from topleft._apps.tiles.folders import MANIFEST, Folder, fingerprints_at, only_writer, write_own
-from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, halved, write_levels
-from topleft._apps.tiles.store import TileStore, begin, n_levels_to
+from topleft._apps.tiles.levels import Written, blocks_with_pixels, halved, write_levels
+from topleft._apps.tiles.store import TileStore, Writing, begin, n_levels_to
 from topleft._core.base.array_types import U8, Array
-from topleft._core.base.arrays import as_count, check_progress, shown
+from topleft._core.base.arrays import as_count, shown
 from topleft._core.base.color import id_colors
 from topleft._core.base.remote import as_location
 from topleft.annex.files import png
-
-if TYPE_CHECKING:
-    from topleft._apps.tiles.tiles import Tiles
+from topleft.annex.windows import WindowedRaster
 
 
 class DeepZoomStore(TileStore):
@@ -52,17 +50,13 @@ class DeepZoomStore(TileStore):
 
 
 def write_deepzoom(
-    raster: Tiles,
+    raster: WindowedRaster,
     path: str | os.PathLike[str],
     tile: int,
     colors: Callable[[Array], U8] | None,
-    resume: bool,
-    overwrite: bool,
-    progress: Progress | bool | None,
-    executor: Any,
+    writing: Writing,
 ) -> Written:
     """`Tiles.to_deepzoom`."""
-    check_executor(executor)
     file = as_location("path", path)
     if not isinstance(file, Path):
         raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
@@ -77,7 +71,6 @@ def write_deepzoom(
         raise ValueError(f"Deep Zoom has pixels, got a raster of {raster.size[0]} x {raster.size[1]}")
     if not (colors is None or callable(colors)):
         raise TypeError(f"colors must be a function of an array, got {shown(colors)}")
-    check_progress(progress)
     paint = painting(raster) if colors is None else colors
     ground = checked(paint(raster.painter.blank((1, 1))), (1, 1))
     n_levels = n_levels_to(raster.size, 1)
@@ -92,14 +85,10 @@ def write_deepzoom(
 
     with only_writer(file):
         there = fingerprints_at(folder, file)
-        if not begin(
-            raster, store, there, fingerprint, resume=resume, overwrite=overwrite, prepare=prepare
-        ):  # fmt: skip
+        if not begin(raster, store, there, fingerprint, writing, prepare=prepare):
             file.unlink(missing_ok=True)
             folder.put(MANIFEST, fingerprint.encode())
-        written = write_levels(
-            raster, store, halve=halved_colors, prepare=prepare, progress=progress, executor=executor
-        )
+        written = write_levels(raster, store, writing, halve=halved_colors, prepare=prepare)
         fill_blanks(raster, store, ground)
         width, height = raster.size
         description = (
@@ -111,7 +100,7 @@ def write_deepzoom(
     return written
 
 
-def fill_blanks(raster: Tiles, store: DeepZoomStore, ground: U8) -> None:
+def fill_blanks(raster: WindowedRaster, store: DeepZoomStore, ground: U8) -> None:
     """Write the tiles that no triangle touches: viewers ask for all."""
     contents: dict[tuple[int, ...], bytes] = {}
     for level, blocks in enumerate(blocks_with_pixels(raster, store.n_levels)):
@@ -125,7 +114,7 @@ def fill_blanks(raster: Tiles, store: DeepZoomStore, ground: U8) -> None:
                     store.folder.put(name, contents[tile.shape])
 
 
-def painting(raster: Tiles) -> Callable[[Array], U8]:
+def painting(raster: WindowedRaster) -> Callable[[Array], U8]:
     """Return the function that makes colours of the pixels of a kind."""
     if raster.kind == "labels":
         return label_colors

@@ -18,24 +18,21 @@ import os
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._apps.tiles.folders import MANIFEST, Folder, fingerprints_at, only_writer, write_own
-from topleft._apps.tiles.levels import Progress, Written, blocks_with_pixels, check_executor, write_levels
-from topleft._apps.tiles.store import TileStore, begin, level_size, n_levels_to
+from topleft._apps.tiles.levels import Written, blocks_with_pixels, write_levels
+from topleft._apps.tiles.store import TileStore, Writing, begin, level_size, n_levels_to
 from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_count, as_number, check_progress
+from topleft._core.base.arrays import as_count, as_number
 from topleft._core.base.georeference import geo_tags, nodata_tag
 from topleft._core.base.options import check_choice
 from topleft._core.base.remote import as_location
 from topleft._core.base.tiff import LIMIT_CLASSIC, Tags, directory, directory_bytes, header
-
-if TYPE_CHECKING:
-    from topleft._apps.tiles.tiles import Tiles
-
+from topleft.annex.windows import WindowedRaster
 
 COMPRESSIONS = ("deflate", "none")
 
@@ -101,25 +98,20 @@ def sums(content: npt.NDArray[np.uint8], shape: tuple[int, ...], dtype: np.dtype
 
 
 def write_geotiff(
-    raster: Tiles,
+    raster: WindowedRaster,
     path: str | os.PathLike[str],
     crs: str | int | None,
     nodata: float | None,
     compression: str,
     tile: int,
     overviews: bool,
-    resume: bool,
-    overwrite: bool,
-    progress: Progress | bool | None,
-    executor: Any,
+    writing: Writing,
 ) -> Written:
     """`Tiles.to_geotiff`."""
-    check_executor(executor)
     file = as_location("path", path)
     if not isinstance(file, Path):
         raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     check_choice("compression", compression, COMPRESSIONS)
-    check_progress(progress)
     side, window = as_count("tile", tile), raster.window_size
     if side % 16:
         raise ValueError(f"tile must be a multiple of 16, got {side}")
@@ -147,12 +139,12 @@ def write_geotiff(
     fingerprint = f"{raster.fingerprint} tiff 2 {side} {compression} {n_levels} {told} {place}"
     with only_writer(file):
         there = fingerprints_at(folder, file)
-        goes_on = begin(raster, store, there, fingerprint, resume=resume, overwrite=overwrite, n_copies=2)
+        goes_on = begin(raster, store, there, fingerprint, writing, n_copies=2)
         if goes_on and there[0][0] == file:  # the file is finished, no part is left
             n_windows = int((raster.index.counts > 0).sum())
             return Written(0, n_windows, raster.n_windows - n_windows)
         folder.put(MANIFEST, fingerprint.encode())
-        written = write_levels(raster, store, progress=progress, executor=executor)
+        written = write_levels(raster, store, writing)
         tags = {**geo, 305: ("s", f"topleft: {fingerprint};".encode() + b"\0")}
         write_own(file, lambda out: assemble(raster, store, out, told, tags))
         folder.remove()
@@ -168,7 +160,7 @@ class LevelTiles:
     is_blank: npt.NDArray[np.bool_]
 
 
-def assemble(raster: Tiles, store: TiffStore, out: IO[bytes], nodata: float | None, more: Tags) -> None:
+def assemble(raster: WindowedRaster, store: TiffStore, out: IO[bytes], nodata: float | None, more: Tags) -> None:
     """Write the file of the parts: header, directories, tiles of the smallest level first."""
     blank = store.encoded(store.filled(np.empty((0, 0, *store.channels), store.dtype)))
     blocks = blocks_with_pixels(raster, store.n_levels)

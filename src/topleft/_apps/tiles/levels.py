@@ -11,45 +11,18 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._apps.cluster import is_client
-from topleft._apps.tiles.store import TileStore
+from topleft._apps.tiles.store import Step, TileStore, Writing
 from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import check_progress, shown
+from topleft.annex.windows import WindowedRaster
 from topleft.errors import MissingPackageError
-
-if TYPE_CHECKING:
-    from topleft._apps.tiles.tiles import Tiles
-
 
 Submit = Callable[[int, int, int], "Future[None]"]
 """Begins to make a block of a level, by its row and column."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """A block that is written.
-
-    Attributes
-    ----------
-    level, row, column : int
-        Which one; level 0 are the windows.
-    n_done, n_blocks : int
-        How many are there now, and how many there will be; blank ones are not counted.
-    """
-
-    level: int
-    row: int
-    column: int
-    n_done: int
-    n_blocks: int
-
-
-Progress = Callable[[Step], object]
 
 
 @dataclass(frozen=True)
@@ -96,7 +69,7 @@ def halved(pixels: Array, nodata: float | None, *, is_mean: bool) -> Array:
     return np.where(n > 0, total / np.maximum(n, 1), empty).astype(pixels.dtype)
 
 
-def blocks_with_pixels(raster: Tiles, n_levels: int) -> list[npt.NDArray[np.bool_]]:
+def blocks_with_pixels(raster: WindowedRaster, n_levels: int) -> list[npt.NDArray[np.bool_]]:
     """Return a mask (rows, columns) for each level: the blocks that hold more than background, to be written."""
     there = [raster.index.counts > 0]
     for _ in range(1, n_levels):
@@ -108,24 +81,21 @@ def blocks_with_pixels(raster: Tiles, n_levels: int) -> list[npt.NDArray[np.bool
 
 
 def write_levels(
-    raster: Tiles,
+    raster: WindowedRaster,
     store: TileStore,
+    writing: Writing,
     *,
     halve: Callable[[Array], Array] | None = None,
     prepare: Callable[[Array], Array] | None = None,
-    progress: Progress | bool | None = None,
-    executor: Any = None,
 ) -> Written:
     """Write all blocks that are not there yet, level by level.
 
     `halve` makes the level above, instead of `halved`; `prepare` converts the pixels of a window to those of the file.
-    The workers of an `executor`, a `dask.distributed.Client`, draw and write the windows; levels are made of these
-    here.
+    The workers of an executor draw and write the windows; levels are made of these here.
     """
     there = blocks_with_pixels(raster, store.n_levels)
     n_blocks = int(sum(level.sum() for level in there))
-    check_progress(progress)
-    bar = _bar(n_blocks) if progress is True else None
+    bar = _bar(n_blocks) if writing.progress is True else None
     n_done = n_drawn = n_kept = 0
 
     def make(level: int, row: int, column: int) -> None:
@@ -169,14 +139,14 @@ def write_levels(
                     bar.update(n_done - bar.n)
                 submit: Submit
                 submit, n_most = partial(begin, make), n_threads
-                if executor is not None and level == 0:
-                    submit, n_most = _submitter(executor, raster, store, prepare)
+                if writing.executor is not None and level == 0:
+                    submit, n_most = _submitter(writing.executor, raster, store, prepare)
                 for done in _in_turn(submit, iter(waiting), n_most):
                     n_drawn, n_done = n_drawn + (level == 0), n_done + 1
                     if bar is not None:
                         bar.update()
-                    elif callable(progress):
-                        progress(Step(*done, n_done, n_blocks))
+                    elif callable(writing.progress):
+                        writing.progress(Step(*done, n_done, n_blocks))
         check_whole(store, there)
     finally:
         if bar is not None:
@@ -201,14 +171,8 @@ def check_whole(store: TileStore, there: list[npt.NDArray[np.bool_]]) -> None:
                 raise store.gone(name)
 
 
-def check_executor(executor: Any) -> None:
-    """Raise an error unless the executor is None or a client of Dask."""
-    if not (executor is None or is_client(executor)):
-        raise TypeError(f"executor must be a dask.distributed.Client or None, got {shown(executor)}")
-
-
 def _submitter(
-    client: Any, raster: Tiles, store: TileStore, prepare: Callable[[Array], Array] | None
+    client: Any, raster: WindowedRaster, store: TileStore, prepare: Callable[[Array], Array] | None
 ) -> tuple[Submit, int]:
     """A function that submits a window to workers of a cluster, and how many it takes at a time."""
     from topleft._apps.tiles.cluster import ClusterWriters, WriteJob

@@ -12,16 +12,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from topleft._apps.cluster import is_client
 from topleft._apps.tiles.folders import Folder, check_space
 from topleft._core.base.array_types import Array
-
-if TYPE_CHECKING:
-    from topleft._apps.tiles.tiles import Tiles
-
+from topleft._core.base.arrays import check_progress, shown
+from topleft.annex.windows import WindowedRaster
 
 DAMAGES = (ValueError, OSError, RuntimeError, SyntaxError, EOFError, zlib.error, struct.error)
 """Errors of zlib, NumPy, numcodecs and Pillow for a damaged tile."""
@@ -31,6 +30,43 @@ LARGE_BYTES = 1 << 28
 
 MOST_SAMPLES = 16
 """The number of those tiles."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A block that is written.
+
+    Attributes
+    ----------
+    level, row, column : int
+        Which one; level 0 are the windows.
+    n_done, n_blocks : int
+        How many are there now, and how many there will be; blank ones are not counted.
+    """
+
+    level: int
+    row: int
+    column: int
+    n_done: int
+    n_blocks: int
+
+
+Progress = Callable[[Step], object]
+
+
+@dataclass(frozen=True)
+class Writing:
+    """How a raster is written: over one that is there, or on with it, with a report of each block, and by whom."""
+
+    resume: bool
+    overwrite: bool
+    progress: Progress | bool | None
+    executor: Any
+
+    def __post_init__(self) -> None:
+        check_progress(self.progress)
+        if not (self.executor is None or is_client(self.executor)):
+            raise TypeError(f"executor must be a dask.distributed.Client or None, got {shown(self.executor)}")
 
 
 def n_levels_to(size: tuple[int, int], side: int) -> int:
@@ -163,13 +199,12 @@ class TileStore(ABC):
 
 
 def begin(
-    raster: Tiles,
+    raster: WindowedRaster,
     store: TileStore,
     there: list[tuple[object, str | None]],
     fingerprint: str,
+    writing: Writing,
     *,
-    resume: bool,
-    overwrite: bool,
     n_copies: int = 1,
     prepare: Callable[[Array], Array] = np.asarray,
 ) -> bool:
@@ -178,6 +213,7 @@ def begin(
     `there`: files and folders at the place of the raster, and their fingerprints, None if topleft did not write them.
     `n_copies`: of all tiles, on the disk at a time. `prepare` converts the pixels of a window to those of the file.
     """
+    resume, overwrite = writing.resume, writing.overwrite
     if resume and overwrite:
         raise ValueError("resume=True continues the store, overwrite=True replaces it: give one of them")
     for place, kept in there:
@@ -206,7 +242,7 @@ def begin(
     return False
 
 
-def bytes_of(raster: Tiles, store: TileStore, prepare: Callable[[Array], Array]) -> int:
+def bytes_of(raster: WindowedRaster, store: TileStore, prepare: Callable[[Array], Array]) -> int:
     """The most bytes of a raster on disk; for a large one the fullest window gives the rate of compression."""
     counts = raster.index.counts
     w, h = raster.window_size

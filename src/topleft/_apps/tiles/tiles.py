@@ -19,7 +19,8 @@ from topleft.annex.windows import INDEX_BYTES, WINDOW, WindowedRaster
 from topleft.typing import RasterKindOption, TiffCompressionOption, YOption, ZarrCompressionOption
 
 if TYPE_CHECKING:
-    from topleft._apps.tiles.levels import Progress, Written
+    from topleft._apps.tiles.levels import Written
+    from topleft._apps.tiles.store import Progress
 
 Path = str | os.PathLike[str]
 
@@ -225,9 +226,11 @@ class Tiles(WindowedRaster):
             If it would not fit the disk, told before a byte is written; if it cannot be written; if a tile has gone or
             is damaged when it is read again, with its name.
         """
+        from topleft._apps.tiles.store import Writing
         from topleft._apps.tiles.zarr_files import write_zarr
 
-        return write_zarr(self, path, chunk, compression, levels, resume, overwrite, progress, executor, storage)
+        writing = Writing(resume, overwrite, progress, executor)
+        return write_zarr(self, path, chunk, compression, levels, writing, storage)
 
     def to_geotiff(
         self,
@@ -270,10 +273,10 @@ class Tiles(WindowedRaster):
             If a CRS is given and pyproj is not installed.
         """
         from topleft._apps.tiles.geotiff import write_geotiff
+        from topleft._apps.tiles.store import Writing
 
-        return write_geotiff(
-            self, path, crs, nodata, compression, tile, overviews, resume, overwrite, progress, executor
-        )
+        writing = Writing(resume, overwrite, progress, executor)
+        return write_geotiff(self, path, crs, nodata, compression, tile, overviews, writing)
 
     def to_deepzoom(
         self,
@@ -307,5 +310,7 @@ class Tiles(WindowedRaster):
             As in `to_zarr`.
         """
         from topleft._apps.tiles.deepzoom import write_deepzoom
+        from topleft._apps.tiles.store import Writing
 
-        return write_deepzoom(self, path, tile, colors, resume, overwrite, progress, executor)
+        writing = Writing(resume, overwrite, progress, executor)
+        return write_deepzoom(self, path, tile, colors, writing)

@@ -13,22 +13,19 @@ import os
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from topleft._apps.tiles.folders import Folder, folder_of, only_writer
-from topleft._apps.tiles.levels import Progress, Written, check_executor, write_levels
-from topleft._apps.tiles.store import TileStore, begin, level_size
+from topleft._apps.tiles.levels import Written, write_levels
+from topleft._apps.tiles.store import TileStore, Writing, begin, level_size
 from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_count, as_size, check_progress
+from topleft._core.base.arrays import as_count, as_size
 from topleft._core.base.options import check_choice
 from topleft._core.base.remote import as_location
+from topleft.annex.windows import WindowedRaster
 from topleft.errors import MissingPackageError
-
-if TYPE_CHECKING:
-    from topleft._apps.tiles.tiles import Tiles
-
 
 COMPRESSIONS = ("gzip", "zstd", "none")
 
@@ -56,20 +53,15 @@ class ZarrStore(TileStore):
 
 
 def write_zarr(
-    raster: Tiles,
+    raster: WindowedRaster,
     path: str | os.PathLike[str],
     chunk: int | tuple[int, int] | None,
     compression: str,
     levels: int,
-    resume: bool,
-    overwrite: bool,
-    progress: Progress | bool | None,
-    executor: Any,
+    writing: Writing,
     storage: dict[str, Any] | None,
 ) -> Written:
     """`Tiles.to_zarr`."""
-    check_progress(progress)
-    check_executor(executor)
     n_levels = as_count("levels", levels)
     window = raster.window_size
     size = window if chunk is None else as_size(chunk, "chunk", smallest=1)
@@ -86,9 +78,9 @@ def write_zarr(
     fingerprint = f"{raster.fingerprint} zarr {size} {compression} {n_levels}"
     with only_writer(as_location("path", path)):
         there: list[tuple[object, str | None]] = [(path, fingerprint_in(folder))] if folder.exists() else []
-        begin(raster, store, there, fingerprint, resume=resume, overwrite=overwrite)
+        begin(raster, store, there, fingerprint, writing)
         write_metadata(raster, store, codec, fingerprint)
-        return write_levels(raster, store, progress=progress, executor=executor)
+        return write_levels(raster, store, writing)
 
 
 def codec_of(compression: str) -> tuple[Callable[[bytes], bytes], Callable[[bytes], bytes], list[dict[str, Any]]]:
@@ -133,7 +125,7 @@ def json_number(value: Any) -> Any:
     return number
 
 
-def write_metadata(raster: Tiles, store: ZarrStore, codec: list[dict[str, Any]], fingerprint: str) -> None:
+def write_metadata(raster: WindowedRaster, store: ZarrStore, codec: list[dict[str, Any]], fingerprint: str) -> None:
     """Write zarr.json of all levels."""
     own: dict[str, Any] = {"fingerprint": fingerprint, "kind": raster.kind}
     if raster.grid is not None:
@@ -167,7 +159,7 @@ def write_metadata(raster: Tiles, store: ZarrStore, codec: list[dict[str, Any]],
         store.folder.put(f"{level}/zarr.json", _json(array))
 
 
-def _multiscales(raster: Tiles, store: ZarrStore) -> dict[str, Any]:
+def _multiscales(raster: WindowedRaster, store: ZarrStore) -> dict[str, Any]:
     """The levels as OME-Zarr lists them: a pixel of level k is 2**k of those of level 0."""
     step = (1.0, 1.0) if raster.grid is None else raster.grid.pixel_size[::-1]
     tail = [1.0] * len(store.channels)
