@@ -50,6 +50,7 @@ def main(folder: Path) -> None:
         "MANIFEST.in",
         "README.md",
         "packaging/bindings.py",
+        "packaging/size.py",
         "packaging/wasm.py",
         "pyproject.toml",
         "setup.py",

@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,22 @@ def test_readme_mesh_is_drawn(folder):
 
 def test_readme_fits_on_two_screens():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+
+
+def test_readme_states_its_size(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "packaging")
+    size = import_module("size")
+    stated = size.stated((ROOT / "README.md").read_text(encoding="utf-8"))
+    for language, lines in size.lines().items():
+        assert abs(stated[language] - lines) <= 500, "run `python packaging/size.py`"
+
+
+def test_size_script_replaces_numbers_alone(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "packaging")
+    size = import_module("size")
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    changed = size.rewritten(text, {"C": 1234567, "minutes": 9})
+    assert size.stated(changed) == size.stated(text) | {"C": 1234567, "minutes": 9}
 
 
 def test_readme_layers_agree(folder):
