@@ -65,7 +65,7 @@ outside of jobs, and options of the command line, hold unless a job has its own:
   out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
   views = 12                                     "views": 12}}]}}
 
-The mesh fills 95 % of the frame; those of --views keep one distance, so that the size does not change. One line at the
+The mesh fills 95 % of the frame; with --views the camera keeps its distance, so the mesh keeps its size. One line at the
 end lists the parts of files that meshes lack, missing textures, say.
 
 Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written, or --strict and a

@@ -234,7 +234,7 @@ def add_mask_command(commands: Any) -> None:
     add("--nodata", type=int, metavar="N", help="the background of --labels (0)")
     add("--layer", metavar="NAME", help="of a vector file (the first one)")
     add("--no-crowds", action="store_true", help="leave out annotations of COCO that are crowds")
-    add("--image", metavar="NAME", help="the one of several images, its file name without the end")
+    add("--image", metavar="NAME", help="draw this image alone: its file name without suffix")
     add(
         "--max-crossings",
         type=positive,
