@@ -34,7 +34,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @dataclass(frozen=True)
-class KeptPictures:
+class StoredPictures:
     """A folder of pictures to compare those of tests with."""
 
     folder: Path
@@ -81,4 +81,4 @@ def assert_picture(request: pytest.FixtureRequest) -> Callable[..., None]:
     them; name.got.png and name.off.png beside it show the new picture and the difference.
     """
     folder = request.path.parent / "pictures"
-    return KeptPictures(folder, request.config.getoption("--update-pictures")).check
+    return StoredPictures(folder, request.config.getoption("--update-pictures")).check

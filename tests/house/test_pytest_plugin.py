@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import topleft as tl
-from topleft.pytest_plugin import KeptPictures
+from topleft.pytest_plugin import StoredPictures
 
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))
 PICTURE = tl.render(CUBE, size=(20, 16))
@@ -17,12 +17,12 @@ PICTURE = tl.render(CUBE, size=(20, 16))
 
 @pytest.fixture
 def check(tmp_path):
-    return KeptPictures(tmp_path / "pictures", is_updating=False).check
+    return StoredPictures(tmp_path / "pictures", is_updating=False).check
 
 
 @pytest.fixture
 def kept(tmp_path):
-    KeptPictures(tmp_path / "pictures", is_updating=True).check(PICTURE, "cube")
+    StoredPictures(tmp_path / "pictures", is_updating=True).check(PICTURE, "cube")
     return tmp_path / "pictures"
 
 
@@ -56,7 +56,7 @@ def test_picture_that_differs_is_drawn_with_the_difference(kept, check):
     "picture", [PICTURE[..., :3], PICTURE[..., 0], PICTURE[..., 0] > 200, PICTURE[..., 0] * np.uint16(257)]
 )
 def test_picture_of_each_kind_is_kept_as_it_is(tmp_path, check, picture):
-    KeptPictures(tmp_path / "pictures", is_updating=True).check(picture, "a.b-c_d")
+    StoredPictures(tmp_path / "pictures", is_updating=True).check(picture, "a.b-c_d")
     check(picture, "a.b-c_d")
     with pytest.raises(AssertionError, match="of 320 pixels differ"):
         check(np.roll(picture, 1, 0), "a.b-c_d")

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from topleft import scenes
-from topleft.pytest_plugin import KeptPictures
+from topleft.pytest_plugin import StoredPictures
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *(ROOT / f"docs/guide/{name}.md" for name in ("layers", "pictures", "grids"))]
@@ -159,7 +159,7 @@ def test_program_of_a_task_runs(name, folder):
     exec(STEPS[name], names)
     for thing in list(names.values()):
         if getattr(thing, "__name__", "").startswith("test_"):
-            pictures = KeptPictures(Path("pictures"), is_updating=True)
+            pictures = StoredPictures(Path("pictures"), is_updating=True)
             thing(*[pictures.check for name in inspect.signature(thing).parameters if name == "assert_picture"])
 
 

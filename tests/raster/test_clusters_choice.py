@@ -70,7 +70,7 @@ def test_vertices_beyond_near_and_far_are_counted(clip_depth):
     points = np.array([[0, 0, z] for z in (-3, -1.5, -0.5, 0.5, 0.75, 2)], np.float32)
     clusters = Clusters(points, np.array([[0, 1, 2], [3, 4, 5]], np.int32))
     view = View.parse(SIZE, {"transform": np.eye(4), "clip_depth": clip_depth})
-    assert ClusteredMesh(clusters, view).find_beyond() == (0.5 if clip_depth == "minus_one_to_one" else 4 / 6)
+    assert ClusteredMesh(clusters, view).share_clipped() == (0.5 if clip_depth == "minus_one_to_one" else 4 / 6)
 
 
 def test_mesh_of_several_samples_is_drawn_from_clusters_where_they_pay(force):

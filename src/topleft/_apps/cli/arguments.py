@@ -65,8 +65,8 @@ outside of jobs, and options of the command line, hold unless a job has its own:
   out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
   views = 12                                     "views": 12}}]}}
 
-The mesh fills 95 % of the frame; with --views the camera keeps its distance, so the mesh keeps its size. One line at the
-end lists the parts of files that meshes lack, missing textures, say.
+The mesh fills 95 % of the frame; with --views the camera keeps its distance, so the mesh keeps its size. One line at
+the end lists the parts of files that meshes lack, missing textures, say.
 
 Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written, or --strict and a
 mesh lacks something; 2, nothing was written.

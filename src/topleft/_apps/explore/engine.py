@@ -134,7 +134,7 @@ def trace(_: Session, request: Request) -> Reply:
         raise ValueError(f"a trace must have {MAX_STEPS} steps at most: draw fewer triangles, or a smaller picture")
     lengths = [HEAD_WORDS + 2 * sum(n for _, n in numbers) for *_, numbers in classic_kernels.list_kinds()]
     end = 0
-    for _ in range(n):
+    for _step in range(n):
         end += lengths[words[end]]
     return Reply({"n": n}, {"counts": counts, "words": words[:end]})
 

@@ -325,11 +325,11 @@ def light_all(tables: Sequence[ShadingTable], const double[:, ::1] lights or Non
 cdef int set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out) except -1:
     """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped.
 
-    Those of a `WaitingMesh` are written when it is drawn.
+    Those of a `UnprojectedMesh` are written when it is drawn.
     """
     cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
-    if isinstance(mesh, WaitingMesh):
-        (<WaitingMesh>mesh).projected.rows, (<WaitingMesh>mesh).projected.seen_rows = &rows[0, 0], &out[0, 0]
+    if isinstance(mesh, UnprojectedMesh):
+        (<UnprojectedMesh>mesh).projected.rows, (<UnprojectedMesh>mesh).projected.seen_rows = &rows[0, 0], &out[0, 0]
         mesh.arrays = mesh.arrays, rows, out
         return 0
     if mesh.is_used is None:
@@ -355,7 +355,7 @@ cdef enum:
     PROJECTED_BLOCK = 1 << 12  # vertices that are projected before a look whether one of them is clipped
 
 
-cdef class WaitingMesh(SnappedMesh):
+cdef class UnprojectedMesh(SnappedMesh):
     """A mesh with room for its snapped vertices, which `ShadedScene.draw` fills."""
 
     cdef tl_projected projected
@@ -396,11 +396,11 @@ cdef class ShadedScene:
         self.scene.instances, self.scene.n, self.scene.view = instances, n, self.mesh.clip_view()
 
     def draw(self, Target target, uint8_t[:, :, ::1] pixels) -> bool:
-        """Project, draw and shade the only mesh, a `WaitingMesh`, in one call: ids, depth and the picture (H, W, 4).
+        """Project, draw and shade the only mesh, a `UnprojectedMesh`, in one call: ids, depth and the picture (H, W, 4).
 
         Returns False where a vertex or a triangle cannot be drawn as it is; there may be no picture then.
         """
-        cdef WaitingMesh mesh = self.mesh
+        cdef UnprojectedMesh mesh = self.mesh
         cdef tl_target rows = target.rows(0)
         cdef tl_window window = mesh.window(0, target.height, target.width)
         cdef uint8_t *picture = &pixels[0, 0, 0]
@@ -413,7 +413,7 @@ cdef class ShadedScene:
         raise_if_given_up()
         return is_drawn
 
-    cdef bint draw_waiting(self, WaitingMesh mesh, const tl_window *window, const tl_target *rows, uint8_t *pixels) noexcept nogil:
+    cdef bint draw_waiting(self, UnprojectedMesh mesh, const tl_window *window, const tl_target *rows, uint8_t *pixels) noexcept nogil:
         cdef tl_slice slice = no_slice()
         slice.end, slice.is_first, slice.is_last = mesh.snapped.n_triangles, True, True
         if not mesh.project() or K.draw_mesh(&mesh.snapped, window, rows, &slice) >= 0:

@@ -205,17 +205,19 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
     return n_triangles >= costs.cluster_triangles and (n_drawn > 0 or n_instances >= costs.cluster_instances)
 
 
-def pays_to_draw_from_clusters(view: View, n_triangles: int, survey: Survey, find_beyond: Callable[[], float]) -> bool:
+def pays_to_draw_from_clusters(
+    view: View, n_triangles: int, survey: Survey, share_clipped: Callable[[], float]
+) -> bool:
     """Tell whether a view of a mesh in clusters is drawn from these; `survey`: their visibility in it.
 
-    `find_beyond`: the share of the vertices beyond the near or far plane.
+    `share_clipped`: the share of the vertices beyond the near or far plane.
     """
     if view.sampling.n_samples > 1:
-        return pays_to_draw_samples(view, n_triangles, survey, find_beyond)
+        return pays_to_draw_samples(view, n_triangles, survey, share_clipped)
     return pays_to_draw_clusters(view, n_triangles, survey)
 
 
-def pays_to_draw_samples(view: View, n_triangles: int, survey: Survey, find_beyond: Callable[[], float]) -> bool:
+def pays_to_draw_samples(view: View, n_triangles: int, survey: Survey, share_clipped: Callable[[], float]) -> bool:
     """Tell whether several samples of a mesh are drawn from clusters, one after the other."""
     costs, is_culled = cost_table(), view.cull != CULL_CODES["none"]
     limits = SampledLimits(*(costs.sampled_cluster_culled if is_culled else costs.sampled_cluster))
@@ -227,7 +229,7 @@ def pays_to_draw_samples(view: View, n_triangles: int, survey: Survey, find_beyo
         return True
     if survey.outside < costs.inside_outside:
         return False
-    return costs.inside_samples * n_triangles * find_beyond() >= n_samples * n_pixels
+    return costs.inside_samples * n_triangles * share_clipped() >= n_samples * n_pixels
 
 
 def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:

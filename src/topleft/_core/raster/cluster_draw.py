@@ -51,7 +51,7 @@ class Survey(NamedTuple):
     front: float
 
 
-class SeenBoxes:
+class BoxView:
     """Boxes behind a view with a `transform`, round points of the type of `points`."""
 
     def __init__(self, points: NDArray[Any], view: View, first_id: int = 0) -> None:
@@ -83,12 +83,12 @@ class SeenBoxes:
         pieces: engine.Pieces | None,
         is_used: NDArray[np.uint8] | None = None,
     ) -> engine.SnappedMesh:
-        how, viewport = self._view.how, self._viewport
+        how, viewport = self._view.raster_state, self._viewport
         mesh = engine.SnappedMesh(source, records, None, triangles, pieces, how, viewport, is_used)
         return mesh.numbered_from(self._first_id)
 
 
-class ClusteredMesh(SeenBoxes):
+class ClusteredMesh(BoxView):
     """A mesh in clusters behind a view with a `transform`; triangle 0 is called `first_id` where it is drawn."""
 
     def __init__(self, clusters: Clusters, view: View, first_id: int = 0) -> None:
@@ -103,7 +103,7 @@ class ClusteredMesh(SeenBoxes):
         n = max(1, int(n_of.sum()))
         return Survey(*(count / n for count in n_of.tolist()))
 
-    def find_beyond(self) -> float:
+    def share_clipped(self) -> float:
         """Return the share of the vertices that lie beyond the near or far plane, by some of them."""
         points, matrix = self.clusters.points, np.asarray(self._view.transform, np.float64)
         some = points[:: max(1, len(points) // SURVEYED_OF_SAMPLES)].astype(np.float64)
@@ -117,7 +117,7 @@ class ClusteredMesh(SeenBoxes):
         if clusters.n_drawn is not None:
             return True
         survey = self.survey(SURVEYED_OF_SAMPLES if self._view.sampling.n_samples > 1 else SURVEYED)
-        pays = choices.pays_to_draw_from_clusters(self._view, clusters.n_triangles, survey, self.find_beyond)
+        pays = choices.pays_to_draw_from_clusters(self._view, clusters.n_triangles, survey, self.share_clipped)
         clusters.backoff.note(pays=pays)
         return pays
 

@@ -317,12 +317,12 @@ def without_sides(
     """Return a mesh of the triangles, after those that show the side that is not drawn are collapsed."""
     if view.single_sided is not None and len(triangles):
         is_single, cull = view.single_sided
-        seen = made(triangles, view.how._replace(cull=cull))
+        seen = made(triangles, view.raster_state._replace(cull=cull))
         left: NDArray[np.int32] = empty(triangles.shape, np.int32)
         n_parts = choices.threads_to_convert(view.threads, len(triangles))
         run_parts(lambda first, end: seen.drop_sides(is_single, first, end, left), len(triangles), n_parts)
         triangles = left
-    return made(triangles, view.how)
+    return made(triangles, view.raster_state)
 
 
 def refine(

@@ -130,7 +130,7 @@ class View:
     """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 
     @property
-    def how(self) -> RasterState:
+    def raster_state(self) -> RasterState:
         """How the engine draws triangles."""
         return RasterState(*self.origin, self.grid_bits, self.cull, self.method, self.test)
 

@@ -19,7 +19,7 @@ from topleft._core.base.memory import FRESH, KeptMemory, Memory, check_fits
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
-from topleft._core.raster.cluster_draw import SeenBoxes, Survey, draw_clustered, equal_bands
+from topleft._core.raster.cluster_draw import BoxView, Survey, draw_clustered, equal_bands
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import FragmentOptions, draw_fragments
 from topleft._core.raster.sampling import SamplePass, draw_sorted, draw_split
@@ -278,7 +278,7 @@ def find_shown(
             if not len(own):
                 continue
             chosen = some[own]
-            boxes = SeenBoxes(np.zeros((1, 3), dtype), placed.view_of(int(chosen[0])))
+            boxes = BoxView(np.zeros((1, 3), dtype), placed.view_of(int(chosen[0])))
             seen, mesh = boxes.seen(target.sink, at, rows)
             is_shown: NDArray[np.uint8] = np.empty(len(own), np.uint8)
             matrices = placed.clip_from_objects[chosen].astype(dtype).astype(np.float64)  # as vertices have them

@@ -223,7 +223,7 @@ class Placed:
         meshes, of_instance = self.scene.mesh_list
         placed = engine.PlacedMeshes(
             meshes, of_instance[some], self.clip_from_objects[some], culls[some], self.numbers[some],
-            is_apart[some].view(np.uint8), view.engine_viewport(), view.how, room, firsts,
+            is_apart[some].view(np.uint8), view.engine_viewport(), view.raster_state, room, firsts,
         )  # fmt: skip
         run_parts(placed.project, n, n_threads)
         return placed

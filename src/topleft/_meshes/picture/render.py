@@ -222,7 +222,9 @@ def draw_at_once(memory: Memory, placed: Placed, options: PictureOptions) -> U8 
         return None
     n_bytes, shape = len(mesh.vertices) * engine.VERTEX_BYTES, view.size[::-1]
     source, records = source_of(mesh.vertices, view), memory.scratch("records", (n_bytes,), np.uint8)
-    waiting = engine.WaitingMesh(source, records, None, mesh.triangles, None, view.how, view.engine_viewport())
+    waiting = engine.UnprojectedMesh(
+        source, records, None, mesh.triangles, None, view.raster_state, view.engine_viewport()
+    )
     lit = Lit([ShownInstance(waiting, mesh, EYE)], placed.camera, view.size, look)
     ids, depth = memory.empty("triangle", shape, np.int32), memory.empty("depth", shape, np.float32)
     picture = empty((*shape, 4), np.uint8)

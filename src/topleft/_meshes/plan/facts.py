@@ -250,7 +250,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTestOption 
     clusters = mesh.clusters
     seen = ClusteredMesh(clusters, view)
     few = seen.survey(SURVEYED_OF_SAMPLES if view.sampling.n_samples > 1 else SURVEYED)
-    if not choices.pays_to_draw_from_clusters(view, n_triangles, few, seen.find_beyond):
+    if not choices.pays_to_draw_from_clusters(view, n_triangles, few, seen.share_clipped):
         return ClusterFacts(None, MOST_SHOWS)
     n = len(clusters)
     found = seen.survey(n)
