@@ -168,6 +168,7 @@ def measure_scene(scene: StaticScene, options: StaticOptions) -> Row:
     if shares is None:
         ways.append(Way("clusters", drawing(scene), FORCED))
         with ways[2].in_force(), counting(counts):
+            ways[2].draw()  # a mesh has clusters from its second picture on
             ways[2].draw()
     check_same_bits(scene.label, ways)
     n_rounds = max(3, min(options.rounds, int(options.most_seconds * 1e3 / (4 * whole_first))))

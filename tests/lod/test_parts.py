@@ -305,6 +305,11 @@ def test_mesh_of_parts_can_be_pickled(ground):
         assert np.array_equal(getattr(same, name), getattr(found, name))
 
 
+def test_mesh_of_parts_keeps_the_axis_that_is_up(ground):
+    upright = tl.Mesh(ground.vertices, ground.triangles, up="z")
+    assert tl.choose_detail(upright, ALONG, SIZE, tolerance=0.5).mesh.up == "z"
+
+
 def test_parts_saved_and_loaded_are_the_same(tmp_path, painted):
     simplify.levels_of(painted).save(tmp_path / "ground.npz")
     again = pickle.loads(pickle.dumps(painted))

@@ -276,6 +276,8 @@ class Guarded:
         self.names.append(name)
         return self.guard(np.zeros(shape, dtype))
 
+    scratch = empty
+
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("guard", [before_a_page, behind_a_page])

@@ -57,7 +57,7 @@ class Snapped:
 
     @property
     def work(self) -> tuple[float, float, float]:
-        """What a draw will meet, guessed when the first choice asks: see `SnappedMesh.guess_seen`."""
+        """What a draw will meet: triangles in the picture, layers, rows. The engine guesses it at the first choice."""
         work = self._work
         if work is None:
             work = self.mesh.guess_seen(*self.size)

@@ -196,6 +196,7 @@ class Levels(Sequence[Level]):
                             materials=mesh.materials,
                             crease=mesh.crease,
                             color_interpolation=mesh.color_interpolation,
+                            up=mesh.up,
                         ),
                         bound,
                         known,

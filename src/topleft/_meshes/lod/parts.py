@@ -226,7 +226,7 @@ class PartedMesh:
         self._extents = extents_of(self._pool, self._counts.tolist())
         self._order = np.arange(len(self._pool.corners), dtype=np.int32)
         defaults = {field.name: None for field in fields(Mesh)}
-        look = {name: getattr(like, name) for name in ("materials", "crease", "color_interpolation")}
+        look = {name: getattr(like, name) for name in ("materials", "crease", "color_interpolation", "up")}
         points = self._pool.arrays["vertices"]
         shared = {"cache": MeshCache(), "vertex_box": box_of(points), "is_finite": bool(np.isfinite(points).all())}
         self._of_all = defaults | look | self._pool.arrays | shared
