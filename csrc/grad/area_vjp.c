@@ -1,8 +1,8 @@
-/* Gradients of vertices from those of the exact areas that triangles cover of pixels: each edge moves area at its rate,
- * by the length of it that lies in a pixel.
+/* Gradients of vertices from the gradients of exact covered areas: an edge moves area at a rate of its length in a
+ * pixel.
  * In: vertices in pixels, gradients by pixel.  Out: gradients of vertices.
  *
- * An edge from a to b with the outward normal N, of its length, that lies in a pixel from s0 to s1 (0 at a, 1 at b) has
+ * An edge from a to b with the outward normal N, |N| = |b - a|, that lies in a pixel from s0 to s1 (0 at a, 1 at b) has
  * d area / d a = N ((s1 - s0) - (s1^2 - s0^2) / 2) and d area / d b = N (s1^2 - s0^2) / 2.
  *
  * Based on: Auzinger, T., Guthe, M., Jeschke, S., "Analytic Anti-Aliasing of Linear Functions on Polytopes", 2012; Li,
@@ -25,7 +25,7 @@ TL_INLINE double area_gradient(const tl_grad_area *p, int64_t triangle, int64_t 
     return sum;
 }
 
-/* Cuts [s[0], s[1]] to where a coordinate lies in [0, size]. */
+/* Clips [s[0], s[1]] to where a coordinate lies in [0, size]. */
 TL_INLINE void cut_to(double from, double by, double size, double *s)
 {
     if (by == 0.0) {
@@ -36,7 +36,7 @@ TL_INLINE void cut_to(double from, double by, double size, double *s)
     s[0] = low > s[0] ? low : s[0], s[1] = high < s[1] ? high : s[1];
 }
 
-/* The pixel of a coordinate, that which an edge goes into where it is between two. */
+/* The pixel of a coordinate; between two pixels the pixel that the edge enters. */
 TL_INLINE int64_t pixel_into(double at, double by, int64_t size)
 {
     const double low = floor(at);
@@ -44,7 +44,7 @@ TL_INLINE int64_t pixel_into(double at, double by, int64_t size)
     return pixel < 0 ? 0 : pixel >= size ? size - 1 : pixel;
 }
 
-/* Adds what an edge moves, from pixel to pixel, to the gradients of its ends. */
+/* Adds the gradients of the ends of an edge, pixel by pixel. */
 static void backward_area_edge(const tl_grad_area *p, int64_t triangle, int32_t first, int32_t last, double sign)
 {
     const double *a = p->points_px + 2 * (int64_t)first, *b = p->points_px + 2 * (int64_t)last;

@@ -1,6 +1,6 @@
-/* Backward from colours of float32 to vertices and attributes at once: what values.c and points.c compute one after the
- * other, without the gradient of `rast`.
- * In: faces, gradients of their pixels.  Out: sums by vertex, of positions and of attributes.
+/* Backward from colours of float32 to vertices and attributes in one pass, instead of values.c and then points.c,
+ * without the gradient of `rast`.
+ *  In: faces, gradients of their pixels.  Out: sums by vertex, of positions and of attributes.
  *
  * With a_k and the total as in points.c, an attribute is P / total, P = sum A_k a_k; here A_k are less that of the last
  * corner.  So a triangle needs the sums of h = g / total and of h_total = -sum h P / total, as they are, times X and
@@ -19,7 +19,7 @@
 #include "lanes/lanes.h"
 #include "lanes/quads.h"
 
-/* Gradients of n attributes, n_columns numbers a pixel, at four pixels; anything beyond the n_pixels.
+/* Loads the gradients of n attributes at four pixels; n_columns numbers a pixel.  Lanes beyond n_pixels are undefined.
  * TL_VQ4_ROOM pixels can be read. */
 TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_t n_columns)
 {
@@ -31,8 +31,8 @@ TL_INLINE vq4 load_gradients(const float *g_out, int64_t n_pixels, int n, int64_
     return vq4_load(some, 4, 4);
 }
 
-/* Sums up the gradients of n attributes at TL_SUMMED of the n_pixels that are left of a run, none of which is clamped:
- * as they are, and times the number of the pixel. */
+/* Sums the gradients of n attributes at TL_SUMMED pixels of a run without clamped weights, or at its last n_pixels:
+ * sums[0] plain, sums[1] times the number of the pixel. */
 TL_INLINE void sum_up_pixels(const run_plane *plane, const float *g_out, int n_pixels, int n, int64_t n_columns,
                              vq4 sums[2])
 {
@@ -49,8 +49,8 @@ TL_INLINE void sum_up_pixels(const run_plane *plane, const float *g_out, int n_p
     }
 }
 
-/* Adds the gradients at a run that is clamped somewhere to its corners, in float64; `rast` and `out` of `values` are
- * those of the picture's pixels. */
+/* Adds the gradients of a run with clamped weights to its corners, in float64; `rast` and `out` of `values` are indexed
+ * by the pixel in the picture. */
 static void backward_clamped(const picture_pass *p, const tl_grad_values *values, const pixel_run *run)
 {
     const tl_grad_view *view = p->view;
@@ -80,7 +80,7 @@ static void backward_clamped(const picture_pass *p, const tl_grad_values *values
     finish_triangle(view, run->id, sums, p->l->vertices, 0);
 }
 
-/* TL_LANES faces to close from `first` on, of which n exist. */
+/* TL_LANES faces from `first` on, of which n exist. */
 typedef struct {
     int64_t first;
     int n;
@@ -89,7 +89,7 @@ typedef struct {
     vd v[3][3], q[3][3], units[3];
 } face_lanes;
 
-/* Loads the triangles of faces; x0 and y0: the middles of their first pixels. */
+/* Loads the triangles of faces; x0 and y0: the centres of their first pixels. */
 TL_INLINE void load_faces(const picture_pass *p, face_lanes *l, vd *x0, vd *y0)
 {
     const int32_t *const corners[3] = {l->corners[0], l->corners[1], l->corners[2]};
@@ -107,7 +107,7 @@ TL_INLINE void load_faces(const picture_pass *p, face_lanes *l, vd *x0, vd *y0)
         l->units[c] = vd_mul(vd_set1(2.0 * p->view->scale[c]), l->units[2]);
 }
 
-/* Adds four columns of n lanes to the rows of their corners, one triangle after the other, from column `first` on. */
+/* Adds four columns of n lanes to the rows of their corners, triangle by triangle, from column `first` on. */
 TL_INLINE void add_rows(int n, double *const rows[3][TL_MAX_LANES], int64_t first, vd columns[3][4])
 {
     double some[3][4 * TL_MAX_LANES];
@@ -119,7 +119,7 @@ TL_INLINE void add_rows(int n, double *const rows[3][TL_MAX_LANES], int64_t firs
             vqd_store(to, vqd_add(vqd_load(to), vqd_load(some[k] + 4 * i)));
         }
 }
-/* Adds the gradients of the attributes of corners; returns those of q_k, added. */
+/* Adds the gradients of the attributes to the corners' sums; adds the gradients of q_k to by_q. */
 TL_INLINE void finish_attributes(const picture_pass *p, const face_lanes *l, double *const to[3][TL_MAX_LANES],
                                  vd by_q[3][3])
 {
@@ -149,7 +149,8 @@ TL_INLINE void finish_attributes(const picture_pass *p, const face_lanes *l, dou
     }
 }
 
-/* Gradients of the corners of faces and of their attributes from their sums, as backward_corners gives them. */
+/* Adds the gradients of the corners of faces and of their attributes, computed from the sums of the faces; see
+ * `backward_corners`. */
 static void finish_triangles(const picture_pass *p, face_lanes *l)
 {
     vd x0, y0, by_q[3][3], g[3][4];
@@ -169,14 +170,14 @@ static void finish_triangles(const picture_pass *p, face_lanes *l)
             g[j][a] = vd_add(g[j][a], vd_sub(vd_mul(l->v[i][c], by_q[k][b]), vd_mul(l->v[i][b], by_q[k][c])));
         }
     }
-    for (int k = 0; k < 3; k++) { /* none of z */
+    for (int k = 0; k < 3; k++) { /* z has no gradient */
         g[k][3] = vd_sub(g[k][2], vd_add(vd_mul(x0, g[k][0]), vd_mul(y0, g[k][1])));
         g[k][2] = vd_set1(0.0);
     }
     add_rows(l->n, to, 0, g);
 }
 
-/* Ends a band: from sums of faces to those of their corners. */
+/* Finishes a band: adds the sums of faces to the sums of their corners. */
 static void finish_faces(const picture_pass *p)
 {
     const int64_t n_faces = p->l->faces->n;

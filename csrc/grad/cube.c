@@ -1,7 +1,7 @@
-/* Directions to points of the faces of a cube map, in lanes; and backwards.
+/* Directions to points on the faces of a cube map, in lanes; and backward.
  *
- * The faces are those of the OpenGL 4.6 specification, table 8.19: +x, -x, +y, -y, +z, -z.  Beyond an edge of a face,
- * where its plane runs on as seen from the middle, lies the next one. */
+ * The faces are those of the OpenGL 4.6 specification, table 8.19: +x, -x, +y, -y, +z, -z.  Points on the plane of a
+ * face beyond its edge are projected from the centre of the cube onto the next face. */
 #ifndef TL_GRAD_CUBE_C
 #define TL_GRAD_CUBE_C
 
@@ -10,19 +10,19 @@
 
 #include "lanes/lanes.h"
 
-/* Faces, and where directions meet them. */
+/* Faces, and the points where directions meet them. */
 typedef struct {
     vi face;
-    vm is_x, is_y; /* whether the face lies along that axis; neither: along z */
-    vd sign;       /* 1 or -1: on which side */
+    vm is_x, is_y; /* whether the face is perpendicular to that axis; neither: to z */
+    vd sign;       /* 1 or -1: the side of the axis */
     vm is_there;
-    vd along[3], slopes[3][2]; /* of the direction along u, v, and towards the face; what they change by */
+    vd along[3], slopes[3][2]; /* the direction along u, along v, and towards the face; derivatives */
     vd uv[2];
 } cube_point;
 
 TL_INLINE vd vd_negative(vd a) { return vd_sub(vd_set1(0.0), a); }
 
-/* Of a direction its part along u (columns), along v (rows) and towards the face. */
+/* The parts of a direction along u (columns), along v (rows) and towards the face. */
 TL_INLINE void onto_face(const cube_point *p, const vd *direction, vd *along)
 {
     const vd x = direction[0], y = direction[1], z = direction[2];
@@ -31,7 +31,7 @@ TL_INLINE void onto_face(const cube_point *p, const vd *direction, vd *along)
     along[2] = vd_mul(p->sign, vd_select(p->is_x, x, vd_select(p->is_y, y, z)));
 }
 
-/* Back. */
+/* The inverse of `onto_face`. */
 TL_INLINE void off_face(const cube_point *p, const vd *along, vd *direction)
 {
     const vd u = along[0], v = along[1], w = vd_mul(p->sign, along[2]);
@@ -40,7 +40,7 @@ TL_INLINE void off_face(const cube_point *p, const vd *along, vd *direction)
     direction[2] = vd_select(p->is_x, vd_negative(vd_mul(p->sign, u)), vd_select(p->is_y, vd_mul(p->sign, v), w));
 }
 
-/* Where directions meet the cube. */
+/* The points where directions meet the cube. */
 TL_INLINE cube_point meet_cube(const vd *direction)
 {
     cube_point p;
@@ -62,7 +62,7 @@ TL_INLINE cube_point meet_cube(const vd *direction)
     return p;
 }
 
-/* What u and v change by, from what directions change by along x and along y, (3, 2). */
+/* The derivatives of u and v, from the derivatives of directions along x and along y, (3, 2). */
 TL_INLINE void slopes_on_face(cube_point *p, const vd *by, vd *slopes)
 {
     for (int c = 0; c < 2; c++) {
@@ -78,8 +78,8 @@ TL_INLINE void slopes_on_face(cube_point *p, const vd *by, vd *slopes)
     }
 }
 
-/* Gradients of directions (3) and of what they change by (3, 2) from those of u, v and the slopes; has_slopes: whether
- * they have any. */
+/* Gradients of directions (3) and of their derivatives (3, 2) from the gradients of u, v and the slopes; without
+ * has_slopes of the directions alone. */
 TL_INLINE void backward_cube(const cube_point *p, const vd *g_uv, const vd *g_slopes, vd *g_direction, vd *g_by,
                              int has_slopes)
 {
@@ -108,7 +108,7 @@ TL_INLINE void backward_cube(const cube_point *p, const vd *g_uv, const vd *g_sl
     }
 }
 
-/* Moves texels of columns x and rows y that lie beyond an edge of their face to the face that is there. */
+/* Moves texels of columns x and rows y beyond an edge of their face to the face that they project to. */
 TL_INLINE void cross_edges(const cube_point *from, int64_t n, vi *face, vi *x, vi *y)
 {
     const vd size = vd_set1((double)n), one = vd_set1(1.0), scale = vd_set1(2.0 / (double)n), half = vd_set1(0.5);

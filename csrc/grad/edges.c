@@ -1,12 +1,12 @@
-/* Pictures whose silhouettes are smooth, and backwards: gradients of colours, and sums by vertex of those of edges.
- * In: `rast`, colours, which triangle lies across each edge.  Out: colours.
+/* Blending across silhouettes, and backward: gradients of colours, and sums by vertex of the gradients of edges.
+ * In: `rast`, colours, the triangle across each edge.  Out: colours.
  *
- * Each pair of neighbours that show different triangles is looked at once in each band that has a pixel of it.  A pixel
- * takes its pairs in an order of rows: with the row below, its own row, with the row above.
+ * Each pair of neighbours that show different triangles is processed once in each band that has a pixel of it.  The
+ * order of a pixel's pairs is that of rows: with the row below, within its row, with the row above.
  *
- * The straight-through rule leaves the picture as it is.  What a triangle that hangs over its neighbour would do to the
- * two pixels if it moved by a pixel is the gradient of its point there, by finite differences of colours: Pidhorskyi,
- * S. et al., "Rasterized Edge Gradients: Handling Discontinuities Differentiably", 2024.  */
+ * The straight-through rule leaves the picture as it is.  Where a triangle overlaps its neighbour, the gradient of its
+ * point is the change of the two pixels when it moves by a pixel, by finite differences of colours: Pidhorskyi, S. et
+ * al., "Rasterized Edge Gradients: Handling Discontinuities Differentiably", 2024. */
 #ifndef TL_GRAD_EDGES_C
 #define TL_GRAD_EDGES_C
 
@@ -20,7 +20,7 @@
 #include "grad/spans.h"
 #include "lanes/lanes.h"
 
-#define TL_NO_ID -2 /* stands for a number that is no triangle's */
+#define TL_NO_ID -2 /* a number that is no triangle's */
 
 /* Adds share * (colour of `from` - colour of `to`). */
 TL_INLINE void take_color(const tl_grad_edges *e, int64_t to, int64_t from, double share, int is_f64)
@@ -33,7 +33,7 @@ TL_INLINE void take_color(const tl_grad_edges *e, int64_t to, int64_t from, doub
     }
 }
 
-/* Column c of the colour of the far pixel of a pair less that of the near one. */
+/* Column c of the colour of the far pixel of a pair minus that of the near pixel. */
 TL_INLINE double color_step(const tl_grad_edges *e, const tl_pair *pair, int64_t c, int is_f64)
 {
     if (e->steps)
@@ -48,7 +48,8 @@ TL_INLINE int in_band(const tl_grad_view *view, int64_t pixel)
     return pixel >= view->first_row * view->width && pixel < view->end_row * view->width;
 }
 
-/* Adds what column c says of the shares of a pair; returns what its gradient moves from the far pixel to the near. */
+/* Adds the gradients of the shares of a pair by column c; returns the gradient that moves from the far pixel to the
+ * near pixel. */
 TL_INLINE double backward_column(const tl_grad_edges *e, const tl_pair *pair, const tl_pair_edge *edge, int64_t c,
                                  double *g_near, double *g_far, int is_f64)
 {
@@ -59,7 +60,7 @@ TL_INLINE double backward_column(const tl_grad_edges *e, const tl_pair *pair, co
     return edge->far * b - edge->near * a;
 }
 
-/* Gradients of the two colours of a pair, and of its edge. */
+/* Adds the gradients of the two colours of a pair, and of its edge. */
 TL_INLINE void backward_pair(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair,
                              const tl_pair_edge *edge, tl_grad_sums *sums, int is_f64)
 {
@@ -77,7 +78,7 @@ TL_INLINE void backward_pair(const tl_grad_view *view, const tl_grad_edges *e, c
         backward_edge(view, pair, edge, g_near, g_far, sums);
 }
 
-/* The weights of a triangle at the middle of a pixel, perspective-correct; 0 when it lies outside. */
+/* Sets the perspective-correct weights of a triangle at the centre of a pixel; returns whether it lies inside. */
 static int weights_of_middle(const tl_grad_view *view, int32_t id, int64_t pixel, double *weights)
 {
     double p[3][3], a[3];
@@ -99,7 +100,7 @@ static int weights_of_middle(const tl_grad_view *view, int32_t id, int64_t pixel
     return weights[0] >= 0.0 && weights[1] >= 0.0 && weights[2] >= 0.0;
 }
 
-/* The straight-through rule: of the triangle that hangs over its neighbour, where no other cuts it. */
+/* Backward of the straight-through rule, for the triangle that overlaps its neighbour; not where both or none do. */
 static void backward_straight(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair *pair, tl_grad_sums *sums)
 {
     double weights[3], step = 0.0, other[3];
@@ -124,7 +125,7 @@ static void backward_straight(const tl_grad_view *view, const tl_grad_edges *e, 
     }
 }
 
-/* Ids of a row of pixels: -1 for none, less for a number that is no triangle's. */
+/* Loads the ids of a row of pixels: -1 for none, TL_NO_ID for a number that is no triangle's. */
 TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_t row, int32_t *ids, int is_f64)
 {
     const int64_t first = row * view->width;
@@ -142,7 +143,7 @@ TL_INLINE void load_ids(const tl_grad_view *view, const tl_grad_edges *e, int64_
     }
 }
 
-/* Whether the surface plainly runs on from one triangle to another, or neither has an edge that counts. */
+/* Whether two triangles are neighbours on the surface, without silhouettes, so that the pair has no edge. */
 TL_INLINE vm runs_on(const tl_grad_edges *e, vm m, vi id, vi other, vi outlines)
 {
     const vi none = vi_set1(0);
@@ -159,17 +160,17 @@ TL_INLINE vm runs_on(const tl_grad_edges *e, vm m, vi id, vi other, vi outlines)
     return found;
 }
 
-/* Where pairs are looked for: between rows, from the lowest to `top`, and within those of the band, row by row. */
+/* A scan for pairs: between rows, from the lowest to `top`, and within the rows of the band, row by row. */
 typedef struct {
     const tl_grad_view *view; /* the band */
     const tl_grad_edges *edges;
     int64_t lowest, top;
-    const int32_t *shown, *begins; /* of a picture, unless NULL: the ids of row 0, and where runs begin */
+    const int32_t *shown, *begins; /* of a picture, unless NULL: ids of row 0, and where runs begin */
     int64_t step;
     const int64_t *row_runs;
-    int64_t meeting;                       /* 2 * row: between a row and the one below; 2 * row + 1: within it */
-    const int32_t *ids, *others, *columns; /* of the pixels that meet; where they may differ */
-    int64_t n_columns, n_taken;            /* of those; how many of them have been looked at */
+    int64_t meeting;                       /* 2 * row: a row with the row below; 2 * row + 1: within the row */
+    const int32_t *ids, *others, *columns; /* of the compared pixels; columns where they may differ */
+    int64_t n_columns, n_taken;            /* columns, and how many of them are processed */
 } pair_scan;
 
 TL_INLINE pair_scan scan_of(const tl_grad_view *view, const tl_grad_edges *e, int64_t lowest, int64_t top)
@@ -192,7 +193,7 @@ TL_INLINE int64_t list_changes(const int32_t *ids, const int32_t *others, int64_
     return n_listed;
 }
 
-/* Goes on to the next two rows that meet, or to the next one whose columns do; 0 at the end. */
+/* Steps to the next comparison: of two rows, or within a row; 0 at the end. */
 TL_INLINE int next_meeting(pair_scan *s, int is_f64)
 {
     const int64_t width = s->view->width, room = width + TL_IDS_ROOM, meeting = ++s->meeting, row = meeting / 2;
@@ -218,7 +219,7 @@ TL_INLINE int next_meeting(pair_scan *s, int is_f64)
     return 1;
 }
 
-/* Adds those of the next columns whose pairs are to be looked at. */
+/* Appends the pairs of the next TL_LANES columns that may have an edge. */
 TL_INLINE void list_some(pair_scan *s, tl_pair_list *list)
 {
     const tl_grad_edges *e = s->edges;
@@ -243,7 +244,7 @@ TL_INLINE void list_some(pair_scan *s, tl_pair_list *list)
     s->n_taken += TL_LANES;
 }
 
-/* Lists the next pairs to be looked at, the first pixel of each as the near one; 0 if there are none left. */
+/* Lists the next pairs, the first pixel of each as the near pixel; 0 at the end. */
 TL_INLINE int next_pairs(pair_scan *s, tl_pair_list *list, int is_f64)
 {
     list->n = 0;
@@ -275,7 +276,7 @@ TL_INLINE void blend_pair(const tl_grad_view *view, const tl_grad_edges *e, cons
         take_color(e, pair->far, pair->near, p->edge.far, is_f64);
 }
 
-/* Whether the second pixel of a pair is the nearer one. */
+/* Whether the second pixel of a pair is nearer. */
 TL_INLINE int is_nearer(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair_list *list, int64_t i,
                         int is_f64)
 {

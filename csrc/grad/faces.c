@@ -1,8 +1,8 @@
-/* What a band of a picture shows, found once for both ways: runs of pixels, faces, pairs of pixels whose edges count.
+/* The contents of a band, for forward and backward: runs of pixels, faces, pairs of pixels with an edge between.
  * In: ids of a picture, a mesh with attributes.  Out: runs, faces, pairs.
  *
- * A triangle that is seen is a face: planes in float64, about the first pixel that shows it and in units of its total
- * there, whose quotients are the attributes at its pixels; and room for the sums of colors.c. */
+ * A visible triangle is a face.  It has planes in float64, relative to the first pixel that shows it and in units of
+ * its total there; attributes at pixels are their quotients.  It has room for the sums of colors.c. */
 #ifndef TL_GRAD_FACES_C
 #define TL_GRAD_FACES_C
 
@@ -16,24 +16,23 @@
 #include "lanes/lanes.h"
 #include "lanes/quads.h"
 
-/* Planes of a face: by column, by row, and at its first pixel; four numbers each.  Where the last is above 0 the sum of
- * the weights is below 1.  Then that pixel's column and row; and of each three attributes their planes, those of the
- * last corner, and sums as many as planes. */
+/* Planes of a face: by column, by row, and at its first pixel; four numbers each.  Where FACE_REST is above 0 the sum
+ * of the weights is below 1.  Then column and row of that pixel; and for each three attributes their planes, their
+ * values at the last corner, and as many sums as planes. */
 enum { FACE_U, FACE_V, FACE_ZW, FACE_REST, FACE_TOTAL = FACE_REST, FACE_PLANE = 12, FACE_COLUMN = 12, FACE_ROW };
 enum { FACE_QUADS = 4 * 4, THREE_LAST = FACE_PLANE, THREE_SUMS = FACE_QUADS };
 
-/* A band, with the rows on either side of it that it takes part in: runs of pixels of equal id, faces, pairs. */
+/* A band with the rows on either side of it that its edges reach: runs of pixels of equal id, faces, pairs. */
 typedef struct {
     const tl_grad_view *view;
     tl_grad_picture *l;
-    tl_grad_view all;                        /* of those rows */
+    tl_grad_view all;                        /* the band and those rows */
     int32_t *faces;                          /* of runs: twice the face, 1 more where clamped, less than 0 for none */
     int32_t *corners[3], *column, *row, *id; /* of faces */
     tl_met_pair *pairs;
     float *rows; /* TL_ROWS_KEPT rows from `base` on: colours, which become gradients */
     int64_t base;
-    double
-        *moves[2][2]; /* forward and back, of even and odd rows: what pairs add to the near pixel, take from the far */
+    double *moves[2][2]; /* forward, backward; of even and odd rows: added to the near pixel, subtracted from the far */
 } picture_pass;
 
 _Static_assert(sizeof(tl_met_pair) == TL_PAIR_BYTES, "callers make room for pairs");
@@ -54,7 +53,7 @@ static picture_pass open_pass(const tl_grad_view *view, tl_grad_picture *l)
     return p;
 }
 
-/* The face of a triangle that has none until then, as a pixel shows it first; -1 if its corners do not exist. */
+/* Makes the face of a triangle that has no face, at the first pixel that shows it; -1 if its corners do not exist. */
 TL_INLINE int32_t make_face(picture_pass *p, int32_t id, int32_t column, int64_t row)
 {
     const tl_grad_view *view = p->view;
@@ -69,7 +68,7 @@ TL_INLINE int32_t make_face(picture_pass *p, int32_t id, int32_t column, int64_t
     return face;
 }
 
-/* Lists where the runs of a row begin; returns how many there are.  Numbers that are no triangle's are runs, too. */
+/* Lists where the runs of a row begin; returns how many.  Ids that are no triangle's form runs, too. */
 TL_INLINE int64_t list_row_runs(const picture_pass *p, const int32_t *ids, int32_t *begins)
 {
     const int64_t width = p->view->width;
@@ -81,14 +80,14 @@ TL_INLINE int64_t list_row_runs(const picture_pass *p, const int32_t *ids, int32
         const vi id = vi_max(x + TL_LANES <= width ? vi_load(ids + x) : vi_load_masked(m, ids + x), none);
         const vm starts = vm_and_not(m, vi_eq(id, vi_shift_in(id, before)));
         before = id;
-        if (!vm_any(starts)) /* most of what is empty */
+        if (!vm_any(starts)) /* background, mostly */
             continue;
         n += vi_compress(begins + n, starts, vi_add(vi_iota(), vi_set1((int32_t)x)));
     }
     return n;
 }
 
-/* Finds the faces of the runs of a row from `first` on, and makes those that there were not. */
+/* Sets the faces of the runs of a row from `first` on; makes faces of triangles without a face. */
 TL_INLINE void find_faces(picture_pass *p, const int32_t *ids, int64_t row, int64_t first, int64_t n_runs)
 {
     const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(p->view->n_triangles));
@@ -98,11 +97,11 @@ TL_INLINE void find_faces(picture_pass *p, const int32_t *ids, int64_t row, int6
         const vi shown = vi_gather(m, ids, vi_load(p->l->begins + r));
         const vm is_there = vm_and(m, vm_and(vi_gt(shown, none), vi_gt(end, shown)));
         const vi face = vi_select(is_there, vi_gather(is_there, p->l->faces->slot_of, shown), none);
-        vi_store(p->faces + r, vi_add(face, face)); /* runs beyond come later */
+        vi_store(p->faces + r, vi_add(face, face)); /* runs beyond n_runs are set later */
         vi_spill(id, shown);
         for (unsigned made = vm_bits(vm_and(is_there, vi_gt(vi_set1(0), face))); made; made &= made - 1) {
             const int k = __builtin_ctz(made);
-            const int32_t slot = p->l->faces->slot_of[id[k]]; /* of another run of these */
+            const int32_t slot = p->l->faces->slot_of[id[k]]; /* a run before in this vector has the face */
             p->faces[r + k] = 2 * (slot >= 0 ? slot : make_face(p, id[k], p->l->begins[r + k], row));
         }
     }
@@ -127,7 +126,7 @@ static void list_faces(picture_pass *p)
     p->l->n_faces = p->l->faces->n;
 }
 
-/* Takes the faces that the picture has left. */
+/* Restores the faces of the forward pass. */
 static void take_faces(const picture_pass *p)
 {
     tl_grad_sums *faces = p->l->faces;
@@ -135,7 +134,7 @@ static void take_faces(const picture_pass *p)
         faces->rows[faces->n] = p->id[faces->n];
 }
 
-/* Planes of TL_LANES faces: of the weights, of z/w and of the total. */
+/* Sets planes of TL_LANES faces: of the weights, of z/w and of the total. */
 TL_INLINE void set_face_planes(const picture_pass *p, int64_t first, vd planes[FACE_PLANE])
 {
     const tl_grad_view *view = p->view;
@@ -156,14 +155,14 @@ TL_INLINE void set_face_planes(const picture_pass *p, int64_t first, vd planes[F
     }
 }
 
-/* The numbers of a face, and those of three attributes from `first` on. */
+/* The numbers of a face; and the offset of its numbers for three attributes from `first` on. */
 TL_INLINE double *face_at(const picture_pass *p, int64_t face)
 {
     return p->l->faces->sums + face * p->l->faces->n_columns;
 }
 TL_INLINE int64_t place_of_three(int64_t first) { return TL_HEAD_OF_FACE + first / 3 * TL_SUMS_OF_FACE; }
 
-/* Stores quads of lanes. */
+/* Stores quads of lanes into faces. */
 TL_INLINE void store_quads(const picture_pass *p, int64_t first, int64_t at, const vd quads[FACE_QUADS])
 {
     const int64_t n_of_face = p->l->faces->n_columns, n = p->l->faces->n - first;
@@ -175,7 +174,7 @@ TL_INLINE void store_quads(const picture_pass *p, int64_t first, int64_t at, con
         memcpy(to + i * n_of_face, some + i * FACE_QUADS, FACE_QUADS * sizeof *some);
 }
 
-/* Planes of each three attributes are those less that of the last corner, which follows. */
+/* Sets the planes of three attributes minus their value at the last corner; that value follows. */
 TL_INLINE void set_attr_planes(const picture_pass *p, int64_t first, int64_t column, vd planes[FACE_QUADS])
 {
     vd attr[3][FACE_PLANE], at[3][3];
@@ -225,7 +224,7 @@ TL_INLINE double zw_at(const picture_pass *p, int32_t id, int64_t column, int64_
     return plane[8] + plane[0] * (double)(column - p->column[face]) + plane[4] * (double)(row - p->row[face]);
 }
 
-/* Whether the second pixel of a pair is the nearer one. */
+/* Whether the second pixel of a pair is nearer. */
 TL_INLINE int is_nearer_at(const picture_pass *p, const tl_pair_list *list, int64_t i)
 {
     const int in_column = list->where[i] & TL_IN_COLUMN;
@@ -234,7 +233,7 @@ TL_INLINE int is_nearer_at(const picture_pass *p, const tl_pair_list *list, int6
                                                           (float)zw_at(p, list->near[i], x, row));
 }
 
-/* Finds the pairs of all rows: those with the row below, then those within a row. */
+/* Lists the pairs of all rows: those with the row below, then those within a row. */
 static void list_row_pairs(const picture_pass *p)
 {
     const int64_t lowest = p->all.first_row, top = p->all.end_row;

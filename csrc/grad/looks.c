@@ -1,5 +1,5 @@
-/* Where pixels look in textures, in lanes: levels, and the texels of a level about a point with their shares.
- * In: coordinates, footprints, biases.  Out: numbers of texels, shares, what these change by.
+/* Texture lookups of pixels, in lanes: levels, and the texels of a level around a point with their shares.
+ * In: coordinates, footprints, biases.  Out: rows of texels, shares, derivatives of the shares.
  *
  * All of it is float64: a texel of 2^-12 of a picture and its share need more digits than float32 has. */
 #ifndef TL_GRAD_LOOKS_C
@@ -14,26 +14,26 @@
 #include "grad/pixels.h"
 #include "lanes/lanes.h"
 
-/* Where pixels look. */
+/* Lookups of TL_LANES pixels. */
 typedef struct {
-    vm is_there; /* whether they look at a texture at all */
-    vi low;      /* the lower of one level or two */
-    vd upper;    /* share of the upper one */
+    vm is_there; /* pixels with a lookup */
+    vi low;      /* the level, or the lower of two levels */
+    vd upper;    /* share of the upper level */
     vd uv[2];
-    vm is_kept[2]; /* whether u, v are numbers */
-    vd by[4];      /* what the level changes by with the slopes of u and v */
+    vm is_kept[2]; /* whether u, v are finite */
+    vd by[4];      /* derivatives of the level by the slopes of u and v */
     cube_point cube;
 } look_lanes;
 
-/* Texels of a level: their rows, shares, and what the shares change by with u and with v. */
+/* Texels of a level: their rows, shares, and the derivatives of the shares by u and by v. */
 typedef struct {
     int n;
     vi row[4];
     vd share[4], by[2][4];
 } texel_shares;
 
-/* Numbers of a tensor (n_rows, stride) from `first` on, four at most, of the rows in lanes, as columns.  Rows that end
- * with the tensor are copied: whole vectors would be read beyond it. */
+/* Loads at most four numbers of a tensor (n_rows, stride) from `first` on, of the rows in lanes, as columns.  Rows at
+ * the end of the tensor are copied first, because a vector load would read beyond it. */
 TL_ONCE void copy_last_rows(const void *p, int64_t stride, int64_t first, const int32_t *rows, void *copy, int is_f64)
 {
     const int64_t n = stride - first < 4 ? stride - first : 4;
@@ -64,7 +64,7 @@ TL_INLINE void load_look_rows(const void *p, int64_t n_rows, int64_t stride, int
         columns[k] = vd_from_vf(vf_of_bits(bits[k]));
 }
 
-/* Writes n numbers of rows of `stride`, those of the lanes in m, from columns. */
+/* Writes n numbers of rows of `stride`, for the lanes in m, from columns. */
 TL_INLINE void store_look_rows(void *p, int64_t stride, int64_t first, int n, vm m, const vd *columns, int is_f64)
 {
     double numbers[6][TL_MAX_LANES];
@@ -75,8 +75,8 @@ TL_INLINE void store_look_rows(void *p, int64_t stride, int64_t first, int n, vm
             put_real(p, stride * k + first + c, numbers[c][k], is_f64);
 }
 
-/* log2 of numbers from 2^-100 to 2^120, by ln(m) = 2 atanh((m - 1) / (m + 1)), m from sqrt(1/2) to sqrt(2): those of
- * libraries differ from processor to processor. */
+/* log2 of numbers from 2^-100 to 2^120, by ln(m) = 2 atanh((m - 1) / (m + 1)), m from sqrt(1/2) to sqrt(2): log2 of C
+ * libraries differs from processor to processor. */
 TL_INLINE vd log2_of_lanes(vd a)
 {
     const vd inverse = vd_power(a, UINT64_C(0x7fe0000000000000), UINT64_C(0x7ff0000000000000)); /* a power of 2 */
@@ -91,7 +91,7 @@ TL_INLINE vd log2_of_lanes(vd a)
     return vd_add(vd_from_vi(exponent), vd_mul(vd_mul(s, sum), vd_set1(2.8853900817779268))); /* 2 / ln 2 */
 }
 
-/* The longer axis of footprints in texels, 2^60 at most, as a level, and what that changes by with each slope. */
+/* The mipmap level of the longer axis of footprints, 2^60 texels at most, and its derivatives by each slope. */
 TL_INLINE vd footprint_level(const tl_grad_texture *t, const vd *slopes, vd *by)
 {
     const vd w = vd_set1((double)t->widths[0]), h = vd_set1((double)t->heights[0]);
@@ -114,7 +114,7 @@ TL_INLINE vd footprint_level(const tl_grad_texture *t, const vd *slopes, vd *by)
     return vd_mul(half, log2_of_lanes(vd_min(vd_max(square, least), vd_set1(0x1p120))));
 }
 
-/* The levels that pixels look at. */
+/* Sets the levels of pixels. */
 TL_INLINE void find_levels(const tl_grad_texture *t, const vd *slopes, const vd *bias, look_lanes *look)
 {
     const vd zero = vd_set1(0.0);
@@ -133,7 +133,7 @@ TL_INLINE void find_levels(const tl_grad_texture *t, const vd *slopes, const vd 
         look->upper = vd_sub(level, vd_floor(level));
 }
 
-/* Where the n pixels from `pixel` on look. */
+/* The lookups of the n pixels from `pixel` on. */
 TL_INLINE look_lanes look_at(const tl_grad_view *view, const tl_grad_texture *t, int64_t pixel, int n, int is_f64)
 {
     look_lanes look = {.is_there = vm_first(n)};
@@ -163,7 +163,7 @@ TL_INLINE look_lanes look_at(const tl_grad_view *view, const tl_grad_texture *t,
     return look;
 }
 
-/* The levels [*first, *end) that any of the pixels looks at. */
+/* The levels [*first, *end) that any of the pixels reads. */
 TL_INLINE void level_range(const tl_grad_texture *t, const look_lanes *look, int *first, int *end)
 {
     int32_t low[TL_MAX_LANES];
@@ -177,7 +177,7 @@ TL_INLINE void level_range(const tl_grad_texture *t, const look_lanes *look, int
     *end += 1 + (t->filter == TL_TEXEL_LEVELS && *end < t->n_levels - 1);
 }
 
-/* Which pixels look at a level, and the share that they give it. */
+/* The pixels that read a level, and its share. */
 TL_INLINE vm at_level(const look_lanes *look, int level, vd *share)
 {
     const vm is_low = vi_eq(look->low, vi_set1(level)), is_upper = vi_eq(look->low, vi_set1(level - 1));
@@ -186,7 +186,7 @@ TL_INLINE vm at_level(const look_lanes *look, int level, vd *share)
     return vm_and(look->is_there, vm_or(is_low, vm_and(is_upper, has_upper)));
 }
 
-/* Places along an axis: the texel below, how far beyond its middle, and what that changes by with u. */
+/* Positions along an axis: the texel below, the distance from its centre, and the derivative of that distance by u. */
 TL_INLINE vi along_axis(const tl_grad_texture *t, const look_lanes *look, int axis, int64_t size, vd *part, vd *by)
 {
     const int is_nearest = t->filter == TL_TEXEL_NEAREST;
@@ -204,7 +204,7 @@ TL_INLINE vi along_axis(const tl_grad_texture *t, const look_lanes *look, int ax
     return is_nearest && t->edge == TL_EDGE_CUBE ? vi_min(texel, vi_set1((int32_t)size - 1)) : texel;
 }
 
-/* Beyond a corner of a cube nothing lies: the mean of the other texels stands for the one there. */
+/* Beyond a corner of a cube there is no texel: the mean of the other three replaces it. */
 TL_INLINE void share_corner(texel_shares *quad, int corner, vm is_there)
 {
     const vd third = vd_set1(1.0 / 3.0), zero = vd_set1(0.0);
@@ -216,7 +216,7 @@ TL_INLINE void share_corner(texel_shares *quad, int corner, vm is_there)
     }
 }
 
-/* The texel of columns x and rows y: its row in the level; what is not there has none of the shares of corner k. */
+/* The row in the level of the texel in columns x and rows y; texels outside, with TL_EDGE_ZERO, get share k = 0. */
 TL_INLINE vi place_texel(const tl_grad_texture *t, const look_lanes *look, int level, vi x, vi y, int k,
                          texel_shares *quad)
 {
@@ -225,7 +225,7 @@ TL_INLINE vi place_texel(const tl_grad_texture *t, const look_lanes *look, int l
     const vm in_x = vi_gt_unsigned(width, x), in_y = vi_gt_unsigned(height, y), is_in = vm_and(in_x, in_y);
     const vi last_x = vi_sub(width, vi_set1(1)), last_y = vi_sub(height, vi_set1(1));
     vi face = t->edge == TL_EDGE_CUBE ? look->cube.face : zero;
-    if (t->edge == TL_EDGE_WRAP) { /* by one at most */
+    if (t->edge == TL_EDGE_WRAP) { /* x and y are outside by 1 at most */
         x = vi_select(in_x, x, vi_select(vi_gt(zero, x), last_x, zero));
         y = vi_select(in_y, y, vi_select(vi_gt(zero, y), last_y, zero));
     } else if (vm_any(vm_and_not(look->is_there, is_in))) {
@@ -248,7 +248,7 @@ TL_INLINE vi place_texel(const tl_grad_texture *t, const look_lanes *look, int l
     return vi_add(vi_mul(vi_add(vi_mul(face, height), y), width), x);
 }
 
-/* The four texels about points, or the nearest. */
+/* The four texels around points, or the nearest texel. */
 TL_INLINE texel_shares find_shares(const tl_grad_texture *t, const look_lanes *look, int level)
 {
     texel_shares quad = {.n = t->filter == TL_TEXEL_NEAREST ? 1 : 4};

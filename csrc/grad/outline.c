@@ -1,6 +1,6 @@
-/* A mesh in a view, as its edges need it: where vertices are, which side of a triangle is seen, and which of its edges
- * are silhouettes.
- * In: vertices, triangles, which one lies across each edge.  Out: places in pixels, a number by triangle. */
+/* The edges of a mesh in a view: pixel positions of vertices, which side of a triangle is visible, and which edges are
+ * silhouettes.
+ * In: vertices, triangles, the triangle across each edge.  Out: positions in pixels, bits by triangle. */
 #ifndef TL_GRAD_OUTLINE_C
 #define TL_GRAD_OUTLINE_C
 
@@ -24,13 +24,13 @@ TL_INLINE void load_vertices_of(const tl_grad_view *view, const int32_t *vertice
         columns[k] = vd_from_vf(vf_of_bits(bits[k]));
 }
 
-/* The share of a part among n of something: [*first, *end). */
+/* The range [*first, *end) of n items that a part has. */
 TL_INLINE void share_of_part(int64_t n, const tl_grad_outline *o, int64_t *first, int64_t *end)
 {
     *first = n * o->part / o->n_parts, *end = n * (o->part + 1) / o->n_parts;
 }
 
-/* Pixels of the picture. */
+/* Sets the pixel positions of vertices. */
 TL_INLINE void place_vertices(const tl_grad_view *view, const tl_grad_outline *o, int is_f64)
 {
     int32_t rows[TL_MAX_LANES];
@@ -50,7 +50,7 @@ TL_INLINE void place_vertices(const tl_grad_view *view, const tl_grad_outline *o
     }
 }
 
-/* Three numbers of each of TL_LANES triangles from i on, zeros beyond n, as columns. */
+/* Loads three numbers of each of TL_LANES triangles from i on, 0 beyond n, as columns. */
 TL_INLINE void load_threes(const int32_t *rows, int64_t i, int64_t n, vi *columns)
 {
     int32_t last[3 * TL_MAX_LANES + 4];
@@ -75,7 +75,7 @@ TL_INLINE vi sign_code(vd area)
     return vi_select(vm_and_not(is_up, is_down), one, vi_select(vm_and_not(is_down, is_up), two, none));
 }
 
-/* Sides of triangles; what lies behind the eye and what does not exist. */
+/* Sets the sides of triangles, and TL_IS_AHEAD; -1 where corners do not exist. */
 TL_INLINE void face_triangles(const tl_grad_view *view, const tl_grad_outline *o, int is_f64)
 {
     const vd zero = vd_set1(0.0);
@@ -117,13 +117,13 @@ TL_INLINE int is_twisted_fold(const tl_grad_view *view, const int32_t *sides, in
     return is_reversed ? (own | across) == TL_SIDES : own && own == across;
 }
 
-/* Triangles of half-edges, which are not below 0: a third of those. */
+/* Triangles of half-edges >= 0: a third of them. */
 TL_INLINE vi triangles_of_halves(vi a)
 {
     return vi_round(vd_mul(vd_from_vi(vi_sub(a, vi_set1(1))), vd_set1(1.0 / 3.0)));
 }
 
-/* Sides, and the edges beyond which nothing lies, or the surface folds. */
+/* Marks the edges that are borders or folds of the surface. */
 static void mark_silhouettes(const tl_grad_view *view, const tl_grad_outline *o)
 {
     const vi none = vi_set1(-1), sides = vi_set1(TL_SIDES), most = vi_set1((int32_t)(3 * view->n_triangles));

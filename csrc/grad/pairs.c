@@ -1,14 +1,14 @@
-/* An edge between two neighbouring pixels that show different triangles: which it is, and what share of the colour of
- * the other one each pixel takes.
+/* The edge between two neighbouring pixels that show different triangles, and the share of its neighbour's colour that
+ * each pixel takes.
  *
- * Coordinates are pixels about the middle of the near pixel: `along` towards the far one, `beside` across.
+ * Coordinates are pixels relative to the centre of the near pixel: `along` towards the far pixel, `beside` across.
  *
- *   silhouette   an edge of the near triangle that is a silhouette, steeper than 45 degrees, and passes between the two
- *                middles at t: beyond 1/2 the far pixel takes t - 1/2, before it the near one takes 1/2 - t
+ *   silhouette   a silhouette edge of the near triangle, steeper than 45 degrees, that passes between the two centres
+ *                at t: beyond 1/2 the far pixel takes t - 1/2, before it the near pixel takes 1/2 - t
  *                (Laine et al. 2020, 3.5)
  *   area         the edge where the surface ends or folds, found by a walk from the near triangle towards the far
- *                middle; each pixel takes the exact share of it that lies beyond the line of that edge.  Near 45
- *                degrees rows and columns share it, the more gradually the shorter the edge is */
+ *                centre; each pixel takes the exact share of it that lies beyond the line of that edge.  Near 45
+ *                degrees rows and columns share it; the shorter the edge, the wider the transition */
 #ifndef TL_GRAD_PAIRS_C
 #define TL_GRAD_PAIRS_C
 
@@ -20,26 +20,26 @@
 #include "grad/pixels.h"
 #include "lanes/lanes.h"
 
-#define TL_CROSSING_SLACK 0.0625 /* px by which the snap may move an edge past a middle that it separates */
-#define TL_HANDOVER 0.6          /* width of the hand-over about 45 degrees, in the cosine of twice the angle */
-#define TL_WALK_STEPS 256        /* of a walk */
-#define TL_PAIRS_AT_ONCE 512     /* pairs that are walked at once */
+#define TL_CROSSING_SLACK 0.0625 /* px by which the snap may move an edge past the centre of a pixel */
+#define TL_HANDOVER 0.6          /* width of the transition about 45 degrees, in the cosine of twice the angle */
+#define TL_WALK_STEPS 256        /* the most steps of a walk */
+#define TL_PAIRS_AT_ONCE 512     /* pairs in a list */
 #define TL_PAIRS_ROOM (TL_PAIRS_AT_ONCE + 2 * TL_MAX_LANES)
 
-/* Two neighbours. */
+/* Two neighbouring pixels. */
 typedef struct {
     int64_t near, far;      /* pixels */
-    int32_t id, far_id;     /* their triangles; the last may be -1 */
+    int32_t id, far_id;     /* their triangles; far_id may be -1 */
     int axis;               /* 0: in a row */
-    double flip, middle[2]; /* flip: 1, or -1 where the far one comes first */
+    double flip, middle[2]; /* flip: 1, or -1 where the far pixel comes first */
 } tl_pair;
 
-/* The edge between them. */
+/* The edge between the pixels of a pair. */
 typedef struct {
     int32_t vertices[2];
-    double t, slope, rise, ends[2]; /* where it crosses the line of middles; d along / d beside; ends: weights of t */
+    double t, slope, rise, ends[2]; /* position on the line of centres; d along / d beside; weights of the ends in t */
     double near, far;               /* shares */
-    double near_by[2], far_by[2];   /* what they change by with t and with the slope */
+    double near_by[2], far_by[2];   /* derivatives of the shares by t and by the slope */
 } tl_pair_edge;
 
 /* A pair and its edge. */
@@ -48,28 +48,28 @@ typedef struct {
     tl_pair_edge edge;
 } tl_met_pair;
 
-/* Pairs of neighbours, some at once. */
+/* A list of pairs of neighbours. */
 typedef struct {
     int64_t n;
-    int32_t near[TL_PAIRS_ROOM], far[TL_PAIRS_ROOM];     /* triangles; the last may be -1 */
+    int32_t near[TL_PAIRS_ROOM], far[TL_PAIRS_ROOM];     /* triangles; `far` may be -1 */
     int32_t column[TL_PAIRS_ROOM], where[TL_PAIRS_ROOM]; /* of the near pixel; where: its row and TL_IN_COLUMN, ... */
     int32_t turned[TL_PAIRS_ROOM];                       /* see orient_pairs */
-    int32_t end[TL_PAIRS_ROOM];                          /* the triangle that has the edge between them, -1 for none */
+    int32_t end[TL_PAIRS_ROOM];                          /* the triangle that has the edge of the pair, -1 for none */
 } tl_pair_list;
 
 enum { TL_IN_COLUMN = 1, TL_IS_BEYOND = 2, TL_ROW_SHIFT = 2 };
 
-/* Walks of a list's pairs: which triangles they have reached, pixels as of the list, which pairs they are. */
+/* Walks of the pairs of a list: the triangle that each has reached, and `far`, `column`, `where` of its pair. */
 typedef struct {
     const tl_grad_view *view;
     const tl_grad_edges *edges;
     tl_pair_list *list;
     int64_t n, n_failed;
     int32_t id[TL_PAIRS_ROOM], far[TL_PAIRS_ROOM], column[TL_PAIRS_ROOM], where[TL_PAIRS_ROOM], pair[TL_PAIRS_ROOM];
-    int32_t failed[TL_PAIRS_ROOM]; /* pairs whose walks lead nowhere */
+    int32_t failed[TL_PAIRS_ROOM]; /* pairs whose walks failed */
 } pair_walks;
 
-/* Some of them. */
+/* TL_LANES walks. */
 typedef struct {
     vi id, far, column, where, pair;
 } walker_lanes;
@@ -77,12 +77,12 @@ typedef struct {
 TL_INLINE vm bits_set(vi a, int bits) { return vm_and_not(vm_all(), vi_eq(vi_and(a, vi_set1(bits)), vi_set1(0))); }
 TL_INLINE vm vd_exceeds(vd a, vd b) { return vm_and_not(vd_ge(a, b), vd_ge(b, a)); }
 
-/* The corners of triangles about the near pixels of pairs. */
+/* The corners of triangles relative to the near pixels of pairs. */
 typedef struct {
     vd along[3], beside[3];
 } placed_lanes;
 
-/* Those of TL_LANES `ids`, whose vertices exist. */
+/* Places the corners of TL_LANES triangles, whose vertices exist. */
 TL_INLINE void place_corners(const tl_grad_view *view, const tl_grad_edges *e, const int32_t *ids, vi column, vi where,
                              placed_lanes *p)
 {
@@ -102,13 +102,14 @@ TL_INLINE void place_corners(const tl_grad_view *view, const tl_grad_edges *e, c
     }
 }
 
-/* Edges: the corner opposite to each, and of its ends how far beside they are; the rest as of tl_pair_edge. */
+/* Edges: the opposite corner, and `beside` of the two ends; t, slope and rise as in tl_pair_edge. */
 typedef struct {
     vi corner;
     vd t, slope, rise, beside[2];
 } exit_lanes;
 
-/* The edges that cross the lines of middles farthest along, among all or those in `allowed`; which lanes have one. */
+/* Finds the edges that cross the lines of centres farthest along, of all edges or those allowed; returns the lanes with
+ * an edge. */
 TL_INLINE vm exit_edges(const placed_lanes *p, const vm *allowed, exit_lanes *edge)
 {
     const vd zero = vd_set1(0.0);
@@ -130,8 +131,8 @@ TL_INLINE vm exit_edges(const placed_lanes *p, const vm *allowed, exit_lanes *ed
                   vd_exceeds(vd_set1(1.0 + TL_CROSSING_SLACK), edge->t));
 }
 
-/* A step of walks from i on, to the next triangle or to the end; those that go on.  Nowhere lead those where the snap
- * moved an edge past a middle, and those that reach behind the eye. */
+/* A step of the walks from i on, to the next triangle or to the end; returns the walks that continue.  A walk fails
+ * where the snap moved an edge past a centre, and behind the eye. */
 TL_INLINE vm step_walks(pair_walks *w, int64_t i, int is_last, walker_lanes *at)
 {
     placed_lanes placed;
@@ -157,13 +158,13 @@ TL_INLINE vm step_walks(pair_walks *w, int64_t i, int is_last, walker_lanes *at)
     return vm_and_not(vm_and_not(m, ends), vi_eq(at->id, at->far));
 }
 
-/* All walks, step by step, from the near triangles to where the surface ends or folds, or to the far ones. */
+/* Walks from the near triangles to where the surface ends or folds, or to the far triangles. */
 static void walk_pairs(pair_walks *w)
 {
     w->n_failed = 0;
     for (int step = 0; step <= TL_WALK_STEPS && w->n; step++) {
         int64_t n_left = 0;
-        vi_store(w->id + w->n, vi_set1(w->id[0])); /* a vector has triangles everywhere */
+        vi_store(w->id + w->n, vi_set1(w->id[0])); /* every lane has a triangle */
         for (int64_t i = 0; i < w->n; i += TL_LANES) {
             walker_lanes at = {vi_load(w->id + i), vi_load(w->far + i), vi_load(w->column + i), vi_load(w->where + i),
                                vi_load(w->pair + i)};
@@ -176,7 +177,7 @@ static void walk_pairs(pair_walks *w)
     }
 }
 
-/* The far ones of pairs become the near ones, where `turned` is -1. */
+/* Swaps the near and far pixels of the pairs with `turned` = -1. */
 TL_INLINE void orient_pairs(tl_pair_list *list)
 {
     const vi in_column = vi_set1(TL_IN_COLUMN), is_beyond = vi_set1(TL_IS_BEYOND);
@@ -192,7 +193,8 @@ TL_INLINE void orient_pairs(tl_pair_list *list)
     }
 }
 
-/* Finds where the surface ends or folds between pairs: from the near triangles, else from the far ones. */
+/* Finds where the surface ends or folds between pairs: by walks from the near triangles, or, if these fail, from the
+ * far ones. */
 static void finish_walks(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list)
 {
     pair_walks w;
@@ -217,11 +219,11 @@ static void finish_walks(const tl_grad_view *view, const tl_grad_edges *e, tl_pa
     walk_pairs(&w);
 }
 
-/* Pairs of which something may come, what they have; the shares as of tl_pair_edge. */
+/* Pairs in lanes, with their edges and shares; the shares as in tl_pair_edge. */
 typedef struct {
-    int32_t ids[TL_MAX_LANES]; /* of the triangles that have their edges */
+    int32_t ids[TL_MAX_LANES]; /* the triangles that have the edges */
     vi where;
-    vm m; /* those of which something comes */
+    vm m; /* pairs with an effect */
     placed_lanes placed;
     exit_lanes edge;
     vd near, far, near_by[2], far_by[2];
@@ -232,7 +234,8 @@ TL_INLINE vd vd_clamped(vd a, vd low, vd high)
     return vd_select(vd_exceeds(low, a), low, vd_select(vd_exceeds(a, high), high, a));
 }
 
-/* By silhouettes, of the near triangles: those steep enough for a pair in a row, or flat enough for one in a column. */
+/* Shares by silhouettes of the near triangles: edges steep enough for a pair in a row, or flat enough for a pair in a
+ * column. */
 TL_INLINE void share_silhouettes(const tl_grad_edges *e, pair_lanes *p)
 {
     const vi outline = vi_gather(p->m, e->outline, vi_load(p->ids));
@@ -256,8 +259,8 @@ TL_INLINE void share_silhouettes(const tl_grad_edges *e, pair_lanes *p)
     p->near_by[1] = p->far_by[1] = zero;
 }
 
-/* The share of squares of side 1 that lies before lines, which cross their middle lines at u and have slopes of 2 h
- * there; what it changes by with u and with h. */
+/* The area of unit squares before lines that cross their middle lines at u with slopes of 2 h; and its derivatives by u
+ * and by h. */
 TL_INLINE vd area_before(vd u, vd h, vd *by_u, vd *by_h)
 {
     const vd zero = vd_set1(0.0), one = vd_set1(1.0), two = vd_set1(2.0), four = vd_set1(4.0);
@@ -272,7 +275,7 @@ TL_INLINE vd area_before(vd u, vd h, vd *by_u, vd *by_h)
     return vd_select(is_whole, vd_select(vd_exceeds(u, vd_set1(0.5)), one, zero), part);
 }
 
-/* How much of edges is left to this axis, the rest being the other one's: rows and columns of pixels. */
+/* The weight of this axis for edges; the other axis, rows or columns of pixels, has the rest. */
 TL_INLINE vd share_of_axis(const exit_lanes *edge, vm in_column)
 {
     const vd zero = vd_set1(0.0), one = vd_set1(1.0), half = vd_set1(0.5), size = vd_abs(edge->slope);
@@ -286,7 +289,7 @@ TL_INLINE vd share_of_axis(const exit_lanes *edge, vm in_column)
     return vd_select(vd_ge(vd_set1(1e-9), width), vd_select(is_steep, one, zero), vd_clamped(part, zero, one));
 }
 
-/* By the area beyond the edges where walks end. */
+/* Shares by the area beyond the edges where walks end. */
 TL_INLINE void share_area(pair_lanes *p)
 {
     const vd zero = vd_set1(0.0), half = vd_set1(0.5);
@@ -311,7 +314,7 @@ TL_INLINE tl_pair pair_of(const tl_grad_view *view, const tl_pair_list *list, in
     return (tl_pair){near, far, list->near[i], list->far[i], axis, flip, {list->column[i] + 0.5, (double)row + 0.5}};
 }
 
-/* Takes pairs out of their lanes; returns how many they are. */
+/* Stores the pairs of lanes with an effect; returns how many. */
 static int64_t store_pairs(const tl_grad_view *view, const tl_pair_list *list, const int32_t *which,
                            const pair_lanes *p, tl_met_pair *out)
 {
@@ -339,7 +342,7 @@ static int64_t store_pairs(const tl_grad_view *view, const tl_pair_list *list, c
     return n;
 }
 
-/* Finds the edges of n pairs of a list, of TL_LANES at most; returns of how many something comes. */
+/* Sets the edges and shares of n pairs of a list, of TL_LANES at most; returns how many have an effect. */
 TL_INLINE int64_t find_pairs(const tl_grad_view *view, const tl_grad_edges *e, const tl_pair_list *list,
                              const int32_t *which, int64_t n, tl_met_pair *out)
 {
@@ -363,7 +366,7 @@ TL_INLINE int64_t find_pairs(const tl_grad_view *view, const tl_grad_edges *e, c
     return store_pairs(view, list, which, &p, out);
 }
 
-/* Lists the pairs of a list of which something may come, after their walks; returns how many. */
+/* Lists the pairs that may have an effect, after their walks; returns how many. */
 static int64_t list_pairs(const tl_grad_view *view, const tl_grad_edges *e, tl_pair_list *list, int32_t *which)
 {
     int64_t n = 0;
@@ -376,7 +379,7 @@ static int64_t list_pairs(const tl_grad_view *view, const tl_grad_edges *e, tl_p
     return n;
 }
 
-/* Adds a gradient of a vertex's pixel coordinates to its sums of x, y, z, w. */
+/* Adds the gradient of a vertex's pixel coordinates to its sums of x, y, z, w. */
 TL_INLINE void backward_vertex(const tl_grad_view *view, tl_grad_sums *sums, int32_t vertex, const double *g_px)
 {
     double *to = sums_of(sums, vertex);
@@ -388,7 +391,7 @@ TL_INLINE void backward_vertex(const tl_grad_view *view, tl_grad_sums *sums, int
     }
 }
 
-/* Adds what the ends of an edge get, from the gradients of both shares. */
+/* Adds the gradients of the ends of an edge, from the gradients of both shares. */
 static void backward_edge(const tl_grad_view *view, const tl_pair *pair, const tl_pair_edge *edge, double g_near,
                           double g_far, tl_grad_sums *sums)
 {

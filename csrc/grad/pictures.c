@@ -1,11 +1,11 @@
-/* Pictures of attributes of float32 with smooth edges, and backwards: from the gradients of a picture, or at once from
- * its mean squared difference from another one.  A band goes row by row while they are in the cache.
- * In: ids of a picture, a mesh with attributes; backward: gradients, or the other picture.  Out: the picture; backward:
- * sums by vertex and by row of attributes, a sum of squares.
+/* Pictures of attributes of float32 with smooth edges, and backward: from the gradients of a picture, or in one pass
+ * from its mean squared difference from a target.  A band is processed row by row while the rows are in the cache.
+ * In: ids of a picture, a mesh with attributes; backward: gradients, or the target.  Out: the picture; backward: sums
+ * by vertex and by row of attributes, a sum of squares.
  *
- * Quotients of the planes of faces are the attributes.  A run of pixels begins in float64 and goes on in float32; one
- * with a weight that is clamped goes by itself, as in points.c.  A row is drawn, finished when the next two are drawn,
- * and led back when these are finished: all in one place. */
+ * Attributes are quotients of the planes of faces.  A run of pixels starts in float64 and is computed in float32; a run
+ * with a clamped weight is computed in float64, as in points.c.  Pass of a row: drawn; finished once the next two rows
+ * are drawn; backward once these are finished; all in one buffer. */
 #ifndef TL_GRAD_PICTURES_C
 #define TL_GRAD_PICTURES_C
 
@@ -22,15 +22,15 @@
 #include "lanes/lanes.h"
 #include "lanes/quads.h"
 
-enum { ROWS_WAITING = 4 }; /* of those that are kept, before a row has been led back */
+enum { ROWS_WAITING = 4 }; /* rows that stay in the buffer until their backward is done */
 
-/* The pixels of the rows that are kept, as those of a picture. */
+/* The rows in the buffer, addressed as a picture. */
 TL_INLINE float *as_picture(const picture_pass *p)
 {
     return (float *)((uintptr_t)p->rows - 4 * (uintptr_t)(p->base * p->view->width * p->l->n_columns));
 }
 
-/* Finds the steps of colour across the pairs of a row, its own and with the row before, and what these move. */
+/* Computes the steps of colour across the pairs within a row and with the row before, and what the pairs move. */
 static void find_steps(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->l->n_columns, *pairs = p->l->row_pairs + (row - p->all.first_row);
@@ -83,7 +83,7 @@ static void move_between(const picture_pass *p, int64_t row, int is_back)
     }
 }
 
-/* A plane of a face from a pixel on, x and y off its first one. */
+/* A plane of a face at a pixel, at x, y from the first pixel of the face; `plane_of_face`: along a row from there. */
 TL_INLINE vqd plane_at_place(const double *plane, double x, double y)
 {
     const vqd in_row = vqd_add(vqd_load(plane + 8), vqd_mul(vqd_load(plane), vqd_set1(x)));
@@ -94,7 +94,7 @@ TL_INLINE run_plane plane_of_face(const double *plane, double x, double y)
     return run_plane_of(vq_from_vqd(plane_at_place(plane, x, y)), vq_from_vqd(vqd_load(plane)));
 }
 
-/* Whether the pixels of a run, x and y off the first one of the face, lie well within their triangle. */
+/* Whether the n pixels of a run, at x, y from the first pixel of the face, lie well within their triangle. */
 TL_INLINE int is_within(const double *face, double x, double y, int64_t n)
 {
     const vqd at = plane_at_place(face, x, y), last = vqd_add(at, vqd_mul(vqd_load(face), vqd_set1((double)(n - 1))));
@@ -102,7 +102,7 @@ TL_INLINE int is_within(const double *face, double x, double y, int64_t n)
     return (vqd_above_zero(at, last) & wanted) == wanted;
 }
 
-/* `rast` of a run that is clamped somewhere, of which row 0 of the picture would stand there. */
+/* `rast` of a run with clamped weights: a pointer that is indexed by the pixel in the picture. */
 static const float *points_of_clamped(const picture_pass *p, const pixel_run *run)
 {
     void *const out[2] = {(void *)((uintptr_t)p->l->rast - 16 * (uintptr_t)(run->row * p->view->width)), 0};
@@ -113,7 +113,7 @@ static const float *points_of_clamped(const picture_pass *p, const pixel_run *ru
     return out[0];
 }
 
-/* Run r of a row, n pixels of a face, as that of a band. */
+/* Run r of a row, n pixels of a face, as a pixel_run. */
 TL_INLINE pixel_run run_of_face(const picture_pass *p, int64_t r, int64_t row, int64_t n)
 {
     const int64_t column = p->l->begins[r];
@@ -137,7 +137,7 @@ TL_ONCE void draw_clamped(const picture_pass *p, int64_t r, int64_t row, int64_t
         values_of_run(&v, &run, rows, c, n - c < TL_FEW_COLUMNS ? (int)(n - c) : TL_FEW_COLUMNS, n, 0);
 }
 
-/* n of n_columns attributes from `first` on at the pixels of a run; x and y off the first pixel of the face. */
+/* Draws n of n_columns attributes from `first` on at the pixels of a run, at x, y from the first pixel of the face. */
 TL_INLINE void draw_three(const double *face, int64_t first, int n, int64_t n_columns, double x, double y,
                           int64_t n_pixels, float *colors)
 {
@@ -158,7 +158,8 @@ TL_INLINE void draw_three(const double *face, int64_t first, int n, int64_t n_co
     }
 }
 
-/* The next row to be finished, of the picture, its gradients or the other one; rows that are kept where it is none. */
+/* The next input row to finish: of the picture, its gradients or the target; the buffer for rows outside of the
+ * band. */
 TL_INLINE const float *row_ahead(const picture_pass *p, int64_t row)
 {
     const tl_grad_picture *l = p->l;
@@ -167,7 +168,7 @@ TL_INLINE const float *row_ahead(const picture_pass *p, int64_t row)
                                                                : numbers + row * p->view->width * l->n_columns;
 }
 
-/* Fetches some pixels of the row ahead into the cache, while others are computed. */
+/* Prefetches pixels of the row ahead while others are computed. */
 TL_INLINE void fetch_ahead(const float *ahead, int64_t column, int64_t n_pixels, int64_t n_columns)
 {
     for (int64_t i = n_columns * column; i < n_columns * (column + n_pixels); i += 16)
@@ -201,10 +202,10 @@ TL_INLINE void draw_row(const picture_pass *p, int64_t row, const float *ahead, 
     }
 }
 
-/* Numbers that are compared at a time, and those of which as many squares are summed up in float32. */
+/* numbers compared at a time; squares that are summed in float32 */
 enum { COMPARED = 32, SQUARED = 256 };
 
-/* Writes the gradient of some numbers over them; adds the squares of their differences. */
+/* Overwrites numbers with their gradient; adds the squares of their differences. */
 TL_INLINE void compare_some(float *out, const float *target, vf scale, vf *squares)
 {
     for (int k = 0; k < COMPARED; k += TL_LANES) {
@@ -214,7 +215,7 @@ TL_INLINE void compare_some(float *out, const float *target, vf scale, vf *squar
     }
 }
 
-/* Writes the gradient of a row over its numbers; returns the sum of the squares of the differences. */
+/* Overwrites a row with its gradient; returns the sum of the squares of the differences. */
 static double compare_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
@@ -247,7 +248,7 @@ static double compare_row(const picture_pass *p, int64_t row)
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-/* Writes a finished row of the picture, compares it, or takes its gradients; returns a sum of squares. */
+/* Finishes a row: stores it, compares it with the target, or loads its gradients; returns a sum of squares. */
 static double finish_row(const picture_pass *p, int64_t row)
 {
     const int64_t n = p->view->width * p->l->n_columns;
@@ -305,8 +306,8 @@ TL_INLINE void backward_row(const picture_pass *p, int64_t row, const float *ahe
     }
 }
 
-/* Rows drawn, finished, led back, one after the other, each in its place: what its pairs move waits until those of the
- * next row have been found. */
+/* Draws, finishes and runs backward each row in its place in the buffer.  What the pairs of a row move is added after
+ * the pairs of the next row are computed. */
 TL_INLINE double pass_rows(picture_pass *p, int64_t n_columns)
 {
     const tl_grad_view *view = p->view;

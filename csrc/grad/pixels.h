@@ -1,6 +1,6 @@
-/* Numbers of tensors, the visible pixels of a band run by run, and sums by row.
+/* Access to the numbers of tensors, the visible pixels of a band by runs, and sums by row.
  *
- * It is plain C, whose sums have one order: every instruction set gives the same bits. */
+ * It is plain C: sums have one order, and every instruction set gives equal bits. */
 #ifndef TL_GRAD_PIXELS_H
 #define TL_GRAD_PIXELS_H
 
@@ -10,15 +10,15 @@
 #include "topleft.h"
 #include "lanes/inline.h"
 
-/* What `outline` holds of a triangle; -1: it does not exist. */
+/* Bits of `outline` of a triangle; -1: it does not exist. */
 enum {
-    TL_SILHOUETTES = 7, /* bit k: the edge opposite to corner k is one */
+    TL_SILHOUETTES = 7, /* bit k: the edge opposite to corner k is a silhouette */
     TL_SIDE_SHIFT = 3,
     TL_SIDES = 3 << TL_SIDE_SHIFT, /* 1: front, 2: back, 0: neither */
     TL_IS_AHEAD = 32,              /* all of its corners have w > 0 */
 };
 
-#define TL_LAST_EXACT_ID (1 << 24) /* the largest that float32 counts up to; from there on its bits are counted */
+#define TL_LAST_EXACT_ID (1 << 24) /* float32 counts exactly up to it; larger ids are stored in its bits */
 #define TL_BITS_OF_LAST 0x4B800000
 
 TL_INLINE double get_real(const void *p, int64_t i, int is_f64)
@@ -34,7 +34,7 @@ TL_INLINE void put_real(void *p, int64_t i, double value, int is_f64)
         ((float *)p)[i] = (float)value;
 }
 
-/* What stands for a triangle: the bits of float32, or the integer that a float64 is; the same for the same triangle. */
+/* A key that is equal for equal triangles: the bits of float32, or a float64 as an integer. */
 TL_INLINE int32_t get_label(const void *rast, int64_t pixel, int is_f64)
 {
     if (is_f64) {
@@ -46,7 +46,7 @@ TL_INLINE int32_t get_label(const void *rast, int64_t pixel, int is_f64)
     return bits;
 }
 
-/* The number of the triangle, -1 for none. */
+/* The id of the triangle, -1 for none. */
 TL_INLINE int32_t id_of_label(int32_t label, int is_f64)
 {
     float id;
@@ -68,7 +68,7 @@ TL_INLINE void put_id(void *rast, int64_t pixel, int32_t id, int is_f64)
     memcpy((float *)rast + 4 * pixel + 3, &bits, sizeof bits);
 }
 
-/* Whether a triangle exists, and its corners do: what has been checked may have been changed since. */
+/* Whether a triangle and its corners exist: checked again, because arrays may have changed since the check. */
 TL_INLINE int has_corners(const tl_grad_view *view, int64_t n_rows, int32_t id)
 {
     if (id >= view->n_triangles)
@@ -81,8 +81,8 @@ TL_INLINE int has_corners(const tl_grad_view *view, int64_t n_rows, int32_t id)
 /* Pixels of a row that show one triangle. */
 typedef struct {
     int32_t id;
-    int64_t row, column, at, n; /* `at`: the first one's number in the picture */
-    int64_t bad_id;             /* a number that is no triangle's, -1: none was met */
+    int64_t row, column, at, n; /* `at`: the first pixel's number in the picture */
+    int64_t bad_id;             /* an id that is no triangle's; -1: none so far */
 } pixel_run;
 
 TL_INLINE pixel_run before_shown(const tl_grad_view *view)
@@ -90,7 +90,7 @@ TL_INLINE pixel_run before_shown(const tl_grad_view *view)
     return (pixel_run){.id = -1, .row = view->first_row, .bad_id = -1};
 }
 
-/* The next pixels of `rast` whose triangle has rows below n_rows; 0 when there are no more. */
+/* Steps to the next pixels of `rast` whose triangle has rows below n_rows; 0 at the end. */
 TL_INLINE int next_shown(const tl_grad_view *view, const void *rast, int64_t n_rows, pixel_run *run, int is_f64)
 {
     int64_t column = run->column + run->n, row = run->row;
@@ -116,7 +116,7 @@ TL_INLINE int next_shown(const tl_grad_view *view, const void *rast, int64_t n_r
     return 0;
 }
 
-/* The rows of a band of a tensor with n numbers a pixel become 0. */
+/* Clears the rows of a band of a tensor with n numbers a pixel. */
 TL_INLINE void clear_band(const tl_grad_view *view, void *out, int64_t n)
 {
     const size_t size = (size_t)((view->is_f64 ? 8 : 4) * n * view->width);
@@ -124,7 +124,7 @@ TL_INLINE void clear_band(const tl_grad_view *view, void *out, int64_t n)
         memset((char *)out + size * (size_t)view->first_row, 0, size * (size_t)(view->end_row - view->first_row));
 }
 
-/* The sums of a row. */
+/* The sums of a row; a new row starts at 0. */
 TL_INLINE double *sums_of(tl_grad_sums *sums, int64_t row)
 {
     int32_t slot = sums->slot_of[row];
@@ -141,21 +141,21 @@ TL_INLINE double *sums_of(tl_grad_sums *sums, int64_t row)
     return sums->sums + slot * sums->n_columns;
 }
 
-/* The sums of the rows of a triangle's three corners. */
+/* The sums of the three corners of a triangle. */
 TL_INLINE void corner_sums(const tl_grad_view *view, tl_grad_sums *sums, int32_t id, double **out)
 {
     for (int k = 0; k < 3; k++)
         out[k] = sums_of(sums, view->tri[3 * (int64_t)id + k]);
 }
 
-/* Ends a band: rows have no place again. */
+/* Ends a band: clears slot_of of its rows. */
 TL_INLINE void flush_band(tl_grad_sums *sums)
 {
     for (int64_t i = 0; i < sums->n; i++)
         sums->slot_of[sums->rows[i]] = -1;
 }
 
-/* Ends a band whose sums are not needed any longer. */
+/* Ends a band and drops its sums. */
 TL_INLINE void reset_band(tl_grad_sums *sums)
 {
     flush_band(sums);

@@ -1,12 +1,12 @@
-/* Weights of the corners at each pixel, z/w, and their derivatives; and backwards, from gradients of these to sums of
+/* Weights of the corners at each pixel, z/w, and their derivatives; and backward, from their gradients to sums of
  * gradients by vertex.
  * In: ids of a picture.  Out: `rast`, `rast_db`; backward: sums of x, y, z, w.
  *
- * With X, Y a pixel's middle, about that (X0, Y0) of the first pixel that shows the triangle, and x' = x - X0 w,
- * y' = y - Y0 w of its corners, a_k = q_k . (X, Y, 1) with q_k the cross product of the other two corners (x', y', w).
- * Weights are
- * a_k / (a_0 + a_1 + a_2), so backward a triangle needs the sums of the gradients of a_k times X, Y and 1: those of its
- * corners follow from them at once.  What the weights change by has the first two numbers of q_k alone.
+ * X, Y: the centre of a pixel minus (X0, Y0), the centre of the first pixel that shows the triangle; x' = x - X0 w, y'
+ * = y - Y0 w of its corners.  Then a_k = q_k . (X, Y, 1) with q_k the cross product of the other two corners (x', y',
+ * w), and the weights are a_k / (a_0 + a_1 + a_2).  So backward needs the sums over a triangle of the gradients of a_k
+ * times X, Y and 1; the gradients of its corners follow from them.  Derivatives of weights need only the first two
+ * numbers of q_k.
  *
  * Based on: Laine, S. et al., "Modular Primitives for High-Performance Differentiable Rendering", 2020, section 3. */
 #ifndef TL_GRAD_POINTS_C
@@ -22,10 +22,10 @@
 #include "lanes/lanes.h"
 #include "lanes/quads.h"
 
-/* A triangle about a pixel. */
+/* A triangle relative to the centre of a pixel. */
 typedef struct {
     double x[3], y[3], z[3], w[3];
-    double q[3][3]; /* q[k]: by X, by Y, and there */
+    double q[3][3]; /* q[k]: by X, by Y, and at the centre */
     double sum[3];  /* of q[0], q[1], q[2] */
     double middle[2];
 } grad_triangle;
@@ -55,10 +55,10 @@ TL_INLINE void load_seen_triangle(const tl_grad_view *view, int32_t id, double x
         t->sum[c] = t->q[0][c] + t->q[1][c] + t->q[2][c];
 }
 
-/* A function of X and Y that has these numbers, in the row of the middle. */
+/* A linear function of X and Y at X in the row of the centre. */
 TL_INLINE double plane_at(const double *q, double x) { return q[0] * x + q[2]; }
 
-/* Writes pixel i of a run, X off the first: weights are clamped to a sum of at most 1, z/w to z_most. */
+/* Writes pixel i of a run, at X from the first pixel: weights are clamped to a sum of at most 1, z/w to z_most. */
 TL_INLINE void store_point(const tl_grad_view *view, const grad_triangle *t, const pixel_run *run, int64_t i, double x,
                            void *const *out, int is_f64)
 {
@@ -107,8 +107,8 @@ static void points_of_ids(const tl_grad_view *view, const id_rows *ids, void *co
     }
 }
 
-/* Numbers of runs, about their first pixel and with its total as 1: u and v times the total there, what they change by
- * with the column and with the row, what the total does, and z/w. */
+/* Numbers of runs, relative to their first pixel and in units of its total: u and v times the total there, their
+ * derivatives by column and by row, those of the total, and z/w. */
 enum {
     POINT_U,
     POINT_U_X,
@@ -122,14 +122,14 @@ enum {
     POINT_ZW_X
 };
 
-/* The middles of some columns or rows. */
+/* The centres of columns or rows. */
 TL_INLINE vd middles_at(const tl_grad_view *view, int axis, vi i)
 {
     const vd middle = vd_add(vd_mul(vd_set1(2.0), vd_from_vi(i)), vd_set1(1.0));
     return vd_add(vd_mul(middle, vd_set1(view->scale[axis])), vd_set1(view->shift[axis]));
 }
 
-/* n <= 3 attributes of float32 of rows, from `first` on, as columns; zeros beyond. */
+/* Loads n <= 3 attributes of float32 of rows, from `first` on, as columns; other columns are 0. */
 TL_INLINE void load_attributes(const float *attr, int64_t n_columns, int64_t first, const int32_t *rows, vd *columns)
 {
     const vi at = vi_mul(vi_load(rows), vi_set1((int32_t)n_columns));
@@ -139,7 +139,7 @@ TL_INLINE void load_attributes(const float *attr, int64_t n_columns, int64_t fir
                          : vd_set1(0.0);
 }
 
-/* Corners v_k = x', y', w of TL_LANES triangles about x0, y0, and q_k, as load_seen_triangle has them; z. */
+/* Loads corners v_k = x', y', w of TL_LANES triangles relative to x0, y0, q_k as in `load_seen_triangle`, and z. */
 TL_INLINE void load_triangles(const tl_grad_view *view, const int32_t *const corners[3], vd x0, vd y0, vd v[3][3],
                               vd q[3][3], vd *z)
 {
@@ -165,7 +165,7 @@ TL_INLINE vd one_for_zero(vd a)
     return vd_select(vm_and(vd_ge(a, zero), vd_ge(zero, a)), vd_set1(1.0), a);
 }
 
-/* Stores a number of runs, 0 for those that show nothing. */
+/* Stores a number of runs, 0 for background. */
 TL_INLINE void set_number(grad_span *s, int r, int number, vm m, vd value)
 {
     vf_store(s->numbers[number] + r, vf_select(m, vf_from_vd(value), vf_set1(0.0f)));
@@ -209,7 +209,7 @@ TL_INLINE void set_point_numbers(const tl_grad_view *view, grad_span *s, double 
     }
 }
 
-/* Where TL_LANES pixels lie. */
+/* Weights and z/w of TL_LANES pixels. */
 typedef struct {
     vf x, inverse, u, v, zw; /* inverse: of the total */
 } lane_points;
@@ -228,7 +228,7 @@ TL_INLINE lane_points points_of_lanes(const span_lanes *p)
 TL_INLINE vf within(vf a, float most) { return vf_min(vf_max(a, vf_set1(-most)), vf_set1(most)); }
 TL_INLINE vf within_one(vf a) { return vf_min(vf_max(a, vf_set1(0.0f)), vf_set1(1.0f)); }
 
-/* What the weights of pixels change by. */
+/* Writes the derivatives of the weights of pixels. */
 TL_INLINE void store_slopes(const span_lanes *p, const lane_points *at, float *out)
 {
     vf slopes[4];
@@ -292,19 +292,19 @@ typedef struct {
     double u, v, zw, db[4];
 } point_gradients;
 
-#define TL_ALMOST_ONE (1.0f - 0x1p-20f) /* weights of float32 whose sum is below it are not clamped */
-#define TL_TIE 0x1p-30 /* weights so little outside are those of a centre on an edge, which rounding moved */
+#define TL_ALMOST_ONE (1.0f - 0x1p-20f) /* float32 weights with a smaller sum are not clamped */
+#define TL_TIE 0x1p-30                  /* weights so little outside are on an edge, but for rounding */
 
-/* What a row of pixels sums up. */
+/* The sums over a row of pixels. */
 typedef struct {
-    double a[4], a_x[4]; /* gradients of a_k and of z/w, and times X */
-    double q[2][3];      /* of the first two numbers of q_k alone */
+    double a[4], a_x[4]; /* gradients of a_k and of z/w: their sums, and times X */
+    double q[2][3];      /* gradients of the first two numbers of q_k alone */
 } row_sums;
 
-/* Where a triangle sums them up: about X0 and Y0, times X, times Y, and as they are. */
+/* The sums of a triangle: X0 and Y0 with FACE_BEGUN, times X, times Y, and plain. */
 enum { FACE_BEGUN = 2, FACE_X = 4, FACE_Y = 8, FACE_ONE = 12 };
 
-/* Adds the gradients at X. */
+/* Adds the gradients of a pixel at X. */
 TL_INLINE void backward_point(const tl_grad_view *view, const grad_triangle *t, const point_gradients *g, double x,
                               int has_db, row_sums *s)
 {
@@ -337,7 +337,7 @@ TL_INLINE void backward_point(const tl_grad_view *view, const grad_triangle *t, 
         s->a[k] += g_a[k], s->a_x[k] += g_a[k] * x;
 }
 
-/* Adds what a run that begins at x, y has summed up to the sums of its triangle: gradients of a_k, and times X. */
+/* Adds the sums of a run that begins at x, y to the sums of its triangle: gradients of a_k, and times X. */
 TL_INLINE void add_row_sums(const double *a, const double *a_x, double x, double y, double *sums)
 {
     if (sums[FACE_BEGUN] == 0.0)
@@ -351,8 +351,8 @@ TL_INLINE void add_row_sums(const double *a, const double *a_x, double x, double
         sums[FACE_ONE + k] += a[k];
 }
 
-/* Gradients of q_k, of z_k and of w_k, from the sums of a triangle.  z/w is sum z_k a_k / D, with D = sum w_k a_k the
- * same at every pixel: the determinant of the corners. */
+/* Gradients of q_k, of z_k and of w_k, from the sums of a triangle.  z/w is sum z_k a_k / D; D = sum w_k a_k, the
+ * determinant of the corners, is equal at every pixel. */
 TL_INLINE void backward_depth(const grad_triangle *t, const double *sums, double by_q[3][3], double *g_z, double *g_w)
 {
     const double moments[3] = {sums[FACE_X + 3], sums[FACE_Y + 3], sums[FACE_ONE + 3]};
@@ -377,7 +377,8 @@ TL_INLINE void backward_depth(const grad_triangle *t, const double *sums, double
     }
 }
 
-/* Adds gradients of the corners of a triangle, from those of q_k = v_i x v_j about x, y, of z_k and of w_k. */
+/* Adds the gradients of the corners of a triangle, from the gradients of q_k = v_i x v_j relative to x, y, of z_k and
+ * of w_k. */
 TL_INLINE void backward_corners(const grad_triangle *t, double by_q[3][3], double x, double y, const double *g_z,
                                 const double *g_w, double **to)
 {
@@ -396,7 +397,7 @@ TL_INLINE void backward_corners(const grad_triangle *t, double by_q[3][3], doubl
     }
 }
 
-/* Gradients of the corners of a triangle from its sums. */
+/* Adds the gradients of the corners of a triangle, computed from its sums. */
 static void finish_triangle(const tl_grad_view *view, int32_t id, const double *sums, tl_grad_sums *vertices,
                             int is_f64)
 {
@@ -408,7 +409,7 @@ static void finish_triangle(const tl_grad_view *view, int32_t id, const double *
     backward_corners(&t, by_q, sums[0], sums[1], g_z, g_w, to);
 }
 
-/* The sums of the triangle of a run, about its first pixel where they begin. */
+/* The sums of the triangle of a run; new sums are relative to its first pixel. */
 TL_INLINE double *sums_for(const tl_grad_view *view, tl_grad_sums *faces, const grad_span *s, int r)
 {
     double *sums = sums_of(faces, s->ids[r]);
@@ -419,7 +420,7 @@ TL_INLINE double *sums_for(const tl_grad_view *view, tl_grad_sums *faces, const 
     return sums;
 }
 
-/* Adds sums about x, y: times their own X, times Y, and as they are. */
+/* Adds sums relative to x, y: times X, times Y, and plain. */
 TL_INLINE void add_three_moments(double *moments, vqd whole, vqd by_x, double x, double y)
 {
     vqd_store(moments, vqd_add(vqd_load(moments), vqd_add(by_x, vqd_mul(whole, vqd_set1(x)))));
@@ -427,8 +428,8 @@ TL_INLINE void add_three_moments(double *moments, vqd whole, vqd by_x, double x,
     vqd_store(moments + 8, vqd_add(vqd_load(moments + 8), whole));
 }
 
-/* Adds what some pixels of a run have summed up, as it is and times their number, in units of what the total is at the
- * run's first pixel; `last`: what the fourth number counts by. */
+/* Adds the sums over pixels of a run, plain and times their number, in units of the total at the run's first pixel;
+ * `last`: the unit of the fourth number. */
 TL_INLINE void add_moments(const tl_grad_view *view, const grad_span *s, int r, int first, double last,
                            const double *begins, double *moments, vq4 sum, vq4 sum_x)
 {
@@ -452,14 +453,14 @@ TL_INLINE void set_point_quads(grad_span *s)
     }
 }
 
-/* Whether weights and z/w of a pixel lie well within what they are clamped to. */
+/* Whether weights and z/w of a pixel lie well within their limits. */
 TL_INLINE int is_unclamped(const float *rast, float z_most)
 {
     return rast[0] > 0.0f && rast[1] > 0.0f && rast[0] + rast[1] < TL_ALMOST_ONE && rast[2] < z_most &&
            rast[2] > -z_most;
 }
 
-/* Adds the gradients at the pixels of a run, none of which is clamped. */
+/* Adds the gradients at the pixels of a run without clamped weights. */
 TL_INLINE void backward_run_of_points(const tl_grad_view *view, const grad_span *s, int r, const float *g_rast,
                                       double *sums)
 {
@@ -483,7 +484,7 @@ TL_INLINE void backward_run_of_points(const tl_grad_view *view, const grad_span 
     }
 }
 
-/* The gradients at the pixels of a run in float64. */
+/* Adds the gradients at the pixels of a run in float64. */
 TL_INLINE void backward_points_of(const tl_grad_view *view, const tl_grad_points *p, const pixel_run *run, int has_db,
                                   int is_f64)
 {
@@ -544,7 +545,7 @@ static int64_t backward_point_rows(const tl_grad_view *view, const tl_grad_point
     return p->g_db ? backward_points(view, p, 1, 0) : backward_points_in_lanes(view, p);
 }
 
-/* Ends a band: from sums of triangles to those of their corners. */
+/* Finishes a band: adds the sums of triangles to those of their corners. */
 static void finish_points(const tl_grad_view *view, const tl_grad_points *p)
 {
     for (int64_t i = 0; i < p->faces->n; i++)

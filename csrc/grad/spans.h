@@ -1,10 +1,10 @@
-/* Parts of rows in lanes: runs of pixels that show one triangle, and numbers of runs, which reach their pixels by a
- * load and a permutation.
+/* Parts of rows in lanes: runs of pixels that show one triangle.  Pixels load the numbers of their run by a load and a
+ * permutation.
  * In: ids of pixels, triangles.  Out: runs, the corners of their triangles.
  *
- * Numbers are float32.  A run ends with its span, and spans begin at multiples of TL_GRAD_SPAN: nothing depends on how
- * many lanes there are.  Vectors of four numbers a pixel are loaded and stored as they lie in memory; lane k then has
- * pixel vi_quad_slot(k).
+ * Numbers are float32.  A run ends with its span, and spans begin at multiples of TL_GRAD_SPAN: no result depends on
+ * the number of lanes.  Vectors of four numbers a pixel are loaded and stored in memory order; lane k then has pixel
+ * vi_quad_slot(k).
  *
  * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013. */
 #ifndef TL_GRAD_SPANS_H
@@ -21,34 +21,34 @@
 #define TL_GRAD_SPAN 256 /* pixels */
 #define TL_GRAD_ROOM (TL_GRAD_SPAN + 2 * TL_MAX_LANES)
 #define TL_RUN_NUMBERS 12
-#define TL_SUMMED 16 /* pixels that are summed up in float32; their sums in float64 */
+#define TL_SUMMED 16 /* summed in float32; their sums are added in float64 */
 
-/* Runs of some pixels of a row, those that show nothing with id -1; run r begins at begins[r] of the span. */
+/* Runs of the pixels of a span; background has id -1.  Run r begins at pixel begins[r] of the span. */
 typedef struct {
-    int64_t row, first; /* of the picture; the first one's column */
+    int64_t row, first; /* row of the picture, column of the first pixel */
     int n, n_runs;
-    int64_t bad_id;                /* as of pixel_run */
-    int before[TL_GRAD_SPAN];      /* of each vector: how many runs have begun before it */
-    unsigned starts[TL_GRAD_SPAN]; /* and the lanes where one begins */
+    int64_t bad_id;                /* see pixel_run */
+    int before[TL_GRAD_SPAN];      /* of each vector: the number of runs that begin before it */
+    unsigned starts[TL_GRAD_SPAN]; /* of each vector: bits of the lanes where runs begin */
     _Alignas(64) int32_t ids[TL_GRAD_ROOM];
     _Alignas(64) int32_t begins[TL_GRAD_ROOM];
     _Alignas(64) int32_t corners[3][TL_GRAD_ROOM];
     _Alignas(64) float numbers[TL_RUN_NUMBERS][TL_GRAD_ROOM];
-    _Alignas(64) float planes[2][4 * TL_GRAD_ROOM]; /* quads of runs, at quad_of_run: at the first pixel, and steps */
+    _Alignas(64) float planes[2][4 * TL_GRAD_ROOM]; /* at quad_of_run: values at the first pixel, and steps */
     _Alignas(64) double inverses[TL_GRAD_ROOM];
 } grad_span;
 
-/* Where the ids of pixels stand: rows of them, to which first_id is added; or, unless it is NULL, `rast`. */
+/* The source of ids: rows of ids, to which first_id is added; or `rast`, unless it is NULL. */
 typedef struct {
     const int32_t *lowest;
     int64_t step, first_id;
     const float *rast;
 } id_rows;
 
-/* Some pixels of a span, and which run each lane has. */
+/* The pixels of a vector in a span, and the run of each lane. */
 typedef struct {
     const grad_span *span;
-    int x, n; /* the first one, and how many there are, at most TL_LANES */
+    int x, n; /* the first pixel; how many, at most TL_LANES */
     int first;
     vi run, pixel; /* pixel: 0, 1, 2 and so on, or in the order of quads */
     vm is_shown;
@@ -79,7 +79,7 @@ TL_INLINE void copy_rows(float *to, const float *from, int n, int k)
         memcpy(to, from, (size_t)(n * k) * sizeof *to);
 }
 
-/* n <= TL_LANES rows of `stride` numbers as columns; zeros beyond. */
+/* Loads n <= TL_LANES rows of `stride` numbers as columns; other lanes are 0. */
 TL_INLINE void load_some_columns(const float *p, int stride, int n, vf *columns)
 {
     float some[4 * TL_MAX_LANES + 4];
@@ -94,7 +94,7 @@ TL_INLINE void load_some_columns(const float *p, int stride, int n, vf *columns)
         load_columns_f32(p, stride, columns);
 }
 
-/* n <= TL_LANES rows of four numbers as columns, in the order of quads; store_some_quads writes them back. */
+/* Loads n <= TL_LANES rows of four numbers as columns, in the order of quads; `store_some_quads` writes them back. */
 TL_INLINE void load_some_quads(const float *p, int n, vf *columns)
 {
     float some[4 * TL_MAX_LANES];
@@ -152,7 +152,7 @@ TL_INLINE void list_span_runs(grad_span *s, const tl_grad_view *view, const id_r
     s->begins[s->n_runs] = s->n;
 }
 
-/* Finds the corners of runs, rows of triangles; what has none below n_rows shows nothing from then on. */
+/* Sets the corners of runs; runs of a triangle without rows below n_rows become background. */
 TL_INLINE void find_corners(grad_span *s, const int32_t *triangles, int64_t n_triangles, int64_t n_rows)
 {
     const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(n_triangles)), rows = vi_set1(clamped_to_int(n_rows));
@@ -165,7 +165,7 @@ TL_INLINE void find_corners(grad_span *s, const int32_t *triangles, int64_t n_tr
             found = vm_and(found, vi_gt_unsigned(rows, corner));
             vi_store(s->corners[k] + r, corner);
         }
-        for (int k = 0; k < 3; k++) /* those of others are read, too */
+        for (int k = 0; k < 3; k++) /* lanes without a triangle are read, too */
             vi_store(s->corners[k] + r, vi_select(found, vi_load(s->corners[k] + r), vi_set1(0)));
         if (vm_any(vm_and_not(wanted, found)))
             for (int k = 0; k < TL_LANES; k++)
@@ -175,10 +175,10 @@ TL_INLINE void find_corners(grad_span *s, const int32_t *triangles, int64_t n_tr
     }
 }
 
-/* A span that lies before those of a band. */
+/* The state before the first span of a band. */
 #define TL_BEFORE_SPANS(view) {.row = (view)->first_row - 1, .first = (view)->width, .bad_id = -1}
 
-/* The next span of a band, with its runs and their corners, rows below n_rows; 0 when there are no more. */
+/* Steps to the next span of a band and sets its runs and their corners, rows below n_rows; 0 at the end. */
 TL_INLINE int next_grad_span(const tl_grad_view *view, const id_rows *ids, int64_t n_rows, grad_span *s)
 {
     s->first += s->n;
@@ -211,7 +211,7 @@ TL_INLINE span_lanes lanes_of_span(const grad_span *s, int i, vi pixel, int is_q
 
 TL_INLINE vf pick_number(const span_lanes *p, int k) { return vf_pick(p->span->numbers[k] + p->first, p->run); }
 
-/* How far pixels lie from the first one of their run. */
+/* Distances of pixels from the first pixel of their run. */
 TL_INLINE vf from_begin(const span_lanes *p)
 {
     return vf_from_vi(vi_sub(vi_add(p->pixel, vi_set1(p->x)), vi_pick(p->span->begins + p->first, p->run)));
@@ -228,7 +228,7 @@ TL_INLINE pixel_run run_of_span(const tl_grad_view *view, const grad_span *s, in
                        .n = s->begins[r + 1] - s->begins[r]};
 }
 
-/* Where the quads of a run stand. */
+/* The position of the quads of a run. */
 TL_INLINE int quad_of_run(int r) { return 4 * (r / TL_LANES * TL_LANES + vi_quad_slot(r % TL_LANES)); }
 
 /* Sets the quads of runs from r on. */
@@ -240,7 +240,7 @@ TL_INLINE void set_quads(grad_span *s, int plane, int r, const vf *columns)
     vi_store_quads((int32_t *)s->planes[plane] + 4 * r, bits);
 }
 
-/* A plane along a run, from its first pixel on; its last number alone, four times. */
+/* A plane along a run, from its first pixel on; `last`: its last number, four times. */
 typedef struct {
     vq4 begin, step;
     vq last, last_step;
@@ -256,7 +256,7 @@ TL_INLINE run_plane plane_of_run(const grad_span *s, int r)
     return run_plane_of(vq_load(s->planes[0] + at), vq_load(s->planes[1] + at));
 }
 
-/* How far four pixels lie from the first one of their run: in all lanes of their quads, and once. */
+/* Distances of four pixels from the first pixel of their run: in all lanes of their quads, and a lane a pixel. */
 typedef struct {
     vq4 quads;
     vq each;
@@ -265,7 +265,7 @@ typedef struct {
 TL_INLINE run_columns columns_from(int x)
 {
     const run_columns columns = {vq4_pixels(), {0.0f, 1.0f, 2.0f, 3.0f}};
-    if (x == 0) /* constants, where x is one */
+    if (x == 0) /* constants when x is known */
         return columns;
     return (run_columns){vq4_add(columns.quads, vq4_set1((float)x)), columns.each + vq_set1((float)x)};
 }
@@ -278,7 +278,7 @@ TL_INLINE vq4 plane_at_pixels(const run_plane *p, const run_columns *columns)
 {
     return vq4_add(p->begin, vq4_mul(p->step, columns->quads));
 }
-/* 1 / the last number at each pixel: a division of four numbers, not of sixteen. */
+/* 1 / the last number of the plane at each pixel: a division of four numbers, not of sixteen. */
 TL_INLINE vq4 inverse_at_pixels(const run_plane *p, const run_columns *columns)
 {
     return vq4_spread(vq_set1(1.0f) / (p->last + p->last_step * columns->each));

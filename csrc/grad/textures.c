@@ -1,7 +1,8 @@
-/* Textures at pixels: the nearest texel, four of them, and those of one or two halvings; and backwards.
- * In: levels, where to look, footprints.  Out: pictures; backward: gradients of what is looked up, sums by texel.
+/* Textures at pixels: the nearest texel, four texels, or four of each of two mipmap levels; and backward.
+ * In: levels, coordinates, footprints.  Out: pictures; backward: gradients of coordinates, footprints and biases, sums
+ * by texel.
  *
- * Pixels go in lanes; what they give to texels is added pixel by pixel, so that each sum has the order of pixels. */
+ * Pixels are in lanes; gradients are added to texels pixel by pixel, so that each sum has the order of pixels. */
 #ifndef TL_GRAD_TEXTURES_C
 #define TL_GRAD_TEXTURES_C
 
@@ -15,13 +16,13 @@
 #include "lanes/lanes.h"
 #include "lanes/quads.h"
 
-/* The first number of a pixel of a tensor with n numbers each. */
+/* The first number of a pixel of a tensor with n numbers each; NULL for NULL. */
 TL_INLINE void *at_pixel(const void *p, int64_t n, int64_t pixel, int is_f64)
 {
     return p ? (char *)p + (is_f64 ? 8 : 4) * n * pixel : 0;
 }
 
-/* Channels [first, first + 4) of a texel of a level. */
+/* Loads channels [first, first + 4) of texels of a level. */
 TL_INLINE void load_texels(const tl_grad_texture *t, int level, vi row, int64_t first, vd *channels, int is_f64)
 {
     const int64_t n_faces = t->edge == TL_EDGE_CUBE ? 6 : 1;
@@ -29,7 +30,7 @@ TL_INLINE void load_texels(const tl_grad_texture *t, int level, vi row, int64_t 
                    channels, is_f64);
 }
 
-/* Four channels of the texture from `first` on. */
+/* Samples four channels of the texture from `first` on. */
 TL_INLINE void mix_texels(const tl_grad_texture *t, const look_lanes *look, int64_t first, vd *sum, int is_f64)
 {
     int level, end;
@@ -79,16 +80,16 @@ static void grad_texels(const tl_grad_view *view, const tl_grad_texture *texture
         texels_of(view, texture, 0);
 }
 
-/* Pixels that gradients come from: rows of g, those in m; n_left are in the picture from the first one on. */
+/* Pixels of a backward pass: the rows of g, lanes in m. */
 typedef struct {
     const tl_grad_texture *t;
-    const void *g; /* of the first one */
+    const void *g; /* gradients, from the first pixel on */
     int64_t n_left;
     vi row;
     vm m;
 } backward_lanes;
 
-/* Adds the gradients of pixels to their texels of a level, `share` times. */
+/* Adds `share` times the gradients of pixels to their texels of a level. */
 TL_INLINE void scatter_shares(const backward_lanes *p, const texel_shares *quad, int level, vm m, vd share,
                               tl_grad_sums *sums, int is_f64)
 {
@@ -118,7 +119,7 @@ TL_INLINE void scatter_shares(const backward_lanes *p, const texel_shares *quad,
     }
 }
 
-/* Gradients of u and v, and of the levels, from those of pixels by a level. */
+/* Adds the gradients of u and v by a level; sets *total, the derivative by the level's share. */
 TL_INLINE void backward_shares(const backward_lanes *p, const texel_shares *quad, int level, vm m, vd share, vd *g_uv,
                                vd *total, int is_f64)
 {
@@ -144,7 +145,7 @@ TL_INLINE void backward_shares(const backward_lanes *p, const texel_shares *quad
         g_uv[axis] = vd_select(m, vd_add(g_uv[axis], vd_mul(share, sums[1 + axis])), g_uv[axis]);
 }
 
-/* Writes the gradients of what pixels look at, from those of u, v and the level. */
+/* Writes the gradients of coordinates, footprints and biases, from the gradients of u, v and the level. */
 TL_INLINE void store_looks(const tl_grad_texture *t, const look_lanes *look, int64_t pixel, vm m, const vd *g_uv,
                            vd g_level, int is_f64)
 {
@@ -168,7 +169,7 @@ TL_INLINE void store_looks(const tl_grad_texture *t, const look_lanes *look, int
         store_look_rows(at_pixel(t->g_bias, 1, pixel, is_f64), 1, 0, 1, m, &g_level, is_f64);
 }
 
-/* Which pixels have a gradient in some channel. */
+/* The pixels with a gradient in some channel. */
 TL_INLINE vm find_backward(const backward_lanes *p, int is_f64)
 {
     const vd zero = vd_set1(0.0);

@@ -1,7 +1,7 @@
-/* Attributes of vertices at pixels, and what they change by; and backwards.
+/* Attributes of vertices at pixels, and their derivatives; and backward.
  * In: `rast`, `rast_db`, attributes.  Out: pictures; backward: gradients of `rast` and `rast_db`, sums by row.
  *
- * Up to four attributes of float32 take the lanes of spans.h, and float32; others float64. */
+ * Up to four attributes of float32 are computed in float32 in the lanes of spans.h; others in float64. */
 #ifndef TL_GRAD_VALUES_C
 #define TL_GRAD_VALUES_C
 
@@ -14,14 +14,14 @@
 #include "lanes/lanes.h"
 #include "lanes/quads.h"
 
-/* First numbers of the attributes of the corners of a triangle. */
+/* Offsets of the attributes of the corners of a triangle. */
 TL_INLINE void attr_rows(const tl_grad_view *view, int32_t id, int64_t n_columns, int64_t *rows)
 {
     for (int k = 0; k < 3; k++)
         rows[k] = n_columns * view->tri[3 * (int64_t)id + k];
 }
 
-/* What an attribute changes by with u and with v. */
+/* Derivatives of an attribute by u and by v. */
 TL_INLINE void attr_steps(const tl_grad_values *v, const int64_t *rows, int64_t c, double *steps, int is_f64)
 {
     const double last = get_real(v->attr, rows[2] + c, is_f64);
@@ -29,7 +29,7 @@ TL_INLINE void attr_steps(const tl_grad_values *v, const int64_t *rows, int64_t 
     steps[1] = get_real(v->attr, rows[1] + c, is_f64) - last;
 }
 
-/* What some attributes change by at the pixels of a run. */
+/* Writes the derivatives of the wanted attributes at the pixels of a run. */
 TL_INLINE void slopes_of_run(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, int is_f64)
 {
     double step[2];
@@ -44,7 +44,7 @@ TL_INLINE void slopes_of_run(const tl_grad_values *v, const pixel_run *run, cons
     }
 }
 
-/* `n` attributes from `first` on at the pixels of a run; n is at most TL_FEW_COLUMNS. */
+/* Writes n attributes from `first` on at the pixels of a run; n is at most TL_FEW_COLUMNS. */
 TL_INLINE void values_of_run(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, int64_t first, int n,
                              int64_t n_columns, int is_f64)
 {
@@ -78,7 +78,7 @@ TL_INLINE int64_t values_of(const tl_grad_view *view, const tl_grad_values *v, i
     return run.bad_id;
 }
 
-/* Sets the numbers of the runs of a span: of each attribute the last corner's, and what it changes by with u and v. */
+/* Sets the numbers of the runs of a span: each attribute at the last corner, and its derivatives by u and v. */
 TL_INLINE void set_value_numbers(const tl_grad_values *v, grad_span *s, int n)
 {
     const vf zero = vf_set1(0.0f);
@@ -97,7 +97,7 @@ TL_INLINE void set_value_numbers(const tl_grad_values *v, grad_span *s, int n)
     }
 }
 
-/* The next span of a band, with the numbers of its runs; 0 when there are no more. */
+/* Steps to the next span of a band and sets the numbers of its runs; 0 at the end. */
 TL_INLINE int next_value_span(const tl_grad_view *view, const tl_grad_values *v, grad_span *s, int n)
 {
     if (!next_grad_span(view, &(id_rows){.rast = v->rast}, v->n_attr, s))
@@ -106,7 +106,7 @@ TL_INLINE int next_value_span(const tl_grad_view *view, const tl_grad_values *v,
     return 1;
 }
 
-/* Writes n columns of pixels, four in the order of quads. */
+/* Writes n columns of pixels; four are in the order of quads. */
 TL_INLINE void store_columns(float *p, int n_pixels, const vf *columns, int n)
 {
     float some[4 * TL_MAX_LANES];
@@ -123,7 +123,7 @@ TL_INLINE void store_columns(float *p, int n_pixels, const vf *columns, int n)
         copy_rows(p, some, n_pixels, n);
 }
 
-/* n attributes, at most TL_FEW_COLUMNS, of float32. */
+/* Writes n <= TL_FEW_COLUMNS attributes of float32. */
 TL_INLINE int64_t values_in_lanes(const tl_grad_view *view, const tl_grad_values *v, int n)
 {
     const vi order = n == 4 ? order_of_quads() : vi_iota();
@@ -157,7 +157,7 @@ TL_INLINE int64_t values_in_lanes(const tl_grad_view *view, const tl_grad_values
     return s.bad_id;
 }
 
-/* Whether numbers of attributes are below 2^31. */
+/* Whether offsets of attributes are below 2^31. */
 TL_INLINE int has_few_values(const tl_grad_values *v) { return v->n_attr < INT32_MAX / TL_FEW_COLUMNS; }
 
 /* See kernels.h. */
@@ -174,7 +174,7 @@ static int64_t grad_values(const tl_grad_view *view, const tl_grad_values *v)
     }
 }
 
-/* The gradients that derivatives of attributes give at the pixels of a run. */
+/* Backward of the derivatives of attributes at the pixels of a run. */
 TL_INLINE void backward_slopes(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, double **to,
                                int is_f64)
 {
@@ -196,13 +196,14 @@ TL_INLINE void backward_slopes(const tl_grad_values *v, const pixel_run *run, co
     }
 }
 
-/* Adds what a run has summed up of an attribute, times u, times v and as it is, to its corners. */
+/* Adds the sums of an attribute over a run, times u, times v and plain, to its corners. */
 TL_INLINE void add_to_corners(double **to, int64_t column, double by_u, double by_v, double whole)
 {
     to[0][column] += by_u, to[1][column] += by_v, to[2][column] += whole - by_u - by_v;
 }
 
-/* The gradients that n attributes from `first` on give at the pixels of a run; those of `rast` are added. */
+/* Backward of n attributes from `first` on at the pixels of a run; adds to the gradients of `rast`, except at `first` =
+ * 0. */
 TL_INLINE void backward_run(const tl_grad_values *v, const pixel_run *run, const int64_t *rows, int64_t first, int n,
                             int64_t n_columns, double **to, int is_f64)
 {
@@ -248,7 +249,7 @@ TL_INLINE int64_t backward_values(const tl_grad_view *view, const tl_grad_values
     return run.bad_id;
 }
 
-/* Those of n attributes of float32 at the pixels of a run, TL_SUMMED at most summed up in float32. */
+/* Backward of n attributes of float32 at the pixels of a run; TL_SUMMED pixels at most are summed in float32. */
 TL_INLINE void backward_quads(const tl_grad_values *v, const pixel_run *run, const grad_span *s, int r, int n,
                               double **to)
 {
