@@ -13,19 +13,19 @@ typedef struct {
     int n_values, per_corner;
 } tl_atlas;
 
-#define TL_NO_TEXEL 16384 /* farther than any gutter reaches */
+#define TL_NO_TEXEL 16384 /* more than any reach of a gutter */
 #define TL_MOST_CHANNELS 4
 
-/* A picture that a camera has taken of a mesh, and its buffers. */
+/* A photo: a camera picture of a mesh, with its buffers. */
 typedef struct {
     int64_t width, height;
-    const int32_t *ids; /* triangles, -1 for none */
+    const int32_t *ids; /* -1 for none */
     const float *depth; /* window depth, 0 near to 1 far */
     const float *light; /* (height, width, n_channels), linear */
     int n_channels;     /* at most TL_MOST_CHANNELS */
-    int keeps_best;     /* the light that is seen best, instead of the mean */
+    int keeps_best;     /* the light with the largest weight, instead of the mean */
     double clip_from_object[16];
-    double eye[4]; /* homogeneous: a place, or with 0 the direction to it */
+    double eye[4]; /* homogeneous: a position, or with eye[3] = 0 a direction */
 } tl_taken;
 
 #define TL_VIEW_BLOCK 16
@@ -37,11 +37,11 @@ typedef struct {
     /* (ceil(height / TL_VIEW_BLOCK), n_blocks): the greatest height of cells [b, b + TL_VIEW_BLOCK] along both axes */
     const double *blocks;
     int64_t n_blocks;
-    double eye[3];         /* column, row and height; at the middles of cells columns and rows are whole; in the grid */
-    const double *ways[2]; /* 1 / (k - eye) of each column, and of each row; of none where that is 0 */
+    double eye[3];         /* column, row and height; centres of cells are whole numbers; within the grid */
+    const double *ways[2]; /* 1 / (k - eye) of each column, and of each row; not read where k = eye */
     double cell[2];        /* width and height of a cell */
-    double curvature;      /* how far the ground falls, a unit of squared distance */
-    double most_squared;   /* distance of the farthest cells */
+    double curvature;      /* how far the ground falls per unit of squared distance */
+    double most_squared;   /* squared distance of the farthest cells */
 } tl_terrain;
 
 #endif

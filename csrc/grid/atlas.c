@@ -1,5 +1,5 @@
 /* Atlas: a mesh's values at the texels of its texture coordinates.
- * In: triangles in texels, values of their corners, pictures that cameras have taken.  Out: values of texels.
+ * In: triangles in texels, values of their corners, photos.  Out: values of texels.
  *
  * Based on: I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974 (the part of a triangle in a texel). */
 #ifndef TL_ATLAS_C
@@ -40,7 +40,7 @@ static void cut_part(const texel_part *in, int is_y, double sign, double limit, 
     }
 }
 
-/* The part of a triangle in the texel at (x, y): its doubled area, and its centre. */
+/* The part of a triangle in the texel at (x, y): returns its doubled area, sets its centre. */
 static double part_in_texel(const double (*c)[2], double x, double y, double *at)
 {
     texel_part one = {{c[0][0], c[1][0], c[2][0]}, {c[0][1], c[1][1], c[2][1]}, 3}, other;
@@ -60,7 +60,7 @@ static double part_in_texel(const double (*c)[2], double x, double y, double *at
     return fabs(area);
 }
 
-/* The box of a triangle in texels, within the atlas; returns whether there is one. */
+/* Sets the box of a triangle in texels, clipped to the rows; returns whether it has texels. */
 static int texel_box(const double (*c)[2], int64_t width, int64_t first_row, int64_t end_row, int64_t *box)
 {
     const int64_t low[2] = {0, first_row}, end[2] = {width, end_row};
@@ -74,7 +74,7 @@ static int texel_box(const double (*c)[2], int64_t width, int64_t first_row, int
     return 1;
 }
 
-/* Weights of the corners at a point, by areas. */
+/* Barycentric weights of a point. */
 static void weigh(const double (*c)[2], double doubled, double x, double y, double *w)
 {
     w[1] = ((x - c[0][0]) * (c[2][1] - c[0][1]) - (y - c[0][1]) * (c[2][0] - c[0][0])) / doubled;
@@ -82,7 +82,7 @@ static void weigh(const double (*c)[2], double doubled, double x, double y, doub
     w[0] = 1.0 - w[1] - w[2];
 }
 
-/* The point of a triangle that is nearest to one: its weights; returns the squared distance. */
+/* Sets the weights of the point of a triangle that is nearest to (x, y); returns the squared distance. */
 static double nearest_in(const double (*c)[2], double doubled, double x, double y, double *w)
 {
     if (doubled != 0.0) {
@@ -120,8 +120,7 @@ static const float *corner_values(const tl_atlas *a, int64_t triangle, int corne
                                           : (int64_t)corner_within(a->triangles[3 * triangle + corner], a->n_points));
 }
 
-/* Rows [first, end): where an id is -1, that of the nearest of the triangles that meet the texel, the first of several,
- * and its values at the point that is nearest to the middle.  `squared`: room for (rows, width), INFINITY. */
+/* Values are those at the point nearest to the texel's centre.  Of several nearest triangles the first is taken. */
 static void touch_texels(const tl_atlas *a, int64_t first, int64_t end, int32_t *ids, float *squared, float *out)
 {
     for (int64_t i = 0; i < a->n_triangles; i++) {
@@ -134,7 +133,7 @@ static void touch_texels(const tl_atlas *a, int64_t first, int64_t end, int32_t 
             for (int64_t x = box[0]; x < box[2]; x++) {
                 const int64_t texel = y * a->width + x;
                 float *const best = squared + (y - first) * a->width + x;
-                if (ids[texel] >= 0 && *best == INFINITY) /* a triangle owns its middle */
+                if (ids[texel] >= 0 && *best == INFINITY) /* a triangle covers its centre */
                     continue;
                 if (!(part_in_texel((const double (*)[2])c, (double)x, (double)y, at) > 0.0))
                     continue;
@@ -154,9 +153,8 @@ static void touch_texels(const tl_atlas *a, int64_t first, int64_t end, int32_t 
     }
 }
 
-/* Rows [first, end): means of the values over the covered areas of texels, and the share that they cover (width a
- * row); of the triangle that covers most the id, the first of several.  `sums`: room for (rows, width, 1 + n_values),
- * `most`: for (rows, width), both 0. */
+/* `out` is the mean of the values over the covered areas.  `ids` is the triangle with the largest area in the texel,
+ * the first of several. */
 static void average_texels(const tl_atlas *a, int64_t first, int64_t end, double *sums, float *most, int32_t *ids,
                            float *out)
 {
@@ -192,8 +190,8 @@ static void average_texels(const tl_atlas *a, int64_t first, int64_t end, double
                 (float)(sums[texel * stride + 1 + k] / sums[texel * stride]);
 }
 
-/* Rows [first, end) of the distance along a row to the nearest texel with an id, the left one of two; TL_NO_TEXEL where
- * none is within `reach`. */
+/* `along` is the distance to the nearest texel with an id, the left of two; TL_NO_TEXEL where none is within
+ * `reach`. */
 static void find_in_rows(const int32_t *ids, int64_t width, int64_t first, int64_t end, int reach, int16_t *along)
 {
     for (int64_t y = first; y < end; y++) {
@@ -214,8 +212,7 @@ static void find_in_rows(const int32_t *ids, int64_t width, int64_t first, int64
     }
 }
 
-/* Rows [first, end) of where the nearest texel with an id is, by Euclid, if it lies within `reach`: its index, or -1.
- * Of several the one of the lowest row.  `room`: 2 * width. */
+/* Of several nearest texels the one in the lowest row is taken. */
 static void find_gutter(const int16_t *along, int64_t width, int64_t height, int64_t first, int64_t end, int reach,
                         int32_t *room, int32_t *from)
 {
@@ -240,7 +237,6 @@ static void find_gutter(const int16_t *along, int64_t width, int64_t height, int
     }
 }
 
-/* Copies texels of n_bytes from where `from` says to those of [first, end) that are none themselves. */
 static void copy_texels(const int32_t *from, int64_t first, int64_t end, int64_t n_bytes, uint8_t *texels)
 {
     for (int64_t i = first; i < end; i++)
@@ -248,8 +244,8 @@ static void copy_texels(const int32_t *from, int64_t first, int64_t end, int64_t
             memcpy(texels + i * n_bytes, texels + from[i] * n_bytes, (size_t)n_bytes);
 }
 
-/* Whether a picture shows a point, which lies at (x, y) of it: the id of the texel, or no nearer depth, at one of the
- * four pixels with middles next to it. */
+/* Whether a photo shows the point of texel `id` at its pixel (x, y): one of the four nearest pixels has its id, or no
+ * nearer depth. */
 static int is_seen(const tl_taken *t, double x, double y, double z, int32_t id)
 {
     const int64_t left = (int64_t)floor(x - 0.5), top = (int64_t)floor(y - 0.5);
@@ -264,7 +260,7 @@ static int is_seen(const tl_taken *t, double x, double y, double z, int32_t id)
     return 0;
 }
 
-/* The light of a picture between its pixels, by those of the four next ones that show the mesh. */
+/* The light of a photo at (x, y): bilinear, of the nearest pixels that show the mesh. */
 static void take_light(const tl_taken *t, double x, double y, float *light)
 {
     const double left = floor(x - 0.5), top = floor(y - 0.5), wx = x - 0.5 - left, wy = y - 0.5 - top;
@@ -273,17 +269,17 @@ static void take_light(const tl_taken *t, double x, double y, float *light)
         const int64_t column = (int64_t)left + (k & 1), row = (int64_t)top + (k >> 1), at = row * t->width + column;
         if (row < 0 || column < 0 || row >= t->height || column >= t->width || t->ids[at] < 0)
             continue;
-        const double weight = (k & 1 ? wx : 1.0 - wx) * (k >> 1 ? wy : 1.0 - wy) + 0x1p-40; /* it may be the only one */
+        const double weight = (k & 1 ? wx : 1.0 - wx) * (k >> 1 ? wy : 1.0 - wy) + 0x1p-40; /* never 0 */
         total += weight;
         for (int c = 0; c < t->n_channels; c++)
             sums[c] += weight * (double)t->light[at * t->n_channels + c];
     }
     for (int c = 0; c < t->n_channels; c++)
-        light[c] = (float)(sums[c] / total); /* one shows it: see is_seen */
+        light[c] = (float)(sums[c] / total); /* total > 0: see `is_seen` */
 }
 
-/* Adds a picture's colours of texels [first, end) to their sums (n_channels of them) and weights: light times the
- * squared cosine at which it is seen; or keeps the light that is seen best. */
+/* The weight is the squared cosine of the view over the squared distance; with keeps_best the light with the largest
+ * weight is kept. */
 static void add_taken(const tl_taken *t, const float *positions, const float *normals, const int32_t *ids,
                       int64_t first, int64_t end, float *sums, float *weights)
 {

@@ -1,8 +1,8 @@
-/* Viewsheds: how high above the ground of each cell a line of sight from one point passes.
- * In: heights at the middles of cells, a point.  Out: heights above the ground, 0 where the ground is seen.
+/* Viewsheds: the height above the ground of each cell at which a line of sight from one point passes.
+ * In: heights at the centres of cells, a point.  Out: heights above the ground, 0 where the ground is visible.
  *
- * The line to each cell is followed by itself, over every line between the middles of neighbours, along rows and along
- * columns, where the height is between theirs; except blocks that lie below the slope that hides the cell already.
+ * The line to each cell is tested by itself, against every line between the centres of neighbours, along rows and along
+ * columns, with heights interpolated between them.  Blocks below the slope that already hides the cell are skipped.
  *
  * Based on: W. R. Franklin, C. K. Ray, Higher Isn't Necessarily Better: Visibility Algorithms and Experiments, 1994
  * (R3, along both axes). */
@@ -18,22 +18,23 @@
 TL_INLINE double max_of(double a, double b) { return a > b ? a : b; }
 TL_INLINE double min_of(double a, double b) { return a < b ? a : b; }
 
-/* A line of sight: from the eye to the middle of a cell, along the axis in which it is longer. */
+/* A line of sight from the eye to the centre of a cell; `along` is the axis in which it is longer, `across` the
+ * other. */
 typedef struct {
     const double *ways, *other_ways; /* 1 / (k - eye) along, and across */
     double from, to, from_across, to_across, low, high;
-    double slope, share, way, across_way; /* across a line along; 1 / way; to - from */
+    double slope, share, way, across_way; /* d across / d along; 1 / way; to - from */
     int64_t stride, across_stride, blocks, across_blocks;
     double fall;
 } sight;
 
-/* How steep the way up from the eye to a height is, at a share of the line; `per` is 1 / share. */
+/* The slope from the eye to a height, at a share of the line; `per` is 1 / share. */
 TL_INLINE double way_up(double height, double eye, double per, double fall, double share)
 {
     return (height - eye) * per - fall * share;
 }
 
-/* The height between two neighbours, from `place` on in steps of `stride`. */
+/* The height at `place`, interpolated between two neighbours `stride` apart. */
 TL_INLINE double height_between(const double *heights, double place, int64_t stride)
 {
     const int64_t line = (int64_t)place;
@@ -41,14 +42,14 @@ TL_INLINE double height_between(const double *heights, double place, int64_t str
     return w > 0.0 ? z[0] + w * (z[stride] - z[0]) : z[0];
 }
 
-/* The steepest way up over the lines between middles that a part of a line of sight crosses: those of the axis along in
- * [first, end), and those across from `low` to `high`. */
+/* The steepest slope over the lines between centres that a part of a line of sight crosses: lines [first, end) of the
+ * axis along, and lines across from `low` to `high`. */
 static double steepest(const tl_terrain *t, const sight *s, int64_t first, int64_t end, double low, double high,
                        double most)
 {
     for (int64_t k = first; k < end; k++) {
         const double at = (double)k - s->from, exact = s->from_across + at * s->slope;
-        const double across = exact < s->low ? s->low : exact > s->high ? s->high : exact; /* rounding leaves no grid */
+        const double across = exact < s->low ? s->low : exact > s->high ? s->high : exact; /* for rounding */
         const double height = height_between(t->heights + k * s->stride, across, s->across_stride);
         const double up = way_up(height, t->eye[2], s->way * s->ways[k], s->fall, at * s->share);
         most = up > most ? up : most;
@@ -57,7 +58,7 @@ static double steepest(const tl_terrain *t, const sight *s, int64_t first, int64
         return most;
     const double least = s->from < s->to ? s->from : s->to, greatest = s->from < s->to ? s->to : s->from;
     for (int64_t k = (int64_t)ceil(low); k <= (int64_t)floor(high); k++) {
-        if ((double)k <= s->low || (double)k >= s->high) /* the line of the eye, or of the cell */
+        if ((double)k <= s->low || (double)k >= s->high) /* in line with the eye or the cell */
             continue;
         const double part = ((double)k - s->from_across) / s->across_way, exact = s->from + part * s->way;
         const double along = exact < least ? least : exact > greatest ? greatest : exact;
@@ -68,7 +69,7 @@ static double steepest(const tl_terrain *t, const sight *s, int64_t first, int64
     return most;
 }
 
-/* The greatest height of the blocks that a part of a line may touch, which lies at [low, high] across a block along. */
+/* The greatest height of the blocks that a part of a line may touch, at [low, high] across, in block `block` along. */
 static double block_height(const tl_terrain *t, const sight *s, int64_t block, double low, double high)
 {
     double most = -INFINITY;
@@ -77,7 +78,7 @@ static double block_height(const tl_terrain *t, const sight *s, int64_t block, d
     return most;
 }
 
-/* The steepest way up over all of a line, block by block from the eye on: most blocks lie below the slope so far. */
+/* The steepest slope over all of a line, block by block from the eye on; most blocks lie below the slope so far. */
 static double follow(const tl_terrain *t, const sight *s)
 {
     double most = -INFINITY;

@@ -1,6 +1,6 @@
-/* Voxels: from columns of crossings the inside voxels, and the voxels that triangles meet.
- * In: bits that TL_SINK_PEEL has noted of a mesh seen along its columns, or points in voxels.  Out: a byte or a share
- * of each voxel, the steps of a column side by side.
+/* Voxels: inside voxels from columns of crossings, and the voxels that triangles meet.
+ * In: bits that TL_SINK_PEEL has set of a mesh drawn along its columns, or points in voxels.  Out: a byte or a share of
+ * each voxel, the steps of a column side by side.
  *
  * Based on: M. Schwarz, H.-P. Seidel, Fast Parallel Surface and Solid Voxelization on GPUs, 2010 (parity by flipped
  * bits; a triangle meets a cube if their projections meet and the cube meets the plane). */
@@ -16,8 +16,7 @@
 #include "polygons/row_bits.c"
 #include "vertex/corners.h"
 
-/* Fills columns between their crossings by the even-odd rule, in place; returns how many have an odd number.  The last
- * crossing of such a column is left out. */
+/* A column with an odd number of crossings loses its last crossing. */
 static int64_t fill_columns(uint64_t *bits, int64_t n_columns, int64_t n_words)
 {
     int64_t n_odd = 0;
@@ -39,7 +38,6 @@ static int64_t fill_columns(uint64_t *bits, int64_t n_columns, int64_t n_words)
     return n_odd;
 }
 
-/* A byte of 0 or 1 for each of the n_steps of columns. */
 static void expand_columns(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out)
 {
     for (int64_t i = 0; i < n_columns; i++, bits += n_words, out += n_steps) {
@@ -54,7 +52,7 @@ static void expand_columns(const uint64_t *bits, int64_t n_columns, int64_t n_wo
     }
 }
 
-/* The share of the samples of voxels that are filled: 2^sample_bits along each axis, n_columns a row of voxels. */
+/* A voxel has 2^sample_bits samples along each axis. */
 static void count_columns(const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, int sample_bits,
                           float *out)
 {
@@ -76,7 +74,6 @@ static void count_columns(const uint64_t *bits, int64_t n_columns, int64_t n_wor
     }
 }
 
-/* Writes 1 for each bit of columns (n_rows, n_columns), at strides of a row, a column and a step. */
 static void scatter_columns(const uint64_t *bits, int64_t n_rows, int64_t n_columns, int64_t n_words,
                             const int64_t *strides, uint8_t *out)
 {
@@ -89,23 +86,23 @@ static void scatter_columns(const uint64_t *bits, int64_t n_rows, int64_t n_colu
         }
 }
 
-/* Where a square of side 1 from (p, q) on meets the side of an edge that its triangle lies on: p a + q b + c >= 0. */
+/* Whether a unit square from (p, q) on meets the inner side of an edge of a triangle: p a + q b + c >= 0. */
 typedef struct {
     double a, b, c;
 } square_test;
 
 typedef struct {
-    int axes[3];             /* the last one is where the normal is largest */
+    int axes[3];             /* axes[2]: where the normal is largest */
     int64_t low[3], high[3]; /* voxels of the box, by axis of the grid */
     double normal[3], near, far;
-    square_test sides[3][3]; /* of the projection along each axis: that of axes[(k + 1) % 3] and axes[(k + 2) % 3] */
+    square_test sides[3][3]; /* [k]: along axes[k]; p, q are axes[(k + 1) % 3], axes[(k + 2) % 3] */
 } voxel_test;
 
 static void set_sides(voxel_test *t, const double (*v)[3], double size)
 {
     for (int k = 0; k < 3; k++) {
         const int p = t->axes[(k + 1) % 3], q = t->axes[(k + 2) % 3], r = t->axes[k];
-        /* the turn of (p, q, r) is that of (0, 1, 2) or the opposite */
+        /* (p, q, r) is an even permutation of (0, 1, 2), or odd */
         const double turn = (t->normal[r] < 0.0) == ((p + 1) % 3 == q) ? -1.0 : 1.0;
         for (int i = 0; i < 3; i++) {
             const double *from = v[i], *to = v[(i + 1) % 3];
@@ -118,7 +115,7 @@ static void set_sides(voxel_test *t, const double (*v)[3], double size)
     }
 }
 
-/* Prepares the test of a triangle; returns whether its box meets the grid. */
+/* Sets the test of a triangle; returns whether its box meets the grid. */
 static int set_voxel_test(voxel_test *t, const double (*v)[3], const int64_t *shape)
 {
     double edges[2][3], size = 1.0;
@@ -127,7 +124,7 @@ static int set_voxel_test(voxel_test *t, const double (*v)[3], const int64_t *sh
         const double n = (double)shape[k];
         if (!(low <= n && high >= 0.0))
             return 0;
-        t->low[k] = low >= n ? shape[k] - 1 : low > 0.0 ? (int64_t)low : 0; /* the far side belongs to the last voxel */
+        t->low[k] = low >= n ? shape[k] - 1 : low > 0.0 ? (int64_t)low : 0; /* a far side is in its last voxel */
         t->high[k] = high >= n ? shape[k] - 1 : (int64_t)high;
         edges[0][k] = v[1][k] - v[0][k], edges[1][k] = v[2][k] - v[0][k];
         size = fmax(size, fmax(fabs(low), fmax(fabs(high), n)));
@@ -157,7 +154,7 @@ TL_INLINE int meets(const square_test *sides, double p, double q)
            p * sides[2].a + q * sides[2].b + sides[2].c >= 0.0;
 }
 
-/* Writes 1 for the voxels that one triangle meets; strides of the grid's axes. */
+/* Writes 1 for the voxels that a triangle meets; strides of the grid's axes. */
 static void touch_triangle(const voxel_test *t, const int64_t *strides, uint8_t *out)
 {
     const int u = t->axes[0], v = t->axes[1], w = t->axes[2];
@@ -181,7 +178,7 @@ static void touch_triangle(const voxel_test *t, const int64_t *strides, uint8_t 
         }
 }
 
-/* Writes 1 for the voxels of a grid, of sides of 1 from the origin on, that triangles [first, end) meet. */
+/* Voxels have sides of 1, from the origin on. */
 static void touch_voxels(const double *points, int64_t n_points, const int32_t *triangles, int64_t first, int64_t end,
                          const int64_t *shape, uint8_t *out)
 {
