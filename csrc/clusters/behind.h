@@ -1,5 +1,5 @@
-/* Behind: whether all that is drawn in a rectangle lies before a depth.
- * In: depths, and bounds of those of segments of rows, or none.  Out: yes or no; bounds that are found out. */
+/* Behind: whether all depths in a rectangle beat a given depth.
+ * In: depths, and bounds of segments of rows, or NULL.  Out: yes or no; tighter bounds. */
 #ifndef TL_BEHIND_H
 #define TL_BEHIND_H
 
@@ -9,16 +9,16 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 
-/* Columns of a rectangle from which on bounds pay. */
+/* Columns of a rectangle from which bounds pay off. */
 #define TL_LEAST_BOUNDED 96
 
-/* The lanes in which a depth does not beat this one. */
+/* The lanes in which `there` does not beat `depth`. */
 TL_INLINE vm not_beating(vm live, vf there, vf depth, int is_farthest)
 {
     return vm_and_not(live, is_farthest ? vf_lt(depth, there) : vf_lt(there, depth));
 }
 
-/* Whether all depths of some columns of a row beat this one. */
+/* Whether all depths in columns [col0, col1) of a row beat `depth`. */
 TL_INLINE int row_beats(const float *row, int64_t col0, int64_t col1, vf depth, int is_farthest)
 {
     for (int64_t col = col0; col < col1; col += TL_LANES) {
@@ -29,8 +29,7 @@ TL_INLINE int row_beats(const float *row, int64_t col0, int64_t col1, vf depth, 
     return 1;
 }
 
-/* Whether all depths of some columns beat this one, in a row with bounds: they keep the results of whole segments, and
- * later depths only come before them. */
+/* Like `row_beats`, with bounds: tests whole segments first and stores what passed; later depths only come nearer. */
 TL_INLINE int bounded_row_beats(const float *row, float *bounds, int64_t width, int64_t col0, int64_t col1, float depth,
                                 int is_farthest)
 {
@@ -51,7 +50,7 @@ TL_INLINE int bounded_row_beats(const float *row, float *bounds, int64_t width, 
     return 1;
 }
 
-/* Whether every depth of a rectangle beats this one; `bounds` may be NULL. */
+/* Whether every depth of a rectangle beats `depth`; `bounds` may be NULL. */
 TL_INLINE int all_beat(const float *depths, int64_t stride_px, float *bounds, int64_t row0, int64_t row1, int64_t col0,
                        int64_t col1, float depth, int is_farthest)
 {

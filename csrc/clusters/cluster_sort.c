@@ -1,7 +1,6 @@
-/* Clusters: a mesh in object space as sets of neighbouring triangles, each measured once; a view needs only
+/* Clusters: sorts a mesh in object space into sets of neighbouring triangles, and bounds each set; a view draws only
  * some.
- * In: vertices and triangles.  Out: clusters, their vertices, and the boxes and normals that cluster_view.c looks
- * at.
+ * In: vertices and triangles.  Out: clusters, their vertices, and the boxes and normals that cluster_view.c tests.
  *
  * Based on: G. M. Morton, A Computer Oriented Geodetic Data Base, 1966 (the order); S. Kumar, D. Manocha, B. Garrett,
  * M. Lin, Hierarchical Back-Face Computation, 1996 (cones of normals). */
@@ -52,7 +51,7 @@ static void place_on_curve(const tl_source *source, const int32_t *triangles, in
     }
 }
 
-/* By 10 bits at a time, the lowest first. */
+/* Radix sort by 10 bits at a time, the lowest first. */
 static void sort_keys(const uint32_t *keys, int64_t n, uint64_t *room, uint64_t *other_room, int32_t *order)
 {
     enum { DIGIT = TL_CURVE_BITS, N_DIGITS = 3, N_VALUES = 1 << DIGIT };
@@ -88,7 +87,7 @@ static int64_t cut_clusters(const int32_t *triangles, const int32_t *order, int6
         const int32_t *t = triangles + 3 * (int64_t)order[i];
         int n_new = 0;
         for (int k = 0; c && k < 3; k++)
-            n_new += seen[t[k]] < c->first_vertex; /* those of clusters before, or none */
+            n_new += seen[t[k]] < c->first_vertex; /* not yet in this cluster */
         if (!c || c->n_triangles == TL_CLUSTER || c->n_vertices + n_new > TL_CLUSTER) {
             c = clusters + n_clusters++;
             *c = (tl_cluster){.cone_cos = -1.0, .first_triangle = i, .first_vertex = n_vertices};
@@ -116,8 +115,8 @@ static inline void cross_3(const double *a, const double *b, double *out)
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* A triangle's normal, as long as twice its area, and its longest side; returns 0 when two corners are one point: then
- * it has no area after any snap. */
+/* Sets a triangle's normal, of length twice its area, and its longest side; returns 0 when two corners coincide: such a
+ * triangle has no area after any snap. */
 static int triangle_normal(const double (*points)[3], const uint8_t *corners, double *normal, double *longest)
 {
     double side[3][3];
@@ -135,7 +134,7 @@ static int triangle_normal(const double (*points)[3], const uint8_t *corners, do
     return 1;
 }
 
-/* The cone of the normals: its axis, the cosine of its half angle, 0 or less when it is too wide to be of use. */
+/* Sets the cone of the normals: its axis, and the cosine of its half angle; <= 0 when it is too wide to be of use. */
 static void measure_cone(const double (*points)[3], const uint8_t *corners, tl_cluster *c)
 {
     double axis[3] = {0.0, 0.0, 0.0}, normal[3], longest;
@@ -192,7 +191,7 @@ static void measure_clusters(const tl_source *source, const uint8_t *corners, in
         }
         if (is_finite)
             measure_cone(points, corners + 3 * c->first_triangle, c);
-        else /* no comparison with NaN holds: always drawn */
+        else /* NaN fails every comparison: the cluster is always drawn */
             c->low[0] = c->high[0] = TL_NAN;
         if (is_finite && box[0] == box[0]) {
             widen_box(box, box + 3, c->low);

@@ -1,14 +1,13 @@
-/* A view of a clustered mesh: which clusters it needs, which of them are hidden, and a cluster
- * as a mesh of its own, with vertices that stay in the first-level cache.
+/* A view of a clustered mesh: which clusters it needs, which of them are occluded, and a cluster as a mesh whose
+ * vertices stay in the first-level cache.
  * In: a clustered mesh in object space, a matrix; then a depth buffer.  Out: the clusters that may draw a sample;
  * snapped vertices and triangles, which raster.c draws.
  *
- * Clusters that are left out draw nothing, whatever the snap does to them: every test has the errors of the vertex
- * stage and of the snap on its far side.
+ * Skipped clusters draw nothing, wherever the snap puts their vertices: every test leaves room for the errors of the
+ * vertex stage and of the snap.
  *
- * Based on: U. Assarsson, T. Möller, Optimized View Frustum Culling Algorithms for Bounding Boxes, 2000;
- * N. Greene, M. Kass, G. Miller, Hierarchical Z-Buffer Visibility, 1993 (with one level: clusters are small in the
- * picture). */
+ * Based on: U. Assarsson, T. Möller, Optimized View Frustum Culling Algorithms for Bounding Boxes, 2000; N. Greene, M.
+ * Kass, G. Miller, Hierarchical Z-Buffer Visibility, 1993 (with one level: clusters are small in the picture). */
 #ifndef TL_CLUSTER_VIEW_C
 #define TL_CLUSTER_VIEW_C
 
@@ -23,19 +22,20 @@
 #include "vertex/project.c"
 #include "clusters/behind.h"
 
-/* Row i of the matrix over a box: its value at the centre, how far it goes from there, and a bound of its terms. */
+/* Row i of the matrix over a box: its value at the centre, its largest deviation from it, and a bound of the sum of its
+ * absolute terms. */
 typedef struct {
     double centre, reach, terms;
 } form_bounds;
 
-/* A box under a matrix. */
+/* A box transformed by a matrix. */
 typedef struct {
     double centre[3], half[3];
     form_bounds f[4];
 } seen_box;
 
 #define TL_N_SIDES 6      /* left, right, above, below, near, far */
-#define TL_IN_DEPTH 0x30u /* within near and far: no triangle is cut into pieces, which have other corners */
+#define TL_IN_DEPTH 0x30u /* within near and far: no triangle is clipped into pieces, which have other corners */
 
 static inline seen_box place_box(const double *low, const double *high, const double *matrix)
 {
@@ -56,8 +56,8 @@ static inline seen_box place_box(const double *low, const double *high, const do
     return b;
 }
 
-/* a * (row i) + b * w over a box: its value at the centre, and how far it may be from that with the errors of the
- * vertex stage. */
+/* a * (row i) + b * w over a box: returns its value at the centre; *reach: the largest deviation, with the errors of
+ * the vertex stage. */
 static inline double mixed_form(const seen_box *box, const tl_cluster_view *v, int i, double a, double b, double *reach)
 {
     const double *row = v->matrix + 4 * i, *row_w = v->matrix + 12;
@@ -67,8 +67,8 @@ static inline double mixed_form(const seen_box *box, const tl_cluster_view *v, i
     return a * box->f[i].centre + b * box->f[3].centre;
 }
 
-/* Whether a box is certain to lie outside of the window; if not, the sides that it is certain to lie within are added
- * to `within`.  Those that are there already are not looked at. */
+/* Whether a box is certainly outside of the window.  If not, adds the sides that it is certainly within to `within`;
+ * sides in `within` on entry are not tested. */
 static int is_outside(const seen_box *box, const tl_cluster_view *v, unsigned *within)
 {
     const double near_w = v->zero_to_one ? 0.0 : 1.0;
@@ -91,10 +91,10 @@ static int is_outside(const seen_box *box, const tl_cluster_view *v, unsigned *w
     return 0;
 }
 
-/* Whether a box within the near and far planes is certain to hold no sample, after the snap: as of most clusters of a
- * mesh that has many triangles for a pixel.
+/* Whether a box within the near and far planes certainly holds no sample after the snap, as most clusters with many
+ * triangles per pixel.
  *
- * x / w of the middle is q, and elsewhere differs from it by (x - q w) / w, a form that is small in the middle. */
+ * x / w of the centre is q; elsewhere it differs by (x - q w) / w, which is small near the centre. */
 static int is_between_samples(const seen_box *box, const tl_cluster_view *v)
 {
     const double w_min = box->f[3].centre - box->f[3].reach - v->error * box->f[3].terms;
@@ -115,12 +115,11 @@ static int is_between_samples(const seen_box *box, const tl_cluster_view *v)
     return 0;
 }
 
-/* Whether every triangle of a box within the near and far planes is certain to be turned the way that is culled after
- * the snap.
+/* Whether every triangle of a box within the near and far planes certainly faces the culled way after the snap.
  *
- * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: the
- * rows of x, y and w take it to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes
- * twice the area by less than 4 d (lx + ly) + 8 d^2 sub-pixels^2 when no side is longer than (lx, ly). */
+ * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: the rows of
+ * x, y and w map it to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes twice
+ * the area by less than 4 d (lx + ly) + 8 d^2 sub-pixels^2 when no side is longer than (lx, ly). */
 static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
     const form_bounds *f = box->f;
@@ -153,8 +152,8 @@ static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const s
     return c->min_height * factor > 8.0 * moved * sides && c->min_area * factor > 16.0 * moved * moved;
 }
 
-/* Whether the cluster shows its back, or the culled side, about: it is drawn late then, when surfaces before it may
- * hide it. */
+/* Whether the cluster roughly shows its back, or the culled side: it is then drawn late, when nearer surfaces may
+ * occlude it. */
 static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
     double along = 0.0;
@@ -168,8 +167,7 @@ static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_
 /* The depth of the vertex stage for z / w. */
 static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
 
-/* Whether the middle of a box lies before the depth of the window there: then it is not hidden.  The cheaper
- * test. */
+/* Whether the centre of a box is nearer than the depth there: the box is then not occluded.  A cheap test. */
 static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window,
                                const tl_target *target)
 {
@@ -183,8 +181,7 @@ static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, co
     return target->sink == TL_SINK_FARTHEST ? there < z : there > z;
 }
 
-/* Whether all of a box lies behind the depths of the window there, by a look at so many pixels at
- * most. */
+/* Whether all of a box is behind the depths of the window; 0 if it covers more than most_px pixels. */
 static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target,
                      int64_t most_px)
 {
@@ -218,7 +215,7 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
         const double error = 2.0 * v->error * (box->f[i].terms + largest[i] * box->f[3].terms) / w_min;
         low[i] -= error, high[i] += error;
     }
-    /* one pixel more on each side than the snap can move it; sums of doubles up to 2^51 have their pixel right */
+    /* the snap moves it by less than a pixel; doubles up to 2^51 give the right pixel */
     const double left = (low[0] + 1.0) * v->half_width_px - 1.5, right = (high[0] + 1.0) * v->half_width_px + 1.5;
     const double top = (1.0 - high[1]) * v->half_height_px - 1.5, bottom = (1.0 - low[1]) * v->half_height_px + 1.5;
     if (!(left > -0x1p50 && right < 0x1p50 && top > -0x1p50 && bottom < 0x1p50))
@@ -231,13 +228,13 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
         return 0;
     /* docs/design/rules.md: the error of a depth before it is rounded to float32 */
     const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
-    if (!(fabs(z) < 0x1p126)) /* the vertex stage has depths end at the largest float32 */
+    if (!(fabs(z) < 0x1p126)) /* the vertex stage clamps depths to the largest float32 */
         return 0;
     return all_beat(target->depth, target->stride_px, target->bounds, row0, row1, col0, col1,
                     (float)(is_farthest ? z + error : z - error), is_farthest);
 }
 
-#define TL_MAX_PX_OF_CULLED 1024 /* triangles that are culled one by one take no longer */
+#define TL_MAX_PX_OF_CULLED 1024 /* culling the triangles costs no more than testing so many pixels */
 
 static int is_cluster_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_window *window,
                              const tl_target *target)
@@ -247,13 +244,13 @@ static int is_cluster_hidden(const tl_cluster *c, const tl_cluster_view *v, cons
     return is_hidden(&box, v, window, target, is_culled_later ? TL_MAX_PX_OF_CULLED : INT64_MAX);
 }
 
-/* ---- the order in which they are drawn ------------------------------------------------------------------- */
+/* ---- the order of drawing ------------------------------------------------------------------------------------ */
 
-#define TL_SLABS 16 /* of depth; within one, neighbours stay together */
+#define TL_SLABS 16 /* of depth; clusters of a slab keep their order */
 
 typedef struct {
     int32_t cluster;
-    float depth; /* w or z: how far from the eye */
+    float depth; /* w, or z without perspective */
 } found_cluster;
 
 static inline int slab_of(float depth, float low, float scale)
@@ -262,14 +259,14 @@ static inline int slab_of(float depth, float low, float scale)
     return at > 0.0f ? (int)(at < (float)(TL_SLABS - 1) ? at : (float)(TL_SLABS - 1)) : 0;
 }
 
-/* z / w of the middle of a cluster. */
+/* z / w of the centre of a cluster. */
 static double depth_of(const tl_cluster *c, const double *matrix)
 {
     const seen_box box = place_box(c->low, c->high, matrix);
     return box.f[2].centre / box.f[3].centre;
 }
 
-/* Sorts the clusters in `found`, those seen from behind with their numbers inverted, into slabs. */
+/* Sorts the clusters in `found` into slabs of depth; clusters seen from behind have inverted numbers and come last. */
 static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, const found_cluster *found, int64_t n,
                           int32_t *list)
 {
@@ -299,8 +296,7 @@ static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, co
     }
 }
 
-/* Whether a cluster in its box cannot show, and why: TL_VISIBILITY_OUTSIDE or CULLED, else FRONT.  `within` is that of
- * what holds it. */
+/* The visibility of a cluster: OUTSIDE, CULLED, or else FRONT.  `within`: the sides that its group is within. */
 TL_INLINE tl_visibility visibility_of(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box,
                                       unsigned within)
 {
@@ -313,9 +309,8 @@ TL_INLINE tl_visibility visibility_of(const tl_cluster *c, const tl_cluster_view
                                                                   : TL_VISIBILITY_FRONT;
 }
 
-/* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a
- * target of depths, without groups of them that it hides.  `room` has 8 bytes for each cluster.  Returns how
- * many. */
+/* Lists the clusters that may draw something, roughly by depth, those seen from behind last.  With a target of depths
+ * skips occluded groups.  `room` has 8 bytes for each cluster.  Returns how many. */
 static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window,
                              const tl_target *target, int32_t *list, void *room)
 {
@@ -358,8 +353,6 @@ static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, 
     }
 }
 
-/* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window or between
- * samples, nor, with a target of depths, behind them. */
 static void find_shown(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
                        const tl_window *window, const tl_target *target, uint8_t *shown)
 {
@@ -374,7 +367,7 @@ static void find_shown(const tl_cluster_view *view, const double *boxes, const d
     }
 }
 
-/* A cluster as a mesh of its own. */
+/* A cluster as a mesh. */
 typedef struct {
     tl_snapped snapped;
     tl_vertex vertices[TL_CLUSTER + TL_CLUSTER_TAIL];
@@ -382,7 +375,7 @@ typedef struct {
     int32_t names[TL_CLUSTER];
 } cluster_mesh;
 
-/* Lists the triangles that have a special corner, and leaves the others; returns their number. */
+/* Lists the triangles with a special corner in slice->outside and removes them; returns the number that remain. */
 static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t n, tl_slice *slice)
 {
     int64_t n_left = 0;
@@ -403,7 +396,7 @@ static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t
     return n_left;
 }
 
-/* Snaps the vertices of a cluster and unpacks its triangles; returns how many of them there are to draw. */
+/* Snaps the vertices of a cluster and unpacks its triangles; returns how many triangles to draw. */
 static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, const tl_snapped *snapped,
                             tl_slice *slice, cluster_mesh *own)
 {
@@ -413,7 +406,7 @@ static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, co
     tl_source source = *pass->source;
     source.data = (const char *)source.data + (size_t)c->first_vertex * row_bytes;
     source.n -= c->first_vertex;
-    /* whole vectors: those of other clusters that this snaps are not looked at */
+    /* whole vectors: also snaps vertices of the next cluster, which nothing reads */
     const int64_t n = ((int64_t)c->n_vertices + TL_LANES - 1) / TL_LANES * TL_LANES;
     const tl_vertex_counts counts = project(&source, 0, n, pass->view, &(tl_projected){.records = own->vertices});
     own->snapped = *snapped;
@@ -429,7 +422,7 @@ static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, co
                                                              : c->n_triangles;
 }
 
-/* The clusters that a pass draws, unless they turn out to be hidden. */
+/* Lists the clusters that a pass draws unless `is_cluster_hidden`. */
 static int64_t list_clusters(tl_cluster_pass *pass, const tl_window *window, const tl_target *target)
 {
     pass->n_drawn = 0;

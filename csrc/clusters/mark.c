@@ -1,5 +1,5 @@
 /* Mark: the vertices that some triangles use.
- * In: ids; most repeat the one before.  Out: a byte for each block of vertices. */
+ * In: ids; most are equal to the id before.  Out: a byte for each block of vertices. */
 #ifndef TL_MARK_C
 #define TL_MARK_C
 
@@ -8,10 +8,10 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-#define TL_MARKED 512    /* ids that are looked at together */
-#define TL_MARK_AHEAD 16 /* triangles that are prefetched before their turn: 1.5 times as fast beyond the caches */
+#define TL_MARKED 512    /* ids processed together */
+#define TL_MARK_AHEAD 16 /* triangles prefetched ahead: 1.5 times as fast beyond the caches */
 
-/* Lists the ids of triangles among n that differ from the one before them; returns how many. */
+/* Lists the ids that differ from the id before; returns how many. */
 static int list_new_ids(const int32_t *ids, int n, int64_t n_triangles, vi *before, int32_t *listed)
 {
     const vi none = vi_set1(-1), end = vi_set1((int32_t)n_triangles);
@@ -27,7 +27,6 @@ static int list_new_ids(const int32_t *ids, int n, int64_t n_triangles, vi *befo
     return n_listed;
 }
 
-/* Marks the blocks of 2^block_bits vertices that triangles use; returns -1, or one with an index that no vertex has. */
 static int64_t mark_vertices(const int32_t *ids, int64_t n, const int32_t *restrict triangles, int64_t n_triangles,
                              int64_t n_vertices, int block_bits, uint8_t *restrict is_used)
 {
@@ -43,7 +42,7 @@ static int64_t mark_vertices(const int32_t *ids, int64_t n, const int32_t *restr
             const int32_t *corners = triangles + 3 * (int64_t)listed[i];
             __builtin_prefetch(triangles + 3 * (int64_t)listed[i + TL_MARK_AHEAD]);
             for (int k = 0; k < 3; k++) {
-                const int32_t corner = corners[k]; /* once: another thread may change it */
+                const int32_t corner = corners[k]; /* read once: another thread may change it */
                 if ((uint32_t)corner < (uint64_t)n_vertices)
                     is_used[corner >> block_bits] = 1;
                 else
