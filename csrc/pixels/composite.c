@@ -1,9 +1,9 @@
-/* Composite: the colour through the layers of a pixel, the nearest first.
+/* Composite: the colour of a pixel through its layers, nearest first.
  * In: planes of ids, colours of triangles or of the layers of pixels.  Out: pixels with alpha.
  *
- * A layer of opacity a lets 1 - a of the light behind it through, so layer k counts w = a_k * (1 - a_0) * ... * (1 -
- * a_(k-1)).  The colour is the mean of the colours by w, the alpha their sum.  All in float64, the operations in this
- * order, rounded once.
+ * A layer of opacity a transmits 1 - a of the light behind it, so layer k has the weight w = a_k * (1 - a_0) * ... * (1
+ * - a_(k-1)).  The colour is the mean of the colours by w, the alpha is the sum of w.  All is float64, in this order of
+ * operations, rounded once.
  *
  * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 ("over"). */
 #ifndef TL_COMPOSITE_C
@@ -15,7 +15,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* The layer with its colour at `color`, in steps of 1 / one. */
+/* Adds the layer whose colour is at `color`, in steps of 1 / ONE. */
 #define TL_ADD_LAYER(NAME, T, ONE)                                                                 \
     TL_INLINE void NAME(const T *color, int n_colors, double *through, double *sum, double *alpha) \
     {                                                                                              \
@@ -37,7 +37,7 @@ static void composite(const tl_composite *p, int64_t n, void *pixels)
         double sum[3] = {0.0, 0.0, 0.0}, alpha = 0.0, through = 1.0;
         for (int k = 0; k < p->n_layers; k++) {
             const int64_t id = p->ids[k * p->plane_px + i];
-            if (id < 0 || id >= p->n_triangles) /* the caller may have written into the layers */
+            if (id < 0 || id >= p->n_triangles) /* the caller may have changed the layers */
                 break;
             const int64_t at = (p->is_flat ? id : k * n + i) * p->n_channels;
             if (!p->is_u8)

@@ -1,9 +1,9 @@
-/* Instances: which instance each pixel shows, the rectangle of pixels round each, and the columns of each in a span.
- * In: ids that count the triangles of all instances.  Out: indices of instances, boxes; for each instance that a span
- * shows the columns from the first to the last that do.
+/* Instances: the instance that each pixel shows, the box of pixels of each, and the columns of each in a span.
+ * In: ids that count the triangles of all instances.  Out: indices of instances, boxes; for each instance visible in a
+ * span the columns from its first to its last pixel.
  *
- * Each instance of a span is worked on by itself, in those columns; where instances alternate from pixel to pixel they
- * are looked at by each of them. */
+ * The instances of a span are processed one by one, each in its columns; columns where instances alternate are
+ * processed once for each of them. */
 #ifndef TL_INSTANCES_C
 #define TL_INSTANCES_C
 
@@ -14,7 +14,7 @@
 #include "lanes/lanes.h"
 #include "pixels/runs.c"
 
-/* The last of n instances with a first id not above `id`, or the first of all; first ids by themselves, or NULL. */
+/* The last of n instances with a first id <= `id`, or the first instance; first_ids, or NULL to read `instances`. */
 TL_INLINE int64_t last_begun(const int64_t *first_ids, const tl_shaded *instances, int64_t n, int64_t id)
 {
     int64_t low = 0, high = n;
@@ -28,13 +28,10 @@ TL_INLINE int64_t last_begun(const int64_t *first_ids, const tl_shaded *instance
     return low;
 }
 
-/* Writes the instance of each of n_rows of `width` ids, -1 where an id is below 0; instance i has the ids from
- * first_ids[i] on to first_ids[i + 1].  With boxes, (n, 4): left, top, right, bottom, those of instances that show are
- * widened to hold their pixels. */
 static void find_instances(const int32_t *ids, int64_t n_rows, int64_t width, const int64_t *first_ids, int64_t n,
                            int32_t *out, int32_t *boxes)
 {
-    int64_t first = 0, end = -1, found = -1; /* the ids of the last instance found */
+    int64_t first = 0, end = -1, found = -1; /* the ids of instance `found` */
     for (int64_t row = 0; row < n_rows; row++, ids += width, out += width)
         for (int64_t col = 0; col < width;) {
             const int64_t begin = col;
@@ -66,8 +63,8 @@ typedef struct {
 
 typedef struct {
     const tl_shaded_scene *scene;
-    const tl_shaded *last, *set; /* the last that was found; that for which runs are set */
-    tl_snapped seen;             /* the mesh of that, as the sample sees it that is shaded */
+    const tl_shaded *last, *set; /* the instance found last; the instance that runs are set for */
+    tl_snapped seen;             /* the mesh of `set`, for the sample that is shaded */
     int n;
     span_part parts[TL_SPAN];
 } span_list;
@@ -77,7 +74,7 @@ static void start_list(span_list *list, const tl_shaded_scene *scene)
     list->scene = scene, list->last = scene->instances, list->set = NULL;
 }
 
-/* The first of the ids from x on that is not one of [low, high]; n if there is none. */
+/* The first column from x on with an id outside [low, high]; n if there is none. */
 TL_INLINE int end_of_ids(const int32_t *ids, int x, int n, int32_t low, int32_t high)
 {
     for (; x < n; x += TL_LANES) {
@@ -90,7 +87,7 @@ TL_INLINE int end_of_ids(const int32_t *ids, int x, int n, int32_t low, int32_t 
     return n;
 }
 
-/* Notes that an instance shows in [first, end). */
+/* Adds columns [first, end) to the part of an instance. */
 static void note_part(span_list *list, const tl_shaded *instance, int first, int end)
 {
     int k = list->n - 1;
@@ -122,7 +119,7 @@ TL_ONCE void list_instances(span_list *list, const int32_t *ids, int n)
             list->last = own = list->scene->instances + last_begun(NULL, list->scene->instances, list->scene->n, id);
         const int32_t end = own->first_id + (int32_t)own->snapped->n_triangles - 1;
         const int first = x;
-        if (id < own->first_id || id > end) { /* of none */
+        if (id < own->first_id || id > end) { /* of no instance */
             x++;
             continue;
         }

@@ -1,4 +1,4 @@
-/* Lay: rows that were drawn in near memory into the picture, which is written once, past the caches.
+/* Lay: copies rows that were drawn in a cached buffer to the picture, with non-temporal stores.
  * In: some columns of a band of rows.  Out: all columns of these rows. */
 #ifndef TL_LAY_C
 #define TL_LAY_C
@@ -9,12 +9,12 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 
-#define TL_LINE 16 /* numbers of a cache line */
+#define TL_LINE 16 /* numbers in a cache line */
 
-/* How many numbers lie before a whole line of memory. */
+/* How many numbers come before the next cache line. */
 TL_INLINE int64_t until_line(const int32_t *p) { return (int64_t)((0 - (uintptr_t)p / sizeof *p) % TL_LINE); }
 
-/* Writes the numbers [k, end) of a row into caches: those that were drawn, if there are any, or `blanks`. */
+/* Writes the numbers [k, end) of a row through the caches: `drawn`, or `blanks` if that is NULL. */
 TL_INLINE void lay_near(int32_t *to, const int32_t *drawn, int64_t k, int64_t end, vi blanks)
 {
     for (; k + TL_LANES <= end; k += TL_LANES)
@@ -23,7 +23,7 @@ TL_INLINE void lay_near(int32_t *to, const int32_t *drawn, int64_t k, int64_t en
         vi_store_masked(to + k, vm_first(end - k), drawn ? vi_load_masked(vm_first(end - k), drawn + k) : blanks);
 }
 
-/* Writes n numbers of a row.  Only whole lines pass the caches: memory takes part of one far more slowly. */
+/* Writes n numbers of a row.  Only whole cache lines are stored non-temporally: partial lines are far slower. */
 TL_INLINE void lay_row(int32_t *to, const int32_t *drawn, int64_t n, int32_t blank)
 {
     const vi blanks = vi_set1(blank);

@@ -16,7 +16,7 @@
 #include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 
-/* The first samples of paint_flat, with colours of four bytes, a vector at a time; returns how many. */
+/* Paints whole vectors of samples with colours of four bytes; returns how many samples. */
 TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *colors, const uint8_t *ground,
                               uint8_t *restrict out)
 {
@@ -36,7 +36,7 @@ TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *c
     return k;
 }
 
-/* Samples from k on, each of n_bytes. */
+/* Paints samples from k on, of n_bytes each. */
 TL_INLINE void paint_bytes(const int32_t *labels, int64_t k, int64_t n, const uint8_t *colors, const uint8_t *ground,
                            uint8_t *restrict out, const size_t n_bytes)
 {
@@ -47,7 +47,6 @@ TL_INLINE void paint_bytes(const int32_t *labels, int64_t k, int64_t n, const ui
     }
 }
 
-/* Copies the colour of each labelled sample's triangle; samples with label -1 get that of the ground, or stay. */
 static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, const uint8_t *ground,
                        uint8_t *restrict out)
 {
@@ -74,7 +73,7 @@ static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int
     return i128_is_zero(high) ? i128_low(low) != 0 : i128_sign(high);
 }
 
-/* Sign of w1 * d1 + w2 * d2 - halves * w_sum / 2, exact, of vertices that are not snapped. */
+/* Sign of w1 * d1 + w2 * d2 - halves * w_sum / 2, exact, for vertices that are not snapped. */
 static int compare_points(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int d1, int d2, int halves)
 {
     const exact_point *p = s->points, sample = sample_of(s->exact, x_px, y_px, bits);
@@ -84,12 +83,12 @@ static int compare_points(const resolve_state *s, int64_t x_px, int64_t y_px, in
     return terms_sign(terms, 3) * edge_sign(p[0], p[1], p[2], &counts);
 }
 
-/* The exact value of a channel rounded to nearest, ties to even; `value` decides unless it is next to a tie. */
+/* The exact value of a channel rounded to nearest, ties to even; `value` suffices unless it is close to a tie. */
 static inline uint8_t round_color(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2,
                                   double value)
 {
     const int below = (int)floor(value);
-    if (!(fabs(value - below - 0.5) < 0x1p-20)) /* or it is no number, of a triangle that has changed */
+    if (!(fabs(value - below - 0.5) < 0x1p-20)) /* or NaN, of a triangle that has changed */
         return (uint8_t)(int)rint(value);
     const int halves = 2 * (below - c0) + 1;
     const int side = s->exact ? compare_points(s, x_px, y_px, bits, d1, d2, halves)
@@ -97,7 +96,7 @@ static inline uint8_t round_color(const resolve_state *s, int64_t x_px, int64_t 
     return (uint8_t)(below + (side > 0 || (side == 0 && (below & 1))));
 }
 
-/* One channel of n samples; w1 and w2 are parts of w_sum. */
+/* One channel of n samples; w1 and w2 have the sum of weights w_sum. */
 static inline void paint_run_u8(const resolve_state *s, const uint8_t *c, int64_t x_px, int64_t y_px, int bits,
                                 const double *w1, const double *w2, double w_sum, int n, int n_channels,
                                 uint8_t *restrict out)
@@ -116,7 +115,7 @@ static inline void paint_run_f32(const float *c, const double *w1, const double 
         out[k * n_channels] = (float)(c0 + (w1[k] * slope1 + w2[k] * slope2));
 }
 
-/* A sample of a piece: the colours of its corners are those of the cut points. */
+/* A sample of a piece: the colours of its corners are interpolated at the cut points. */
 static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t x_px, int64_t y_px, int bits,
                         const void *colors, int n_channels, int is_u8, void *out)
 {
@@ -142,7 +141,7 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
     }
 }
 
-/* The weights of corners 1 and 2 of n samples of a triangle that is not snapped, as parts of 1. */
+/* The weights of corners 1 and 2 at n samples of a triangle that is not snapped; weights sum to 1. */
 static void exact_weights_at(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int n, double *w1,
                              double *w2)
 {
@@ -167,7 +166,7 @@ static void exact_weights_at(const resolve_state *s, int64_t x_px, int64_t y_px,
     }
 }
 
-/* n samples of one triangle in a row. */
+/* Paints n samples of one triangle in a row. */
 static void paint_run(resolve_state *s, const tl_window *window, int64_t row, int64_t col, int n, const void *colors,
                       int n_channels, int is_u8, void *out)
 {
@@ -216,7 +215,7 @@ static void paint_gouraud(const tl_snapped *snapped, const tl_window *window, co
                 paint_run(&s, window, row, col, (int)n, colors, n_channels, is_u8, out + col * pixel_bytes);
                 continue;
             }
-            n = 1; /* the next sample may belong to another piece */
+            n = 1; /* the next sample may be in another piece */
             read_corners(snapped, id, corners);
             paint_piece(&s, corners, x_px, y_px, bits, colors, n_channels, is_u8, out + col * pixel_bytes);
         }

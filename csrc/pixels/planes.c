@@ -1,9 +1,9 @@
-/* Planes: the value that each pixel has on its triangle, in float64, from vertices as they were before the snap.
- * In: triangle ids, float64 points in pixels, a value for each point.  Out: values at the pixel centres; NaN where no
- * triangle is.
+/* Planes: the value of each pixel on its triangle, in float64, from vertices before the snap.
+ * In: triangle ids, float64 points in pixels, a value for each point.  Out: values at the pixel centres; NaN for the
+ * background.
  *
- * A triangle owns pixels by its snapped vertices, so a centre may lie a fraction of a sub-pixel outside of the exact
- * triangle: the value is kept within the three of the triangle. */
+ * Snapped vertices decide coverage, so a centre may lie a fraction of a sub-pixel outside of the exact triangle: the
+ * value is clamped to the three values of the corners. */
 #ifndef TL_PLANES_C
 #define TL_PLANES_C
 
@@ -15,12 +15,11 @@
 
 /* The plane of one triangle: TL_PLANE_DOUBLES, a cache line. */
 typedef struct {
-    int64_t id; /* -1: none yet */
+    int64_t id; /* -1: empty */
     double x, y, value, slope_x, slope_y, low, high;
 } value_plane;
 
-/* Planes that were needed lately: rows come back to the triangles of the row above.  A power of two; 512 of them are 32
- * KiB. */
+/* Recently used planes: a row often shows the triangles of the row before.  A power of two; 512 of them are 32 KiB. */
 #define TL_N_RECENT_PLANES 512
 
 static inline double lower(double a, double b) { return b < a ? b : a; }
@@ -45,7 +44,7 @@ static void load_plane(value_plane *p, const tl_valued *mesh, int64_t id)
     const double av = v[1] - v[0], bv = v[2] - v[0], twice_area = ax * by - ay * bx;
     p->x = x[0], p->y = y[0], p->value = v[0];
     p->low = lower(lower(v[0], v[1]), v[2]), p->high = upper(upper(v[0], v[1]), v[2]);
-    p->slope_x = p->slope_y = 0.0; /* the snap alone gave it an area: no slope is right, and this one is flat */
+    p->slope_x = p->slope_y = 0.0; /* only the snap gave it an area: no slope is right, so it is flat */
     if (twice_area != 0.0) {
         p->slope_x = (av * by - bv * ay) / twice_area;
         p->slope_y = (bv * ax - av * bx) / twice_area;
@@ -80,10 +79,10 @@ TL_INLINE void fill_pixel(const value_plane *p, int64_t col, row_start at, int i
         ((double *)row)[col] = value;
 }
 
-/* How many pixels ahead the plane is prefetched: it lies in a distant cache, and its number is known. */
+/* Pixels ahead for which planes are prefetched: they are in a distant cache, and their ids are known. */
 #define TL_PLANES_AHEAD 32
 
-/* Small triangles: a pixel at a time from listed planes, without a branch that depends on where a triangle ends. */
+/* Small triangles: pixel by pixel from listed planes, without a branch at the end of a triangle. */
 TL_INLINE void fill_listed(const value_plane *planes, int64_t n_triangles, const int32_t *ids, int64_t width,
                            row_start at, int is_f32, void *row)
 {
@@ -95,10 +94,10 @@ TL_INLINE void fill_listed(const value_plane *planes, int64_t n_triangles, const
     }
 }
 
-/* Large ones: a run of one triangle at a time. */
+/* Large triangles: run by run. */
 TL_INLINE void fill_run(const value_plane *p, int64_t first, int64_t end, row_start at, int is_f32, void *row)
 {
-    const value_plane plane = *p; /* the row cannot change it */
+    const value_plane plane = *p; /* a copy: stores to the row cannot alias it */
     for (int64_t col = first; col < end; col++)
         fill_pixel(&plane, col, at, is_f32, row);
 }

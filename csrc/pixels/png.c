@@ -1,9 +1,9 @@
 /* PNG: rows of a picture to the compressed bytes of the file, a block of deflate for each band of rows.
- * In: rows of bytes.  Out: a block that ends at a byte, so that bands do not know of each other.
+ * In: rows of bytes.  Out: a block that ends at a byte, so that bands are independent.
  *
- * A band has the filter, up or average, that takes fewer bits for every eighth row.  Then bytes have Huffman codes, and
- * bytes that repeat those of the pixel before are one match; no other repeats are looked for.  Codes are those of the
- * counts in these rows.  There are integers alone, so a picture has the same bytes on every machine.
+ * A band uses the filter, up or average, that takes fewer bits for every sixteenth row.  Bytes have Huffman codes;
+ * bytes equal to those of the pixel before are one match; other repeats are not searched.  Codes are those of the
+ * counts in these rows.  All is integers, so a picture has equal bytes on every machine.
  *
  * Based on: Portable Network Graphics (PNG) Specification, Third Edition, W3C, 2025; P. Deutsch, RFC 1950 and RFC 1951,
  * 1996; D. A. Huffman, A Method for the Construction of Minimum-Redundancy Codes, 1952; J. van Leeuwen, On the
@@ -25,23 +25,23 @@ enum {
     N_SYMBOLS = 286, /* bytes, the end of a block, 29 lengths */
     END_OF_BLOCK = 256,
     FIRST_LENGTH = 257,
-    MOST_BITS = 12, /* of a code: four of them fit a word with what is left of the last byte */
+    MOST_BITS = 12, /* of a code: four codes and the rest of the last byte fit a word */
     LEAST_MATCH = 3,
     MOST_MATCH = 258,
-    COUNTED_ROWS = 16, /* one of so many rows is counted: all would take twice as long for 0.1 % fewer bytes */
+    COUNTED_ROWS = 16, /* every 16th row is counted: counting all would take twice as long for 0.1 % fewer bytes */
 };
 
-/* The least length of each symbol, and how many bits tell how much longer a match is. */
+/* The least length of each length symbol, and how many extra bits follow it. */
 static const uint16_t LENGTHS[29] = {3,  4,  5,  6,  7,  8,  9,  10, 11,  13,  15,  17,  19,  23, 27,
                                      31, 35, 43, 51, 59, 67, 83, 99, 115, 131, 163, 195, 227, 258};
 static const uint8_t LENGTH_BITS[29] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2,
                                         2, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5, 0};
 
-/* Codes: the number of bits, and from bit 8 on these as they stand in the file, the first one the lowest.  Shifts take
- * the lowest 6 bits of such a number as it is. */
+/* Codes: the number of bits, and from bit 8 on the bits as in the file, the first bit lowest.  Shifts read only the
+ * lowest 6 bits of such a number, so it needs no mask. */
 typedef struct {
     uint32_t of_symbol[N_SYMBOLS];
-    uint32_t of_length[MOST_MATCH + 1]; /* with its bits and that of the distance */
+    uint32_t of_length[MOST_MATCH + 1]; /* with the extra bits, and the bit of the distance */
 } png_codes;
 
 typedef struct {
@@ -66,7 +66,7 @@ TL_INLINE void write_bits(png_writer *w, uint64_t bits, int n_bits)
 
 TL_INLINE void write_code(png_writer *w, uint32_t code) { write_bits(w, code >> 8, code & 63); }
 
-/* Four bytes. */
+/* Writes the codes of four bytes. */
 TL_INLINE void write_four(png_writer *w, const uint32_t *code, const uint8_t *bytes)
 {
     const uint32_t a = code[bytes[0]], b = code[bytes[1]], c = code[bytes[2]], d = code[bytes[3]], ab = a + b;
@@ -74,7 +74,7 @@ TL_INLINE void write_four(png_writer *w, const uint32_t *code, const uint8_t *by
     write_bits(w, front | back << (ab & 63), (ab + c + d) & 63);
 }
 
-/* The filter's number and the filtered row. */
+/* Writes the filter's number and the filtered row. */
 static void filter_row(const tl_png_rows *rows, int64_t row, int filter, uint8_t *restrict out)
 {
     const uint8_t *own = rows->pixels + row * rows->n_bytes, *above = row ? own - rows->n_bytes : rows->above;
@@ -93,7 +93,7 @@ static void filter_row(const tl_png_rows *rows, int64_t row, int filter, uint8_t
     }
 }
 
-/* Adler-32 of n more bytes: 64 sums of them side by side, of up to 16 lines, and those of the sums before each line. */
+/* Adler-32 of n more bytes: 64 sums side by side, over up to 16 lines, and the sums of these sums before each line. */
 static uint32_t add_adler(uint32_t adler, const uint8_t *bytes, int64_t n)
 {
     uint32_t a = adler & 0xffff, b = adler >> 16;
@@ -114,7 +114,7 @@ static uint32_t add_adler(uint32_t adler, const uint8_t *bytes, int64_t n)
     return b % 65521 << 16 | a % 65521;
 }
 
-/* How many bytes from i on repeat those of the pixel before. */
+/* The number of bytes from i on that equal those of the pixel before. */
 TL_INLINE int64_t match_length(const uint8_t *row, int64_t i, int64_t end, int step)
 {
     int64_t k = i;
@@ -128,7 +128,7 @@ TL_INLINE int64_t match_length(const uint8_t *row, int64_t i, int64_t end, int s
     return k - i;
 }
 
-/* Which of the 29 symbols a length has. */
+/* The symbol of a length, of 29. */
 TL_INLINE int length_symbol(int64_t length)
 {
     const int over = (int)length - LEAST_MATCH, high = over < 8 ? 0 : 29 - __builtin_clz((unsigned)over);
@@ -144,7 +144,7 @@ TL_INLINE void code_symbol(int symbol, uint32_t *counts, const png_codes *codes,
         write_code(w, codes->of_symbol[symbol]);
 }
 
-/* Counts a match, or writes its code, without an end too short for a symbol; returns how many bytes are coded. */
+/* Counts a match, or writes its code, but not a rest too short for a symbol; returns how many bytes are coded. */
 TL_INLINE int64_t code_match(int64_t length, uint32_t *counts, const png_codes *codes, png_writer *w)
 {
     int64_t rest = length;
@@ -162,8 +162,8 @@ TL_INLINE int64_t code_match(int64_t length, uint32_t *counts, const png_codes *
 TL_INLINE void code_row(const uint8_t *row, int64_t n, int step, uint32_t *counts, const png_codes *codes,
                         png_writer *w)
 {
-    /* After the filter up a single pixel makes a match: it saves 3 to 8 % of a picture of ids.  After the other these
-     * are chance. */
+    /* With filter up a single equal pixel makes a match: this saves 3 to 8 % of a picture of ids.  With filter average
+     * such matches are chance. */
     const uint64_t matched = row[0] == FILTER_UP ? 0xffffffff : UINT64_MAX;
     int64_t i = 0;
     for (; i < n && i <= step; i++)
@@ -190,12 +190,12 @@ TL_ONCE void count_row(const uint8_t *row, int64_t n, int step, uint32_t *counts
 
 TL_ONCE void write_row(const uint8_t *row, int64_t n, int step, const png_codes *codes, png_writer *w)
 {
-    png_writer own = *w; /* in registers */
+    png_writer own = *w; /* a copy, to be kept in registers */
     code_row(row, n, step, NULL, codes, &own);
     *w = own;
 }
 
-/* Lengths of Huffman codes of symbols that all occur, MOST_BITS at most. */
+/* Sets the lengths of Huffman codes, MOST_BITS at most; every symbol has a count > 0. */
 static void find_code_bits(const uint32_t *counts, uint8_t *n_bits)
 {
     keyed pairs[2 * N_SYMBOLS];
@@ -206,7 +206,7 @@ static void find_code_bits(const uint32_t *counts, uint8_t *n_bits)
     const keyed *sorted = sort_pairs(pairs, pairs + N_SYMBOLS, N_SYMBOLS);
     for (int i = 0; i < N_SYMBOLS; i++)
         weight[i] = sorted[i].key;
-    /* leaves ascend, and so do the nodes above them: the lightest two are at the heads of two queues */
+    /* leaves ascend, and so do inner nodes: the two lightest are at the heads of two queues */
     for (int leaf = 0, node = N_SYMBOLS, made = N_SYMBOLS; made < 2 * N_SYMBOLS - 1; made++) {
         weight[made] = 0;
         for (int k = 0; k < 2; k++) {
@@ -221,7 +221,7 @@ static void find_code_bits(const uint32_t *counts, uint8_t *n_bits)
         if (i < N_SYMBOLS)
             n_of[min64(depth[i], MOST_BITS)]++;
     }
-    int32_t taken = -(1 << MOST_BITS); /* codes of MOST_BITS bits that are one too many */
+    int32_t taken = -(1 << MOST_BITS); /* how many codes of MOST_BITS bits exceed the room */
     for (int bits = 1; bits <= MOST_BITS; bits++)
         taken += n_of[bits] << (MOST_BITS - bits);
     for (; taken > 0; taken--) {
@@ -235,7 +235,7 @@ static void find_code_bits(const uint32_t *counts, uint8_t *n_bits)
             n_bits[sorted[i++].i] = (uint8_t)bits;
 }
 
-/* The lowest n bits the other way round. */
+/* Reverses the lowest n bits. */
 TL_INLINE uint32_t reversed(uint32_t bits, int n)
 {
     uint32_t other = 0;
@@ -255,12 +255,12 @@ static void set_codes(png_codes *codes, const uint8_t *n_bits)
         const int symbol = length_symbol(length), n_own = n_bits[FIRST_LENGTH + symbol];
         const uint32_t own = codes->of_symbol[FIRST_LENGTH + symbol] & ~255u,
                        rest = (uint32_t)(length - LENGTHS[symbol]);
-        /* the distance is a zero */
+        /* the distance has one code: a bit 0 */
         codes->of_length[length] = own | rest << (8 + n_own) | (uint32_t)(n_own + LENGTH_BITS[symbol] + 1);
     }
 }
 
-/* How many bits some of the rows take by a filter, and their codes. */
+/* Sets the code lengths of a filter for the counted rows; returns the bits that these rows take. */
 static int64_t try_filter(const tl_png_rows *rows, int filter, uint8_t *row, uint8_t *n_bits)
 {
     uint32_t counts[N_SYMBOLS];
@@ -278,12 +278,13 @@ static int64_t try_filter(const tl_png_rows *rows, int filter, uint8_t *row, uin
     return sum;
 }
 
-/* The head of a block that is not the last: the lengths of its codes, four bits each, and one distance, a pixel. */
+/* Writes the head of a block that is not the last: the lengths of its codes, four bits each, and one distance, a
+ * pixel. */
 static void write_head(png_writer *w, int step, const uint8_t *n_bits)
 {
     const int n_lengths = N_SYMBOLS + step;
     write_bits(w, 4 | (N_SYMBOLS - 257) << 3 | (step - 1) << 8 | 15 << 13, 17);
-    write_bits(w, 0, 9); /* 16, 17 and 18 are not used */
+    write_bits(w, 0, 9); /* symbols 16, 17 and 18 are not used */
     for (int i = 0; i < 16; i++)
         write_bits(w, 4, 3);
     for (int i = 0; i < n_lengths; i++)
@@ -304,7 +305,7 @@ static int64_t encode_rows(const tl_png_rows *rows, uint8_t *row, uint32_t *adle
         write_row(row, 1 + rows->n_bytes, rows->pixel_bytes, &codes, &w);
     }
     write_code(&w, codes.of_symbol[END_OF_BLOCK]);
-    write_bits(&w, 0, 3 + (-(w.n_bits + 3) & 7)); /* a stored block of nothing ends at a byte */
+    write_bits(&w, 0, 3 + (-(w.n_bits + 3) & 7)); /* an empty stored block ends at a byte */
     write_bits(&w, 0xffff0000, 32);
     return w.out - out;
 }

@@ -1,9 +1,8 @@
-/* Points: where in space the pixels of a visibility buffer lie, their distances, and their ways in the
- * picture.
- * In: ids, the meshes they were drawn from, positions of their vertices.  Out: float32, or float64, of each pixel.
+/* Points: the points in space of the pixels of a visibility buffer, their distances, and their motion in the picture.
+ * In: ids, the meshes they were drawn from, positions of their vertices.  Out: float32, or float64, per pixel.
  *
- * A point has the weights of its pixel in its triangle, relative to the first corner: it lies on the triangle.  A
- * number that depends linearly on the point is computed at the corners, and interpolated.  All is float64, rounded once
+ * A point is interpolated with the weights of its pixel, relative to the first corner: it lies on the triangle.  A
+ * number that depends linearly on the point is computed at the corners and interpolated.  All is float64, rounded once
  * at the end. */
 #ifndef TL_POINTS_C
 #define TL_POINTS_C
@@ -22,12 +21,12 @@
 
 typedef struct {
     weighed_span weighed;
-    /* of each row at the first corner, and along the edges to the others */
+    /* of each row: at the first corner, and differences along the edges to the other corners */
     _Alignas(64) double value[3 * TL_POINT_ROWS][TL_SPAN_ROOM];
     double numbers[3][TL_SPAN_ROOM]; /* of the pixels of the span */
 } point_span;
 
-/* The rows at the corners of runs. */
+/* Sets the rows at the corners of runs. */
 TL_INLINE void set_values(point_span *r, const tl_points *points, const tl_point_mesh *mesh)
 {
     const int end = TL_LANES + r->weighed.runs.n_runs;
@@ -47,7 +46,7 @@ TL_INLINE void set_values(point_span *r, const tl_points *points, const tl_point
     }
 }
 
-/* Where x, y and w lie in the picture. */
+/* Projects x, y and w to pixels; NaN unless w > 0. */
 TL_INLINE void to_pixels(const tl_points *points, const vd *p, vd *xy)
 {
     const vd one = vd_set1(1.0), none = vd_set1(TL_NAN), inverse = vd_div(one, p[2]);
@@ -57,7 +56,7 @@ TL_INLINE void to_pixels(const tl_points *points, const vd *p, vd *xy)
     xy[1] = vd_select(is_behind, none, vd_mul(vd_sub(one, y), vd_set1(points->half_height_px)));
 }
 
-/* The numbers of vector i of a span; returns how many. */
+/* Computes the numbers of vector i of a span; returns how many. */
 TL_INLINE int make_numbers(const point_span *r, const tl_points *points, int i, vd *out)
 {
     const weighed_span *weighed = &r->weighed;
@@ -89,12 +88,12 @@ TL_INLINE int make_numbers(const point_span *r, const tl_points *points, int i, 
     return points->n_rows;
 }
 
-/* The numbers of n pixels of a span from `first` on that show one mesh, after its runs. */
+/* Stores the numbers of n pixels of a span from `first` on, all of one mesh, whose runs are set. */
 TL_INLINE void set_numbers(point_span *r, const tl_points *points, int n_numbers, int first, int n)
 {
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         const vm visible = vm_from_bits(r->weighed.runs.visible[i]);
-        vd numbers[3] = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)}; /* for compilers, which do not know the kind */
+        vd numbers[3] = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)}; /* for compilers, which cannot see the kind */
         if (!vm_any(visible))
             continue;
         make_numbers(r, points, i, numbers);
@@ -105,7 +104,7 @@ TL_INLINE void set_numbers(point_span *r, const tl_points *points, int n_numbers
     }
 }
 
-/* The instances of a span of n pixels, one after the other; the background elsewhere. */
+/* Fills a span of n pixels, instance by instance; the background elsewhere. */
 TL_INLINE void fill_span(point_span *r, span_list *list, const tl_points *points, int n_numbers, const int32_t *ids,
                          int64_t row, int64_t column, int n)
 {
@@ -162,7 +161,7 @@ static void fill_points(const tl_shaded_scene *scene, const tl_window *window, c
                         const int32_t *ids, void *out)
 {
     const int n_numbers = points->kind == TL_POINT_LENGTH ? 1 : points->kind == TL_POINT_FLOW ? 2 : points->n_rows;
-    switch (n_numbers) { /* so that each has a loop of its own */
+    switch (n_numbers) { /* each number has a specialised loop */
     case 1: fill_rows(scene, window, points, 1, ids, out); break;
     case 2: fill_rows(scene, window, points, 2, ids, out); break;
     default: fill_rows(scene, window, points, 3, ids, out);

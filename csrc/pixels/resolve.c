@@ -1,5 +1,5 @@
-/* Resolves MSAA: the colour of a pixel from those of its samples, all with the same weight (a box filter one pixel
- * wide); and the depth of a picture with one depth for all triangles, after the ids have been drawn without any.
+/* Resolves MSAA: averages the colours of the samples of a pixel, all with equal weight (a box filter one pixel wide).
+ * Also sets the depth of a picture with one depth for all triangles, after its ids were drawn without depth.
  * In: the label of each sample, or colours of samples; ids.  Out: colours; a sample with label -1 counts as the old
  * pixel; ids and depth.
  *
@@ -27,7 +27,7 @@ TL_INLINE uint8_t mean_u8(const uint8_t *values, int sample_bits, const tl_trans
     return transfer ? transfer->encode[mean] : (uint8_t)mean;
 }
 
-/* The mean of samples that are weighted by their alpha. */
+/* The mean of samples, weighted by their alpha. */
 TL_INLINE uint8_t weighted_mean_u8(const uint8_t *values, const uint8_t *alpha, int sample_bits,
                                    const tl_transfer *transfer)
 {
@@ -58,14 +58,14 @@ TL_INLINE float weighted_mean_f32(const float *values, const float *alpha, int s
     return (float)(sum / total);
 }
 
-/* One pixel: the colour of sample k stands at colors[k]. */
+/* Averages one pixel; colors[k] points to the colour of sample k. */
 TL_INLINE void mean_pixel_u8(const void *const *colors, int sample_bits, int n_channels, const tl_transfer *transfer,
                              uint8_t *pixel)
 {
     const tl_transfer *light = transfer && transfer->decode ? transfer : NULL;
     const int n_colors = transfer ? transfer->n_channels : 0;
     uint8_t values[TL_MAX_SAMPLES], alpha[TL_MAX_SAMPLES];
-    int differs = 0; /* alpha that differs is not 0 everywhere */
+    int differs = 0; /* if so, the sum of alpha is not 0 */
     if (transfer && transfer->is_straight)
         for (int k = 0; k < 1 << sample_bits; k++) {
             alpha[k] = ((const uint8_t *)colors[k])[n_colors];
@@ -109,7 +109,7 @@ TL_INLINE void mean_pixel(const void *const *colors, int sample_bits, int n_chan
         mean_pixel_f32(colors, sample_bits, n_channels, transfer, pixel);
 }
 
-/* Two sums of up to 2^4 numbers below 256, 16 bits apart, to their means. */
+/* Turns two sums of up to 2^4 bytes, 16 bits apart, into their means. */
 TL_INLINE vi mean_pairs(vi sums, int sample_bits)
 {
     const vi is_odd = vi_and(vi_shift_right(sums, sample_bits), vi_set1(0x00010001));
@@ -117,11 +117,11 @@ TL_INLINE vi mean_pairs(vi sums, int sample_bits)
     return vi_and(vi_shift_right(vi_add(vi_add(sums, half), is_odd), sample_bits), vi_set1(0x00ff00ff));
 }
 
-/* Where the colours of triangles stand, and how those of a pixel's samples are averaged. */
+/* Colours of triangles, and how the samples of a pixel are averaged. */
 typedef struct {
     const char *colors;
     int row_bytes, n_channels, is_u8, sample_bits;
-    int64_t stride; /* from label to label of a pixel */
+    int64_t stride; /* from sample to sample of a pixel */
     const tl_transfer *transfer;
 } mean_source;
 
@@ -135,8 +135,8 @@ TL_ONCE void mean_labels(const mean_source *s, const int32_t *labels, char *pixe
     mean_pixel(own, s->sample_bits, s->n_channels, s->is_u8, s->transfer, pixel);
 }
 
-/* The mean of the bytes of TL_LANES pixels, four a colour; `own` are the old ones.  Lanes in `rest` are weighted by an
- * alpha that differs, and left for others. */
+/* The means of the bytes of TL_LANES pixels of four bytes; `own` are the old pixels.  Lanes in `rest` need weights by
+ * alpha and are not set. */
 TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi own, vm *rest)
 {
     const tl_transfer *transfer = s->transfer;
@@ -147,7 +147,7 @@ TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi
     *rest = is_mixed;
     for (int k = 1; k < 1 << s->sample_bits; k++)
         is_mixed = vm_or(is_mixed, vm_and_not(live, vi_eq(vi_load_masked(live, labels + k * s->stride), first)));
-    if (!vm_any(vm_or(is_mixed, vm_and_not(vm_all(), vi_eq(first, vi_set1(labels[0])))))) /* inside of one triangle */
+    if (!vm_any(vm_or(is_mixed, vm_and_not(vm_all(), vi_eq(first, vi_set1(labels[0])))))) /* within one triangle */
         return labels[0] < 0 ? own : vi_set1(palette[labels[0]]);
     const vm is_drawn = vm_and(live, vi_gt(first, minus_one));
     const vi color = vi_select(is_drawn, vi_gather(is_drawn, palette, first), own);
@@ -166,14 +166,14 @@ TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi
                      vi_or(mean_pairs(even, s->sample_bits), vi_shift_left(mean_pairs(odd, s->sample_bits), 8)), color);
 }
 
-/* Pixels that are looked at as one: inside of a large triangle, and outside of all, every sample has one label. */
+/* Pixels tested together: within a large triangle, and in the background, all their samples have one label. */
 #define MEAN_BLOCK 64
 
 TL_INLINE int block_has_one_label(const mean_source *s, const int32_t *labels)
 {
     const int32_t *last = labels + (((int64_t)1 << s->sample_bits) - 1) * s->stride;
     if (labels[0] != labels[MEAN_BLOCK - 1] || labels[0] != last[0] || labels[0] != last[MEAN_BLOCK - 1])
-        return 0; /* edges are seldom missed here */
+        return 0; /* a cheap test that most edges fail */
     const vi first = vi_set1(labels[0]);
     vi differs = vi_set1(0);
     for (; labels <= last; labels += s->stride)
@@ -182,7 +182,7 @@ TL_INLINE int block_has_one_label(const mean_source *s, const int32_t *labels)
     return !vm_any(vm_and_not(vm_all(), vi_eq(differs, vi_set1(0))));
 }
 
-/* MEAN_BLOCK pixels of one triangle, or none of any. */
+/* Paints MEAN_BLOCK pixels of one triangle; a label < 0 changes nothing. */
 TL_INLINE void paint_block(const mean_source *s, int32_t label, int pixel_bytes, char *pixels)
 {
     if (label < 0)
@@ -200,7 +200,7 @@ TL_INLINE void paint_block(const mean_source *s, int32_t label, int pixel_bytes,
         memcpy(pixels + done, pixels, done);
 }
 
-/* n pixels of n_channels bytes. */
+/* Averages n pixels of n_channels bytes. */
 TL_INLINE void mean_flat_bytes(const mean_source *s, const int32_t *labels, int64_t n, int n_channels, char *pixels)
 {
     for (int64_t i = 0; i < n; i += TL_LANES) {
@@ -230,7 +230,7 @@ TL_INLINE void mean_flat_bytes(const mean_source *s, const int32_t *labels, int6
     }
 }
 
-/* One after the other. */
+/* Averages n pixels one by one. */
 TL_INLINE void mean_flat_pixels(const mean_source *s, const int32_t *labels, int64_t n, char *pixel)
 {
     const int pixel_bytes = s->n_channels * (s->is_u8 ? 1 : 4);
@@ -250,7 +250,6 @@ TL_INLINE void mean_flat_pixels(const mean_source *s, const int32_t *labels, int
     }
 }
 
-/* n pixels with samples in the colours of their triangles; planes of labels lie `stride` apart. */
 static void mean_flat(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette,
                       int n_channels, int is_u8, const tl_transfer *transfer, void *pixels)
 {
@@ -265,7 +264,6 @@ static void mean_flat(const int32_t *labels, int sample_bits, int64_t stride, in
         mean_flat_bytes(&s, labels, n, n_channels, pixels);
 }
 
-/* n pixels from planes of colours that lie `stride` pixels apart. */
 static void mean_colors(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
                         const tl_transfer *transfer, void *pixels)
 {

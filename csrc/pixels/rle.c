@@ -1,9 +1,8 @@
 /* Run lengths of masks and of ids, down the columns as COCO counts them.
- * In: rows of pixels of one or four bytes.  Out: runs of equal pixels; the runs as counts of each object; the
- * counts as text.
+ * In: rows of pixels of one or four bytes.  Out: runs of equal pixels; the counts of each object; the counts as text.
  *
- * A line of cache of each row is compared with the row above it, a word at a time; the rows at which a column changes
- * wait in a list of their own until all rows of the line have been seen, so that each line is read once. */
+ * A cache line of each row is compared with the row above it, a word at a time.  The rows at which a column changes are
+ * listed by column, so that each cache line is read once. */
 #ifndef TL_RLE_C
 #define TL_RLE_C
 
@@ -25,20 +24,22 @@ TL_INLINE int64_t value_at(const tl_run_source *s, int64_t row, int64_t column)
     return value;
 }
 
-/* Adds `row` to the lists of the columns that differ in two words, the first `column` columns into the line. */
+/* Adds `row` to the lists of the columns in which two words differ; `column`: the first column of the words in the
+ * line. */
 TL_INLINE void note_changes(uint64_t differs, int n_bytes, int64_t column, int64_t height, int32_t row, int32_t *rows,
                             int32_t *n_rows)
 {
     const int shift = n_bytes == 1 ? 3 : 5; /* pixels to bits */
     const uint64_t pixel = n_bytes == 1 ? 0xff : 0xffffffff;
     while (differs) {
-        const int first = __builtin_ctzll(differs) >> shift; /* of the word */
+        const int first = __builtin_ctzll(differs) >> shift; /* in the word */
         rows[(column + first) * height + n_rows[column + first]++] = row;
         differs &= ~(pixel << (first << shift));
     }
 }
 
-/* The rows at which each column of a line of n bytes changes, and how many: `rows` has `height` a column. */
+/* Lists the rows at which each column of a line of n bytes changes: `rows` has `height` a column, `n_rows` their
+ * number. */
 static void find_changes(const tl_run_source *s, int64_t first_byte, int64_t n, int32_t *rows, int32_t *n_rows)
 {
     const int64_t a_word = 8 / s->n_bytes;
@@ -64,8 +65,6 @@ static void find_changes(const tl_run_source *s, int64_t first_byte, int64_t n, 
     }
 }
 
-/* Appends the runs of a window, except those of the background, to a table of *n with room for n_room; `rows` has
- * TL_RLE_LINE * height numbers.  Returns whether there was room for all. */
 static int list_column_runs(const tl_run_source *s, int32_t *rows, tl_run *runs, int64_t n_room, int64_t *n)
 {
     const int64_t a_line = TL_RLE_LINE / s->n_bytes;
@@ -93,7 +92,6 @@ static int list_column_runs(const tl_run_source *s, int32_t *rows, tl_run *runs,
     return 1;
 }
 
-/* Counts of objects from n runs in their order: run i is of object[i], of none where that is below 0. */
 static void count_runs(const tl_run *runs, const int32_t *object, int64_t n, const tl_rles *rles)
 {
     memset(rles->n_counts, 0, (size_t)rles->n * sizeof *rles->n_counts);
@@ -103,7 +101,7 @@ static void count_runs(const tl_run *runs, const int32_t *object, int64_t n, con
         if (k < 0)
             continue;
         int64_t *next = rles->counts + rles->starts[k] + rles->n_counts[k];
-        if (rles->n_counts[k] && runs[i].start == rles->ends[k]) { /* goes on at the top of the next column */
+        if (rles->n_counts[k] && runs[i].start == rles->ends[k]) { /* continues at the top of the next column */
             next[-1] += runs[i].end - runs[i].start;
         } else {
             next[0] = runs[i].start - rles->ends[k];
@@ -117,8 +115,8 @@ static void count_runs(const tl_run *runs, const int32_t *object, int64_t n, con
             rles->counts[rles->starts[k] + rles->n_counts[k]++] = rles->n_pixels - rles->ends[k];
 }
 
-/* Counts as text, five bits a character, a sixth that says that more follow: from the fourth count on the difference
- * from the last but one.  The text of object k goes from text_starts[k] to text_starts[k + 1]. */
+/* Text: five bits a character, the sixth bit is set if more follow.  From the fourth count on the number is the
+ * difference from the count two before. */
 static void write_counts(const tl_rles *rles, int64_t *text_starts, uint8_t *text)
 {
     int64_t at = 0;

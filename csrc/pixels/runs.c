@@ -1,15 +1,14 @@
 /* Runs: the parts of a row that one triangle owns, and its coefficients for the pixels, a vector of runs at a time.
- * In: a row of ids, vertex records, attributes of vertices.  Out: coefficients, which reach the pixels by a load and a
- * permutation.
+ * In: a row of ids, vertex records, attributes of vertices.  Out: coefficients of runs; pixels read them by a load and
+ * a permutation.
  *
  * The weight of corner k at a pixel is E_k * q_k, its edge function times 1/w: a value is sum(E_k q_k a_k) / sum(E_k
- * q_k).  E_k is an exact integer, rounded once to float32; nothing depends on where a run, a window or a thread
- * begins.  Edge functions are positive where the front is seen.  So the sum over the normals of the corners points to
- * the viewer, whichever side is seen.
+ * q_k).  E_k is an exact integer, rounded once to float32; no result depends on where a run, a window or a thread
+ * begins.  Edge functions are positive where the front is visible.  So the sum of the normals of the corners points to
+ * the viewer, whichever side is visible.
  *
- * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013; J. F. Blinn, Hyperbolic Interpolation, 1992;
- * M. Olano and T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997 (triangles cut by a clip
- * plane). */
+ * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013; J. F. Blinn, Hyperbolic Interpolation, 1992; M.
+ * Olano and T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997 (clipped triangles). */
 #ifndef TL_RUNS_C
 #define TL_RUNS_C
 
@@ -28,34 +27,34 @@
 #define TL_SPAN 512 /* pixels of a row that are shaded together */
 #define TL_SPAN_ROOM (TL_SPAN + 2 * TL_MAX_LANES)
 
-/* Columns of the picture, from a multiple of this on, that a run of the unsnapped does not leave; a power of two. */
+/* Runs of unsnapped triangles end at columns of the picture that are multiples of it; a power of two. */
 #define TL_RUN_BLOCK 32
 
-/* Twice the area of unsnapped triangles, in the units that their edge functions are integers of. */
+/* Twice the area of unsnapped triangles, in the units of their integer edge functions. */
 #define TL_UNIT_AREA 0x1p24
 
-/* The most that one of their steps to the next column is, in units. */
+/* The largest step of an unsnapped edge function to the next column, in these units. */
 #define TL_MOST_STEP 0x1p36
 
-/* |E| below this stay int32, with the step to anywhere else in the box. */
+/* Edge functions below it stay in int32 all over the box. */
 #define TL_INT32_BOX 0x1p30f
 
-/* Interpolated normals that cancel are shorter: rounding could have made them. */
+/* Shorter interpolated normals have cancelled: they may be rounding errors. */
 #define TL_NO_NORMAL 1e-6f
 
 enum {                                /* coefficients of runs, float32 */
-       RUN_NORMAL = 0,                /* corner by corner, times q; the face's in the first three when flat */
+       RUN_NORMAL = 0,                /* corner by corner, times q; the face normal in the first three when flat */
        RUN_SHORTEST = RUN_NORMAL + 9, /* the squared length below which normals have cancelled */
        RUN_Q = RUN_SHORTEST + 1,
-       RUN_U = RUN_Q + 3, /* times q, as everything that follows */
+       RUN_U = RUN_Q + 3, /* times q, as all up to RUN_GRADIENT */
        RUN_V = RUN_U + 3,
        RUN_COLOR = RUN_V + 3,
        RUN_GRADIENT = RUN_COLOR + 9, /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
-       RUN_REST = RUN_GRADIENT + 6,  /* of the unsnapped: rests of E1 and E2 in the middle of a block, and a column */
-       RUN_ALPHA = RUN_REST + 4,     /* from here on of full materials and holes */
+       RUN_REST = RUN_GRADIENT + 6,  /* unsnapped: rests of E1 and E2 in the middle of a block, and per column */
+       RUN_ALPHA = RUN_REST + 4,     /* from here on for full materials and cut-outs */
        RUN_UV1 = RUN_ALPHA + 3,      /* as RUN_U and RUN_V, of the second set */
        RUN_GRADIENT1 = RUN_UV1 + 6,
-       RUN_TANGENT = RUN_GRADIENT1 + 6, /* of both sets: see set_tangents; not times q */
+       RUN_TANGENT = RUN_GRADIENT1 + 6, /* of both sets: see `set_tangents`; not times q */
        N_TANGENT_FLOATS = 7,
        N_RUN_FLOATS = RUN_TANGENT + 2 * N_TANGENT_FLOATS,
 };
@@ -73,28 +72,27 @@ typedef struct {
     const tl_shading *shading;
     const tl_view *view;
     int32_t first_id;                                               /* the id of triangle 0 */
-    int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
-    int needs_alpha, needs_uv1, needs_tangents[2];                  /* the same; tangents of each set of uv */
-    int needs_more;                                                 /* any of these */
-    /* the light is the grey of srgb.c: per channel the line and the root of its colour */
+    int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether the shading reads it */
+    int needs_alpha, needs_uv1, needs_tangents[2];                  /* whether it reads these; tangents per set of uv */
+    int needs_more;                                                 /* alpha, uv1 or tangents */
+    /* the light is the grey of srgb.c: line and root per channel */
     int is_grey;
     float grey_line[3], grey_root[3];
-    int has_far_texels; /* some are prefetched */
-    int is_plain;       /* edge functions and normals of vertices are all that runs need */
+    int has_far_texels; /* some texels are prefetched */
+    int is_plain;       /* runs need only edge functions and normals of vertices */
     int n_runs, n_special;
     float max_min_length;   /* the largest RUN_SHORTEST of plain runs; INFINITY where runs are not plain */
-    int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
+    int first_run[TL_SPAN]; /* of each vector: the slot after the runs that begin before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
-    /* vectors of runs begin with a cache line: one across two takes twice as long */
+    /* aligned: a vector across two cache lines takes twice as long */
     _Alignas(64) int32_t ints[N_RUN_INTS][TL_SPAN_ROOM];
     _Alignas(64) float floats[N_RUN_FLOATS][TL_SPAN_ROOM];
-    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM]; /* see keep_corners */
+    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM]; /* see `keep_corners` */
     special_run special[TL_SPAN];
 } shade_runs;
 
-/* Lists the runs of n ids from `column` on; run r stands in slot TL_LANES + r.  Ids outside the mesh count as
- * background; runs have those of its triangles.  Runs of the unsnapped end with a block of columns, and know where they
- * begin. */
+/* Lists the runs of n ids from `column` on; run r has slot TL_LANES + r.  Ids outside the mesh count as background.
+ * Runs of unsnapped triangles end with a block of columns, and store the column where they begin. */
 TL_INLINE void list_runs(shade_runs *s, const int32_t *ids, int n, int64_t column, int is_exact)
 {
     const vi first_column = vi_add(vi_iota(), vi_set1((int32_t)column));
@@ -130,10 +128,10 @@ TL_ONCE void find_runs(shade_runs *s, const int32_t *ids, int n, int64_t column)
         list_runs(s, ids, n, column, 0);
 }
 
-/* Three numbers of 32 bits at rows + 3 * i[lane], as columns c[1] to c[3]. */
+/* Loads three numbers of 32 bits at rows + 3 * i[lane], as columns c[1] to c[3]. */
 TL_INLINE void load_triples(const void *rows, const int32_t *i, vi *c)
 {
-    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(i), vi_set1(0)))) { /* 16 bytes, from the number before the row on */
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(i), vi_set1(0)))) { /* loads 16 bytes, from 4 before the row on */
         vi_load_records((const char *)rows - 4, 12, i, c);
         return;
     }
@@ -145,8 +143,8 @@ TL_INLINE void load_triples(const void *rows, const int32_t *i, vi *c)
         c[k + 1] = vi_load(own[k]);
 }
 
-/* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have.
- * Returns the runs that needed none of that. */
+/* Loads the corners of the triangles of TL_LANES runs, clamped to the vertices.  Returns the runs whose corners were
+ * not clamped. */
 TL_INLINE vm run_corners(const shade_runs *s, int slot, vi *corners)
 {
     const vi last = vi_set1((int32_t)s->snapped->mesh.n_vertices - 1), zero = vi_set1(0);
@@ -162,7 +160,7 @@ TL_INLINE vm run_corners(const shade_runs *s, int slot, vi *corners)
 
 TL_INLINE void put(shade_runs *s, int coefficient, int slot, vf a) { vf_store(s->floats[coefficient] + slot, a); }
 
-/* Times q, corner by corner. */
+/* Stores a value times q, corner by corner. */
 TL_INLINE void put_three(shade_runs *s, int first, int slot, const vf *q, vf a0, vf a1, vf a2)
 {
     put(s, first, slot, vf_mul(q[0], a0));
@@ -170,19 +168,20 @@ TL_INLINE void put_three(shade_runs *s, int first, int slot, const vf *q, vf a0,
     put(s, first + 2, slot, vf_mul(q[2], a2));
 }
 
-/* The constants that TL_LANES runs have from their triangles. */
+/* Constants of the triangles of TL_LANES runs. */
 typedef struct {
     _Alignas(64) int32_t corners[3][TL_MAX_LANES];
     vf q[3], normal[3][3], area, col_step[3], row_step[3];
 } run_setup;
 
-/* The step of a value in perspective along a column or a row: the sum of the steps of the weights times the value. */
+/* The derivative of a perspective value along a column or a row: the sum of the steps of the weights times the
+ * value. */
 TL_INLINE vf gradient_of(const vf *step, const vf *value)
 {
     return vf_fma(step[0], value[0], vf_fma(step[1], value[1], vf_mul(step[2], value[2])));
 }
 
-/* A set of uv; its coefficients begin at `first`, those of its gradients at `gradient`. */
+/* Stores a set of uv; its coefficients begin at `first`, those of its gradients at `gradient`. */
 TL_INLINE void set_uv(shade_runs *s, int slot, const run_setup *r, const float *uv, int first, int gradient)
 {
     const vf *q = r->q;
@@ -212,7 +211,7 @@ TL_INLINE void set_face_normals(shade_runs *s, int slot, vf area)
         put(s, RUN_NORMAL + k, slot, vf_select(is_back, vf_sub(zero, vf_of_bits(c[k])), vf_of_bits(c[k])));
 }
 
-/* +1, or -1 where the normals of the vertices point to the other side than the order of the corners. */
+/* 1, or -1 where the normals of the vertices point to the clockwise side. */
 TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
 {
     float side[TL_MAX_LANES];
@@ -221,7 +220,7 @@ TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
     return vf_load(side);
 }
 
-/* The rows of the normals of TL_LANES triangles with corner normals. */
+/* Loads the rows of the corner normals of TL_LANES triangles. */
 TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][TL_MAX_LANES])
 {
     vi c[4];
@@ -230,7 +229,7 @@ TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][T
         vi_spill(rows[k], c[k + 1]);
 }
 
-/* The positions (x, y, z) of TL_LANES vertices, of rows of three float32. */
+/* Loads positions (x, y, z) of TL_LANES vertices from rows of three float32. */
 TL_INLINE void load_positions_f32(const float *positions, const int32_t *vertices, vf *p)
 {
     vi bits[4];
@@ -239,7 +238,7 @@ TL_INLINE void load_positions_f32(const float *positions, const int32_t *vertice
         p[axis] = vf_of_bits(bits[axis + 1]);
 }
 
-/* The positions (x, y, z) of TL_LANES vertices, of rows of float32 or float64, as float64. */
+/* Loads positions (x, y, z) of TL_LANES vertices, rows of float32 or float64, as float64. */
 TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *vertices, vd *p)
 {
     if (!is_f64) {
@@ -250,7 +249,7 @@ TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *
         return;
     }
     const double *rows = positions;
-    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* as in load_triples */
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* see `load_triples` */
         vd row[4];
         vd_load_records(rows - 1, 3, vertices, row);
         for (int axis = 0; axis < 3; axis++)
@@ -265,7 +264,7 @@ TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *
         p[axis] = vd_load(lanes[axis]);
 }
 
-/* 1/w of TL_LANES vertices, as set_inverse_w has it; the source has a matrix. */
+/* 1/w of TL_LANES vertices, equal to that of `set_inverse_w`; the source has a matrix. */
 TL_INLINE vf find_inverse_w(const tl_source *source, const int32_t *vertices)
 {
     if (source->scalar == TL_F32) {
@@ -282,7 +281,7 @@ TL_INLINE vf find_inverse_w(const tl_source *source, const int32_t *vertices)
     return vf_from_vd(vd_div(vd_set1(1.0), vd_add(vd_add(sum, vd_mul(vd_set1(m[2]), p[2])), vd_set1(m[3]))));
 }
 
-/* Normals and q of the corners. */
+/* Loads normals and q of the corners. */
 TL_INLINE void load_normals(const shade_runs *s, int slot, run_setup *r)
 {
     const tl_shading *shading = s->shading;
@@ -301,7 +300,7 @@ TL_INLINE void load_normals(const shade_runs *s, int slot, run_setup *r)
             r->q[k] = find_inverse_w(s->snapped->mesh.source, r->corners[k]);
             continue;
         }
-        if (shading->normal_of_corner && s->snapped->mesh.n_vertices >> 29) { /* places of numbers take 32 bits */
+        if (shading->normal_of_corner && s->snapped->mesh.n_vertices >> 29) { /* offsets exceed 32 bits */
             vi_load_records(shading->normals, 16, r->corners[k], own);
             c[3] = own[3];
         } else if (shading->normal_of_corner) {
@@ -312,8 +311,8 @@ TL_INLINE void load_normals(const shade_runs *s, int slot, run_setup *r)
     }
 }
 
-/* The edges of the triangles of TL_LANES runs from their first corners on, over the longest coordinate of each.
- * A difference of float32 is rounded alike in float32 and, by way of float64, in two steps: 53 bits are 2 * 24 + 2. */
+/* Loads the edges of the triangles of TL_LANES runs from their first corners on, divided by the longest coordinate of
+ * each. A float32 difference is equal whether rounded in float32 or first in float64: 53 bits are 2 * 24 + 2. */
 TL_INLINE void load_edges(const shade_runs *s, const run_setup *r, vf edge[2][3])
 {
     const tl_shading *shading = s->shading;
@@ -345,9 +344,9 @@ TL_INLINE void load_edges(const shade_runs *s, const run_setup *r, vf edge[2][3]
             edge[k][axis] = vf_mul(edge[k][axis], scale);
 }
 
-/* Tangents of TL_LANES triangles: the directions in which u and v grow, over the length of the longer one, and the hand
- * (1: right) that they make with the normal towards the viewer.  All are turned where the other side is lit than that
- * of the normals of the mesh, so that bent normals are turned as a whole.  0 where uv have no area. */
+/* Stores tangents of TL_LANES triangles: the directions in which u and v grow, over the longer length, and the hand (1:
+ * right) that they make with the normal towards the viewer.  All are negated where the side that is lit is not that of
+ * the mesh's normals, so that bent normals turn as a whole.  0 where uv have no area. */
 TL_INLINE void set_tangents(shade_runs *s, int slot, const run_setup *r, const float *uv, vf side, int first)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), minus = vf_set1(-1.0f);
@@ -375,7 +374,7 @@ TL_INLINE void set_tangents(shade_runs *s, int slot, const run_setup *r, const f
     put(s, first + 6, slot, vf_mul(hand, turn));
 }
 
-/* For full materials and holes alone. */
+/* Stores attributes of full materials and cut-outs. */
 static void set_more_attributes(shade_runs *s, int slot, const run_setup *r)
 {
     const tl_shading *shading = s->shading;
@@ -396,7 +395,7 @@ static void set_more_attributes(shade_runs *s, int slot, const run_setup *r)
         }
 }
 
-/* Normals of the corners of TL_LANES runs, weighted, and how short their sum may be. */
+/* Stores the weighted normals of the corners of TL_LANES runs, and the length below which their sum has cancelled. */
 TL_INLINE void put_normals(shade_runs *s, int slot, vf area, const vf *q, const vf (*normal)[3])
 {
     const vf most = vf_mul(vf_mul(area, vf_set1(TL_NO_NORMAL)), vf_max(q[0], vf_max(q[1], q[2])));
@@ -408,7 +407,7 @@ TL_INLINE void put_normals(shade_runs *s, int slot, vf area, const vf *q, const 
     }
 }
 
-/* Everything but edge functions of TL_LANES runs. */
+/* Stores all attributes of TL_LANES runs. */
 TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
 {
     const tl_shading *shading = s->shading;
@@ -434,10 +433,10 @@ TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
         set_more_attributes(s, slot, r);
 }
 
-/* The centre of a pixel in the space of the snapped vertices, seen from the sample. */
+/* The centre of a pixel in sub-pixels; vertices are relative to the sample. */
 static inline double center_fx(int64_t at_px, int bits) { return ((double)at_px + 0.5) * (double)(1 << bits); }
 
-/* Edge functions of a triangle that no clip plane cuts, whatever its size: exact below 2^53. */
+/* Edge functions of a triangle that no clip plane cuts, of any size: exact below 2^53. */
 static void special_edges(special_run *e, const double *x_fx, const double *y_fx, double y, float *row_step)
 {
     double area = 0.0;
@@ -452,8 +451,7 @@ static void special_edges(special_run *e, const double *x_fx, const double *y_fx
     e->area = (float)area;
 }
 
-/* Edge functions of a triangle that a clip plane cuts: from homogeneous corners, with q in the edge functions; the
- * area is +-1. */
+/* Edge functions of a clipped triangle from homogeneous corners, with q included; the area is +-1. */
 static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vertex_set *set, const int32_t *corners,
                               double y, double unit, float *row_step)
 {
@@ -481,8 +479,8 @@ static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vert
     e->area = det < 0.0 ? -1.0f : 1.0f;
 }
 
-/* Edge functions over the area, of vertices that are not snapped, beyond the range of float32.  Of a sliver with a box
- * of more of its areas float64 has lost the weights: it takes the mean of its corners. */
+/* Divides edge functions of unsnapped vertices by the area, beyond the range of float32.  Where a sliver's box is
+ * larger than TL_BOX_AREAS areas, float64 has lost the weights: each is then 1/3. */
 #define TL_BOX_AREAS 0x1p36
 static void normalize_edges(special_run *e, const tl_vertex_set *set, const int32_t *corners, const double *x_fx,
                             const double *y_fx, float *row_step)
@@ -508,7 +506,7 @@ static void normalize_edges(special_run *e, const tl_vertex_set *set, const int3
     e->area = (float)sign;
 }
 
-/* The corners in sub-pixels, seen from the sample. */
+/* The corners in sub-pixels, relative to the sample. */
 static void place_special(const tl_vertex_set *set, const int32_t *corners, double unit, double *x_fx, double *y_fx)
 {
     for (int k = 0; k < 3; k++) {
@@ -522,7 +520,7 @@ static void place_special(const tl_vertex_set *set, const int32_t *corners, doub
     }
 }
 
-/* Sets up one run by itself and puts it into its lane. */
+/* Sets up one special run and stores it in its lane. */
 static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setup *r)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
@@ -575,8 +573,8 @@ TL_INLINE run_origin origin_of_runs(const shade_runs *s, int64_t row)
                         vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx), bits};
 }
 
-/* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: a sum that wraps on the way
- * comes back at the pixel.  Returns the runs that need others; their sum is the area. */
+/* Sets edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: sums that wrap there are
+ * right at the pixel.  Returns the runs that are special; RUN_SUM is the area. */
 TL_INLINE vm find_edges(shade_runs *s, int slot, const run_origin *origin, vi *x, vi *y, vf *col_step, vf *row_step)
 {
     const int bits = origin->bits;
@@ -604,7 +602,7 @@ TL_INLINE vm find_edges(shade_runs *s, int slot, const run_origin *origin, vi *x
     return is_special;
 }
 
-/* The corners of TL_LANES runs in pixels; `corners` are their numbers times 2^shift. */
+/* Loads the corners of TL_LANES runs in pixels; `corners` are indices times 2^shift. */
 TL_INLINE void load_exact_corners(const tl_exact_points *points, const int32_t *corners, int shift, vd *x, vd *y)
 {
     if (points->stride == TL_PLACED) {
@@ -620,11 +618,11 @@ TL_INLINE void load_exact_corners(const tl_exact_points *points, const int32_t *
     *x = vd_load(lanes[0]), *y = vd_load(lanes[1]);
 }
 
-/* A number near column `near` and its step, in units: the nearest integers, which int32 has modulo 2^32, and the
- * rests; as the coefficients of edge k. */
+/* Stores edge function k from its value near column `near` and its step, in units: the nearest integers modulo 2^32,
+ * and the rests. */
 TL_INLINE void put_exact_edge(shade_runs *s, int slot, int k, vd e, vd step, vi near, vd to_middle)
 {
-    const vd integers = vd_set1(0x1.8p52); /* next to it are the integers, and its last bits theirs */
+    const vd integers = vd_set1(0x1.8p52); /* added to it, a number is rounded to an integer in the last bits */
     const vd rounded = vd_add(e, integers), rounded_step = vd_add(step, integers);
     const vd rest = vd_sub(e, vd_sub(rounded, integers)), rest_step = vd_sub(step, vd_sub(rounded_step, integers));
     const vi whole_step = vi_low_bits(rounded_step);
@@ -634,13 +632,13 @@ TL_INLINE void put_exact_edge(shade_runs *s, int slot, int k, vd e, vd step, vi 
     put(s, RUN_REST + 2 * k - 1, slot, vf_from_vd(rest_step));
 }
 
-/* As find_edges, of corners x and y in pixels that are not snapped; returns the area, too.
+/* Like `find_edges`, for corners x and y in pixels that are not snapped; sets the area, too.
  *
  * Edge functions are counted in 2^-24 of twice the area: an integer, exact modulo 2^32 at every column, and a rest,
- * float32, which stays below 17 and errs by less than 2^-20.  The sum of both is rounded once.  Both are found in
- * float64 at the column of the block that is nearest to corner 0, and rests counted from the middle of the block.  So
- * E / area errs by 2^-24 of itself, 2^-44, and the error of float64: less than 2^-50 boxes over areas.  Nothing
- * depends on the window: columns and rows are those of the picture. */
+ * float32, which stays below 17 and errs by less than 2^-20.  The sum of both is rounded once.  Both are computed in
+ * float64 at the column of the block that is nearest to corner 0, and rests from the middle of the block.  So E / area
+ * errs by 2^-24 of itself, 2^-44, and the error of float64: less than 2^-50 boxes over areas.  No result depends on the
+ * window: columns and rows are those of the picture. */
 TL_INLINE vm find_exact_edges(shade_runs *s, int slot, int64_t row, const vd *x, const vd *y, vf *col_step,
                               vf *row_step, vf *area)
 {
@@ -703,11 +701,12 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
     return is_special;
 }
 
-/* With fewer triangles asking saves nothing: shading takes 1.02 times as long with 300,000, 1.1 to 1.2 with 120,000. */
+/* Prefetching saves nothing with fewer triangles: shading takes 1.02 times as long with 300,000, 1.1 to 1.2 with
+ * 120,000. */
 #define TL_FETCHED_TRIANGLES 500000
-#define TL_FETCH_RUNS 32 /* how many runs before its turn the rows of a run's corners are prefetched */
+#define TL_FETCH_RUNS 32 /* runs ahead for which the rows of the corners are prefetched */
 
-/* Indices are not checked yet: addresses, and no pointers. */
+/* Prefetches a row by its address: indices are not checked yet. */
 TL_INLINE void fetch_row(const void *rows, uintptr_t n_bytes, int32_t row)
 {
     __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)row * n_bytes));
@@ -736,7 +735,7 @@ TL_INLINE void fetch_triangles(const shade_runs *s, int first, int end)
     }
 }
 
-/* Asks for the corners of runs [first, end). */
+/* Prefetches the rows of the corners of runs [first, end). */
 TL_INLINE void fetch_corners(const shade_runs *s, int first, int end)
 {
     const tl_shading *shading = s->shading;
@@ -760,8 +759,8 @@ TL_INLINE void fetch_corners(const shade_runs *s, int first, int end)
     }
 }
 
-/* The corners of all runs, times 2^shift.  A pass of its own: numbers stored one by one are not yet there for a
- * vector load, nor the other way round; meanwhile the processor has the next vector of runs. */
+/* Stores the corners of all runs, times 2^shift.  This is a pass by itself because a vector load stalls on numbers that
+ * were just stored one by one. */
 TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
 {
     const int end = TL_LANES + s->n_runs;
@@ -778,7 +777,7 @@ TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
     }
 }
 
-/* Edge functions and attributes of the runs of a row, a vector of them at a time. */
+/* Sets edge functions and attributes of the runs of a row, a vector of runs at a time. */
 TL_INLINE void set_any_runs(shade_runs *s, int64_t row, int fetches)
 {
     const int end = TL_LANES + s->n_runs;
@@ -801,7 +800,7 @@ TL_INLINE void set_any_runs(shade_runs *s, int64_t row, int fetches)
     }
 }
 
-/* Corner k of TL_LANES runs.  Compilers leave a loop over three of them rolled, and x and y in memory. */
+/* Loads corner k of TL_LANES runs.  Compilers leave a loop over three corners rolled, with x and y in memory. */
 TL_INLINE void load_plain_corner(const shade_runs *s, int slot, int k, vi *x, vi *y)
 {
     vi c[4];
@@ -809,7 +808,7 @@ TL_INLINE void load_plain_corner(const shade_runs *s, int slot, int k, vi *x, vi
     x[k] = c[0], y[k] = c[1];
 }
 
-/* Normal and q of corner k of TL_LANES runs. */
+/* Loads normal and q of corner k of TL_LANES runs. */
 TL_INLINE vf load_plain_normal(const shade_runs *s, int slot, int k, vf *normal)
 {
     vi c[4];
@@ -829,8 +828,8 @@ TL_INLINE float largest_lane(vf a)
     return most;
 }
 
-/* Sets up runs that need no more than normals of vertices: 0 if one of them is special.  Passes of few
- * operations, so that those of several vectors of runs overlap. */
+/* Sets up runs that need only normals of vertices; 0 if a run is special.  The passes are short, so that several
+ * vectors of runs overlap. */
 TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
 {
     const int end = TL_LANES + s->n_runs;
@@ -873,7 +872,7 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
     return 1;
 }
 
-/* Prepares the runs of a row. */
+/* Sets up the runs of a row. */
 TL_ONCE void set_runs(shade_runs *s, int64_t row)
 {
     const tl_shading *shading = s->shading;
@@ -883,7 +882,7 @@ TL_ONCE void set_runs(shade_runs *s, int64_t row)
     s->max_min_length = INFINITY;
     if (!s->n_runs)
         return;
-    /* the rest of the last vector: a triangle that is there */
+    /* fills the last vector with a valid triangle */
     vi_store(s->ints[RUN_ID] + end, vi_set1(s->ints[RUN_ID][end - 1]));
     if (!s->is_plain || !(is_exact ? set_plain_runs(s, row, fetches, 1) : set_plain_runs(s, row, fetches, 0)))
         set_any_runs(s, row, fetches);
@@ -892,10 +891,10 @@ TL_ONCE void set_runs(shade_runs *s, int64_t row)
             s->ints[RUN_MATERIAL][slot] = shading->material_of[s->ints[RUN_ID][slot]];
 }
 
-/* A vector of pixels: the runs of its lanes, and the quantity to show. */
+/* A vector of pixels: the runs of its lanes, and the interpolated attributes. */
 typedef struct {
     const shade_runs *s;
-    int first;  /* the slot of the run that lane 0 belongs to, or of the first one behind it */
+    int first;  /* the slot of lane 0's run; of the next run if lane 0 has none */
     vi run;     /* of each lane, from `first` on */
     vm visible; /* lanes that show a triangle */
     vi column;  /* in the window */
@@ -905,7 +904,7 @@ typedef struct {
     vf color[3]; /* of the vertices */
     vf uv[2], du[2], dv[2];
     vf ray[3], point[3];
-    /* of full materials and holes: */
+    /* of full materials and cut-outs: */
     vf alpha; /* of the vertices */
     vf uv1[2], du1[2], dv1[2];
     vf opacity; /* of the surface */
@@ -926,8 +925,7 @@ TL_INLINE vf weighed(const shaded_lanes *p, int c0, int c1, int c2)
     return vf_fma(p->e[0], pick(p, c0), vf_fma(p->e[1], pick(p, c1), vf_mul(p->e[2], pick(p, c2))));
 }
 
-/* The lanes of vector i of the span that begins at `column`, and their edge functions; except those of special
- * runs. */
+/* Sets the runs and the edge functions of vector i of the span that begins at `column`; not those of special runs. */
 TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column, vi *e, vi *sum)
 {
     const unsigned starts = s->starts[i];
@@ -943,7 +941,7 @@ TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t c
     e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
 }
 
-/* Adds the constants of edge functions of vertices that are not snapped. */
+/* Sets the rests of edge functions of vertices that are not snapped. */
 TL_INLINE void find_rests(const shaded_lanes *p, vf *rest)
 {
     const vi in_block = vi_set1((int32_t)(p->s->window->x_px & (TL_RUN_BLOCK - 1))), last = vi_set1(TL_RUN_BLOCK - 1);
@@ -958,8 +956,8 @@ TL_INLINE void find_rests(const shaded_lanes *p, vf *rest)
 typedef struct {
     vd x_fx; /* of the pixels */
     vi special;
-    int32_t number[TL_MAX_LANES]; /* the same, lane by lane */
-    vm rest;                      /* lanes with their runs still to come */
+    int32_t number[TL_MAX_LANES]; /* `special`, lane by lane */
+    vm rest;                      /* lanes whose runs are not processed yet */
     const special_run *run;
 } special_lanes;
 
@@ -973,7 +971,7 @@ TL_INLINE special_lanes start_special(const shaded_lanes *p, vi special)
     return own;
 }
 
-/* Takes the next run; returns its lanes, none behind the last one. */
+/* Steps to the next special run; returns its lanes, none after the last run. */
 TL_INLINE vm next_special(const shaded_lanes *p, special_lanes *own)
 {
     if (!vm_any(own->rest))

@@ -1,8 +1,8 @@
-/* Slopes: the changes of vertices' values from pixel to pixel, along x and along y.
+/* Slopes: the derivatives of vertices' values along x and along y, per pixel.
  * In: ids, weights of pixels, and the slopes of the weights of each visible triangle.  Out: float32.
  *
- * The weights of a pixel are l / (l0 + l1 + l2) with l linear in x and y, and the sum is 1/w:
- * d weight = w (d l - weight d sum).  All is float64, rounded once at the end. */
+ * The weights of a pixel are l / (l0 + l1 + l2) with l linear in x and y, and the sum is 1/w: d weight = w (d l -
+ * weight d sum).  All is float64, rounded once at the end. */
 #ifndef TL_SLOPES_C
 #define TL_SLOPES_C
 
@@ -19,7 +19,6 @@ TL_INLINE void slopes_of_weights(const double *steps, int axis, double w, const 
         slopes[k] = w * (steps[3 * k + axis] - (double)weights[k] * sum);
 }
 
-/* (n, n_values, 2) numbers; 0 where nothing shows. */
 static void fill_slopes(const tl_sloped *s, const int32_t *ids, const float *weights, int64_t n, float *out)
 {
     const int64_t n_values = s->n_values;

@@ -1,5 +1,6 @@
-/* Split: lists the pixels that show several triangles; all others show that of their first sample.
- * In: ids and depth of each sample of a band of rows.  Out: the columns of such pixels, the ids and depths of their
+/* Split: lists the pixels whose samples show different triangles; all other pixels show the triangle of their first
+ * sample.
+ * In: ids and depth of each sample of a band of rows.  Out: the columns of split pixels, the ids and depths of their
  * samples; from these the ids of every pixel. */
 #ifndef TL_SPLIT_C
 #define TL_SPLIT_C
@@ -10,7 +11,6 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* Lists those of `seen` from place `at` on, which has room for a vector more than there are; returns where they end. */
 static int64_t split_pixels(const tl_seen_samples *seen, const tl_split *split, int64_t at)
 {
     const int n_others = (1 << seen->sample_bits) - 1;
@@ -42,7 +42,6 @@ static int64_t split_pixels(const tl_seen_samples *seen, const tl_split *split, 
     return at;
 }
 
-/* Writes the ids of rows that sample k, not the first, sees. */
 static void spread_ids(const tl_split *split, int k, int64_t n_rows, int64_t width, const int32_t *first_ids,
                        int32_t *ids)
 {

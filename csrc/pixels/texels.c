@@ -1,9 +1,9 @@
-/* Texels: an array of values looked up at (u, v), between its texels, and in halvings where these are smaller than a
- * pixel.
- * In: float32 values of any number of channels, coordinates of pixels and how fast they change.  Out: float32.
+/* Texels: an array of values sampled at (u, v), between its texels, and in mipmap levels where texels are smaller than
+ * a pixel.
+ * In: float32 values of any number of channels, coordinates of pixels and their derivatives.  Out: float32.
  *
- * Positions and weights are float64, and so are the sums, rounded once at the end.  shade/texture.c does the same for
- * pictures of four channels, with vectors of pixels.
+ * Positions and weights are float64, and so are the sums, rounded once at the end.  shade/texture.c samples pictures of
+ * four channels, with vectors of pixels.
  *
  * Based on: L. Williams, Pyramidal Parametrics, 1983; P. Heckbert, Fundamentals of Texture Mapping and Image Warping,
  * 1989 (the footprint of a pixel from derivatives). */
@@ -17,7 +17,7 @@
 #include "shading.h"
 #include "lanes/lanes.h"
 
-/* Beyond these a float64 has no fraction; the texel of NaN is the first. */
+/* A larger float64 has no fraction; NaN maps to texel 0. */
 #define TL_LAST_FRACTION 0x1p52
 
 /* The largest integer not above a. */
@@ -48,7 +48,7 @@ TL_INLINE double log2_of(double a)
     return (double)exponent + t * sum * 2.8853900817779268; /* 2 / ln 2 */
 }
 
-/* Where a coordinate lies within the array, 0 to 1; clamped ones stay as they are. */
+/* Folds a coordinate into the array, 0 to 1; a clamped coordinate is returned as it is. */
 TL_INLINE double folded_to_array(double a, tl_wrap wrap)
 {
     if (wrap == TL_WRAP_CLAMP)
@@ -62,7 +62,7 @@ TL_INLINE double folded_to_array(double a, tl_wrap wrap)
     return wrap == TL_WRAP_MIRROR && a > 1.0 ? 2.0 - a : a;
 }
 
-/* Which of n texels an index of a folded coordinate means. */
+/* The texel, of n, of an index of a folded coordinate. */
 TL_INLINE int64_t wrapped(int64_t index, int64_t n, tl_wrap wrap)
 {
     if (index < 0)
@@ -72,7 +72,7 @@ TL_INLINE int64_t wrapped(int64_t index, int64_t n, tl_wrap wrap)
     return index;
 }
 
-/* The two texels of an axis next to a point, and the share of the second. */
+/* The two texels of an axis next to a point, and the share of the second texel. */
 typedef struct {
     int64_t first, second;
     double share;
@@ -103,7 +103,7 @@ TL_INLINE void add_level(const tl_levels *t, int level, double u, double v, doub
     }
 }
 
-/* How many halvings down the texels are as large as a pixel: log2 of the longer side of its footprint. */
+/* The mipmap level at which texels are as large as a pixel: log2 of the longer side of its footprint. */
 TL_INLINE double level_of(const tl_levels *t, const float *slopes)
 {
     const double width = (double)t->rows[1], height = (double)t->rows[2], last = (double)(t->n_levels - 1);
@@ -113,7 +113,7 @@ TL_INLINE double level_of(const tl_levels *t, const float *slopes)
         const double square = x * x + y * y;
         longer = square > longer ? square : longer;
     }
-    if (!(longer > 1.0)) /* larger texels; or no numbers */
+    if (!(longer > 1.0)) /* larger texels, or NaN */
         return 0.0;
     const double level = longer < 0x1p1000 ? 0.5 * log2_of(longer) : last;
     return level < last ? level : last;
@@ -122,7 +122,7 @@ TL_INLINE double level_of(const tl_levels *t, const float *slopes)
 /* Channels that are summed at a time. */
 #define TL_MAX_SUMS 16
 
-/* One pixel; v from the top down. */
+/* Samples one pixel; v from the top down. */
 TL_INLINE void look_up_one(const tl_levels *t, double u, double v, const float *slopes, float *out)
 {
     u = folded_to_array(u, t->wrap_u), v = folded_to_array(v, t->wrap_v);
@@ -147,7 +147,6 @@ TL_INLINE void look_up_one(const tl_levels *t, double u, double v, const float *
     }
 }
 
-/* (n, n_channels) values; the background where nothing shows.  `slopes` (n, 2, 2) is read where there are halvings. */
 static void fill_texels(const tl_levels *t, const int32_t *ids, const float *uv, const float *slopes, float background,
                         int64_t n, float *out)
 {
@@ -161,14 +160,13 @@ static void fill_texels(const tl_levels *t, const int32_t *ids, const float *uv,
     }
 }
 
-/* Which level n pixels look at, from 0 to the last. */
 static void levels_seen(const tl_levels *t, const float *slopes, int64_t n, double *out)
 {
     for (int64_t i = 0; i < n; i++)
         out[i] = level_of(t, slopes + 4 * i);
 }
 
-/* The texels of an axis that texel i of its halving is the mean over, and their weights: 1 to 3 of them. */
+/* The texels of an axis that texel i of the next level is the mean of, and their weights: 1 to 3 texels. */
 typedef struct {
     int64_t first;
     int n;
@@ -185,7 +183,7 @@ TL_INLINE halving halving_of(int64_t i, int64_t n)
     return (halving){2 * i, 3, {whole * ((m - (double)i) / m), whole, whole * ((double)(i + 1) / m)}};
 }
 
-/* Rows [first, end) of the halving of a level: the mean over its area.  No side is below 1. */
+/* `out` is the mean over the area of a texel.  No side is below 1. */
 static void halve_rows(const float *level, int64_t width, int64_t height, int n_channels, int64_t first, int64_t end,
                        float *out)
 {

@@ -1,10 +1,9 @@
-/* Weights: those of the three corners at the pixels of a visibility buffer, in float64, a vector of pixels at a time.
+/* Weights of the three corners at the pixels of a visibility buffer, in float64, a vector of pixels at a time.
  * In: ids, the mesh they were drawn from.  Out: barycentric weights, or values of the vertices.
  *
- * The bits are those of weights_of_pixel: edge functions are integers below 2^53, so float64 has them exactly, and
- * every operation after that is the same.  The rest is left to weights_of_pixel itself, pixel by pixel:
- * triangles that a clip plane cuts, coordinates beyond 2^30, boxes beyond 2^52, and 1/w that vd_quotients might not
- * take. */
+ * The bits equal those of `weights_of_pixel`: edge functions are integers below 2^53, exact in float64, and all later
+ * operations are equal.  `weights_of_pixel` computes the rest pixel by pixel: triangles that a clip plane cuts,
+ * coordinates beyond 2^30, boxes beyond 2^52, and 1/w outside the range of vd_quotients. */
 #ifndef TL_WEIGHTS_C
 #define TL_WEIGHTS_C
 
@@ -21,21 +20,21 @@
 #include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 
-#define TL_ALONE -1 /* RUN_SPECIAL of a run that is left to weights_of_pixel */
+#define TL_ALONE -1 /* RUN_SPECIAL of a run that `weights_of_pixel` computes */
 #define TL_FLOAT64_BOX 0x1p52
 #define TL_MAX_INV_W 0x1p200
 
 typedef struct {
     shade_runs runs;
     resolve_state alone;
-    int n_alone;                                      /* runs that are left to weights_of_pixel */
+    int n_alone;                                      /* runs that `weights_of_pixel` computes */
     int has_w;                                        /* whether w differs from vertex to vertex */
-    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM];    /* by run: of vertices that are there */
+    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM];    /* by run: of vertices that exist */
     _Alignas(64) double q[3][TL_SPAN_ROOM];           /* 1/w of the corners, by run */
     _Alignas(64) double w[3][TL_SPAN + TL_MAX_LANES]; /* the weights of the pixels of the span */
 } weighed_span;
 
-/* Weights of nothing yet. */
+/* Starts without a mesh. */
 static void start_weights(weighed_span *r, const tl_window *window)
 {
     r->runs.window = window, r->runs.shading = NULL;
@@ -44,7 +43,7 @@ static void start_weights(weighed_span *r, const tl_window *window)
     memset(r->corners, 0, sizeof r->corners);
 }
 
-/* Weights in triangles of a mesh from now on, the first of which is called first_id. */
+/* Sets the mesh whose triangles are weighed; the id of triangle 0 is first_id. */
 static void weigh_mesh(weighed_span *r, const tl_snapped *snapped, int32_t first_id)
 {
     const tl_source *source = snapped->mesh.source;
@@ -53,7 +52,7 @@ static void weigh_mesh(weighed_span *r, const tl_snapped *snapped, int32_t first
     r->has_w = snapped->mesh.inv_w || (source && !(source->matrix && source->is_affine));
 }
 
-/* How a run that int32 does not hold is to be weighed. */
+/* RUN_SPECIAL of a run that does not fit int32: float64 edge functions, or TL_ALONE. */
 static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
@@ -74,7 +73,7 @@ static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
     return e->area == 0.0f ? TL_ALONE : s->n_special + 1;
 }
 
-/* How a run of vertices that are not snapped is to be weighed: float64 where each weight is then within 2^-30. */
+/* RUN_SPECIAL of a run of unsnapped vertices: float64 if each weight is then within 2^-30, else TL_ALONE. */
 static int32_t weigh_exact_run(weighed_span *r, int slot, const int32_t *corners, int64_t row)
 {
     shade_runs *s = &r->runs;
@@ -83,7 +82,7 @@ static int32_t weigh_exact_run(weighed_span *r, int slot, const int32_t *corners
     double x_fx[3], y_fx[3], area;
     float row_step[3];
     exact_point p[3];
-    if (set->sample_x_fx || set->sample_y_fx) /* moves vertices by a rounded number */
+    if (set->sample_x_fx || set->sample_y_fx) /* it would move vertices by a rounded number */
         return TL_ALONE;
     for (int k = 0; k < 3; k++)
         p[k] = point_of(set->exact, corners[k]);
@@ -111,8 +110,8 @@ TL_INLINE void load_inverse_w(const tl_vertex_set *set, const int32_t *vertices,
             q[lane] = inverse_w(set, vertices[lane]);
 }
 
-/* The corners of runs and their 1/w: in a pass of its own, as numbers stored one by one are not yet there for
- * vectors. */
+/* Loads the corners of runs and their 1/w.  This is a pass by itself because a vector load stalls on numbers that were
+ * just stored one by one. */
 TL_INLINE void load_run_corners(weighed_span *r)
 {
     shade_runs *s = &r->runs;
@@ -134,13 +133,13 @@ TL_INLINE void load_run_corners(weighed_span *r)
     }
 }
 
-/* Prepares the runs of a row. */
+/* Sets up the runs of a row. */
 TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
 {
     shade_runs *s = &r->runs;
     const vd most = vd_set1(TL_MAX_INV_W), least = vd_set1(1.0 / TL_MAX_INV_W);
     s->n_special = r->n_alone = 0;
-    if (s->n_runs) /* the rest of the last vector: a triangle that is there */
+    if (s->n_runs) /* fills the last vector with a valid triangle */
         vi_store(s->ints[RUN_ID] + TL_LANES + s->n_runs, vi_set1(s->ints[RUN_ID][TL_LANES + s->n_runs - 1]));
     load_run_corners(r);
     for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
@@ -169,7 +168,7 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
     }
 }
 
-/* Edge functions of the lanes with float64 runs. */
+/* Sets the edge functions of the lanes with float64 runs. */
 static void set_float64_edges(const shaded_lanes *p, vi special, vd *e, vm *is_back)
 {
     const vd zero = vd_set1(0.0);
@@ -184,8 +183,7 @@ static void set_float64_edges(const shaded_lanes *p, vi special, vd *e, vm *is_b
     }
 }
 
-/* Weights of the lanes with runs that are left to weights_of_pixel; lanes of a missing triangle cease to be
- * visible. */
+/* Sets the weights of the lanes with TL_ALONE; lanes of a triangle that no longer exists become invisible. */
 static void set_lonely_weights(weighed_span *r, const shaded_lanes *p, vi special, int64_t row, int i)
 {
     const tl_window *window = r->runs.window;
@@ -207,8 +205,8 @@ static void set_lonely_weights(weighed_span *r, const shaded_lanes *p, vi specia
     }
 }
 
-/* The weights of vector i of a span.  They are summed up in the order of corners that makes the area positive, as
- * weights_of_pixel has them. */
+/* Sets the weights of vector i of a span.  They are summed in the order of corners that makes the area positive, as in
+ * `weights_of_pixel`. */
 TL_INLINE void weigh_lanes(weighed_span *r, int i, int64_t column, int64_t row)
 {
     const shade_runs *s = &r->runs;
@@ -234,7 +232,7 @@ TL_INLINE void weigh_lanes(weighed_span *r, int i, int64_t column, int64_t row)
         set_lonely_weights(r, &p, special, row, i);
 }
 
-/* The runs of n ids of a row, and the weights of the pixels that they show. */
+/* Lists the runs of n ids of a row, and sets the weights of their visible pixels. */
 TL_ONCE void weigh_span(weighed_span *r, const int32_t *ids, int n, int64_t row, int64_t column)
 {
     find_runs(&r->runs, ids, n, column);
@@ -244,7 +242,7 @@ TL_ONCE void weigh_span(weighed_span *r, const int32_t *ids, int n, int64_t row,
             weigh_lanes(r, i, column, row);
 }
 
-/* Writes n pixels, up to TL_LANES: n_channels numbers, `step` apart from pixel to pixel. */
+/* Writes n <= TL_LANES pixels: n_channels numbers each, `step` apart from pixel to pixel. */
 TL_INLINE void store_channels(float *restrict out, int64_t step, int n, const vf *channels, int n_channels)
 {
     if (n == TL_LANES && step == n_channels && n_channels < 4) {
@@ -285,14 +283,14 @@ static void barycentric(const tl_snapped *snapped, const tl_window *window, cons
         }
 }
 
-/* The input of `interpolate`. */
+/* The values that `interpolate` reads. */
 typedef struct {
     const float *rows; /* (n_vertices, n_values), or (n_triangles, 3, n_values) */
     int n_values, per_corner;
     float background;
 } vertex_values;
 
-/* The values of the corners of runs, n_channels from `first` on, into the coefficients 3 c + k. */
+/* Loads the values of the corners of runs, n_channels from `first` on, into the coefficients 3 c + k. */
 TL_INLINE void load_values(weighed_span *r, const vertex_values *values, int first, int n_channels)
 {
     shade_runs *s = &r->runs;
@@ -314,7 +312,7 @@ TL_INLINE void load_values(weighed_span *r, const vertex_values *values, int fir
         }
 }
 
-/* n_channels of the pixels of a span. */
+/* Interpolates n_channels at the pixels of a span. */
 TL_INLINE void interpolate_span(weighed_span *r, const vertex_values *values, int first, int n_channels, int n,
                                 float *out)
 {
@@ -367,7 +365,7 @@ static void interpolate(const tl_snapped *snapped, const tl_window *window, cons
         }
 }
 
-/* 1/w of vertices [first, end), as inverse_w has it. */
+/* The bits equal those of `inverse_w`. */
 static void inverse_ws(const tl_source *source, int64_t first, int64_t end, double *restrict out)
 {
     int64_t i = first;

@@ -1,9 +1,9 @@
-/* Exact weights: those of the three corners of one pixel, from vertices that are not snapped.
+/* Exact weights of the three corners at one pixel, from vertices that are not snapped.
  * In: a triangle's id and the points it was drawn from.  Out: edge functions in proportion, float64.
  *
- * A float64 edge function is taken where its error bound is below 2^-32 of it; elsewhere, near an edge and of slivers,
- * one that is exact to 2^-50.  So each weight is within 2^-30 of its own size, however far apart the w are.  weights.c
- * and paint.c do without where has_float_weights says that plain float64 gives weights within 2^-38 of 1. */
+ * A float64 edge function is used where its error bound is below 2^-32 of it; elsewhere, near an edge and for slivers,
+ * an edge function that is exact to 2^-50.  So each weight is within 2^-30 of its own size, however much w differs.
+ * weights.c and paint.c use plain float64 where `has_float_weights` proves weights within 2^-38 of 1. */
 #ifndef TL_WEIGHTS_EXACT_C
 #define TL_WEIGHTS_EXACT_C
 
@@ -15,15 +15,15 @@
 #include "exact/pieces.c"
 #include "exact/sign.c"
 
-/* Where a pixel is looked at. */
+/* The position of the sample of a pixel. */
 TL_INLINE exact_point sample_of(const tl_vertex_set *set, int64_t x_px, int64_t y_px, int bits)
 {
     const double unit = 1.0 / (double)(1 << bits);
     return (exact_point){(double)x_px + 0.5 + set->sample_x_fx * unit, (double)y_px + 0.5 + set->sample_y_fx * unit};
 }
 
-/* Whether float64 edge functions over the area are weights within 2^-38: not of slivers, nor where products leave the
- * range.  *area is then twice the area, within 2^-38 of its size. */
+/* Whether float64 edge functions over the area are weights within 2^-38: not for slivers, nor where products overflow.
+ * *area is then twice the area, within 2^-38 of its size. */
 static int has_float_weights(const exact_point *p, double *area)
 {
     const double x1 = p[1].x - p[0].x, y1 = p[1].y - p[0].y, x2 = p[2].x - p[0].x, y2 = p[2].y - p[0].y;
@@ -34,7 +34,7 @@ static int has_float_weights(const exact_point *p, double *area)
     return box < 0x1p100 && box > 0x1p-100 && fabs(*area) * 0x1p12 >= box;
 }
 
-/* Whether a sample lies in a triangle of either turn. */
+/* Whether a sample lies in a triangle of either winding. */
 static int holds(const exact_point *p, exact_point sample)
 {
     tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
@@ -43,7 +43,7 @@ static int holds(const exact_point *p, exact_point sample)
     return sign && is_inside(turned, sample, TL_TEST_SAMPLE, &counts);
 }
 
-/* The piece of a triangle that holds a sample, -1 if none does. */
+/* The piece of a triangle that holds a sample, or -1; sets its corners. */
 static int64_t piece_at(const tl_pieces *pieces, int64_t id, exact_point sample, exact_point *corners)
 {
     const int64_t n = pieces ? pieces->n_pieces : 0;
@@ -57,7 +57,7 @@ static int64_t piece_at(const tl_pieces *pieces, int64_t id, exact_point sample,
     return -1;
 }
 
-/* The edge functions opposite the corners, all by one power of two, which makes them numbers near 1. */
+/* The edge functions opposite the corners, all scaled by one power of two to numbers near 1. */
 static void scaled_edges(const exact_point *corners, exact_point s, double *e)
 {
     scaled_number found[3];

@@ -1,4 +1,4 @@
-/* The weights of one pixel, of any triangle whatever.  weights.c has the same a vector of pixels at a time.
+/* The weights of the corners at one pixel, for any triangle.  weights.c computes vectors of pixels.
  * In: a triangle's id and the vertex records it was drawn from.  Out: barycentric weights, float64. */
 #ifndef TL_WEIGHTS_ONE_C
 #define TL_WEIGHTS_ONE_C
@@ -14,14 +14,14 @@
 #include "exact/sign.c"
 #include "pixels/weights_exact.c"
 
-/* The triangle (or piece) under the last pixel: neighbours mostly share it. */
+/* The triangle or piece at the last pixel: neighbours mostly share it. */
 typedef struct {
-    int64_t id; /* -1: none yet */
+    int64_t id; /* -1: empty */
     tl_triangle triangle;
     const double *piece[3]; /* weights of a piece's corners in the source triangle, or NULL */
     double inv_w[3];
-    int slot[3]; /* which of the input triangle's corners each turned corner is */
-    /* instead of `triangle` where vertices are not snapped: the mesh's own, and the corners, which are not turned */
+    int slot[3]; /* the input triangle's corner of each corner, which may be reordered */
+    /* unsnapped, instead of `triangle`: the mesh's vertices, and the corners, not reordered */
     const tl_vertex_set *exact;
     exact_point points[3];
 } resolve_state;
@@ -62,7 +62,7 @@ static int load_resolved(resolve_state *s, const tl_vertex_set *set, const int32
     return 1;
 }
 
-/* As find_triangle, of vertices that are not snapped. */
+/* `find_triangle` for vertices that are not snapped. */
 static int find_exact(resolve_state *s, const tl_snapped *snapped, int64_t id, const int32_t *corners, int64_t x_px,
                       int64_t y_px, int bits)
 {
@@ -88,7 +88,7 @@ static int find_exact(resolve_state *s, const tl_snapped *snapped, int64_t id, c
     return 1;
 }
 
-/* Makes `s` describe the triangle or piece that shows at the pixel; 0 when the buffer does not belong to the mesh. */
+/* Loads the triangle or piece that the pixel shows into `s`; 0 when the buffer does not belong to the mesh. */
 static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id, int64_t x_px, int64_t y_px, int bits)
 {
     if (id == s->id && !s->piece[0])
@@ -127,7 +127,7 @@ static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id
     return 0;
 }
 
-/* The edge functions opposite the corners of the triangle or piece, of either turn, in proportion. */
+/* The edge functions opposite the corners of the triangle or piece, of either winding, in proportion. */
 static void edges_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, double *e)
 {
     if (s->exact) {
