@@ -5,29 +5,29 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define TL_POLYGON_PAD 16                   /* points behind the last one, which may be read */
+#define TL_POLYGON_PAD 16                   /* points after the last point, which may be read */
 #define TL_POLYGON_LIMIT ((int64_t)1 << 60) /* of |x_fx| and |y_fx| */
-#define TL_NARROW_POLYGON (1 << 24)         /* of those that lanes take */
+#define TL_NARROW_POLYGON (1 << 24)         /* |x_fx|, |y_fx| of narrow points, which lanes process */
 
 /* Polygons of rings.  Coordinates count 2^-bits pixels from the upper left corner of the window, bits >= 1.  A point
- * that is not narrow has x_fx = INT32_MIN, and then all points stand in wide_fx as well. */
+ * that is not narrow has x_fx = INT32_MIN; wide_fx then has all points. */
 typedef struct {
     const int32_t *x_fx, *y_fx; /* (n_points + TL_POLYGON_PAD,) */
     const int64_t *wide_fx;     /* (n_points, 2), or NULL */
-    const int64_t *rings;       /* (n_rings + 1,): ring k has the points [rings[k], rings[k + 1]), and closes itself */
+    const int64_t *rings;       /* (n_rings + 1,): ring k has the points [rings[k], rings[k + 1]), then closes */
     const int64_t *polygons;    /* (n_polygons + 1,): polygon i has the rings [polygons[i], polygons[i + 1]) */
     const uint8_t *is_wide;     /* (n_polygons,): some point is not narrow */
     const int8_t *weights;      /* (n_rings,): the factor of a ring's signed area, -1, 0 or 1; see `certify_polygons` */
-    const uint8_t *is_simple;   /* (n_polygons,): the weights are right; otherwise pixels are resolved one by one */
+    const uint8_t *is_simple;   /* (n_polygons,): the weights are valid; otherwise pixels are resolved one by one */
     int64_t n_polygons;
     int bits;
     int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
-    int64_t *crossings_left;          /* of all threads: how often rings may cross, see slabs.c */
+    int64_t *crossings_left;          /* shared by all threads: how often rings may cross, see slabs.c */
     struct tl_pause *pause;           /* of this call, or NULL: the picture is drawn to its end */
 } tl_polygons;
 
-/* The pixels [left, right) x [top, bottom) that a polygon reaches into, cut off at the window. */
+/* The pixels [left, right) x [top, bottom) that a polygon reaches, clipped to the window. */
 typedef struct {
     int32_t left, top, right, bottom;
 } tl_polygon_box;
@@ -36,7 +36,7 @@ typedef enum { TL_POLYGON_CENTER = 0, TL_POLYGON_OUTER = 1, TL_POLYGON_INNER = 2
 
 #define TL_SPAN_WAIT 256
 
-/* Scratch of labels: no bytes of it mean anything between two calls. */
+/* Scratch of labels; its contents do not matter between two calls. */
 #define TL_LABEL_EDGES 4096
 #define TL_LABEL_ROWS 1024
 #define TL_LABEL_ROOM 65536
@@ -49,20 +49,20 @@ typedef struct {
     int32_t n_waiting[2], now;
 } tl_label_scratch;
 
-/* Rows of cells that are computed at a time for polygons of many edges, and cells a row. */
+/* Rows of cells that are computed at a time for polygons of many edges; and cells in a row. */
 #define TL_CELL_ROWS 64
 static inline int64_t tl_polygon_stride(int64_t width) { return (width + 128) / 64 * 64; }
 
 /* The part of an edge in one row, from its upper to its lower end. */
 typedef struct {
-    double x, slope, length; /* px right of column `col` at the upper end, px a px of y, px from end to end along x */
+    double x, slope, length; /* px right of column `col` at the upper end; d x / d y; px from end to end along x */
     double ya, yb;           /* px from the top of the row */
     int64_t col;
-    int32_t ta, tb; /* the same as ya, yb in sub-pixels */
+    int32_t ta, tb; /* ya, yb in sub-pixels */
     int32_t sign;   /* 1 downwards, -1 upwards */
 } tl_edge_piece;
 
-/* Where pieces wait to be resolved. */
+/* Scratch of pieces to be resolved. */
 #define TL_PIECE_WORDS 31
 typedef struct {
     tl_edge_piece *pieces; /* (n_pieces,), at least as many as a polygon has edges */
@@ -81,8 +81,8 @@ typedef struct {
     tl_polygon_test test;
     int64_t width, top, bottom; /* rows of the window that are drawn */
     int n_bytes;                /* of a pixel, 1 or 4 */
-    int32_t background;         /* the rows get it first */
-    int waits;                  /* spans are written later, when their memory has come */
+    int32_t background;         /* what the rows are filled with first */
+    int waits;                  /* spans are buffered and prefetched before they are written */
     void *pixels;               /* the window's first pixel, rows of `width` */
     int32_t *cells;             /* (TL_CELL_ROWS * tl_polygon_stride(width),), all 0, and left so */
     tl_label_scratch *scratch;
@@ -91,28 +91,28 @@ typedef struct {
 
 /* A job of shares: the areas of each pixel that lie in polygons. */
 typedef struct {
-    const int32_t *listed; /* as above */
+    const int32_t *listed; /* the polygons listed[first] to listed[end - 1]; NULL: first to end - 1 */
     int64_t first, end;
     const tl_polygon_box *boxes;
     int64_t width, top, bottom;
     int32_t *cells;  /* (n_cells,), all TL_CELL_CLEAR, and left so */
     int64_t n_cells; /* at least TL_LEAST_SHARE_CELLS */
     tl_piece_scratch *pieces;
-    /* pixels: the sum of the shares, at most 1; or, with colours, the mix of the pixel's and the polygon's by its
+    /* pixels: the sum of the shares, at most 1; or, with colours, the pixel's colour mixed with the polygon's by its
      * share */
     float *pixels;       /* the window's first pixel, rows of `width` pixels of n_channels */
     const float *colors; /* (n_polygons, n_channels), or NULL */
     int n_channels;
-    int is_alone; /* one polygon is drawn over whatever there is, 0 where it is not; no colours */
+    int is_alone; /* one polygon replaces the pixels, 0 outside of it; no colours */
     /* or a table: */
     int64_t *starts; /* (n_polygons + 1,) from starts[first] on */
     void *indices;   /* int32 or int64: row * width + column */
     float *areas;
     int is_long;    /* int64 indices */
-    int64_t n_room; /* entries that there is room for, with 16 more behind them */
+    int64_t n_room; /* the most entries; 16 more can be written after them */
 } tl_share_job;
 
-/* Cells that there are at least: small polygons are drawn some at a time. */
+/* The least number of cells: small polygons are drawn several at a time. */
 #define TL_LEAST_SHARE_CELLS 49152
 
 /* int64 that `certify_polygons` needs for a polygon: two keys for each ring, and the nodes of a tree. */

@@ -1,6 +1,6 @@
 /* Backward from colours of float32 to vertices and attributes in one pass, instead of values.c and then points.c,
  * without the gradient of `rast`.
- *  In: faces, gradients of their pixels.  Out: sums by vertex, of positions and of attributes.
+ * In: faces, gradients of their pixels.  Out: sums by vertex, of positions and of attributes.
  *
  * With a_k and the total as in points.c, an attribute is P / total, P = sum A_k a_k; here A_k are less that of the last
  * corner.  So a triangle needs the sums of h = g / total and of h_total = -sum h P / total, as they are, times X and

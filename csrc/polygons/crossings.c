@@ -1,14 +1,14 @@
-/* Crossings: where the edges of rings pass the samples of rows.
- * In: rings in fixed point.  Out: a row, a column and a direction for each row that an edge passes.
+/* Crossings: where the edges of rings cross the sample lines of rows.
+ * In: rings in fixed point.  Out: a row, a column and a direction for each row that an edge crosses.
  *
- * An edge counts in the row with its sample at Y when (y0 > Y) != (y1 > Y), and for the columns with a sample at or
- * right of the crossing: the top-left rule.  Of an edge from its upper end (x0, y0), dy > 0, in row r and with `unit`
- * sub-pixels a pixel     column = ceil(N / D),  D = unit dy,  N = (x0 - sample_x) dy + dx (Y - y0).
+ * An edge crosses the row with its sample at Y when (y0 > Y) != (y1 > Y), and counts for the columns with a sample at
+ * or right of the crossing: the top-left rule.  For an edge from its upper end (x0, y0), dy > 0, in row r and with
+ * `unit` sub-pixels a pixel: column = ceil(N / D),  D = unit dy,  N = (x0 - sample_x) dy + dx (Y - y0).
  *
  * In lanes the column is floor((N + D - 1/2) / D).  Narrow coordinates are below 2^24, so N + D - 1/2 has at most 53
  * bits and is exact in float64, also after k rows (N + k unit dx).  Its quotient q by D is at least 1 / (2 D) from an
  * integer, and the product with the rounded 1 / D errs by less than 2^-51 |q|: too little, for |q| 2 D < 2 * 2^24 *
- * 2^25.  Wide rings take 128-bit integers. */
+ * 2^25.  Wide rings use 128-bit integers. */
 #ifndef TL_POLYGON_CROSSINGS_C
 #define TL_POLYGON_CROSSINGS_C
 
@@ -19,12 +19,13 @@
 #include "vertex/fixed.h"
 #include "polygons/points.c"
 
-#define TL_FEW_ROWS \
-    6 /* edges of so many rows are walked a vector at a time; longer ones by a vector of rows: 4 and 8 are slower */
+/* Edges of at most so many rows are walked a vector of edges at a time, longer edges a vector of rows at a time: 4 and 8
+ * are slower. */
+#define TL_FEW_ROWS 6
 
 #define TL_EDGES_TO_PAUSE 4096 /* between two polls for cancelling; a multiple of TL_LANES */
 
-/* Rows [top, bottom) of a picture of some width, and where pixels are sampled. */
+/* Rows [top, bottom) of a picture of some width, and the sample of its pixels. */
 typedef struct {
     int32_t top, bottom, width, center_x, center_y;
     int bits;
@@ -73,7 +74,7 @@ TL_INLINE vi crossing_columns(vd num, vd inv, vi width)
     return vi_min(vi_max(vi_round(vd_floor(vd_mul(num, inv))), vi_set1(0)), width);
 }
 
-/* The points of TL_LANES edges from point i on of the ring [first, end); `live` are those that there are. */
+/* Loads the points of TL_LANES edges from point i on of the ring [first, end); returns the lanes with an edge. */
 TL_INLINE vm load_ring_edges(const tl_polygons *s, int64_t first, int64_t end, int64_t i, vi *ax, vi *ay, vi *bx,
                              vi *by)
 {
@@ -86,13 +87,13 @@ TL_INLINE vm load_ring_edges(const tl_polygons *s, int64_t first, int64_t end, i
     return vm_first(end - i);
 }
 
-/* Where crossings go. */
+/* Outputs of crossings. */
 typedef enum { TO_BITS, TO_COUNTS, TO_LISTS, TO_CELLS } crossing_sink_kind;
 typedef struct {
     int64_t stride; /* bits or cells a row */
     uint64_t *bits; /* BITS: a bit for each crossing of a column, modulo 2 */
     int32_t *cells; /* CELLS: down less up */
-    uint32_t *at;   /* COUNTS: differences of numbers by row; LISTS: where each row goes on */
+    uint32_t *at;   /* COUNTS: differences of counts by row; LISTS: where the next crossing of each row goes */
     int32_t *list;  /* LISTS: 2 column + 1 when upwards */
 } crossing_sink;
 
@@ -108,7 +109,7 @@ TL_INLINE void put_crossing(const crossing_sink *s, crossing_sink_kind kind, int
     }
 }
 
-/* One edge of any size. */
+/* Walks one edge of any size. */
 static inline void walk_wide_edge(const row_frame *f, const crossing_sink *s, crossing_sink_kind kind, int64_t ax,
                                   int64_t ay, int64_t bx, int64_t by)
 {
@@ -134,7 +135,7 @@ static inline void walk_wide_edge(const row_frame *f, const crossing_sink *s, cr
     }
 }
 
-/* Edges of few rows a row of all of them at a time, the others a vector of rows. */
+/* Walks edges of few rows row by row, all lanes together; walks longer edges one by one, a vector of rows at a time. */
 TL_INLINE void walk_lanes(const row_frame *f, const crossing_sink *s, crossing_sink_kind kind, const crossing_lanes *e,
                           vm live)
 {
@@ -174,7 +175,7 @@ TL_INLINE void walk_lanes(const row_frame *f, const crossing_sink *s, crossing_s
     }
 }
 
-/* How many crossings each row has, as differences: the ends alone. */
+/* Counts the crossings of each row, as differences at the ends of edges. */
 TL_INLINE void count_lanes(const row_frame *f, const crossing_sink *s, vi ay, vi by, vm live)
 {
     const vi before = vi_set1((1 << f->bits) - 1 - f->center_y), top = vi_set1(f->top), bottom = vi_set1(f->bottom);

@@ -1,10 +1,10 @@
-/* Labels: many polygons, the later one over the earlier ones.
+/* Labels: many polygons, each over those before it.
  * In: rings, and a number for each polygon.  Out: rows of int32, or of bytes.
  *
- * A polygon of one ring with downward edges of as many rows as it spans is met once each way in each row, for a
- * closed ring is met as often downwards as upwards in each: two columns a row, no lists.  Others list the crossings
- * of their rows.  Polygons of many edges, and tests of squares, go through bits.  Rows of a picture lie far
- * apart in memory: spans may wait until their lines have come. */
+ * A closed ring crosses each row as often downwards as upwards.  So a polygon of one ring whose downward edges have as
+ * many rows as the ring crosses each row once each way: two columns a row, no lists.  Other polygons list the crossings
+ * of their rows.  Polygons of many edges, and tests of squares, use bits.  Rows of a picture are far apart in memory:
+ * spans may be buffered until their cache lines are prefetched. */
 #ifndef TL_POLYGON_LABELS_C
 #define TL_POLYGON_LABELS_C
 
@@ -25,7 +25,7 @@ TL_INLINE void store_span_32(int32_t *out, int64_t n, int32_t value)
     for (; n >= TL_LANES; n -= TL_LANES, out += TL_LANES)
         vi_store(out, v);
     vi_store_masked(out, vm_first(n), v);
-#elif TL_LANES > 1 /* masked stores cost AMD's cores twenty cycles: the last whole vector overlaps the one before */
+#elif TL_LANES > 1 /* masked stores cost 20 cycles on AMD: the last whole vector overlaps the vector before it */
     if (n >= TL_LANES) {
         for (int64_t j = 0; j < n - TL_LANES; j += TL_LANES)
             vi_store(out + j, v);
@@ -58,7 +58,7 @@ TL_INLINE void write_waiting(tl_label_scratch *w, int n_bytes, int which)
     w->n_waiting[which] = 0;
 }
 
-/* Writes the columns [begin, end) of a row, or lets them wait. */
+/* Writes the columns [begin, end) of a row, or buffers and prefetches them. */
 TL_INLINE void write_span(const tl_label_job *job, int n_bytes, char *row, int64_t begin, int64_t end, int32_t value)
 {
     char *at = row + begin * n_bytes;
@@ -76,7 +76,7 @@ TL_INLINE void write_span(const tl_label_job *job, int n_bytes, char *row, int64
     }
 }
 
-/* The edges of a polygon that pass rows; those without are left out.  Returns how many there are. */
+/* Stores the edges of a polygon that cross rows; returns how many. */
 TL_INLINE int gather_edges(const tl_polygons *p, int64_t polygon, const row_frame *f, tl_label_scratch *w, int *n_down,
                            int *low, int *high)
 {
@@ -108,7 +108,7 @@ TL_INLINE int gather_edges(const tl_polygons *p, int64_t polygon, const row_fram
     return n;
 }
 
-/* Each row once down and once up. */
+/* Labels a polygon that crosses each row once down and once up. */
 TL_INLINE void label_simply(const tl_label_job *job, int n_bytes, int n_edges, int low, int high, int32_t value)
 {
     tl_label_scratch *w = job->scratch;
@@ -162,14 +162,14 @@ TL_INLINE void label_by_lists(const tl_label_job *job, int n_bytes, int is_nonze
     }
 }
 
-/* Rows [top, bottom), at most TL_CELL_ROWS, through a bit a pixel. */
+/* Labels rows [top, bottom), at most TL_CELL_ROWS, by a bit a pixel. */
 static void label_by_bits(const tl_polygons *p, int64_t polygon, const tl_label_job *job, int64_t top, int64_t bottom,
                           int32_t value)
 {
     const row_frame f = place_rows(p, top, bottom, job->width);
     const int64_t stride = tl_polygon_stride(job->width), n_words = stride >> 6, n_rows = bottom - top;
     uint64_t *bits = (uint64_t *)job->cells;
-    if (p->is_nonzero) { /* a row of sums becomes bits in their place */
+    if (p->is_nonzero) { /* the bits of a row overwrite its sums */
         const crossing_sink s = {.stride = stride, .cells = job->cells};
         walk_to_cells(p, polygon, &f, &s);
         for (int64_t r = 0; r < n_rows; r++)
@@ -224,7 +224,7 @@ TL_INLINE void label_polygon(const tl_polygons *p, int64_t polygon, const tl_lab
             return;
         }
     }
-    write_all_waiting(job, n_bytes); /* spans below do not wait */
+    write_all_waiting(job, n_bytes); /* spans below are not buffered */
     for (int64_t row = top; row < bottom && !is_polygon_given_up(p, TL_CELL_ROWS * job->width); row += TL_CELL_ROWS)
         label_by_bits(p, polygon, job, row, row + TL_CELL_ROWS < bottom ? row + TL_CELL_ROWS : bottom, value);
 }
@@ -243,7 +243,6 @@ static __attribute__((noinline)) void label_words(const tl_polygons *p, const tl
     write_all_waiting(job, 4);
 }
 
-/* Rows [job->top, job->bottom): the background, then polygon after polygon. */
 static void label_polygons(const tl_polygons *p, const tl_label_job *job)
 {
     tl_label_scratch *w = job->scratch;

@@ -1,9 +1,9 @@
 /* Mask: the pixels with a sample inside of one polygon.
  * In: rings.  Out: bytes, 0 or 1.
  *
- * Even-odd: a bit a pixel, in which crossings cancel in pairs, and the parity from the left of 64 of them at a time.
- * Nonzero: a first pass over the ends of edges counts the crossings of each row, a second one lists them; rows of few
- * are sorted, those of many become sums by column. */
+ * Even-odd: a bit a pixel; crossings cancel in pairs, then the parity from the left is computed for 64 pixels at a
+ * time. Nonzero: a first pass over the ends of edges counts the crossings of each row, a second pass lists them; rows
+ * of few crossings are sorted, rows of many become sums by column. */
 #ifndef TL_POLYGON_MASK_C
 #define TL_POLYGON_MASK_C
 
@@ -15,10 +15,10 @@
 #include "polygons/crossings.c"
 #include "polygons/row_bits.c"
 
-#define TL_SORTED_CROSSINGS 8 /* of a row; sums by column pay beyond: a star of a million corners */
+#define TL_SORTED_CROSSINGS 8 /* in a row; with more, sums by column are faster: a star of a million corners */
 
-/* Rows [top, bottom) of the mask `out`, rows of `width`; bits has (bottom - top) * tl_polygon_stride(width) bits, all
- * 0, and left so. */
+/* Rows of `out` have `width` bytes.  `bits` has (bottom - top) * tl_polygon_stride(width) bits, all 0, and they end as
+ * 0. */
 static void mask_even_odd(const tl_polygons *p, int64_t polygon, int64_t width, int64_t top, int64_t bottom,
                           uint64_t *bits, uint8_t *out)
 {
@@ -58,7 +58,7 @@ TL_INLINE void sort_crossings(int32_t *v, int n)
     }
 }
 
-/* The next span of sorted crossings v[*i, n): columns [*begin, *end). */
+/* Steps to the next span of sorted crossings v[*i, n): columns [*begin, *end). */
 TL_INLINE int next_span(const int32_t *v, int n, int is_nonzero, int *i, int32_t *begin, int32_t *end)
 {
     while (*i + 1 < n) {
@@ -91,8 +91,8 @@ static void mask_listed_row(int32_t *v, int n, int64_t width, uint8_t *out)
     memset(out + at, 0, (size_t)(width - at));
 }
 
-/* Masks a polygon by the nonzero rule.  `at` has bottom - top + 1 numbers; `list` room for n_list, at least as many as
- * the polygon has edges; cells tl_polygon_stride(width), all 0, and left so, and bits a bit for each. */
+/* `at` has bottom - top + 1 numbers; `list` has room for n_list, at least the edges of the polygon; `cells` has
+ * tl_polygon_stride(width) numbers, all 0, and they end as 0; `bits` has a bit for each cell. */
 static void mask_nonzero(const tl_polygons *p, int64_t polygon, int64_t width, int64_t top, int64_t bottom,
                          uint32_t *at, int32_t *list, int64_t n_list, int32_t *cells, uint64_t *bits, uint8_t *out)
 {
@@ -101,13 +101,13 @@ static void mask_nonzero(const tl_polygons *p, int64_t polygon, int64_t width, i
     crossing_sink s = {.at = at, .list = list};
     memset(at, 0, sizeof *at * (size_t)(bottom - top + 1));
     walk_polygon(p, polygon, &f, &s, TO_COUNTS);
-    if (is_polygon_given_up(p, 1)) /* lists would not be as long as the numbers say */
+    if (is_polygon_given_up(p, 1)) /* counts may be incomplete */
         return;
     for (int64_t k = 1; k < bottom - top; k++) /* counts from their differences */
         at[k] += at[k - 1];
     for (int64_t first = top, end = top; first < bottom; first = end) {
         int64_t n = 0;
-        uint32_t *starts = at + (first - top); /* becomes where each row begins, then where it ends */
+        uint32_t *starts = at + (first - top); /* becomes the begin of each row, then its end */
         for (; end < bottom && n + at[end - top] <= n_list; end++) {
             const uint32_t count = at[end - top];
             at[end - top] = (uint32_t)n;

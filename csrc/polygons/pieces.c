@@ -1,9 +1,9 @@
 /* Pieces: the exact share of each pixel that lies in a polygon with rings that may cross, touch or cover each other.
  * In: rings.  Out: a row of shares, float64, at a time.
  *
- * Edges are cut at the rows, and each pixel takes the pieces that reach into it (slabs.c).  Edges left of it come
- * in as winding numbers alone.  A pixel's share depends on the edges, not on the window: ends of pieces are quotients
- * of integers, each rounded once, and counted from the pixel. */
+ * Edges are cut at the rows, and each pixel is resolved from the pieces that reach into it (slabs.c).  Edges left of it
+ * count only as winding numbers.  A pixel's share depends on the edges, not on the window: ends of pieces are quotients
+ * of integers, each rounded once, relative to the pixel. */
 #ifndef TL_POLYGON_PIECES_C
 #define TL_POLYGON_PIECES_C
 
@@ -18,7 +18,7 @@
 #include "polygons/points.c"
 #include "polygons/slabs.c"
 
-/* Counts the rows [top, bottom) that edges pass, or cuts the edges there. */
+/* Cuts edges at the rows [top, bottom); with pieces = NULL only counts the pieces of each row. */
 TL_INLINE void cut_edges(const tl_polygons *p, int is_wide, int64_t polygon, int64_t top, int64_t bottom, int64_t *next,
                          tl_edge_piece *pieces)
 {
@@ -68,7 +68,7 @@ TL_INLINE void cut_edges(const tl_polygons *p, int is_wide, int64_t polygon, int
     }
 }
 
-/* Winding numbers left of the pixel change at height t. */
+/* Adds a change of the winding number left of the pixel at height t. */
 static void note_change(piece_row *w, int32_t t, int32_t change)
 {
     int k = w->n_changes;
@@ -95,7 +95,7 @@ static void note_left(piece_row *w, const tl_edge_piece *e)
     note_change(w, e->tb, -e->sign);
 }
 
-/* The shares of the columns [left, right) of the row of these n pieces: shares[column - left]. */
+/* Sets the shares of columns [left, right) of a row from its n pieces: shares[column - left]. */
 static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64_t n, int64_t left, int64_t right,
                         const tl_piece_scratch *scratch, double *shares)
 {
@@ -133,7 +133,7 @@ static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64
             col++;
             continue;
         }
-        /* nothing but level edges until the next piece begins: the windings left of here tell */
+        /* only level edges until the next piece: winding numbers decide */
         const int64_t end = taken < n && pairs[taken].key < right ? pairs[taken].key : right;
         const double share = resolve_pixel(&w, col);
         for (; col < end; col++)
@@ -142,7 +142,7 @@ static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64
     count_crossings(&w);
 }
 
-/* Takes a row of shares of the columns [left, right). */
+/* Receives a row of shares of the columns [left, right). */
 typedef void (*take_shares)(void *to, int64_t row, int64_t left, int64_t right, const double *shares);
 
 /* Resolves the rows [top, bottom) of a polygon within its box. */
@@ -156,8 +156,7 @@ static void resolve_polygon(const tl_polygons *p, int64_t polygon, const tl_poly
         cut_edges(p, 1, polygon, top, bottom, starts, NULL);
     else
         cut_edges(p, 0, polygon, top, bottom, starts, NULL);
-    for (int64_t first = top, end = top; first < bottom;
-         first = end) { /* as many rows as there is room for the pieces of */
+    for (int64_t first = top, end = top; first < bottom; first = end) { /* as many rows as their pieces have room */
         int64_t n = 0;
         for (; end < bottom && n + starts[end - top] <= scratch->n_pieces; end++) {
             const int64_t count = starts[end - top];

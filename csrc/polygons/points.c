@@ -1,5 +1,6 @@
 /* Points of polygons to fixed point, and the boxes of polygons.
- * In: pixels.  Out: int32 coordinates by column, from the window's corner; int64 ones where that is not enough. */
+ * In: pixels.  Out: int32 coordinates by column, from the window's corner; int64 coordinates where int32 does not
+ * suffice. */
 #ifndef TL_POLYGON_POINTS_C
 #define TL_POLYGON_POINTS_C
 
@@ -49,7 +50,7 @@ static void snap_point(const tl_source *source, int64_t i, int bits, int grid_bi
         wide_fx[2 * i] = x, wide_fx[2 * i + 1] = y;
 }
 
-/* One coordinate of TL_LANES points; lanes that are not narrow leave `narrow`. */
+/* Snaps one coordinate of TL_LANES points; removes lanes that are not narrow from `narrow`. */
 TL_INLINE vi snap_column(vd v, int bits, int grid_bits, double corner_px, vm *narrow)
 {
     const vd magic = vd_set1(0x1.8p52); /* adding and subtracting it rounds |fx| < 2^51 to an integer, ties to even */
@@ -62,8 +63,6 @@ TL_INLINE vi snap_column(vd v, int bits, int grid_bits, double corner_px, vm *na
     return vi_round(at);
 }
 
-/* Points [first, end).  With wide_fx NULL those that are not narrow are counted, and the caller comes again with a
- * table. */
 static tl_vertex_counts snap_points(const tl_source *source, int64_t first, int64_t end, int bits, int grid_bits,
                                     const int64_t *corner_px, int32_t *x_fx, int32_t *y_fx, int64_t *wide_fx)
 {
@@ -72,7 +71,7 @@ static tl_vertex_counts snap_points(const tl_source *source, int64_t first, int6
     const int64_t far = (int64_t)1 << (50 - grid_bits);
     const int is_near = corner_px[0] > -far && corner_px[0] < far && corner_px[1] > -far && corner_px[1] < far;
     if (is_near && source->scalar != TL_I64 && !wide_fx)
-        for (; i + TL_LANES + 1 < end; i += TL_LANES) { /* two numbers past the last row are read */
+        for (; i + TL_LANES + 1 < end; i += TL_LANES) { /* reads two numbers past the last row */
             vm narrow = vm_all();
             vd columns[4];
             if (source->scalar == TL_F64) {
@@ -93,7 +92,7 @@ static tl_vertex_counts snap_points(const tl_source *source, int64_t first, int6
     return n;
 }
 
-/* Whether to give up the call, after work that takes as long as so many pixels of a large triangle. */
+/* Adds work worth so many pixels of a large triangle; returns whether to give up the call. */
 TL_INLINE int is_polygon_given_up(const tl_polygons *s, int64_t n_px)
 {
     tl_pause *pause = s->pause;
@@ -114,7 +113,6 @@ static inline int64_t polygon_y(const tl_polygons *s, int is_wide, int64_t i)
 
 static inline int32_t clamp_px(int64_t a, int64_t high) { return (int32_t)(a < 0 ? 0 : a > high ? high : a); }
 
-/* Boxes of polygons [first, end), and which of them are wide.  Returns the largest number of edges of one. */
 static int64_t bound_polygons(const tl_polygons *s, int64_t first, int64_t end, int64_t width, int64_t height,
                               uint8_t *is_wide, tl_polygon_box *boxes)
 {
@@ -146,8 +144,6 @@ static int64_t bound_polygons(const tl_polygons *s, int64_t first, int64_t end, 
     return most;
 }
 
-/* Sorts polygons by bands of rows, in their order.  starts has n_bands + 2 numbers; without `listed` only these are
- * set, the last one to the length of `listed`. */
 static void sort_polygons(const tl_polygon_box *boxes, int64_t n, int64_t band_rows, int64_t n_bands, int64_t *starts,
                           int32_t *listed)
 {

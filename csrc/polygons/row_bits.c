@@ -1,5 +1,5 @@
 /* Rows of bits: crossings to the pixels inside, and pixels inside to bytes or spans.
- * In: a bit or a sum for each column where crossings are.  Out: a bit for each pixel inside. */
+ * In: a bit or a sum for each column with crossings.  Out: a bit for each pixel inside. */
 #ifndef TL_POLYGON_ROW_BITS_C
 #define TL_POLYGON_ROW_BITS_C
 
@@ -16,7 +16,7 @@ TL_INLINE uint64_t parity_from_left(uint64_t x)
     return x;
 }
 
-/* Crossings modulo 2 to the pixels inside by the even-odd rule, in place.  Most words hold no crossing. */
+/* Turns crossings modulo 2 into the pixels inside by the even-odd rule, in place.  Most words have no crossing. */
 TL_INLINE void fill_parity(uint64_t *bits, int64_t n_words)
 {
     uint64_t carry = 0;
@@ -30,7 +30,7 @@ TL_INLINE void fill_parity(uint64_t *bits, int64_t n_words)
     }
 }
 
-/* Sums of directions to the pixels that are wound round; clears the cells, a multiple of 64. */
+/* Turns sums of directions into the pixels with a winding number other than 0; clears the cells, a multiple of 64. */
 TL_INLINE void fill_winding(int32_t *cells, int64_t n_cells, uint64_t *bits)
 {
     vi carry = vi_set1(0);
@@ -51,7 +51,7 @@ TL_INLINE void fill_winding(int32_t *cells, int64_t n_cells, uint64_t *bits)
     }
 }
 
-/* A row of bytes, 0 or 1. */
+/* Writes a row of bytes, 0 or 1. */
 TL_INLINE void store_bytes(uint8_t *out, int64_t width, const uint64_t *bits)
 {
     int64_t c = 0;
@@ -64,7 +64,7 @@ TL_INLINE void store_bytes(uint8_t *out, int64_t width, const uint64_t *bits)
     }
 }
 
-/* The next run [*begin, *end) of set bits at or after *end below n; 0 when there is none. */
+/* Steps to the next run [*begin, *end) of set bits at or after *end and below n; 0 at the end. */
 TL_INLINE int next_run(const uint64_t *bits, int64_t n, int64_t *begin, int64_t *end)
 {
     int64_t at = *end;

@@ -1,9 +1,9 @@
 /* Shares: the exact area of each pixel that lies in a polygon, as sums, mixes of colours, or a table.
- * In: rings, and the weight of each one's area.  Out: float32.
+ * In: rings, and the weight of the area of each ring.  Out: float32.
  *
- * A polygon is drawn into cells of its own box, which stay in the cache (area/ramp.c), and these are summed along
- * rows; sums are integers modulo 2^32, so however often edges cover each other on the way, the result in [0, 2^24]
- * is right.  Polygons with rings that meet are resolved pixel by pixel (pieces.c). */
+ * A polygon is drawn into cells of its box, which stay in the cache (area/ramp.c), and the cells are summed along rows.
+ * Sums are integers modulo 2^32, so the result in [0, 2^24] is right however often edges cover each other.  Polygons
+ * with rings that meet are resolved pixel by pixel (pieces.c). */
 #ifndef TL_POLYGON_SHARES_C
 #define TL_POLYGON_SHARES_C
 
@@ -22,12 +22,12 @@
 
 #define TL_WHOLE (1 << TL_AREA_BITS)
 
-/* Small polygons are drawn some at a time, one below the other: vectors of edges are then fuller, which takes a third
- * off 20,000 cells of 28 px.  The areas of an edge do not depend on where it is drawn. */
+/* Small polygons are drawn several at a time, stacked below each other: vectors of edges are then fuller, which saves a
+ * third of the time for 20,000 cells of 28 px.  The areas of an edge do not depend on where it is drawn. */
 #define TL_STACK_COLUMNS 64
 #define TL_STACK_HEIGHT 128
 #define TL_STACK_ROWS 512
-#define TL_STACK_BEYOND 8 /* an edge that passes up to 6 columns a row writes 8 */
+#define TL_STACK_BEYOND 8 /* an edge that crosses up to 6 columns a row writes 8 */
 #define TL_STACK_MAX 8    /* 4 is slower by 10 percent, 16 by 5 */
 
 typedef struct {
@@ -36,7 +36,7 @@ typedef struct {
     int is_full;
 } share_output;
 
-/* Edges of a ring, a vector at a time, as push_edges in area.c; long ones by themselves. */
+/* Draws TL_LANES edges of a ring, as `push_edges` in area.c does; long edges one by one. */
 TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t first, int64_t end, int64_t i, int weight,
                                int32_t right_fx, int32_t down_fx)
 {
@@ -54,11 +54,11 @@ TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t firs
     const vm on = vm_and_not(e.on, alone);
     if (!vm_any(on))
         return;
-    const vi negative = vi_sub(zero, e.dy); /* areas right of edges that run upwards are added */
+    const vi negative = vi_sub(zero, e.dy); /* areas right of upward edges are added */
     queue_edges(s, &e, on, weight > 0 ? vi_select(e.is_up, e.dy, negative) : vi_select(e.is_up, negative, e.dy));
 }
 
-/* Draws a polygon without rings that meet, moved so far, into the cells of the plane. */
+/* Draws a polygon whose rings do not meet into the cells of the plane, shifted. */
 static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon, int32_t right_fx, int32_t down_fx)
 {
     for (int64_t ring = p->polygons[polygon]; ring < p->polygons[polygon + 1]; ring++) {
@@ -81,7 +81,8 @@ static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon, i
     }
 }
 
-/* Fills the last vector of edges of many rows with some of fewer: those rows have no height, and add nothing. */
+/* Fills the last vector of edges of many rows with edges of fewer rows: their missing rows have no height, and add
+ * nothing. */
 static void fill_vectors(area_state *s, int first_kind)
 {
     for (int kind = first_kind + TL_SHORT_ROWS - 1, from = kind - 1; kind > first_kind; kind--) {
@@ -110,7 +111,7 @@ static void finish_cells(area_state *s)
 
 TL_INLINE vi whole_at_most(vi sums) { return vi_min(vi_max(sums, vi_set1(0)), vi_set1(TL_WHOLE)); }
 
-/* The sums of TL_LANES cells, in [0, TL_WHOLE]; clears them.  Most hold nothing. */
+/* Returns the sums of TL_LANES cells, clamped to [0, TL_WHOLE]; clears the cells, most of which are 0. */
 TL_INLINE vi take_cells(int32_t *cells, vi *carry)
 {
     const vi bias = vi_set1(TL_CELL_ZERO), v = vi_load(cells);
@@ -131,8 +132,8 @@ TL_INLINE vi begin_cells(int32_t *row)
     return vi_set1((int32_t)sum);
 }
 
-/* Appends the cells of a row that are not 0 to a table of n entries, and clears them; returns how many there are then.
- * Boxes of polygons are small: to find which cells hold something costs more than to add them. */
+/* Appends the cells of a row that are not 0 to a table of n entries, and clears them; returns the new n.  Boxes of
+ * polygons are small: to search for cells with a value costs more than to add all. */
 TL_INLINE int64_t pack_row(int is_long, int32_t *cells, vi carry, int64_t width, int64_t index, void *indices,
                            float *areas, int64_t n)
 {
@@ -167,8 +168,8 @@ static void mix_pixel(const tl_share_job *job, int64_t polygon, int64_t at, floa
         pixel[k] += (color[k] - pixel[k]) * share;
 }
 
-/* A row of cells to where shares go; `n_beyond` cells right of the columns may hold something, and those left of them
- * unless the polygon lies wholly inside. */
+/* Stores a row of cells as shares.  `n_beyond` cells right of the columns may have values, and so may those left of
+ * them, unless is_inside. */
 TL_INLINE void put_cells(share_output *out, int32_t *cells, int64_t row, int64_t left, int64_t right, int is_inside,
                          int64_t n_beyond)
 {
@@ -209,7 +210,7 @@ TL_INLINE void put_cells(share_output *out, int32_t *cells, int64_t row, int64_t
         vi_store(cells + c, vi_set1(TL_CELL_ZERO));
 }
 
-/* A row of shares of a polygon that was resolved to where they go. */
+/* Stores a row of shares of a resolved polygon. */
 static void put_shares(void *to, int64_t row, int64_t left, int64_t right, const double *shares)
 {
     share_output *out = to;
@@ -240,7 +241,7 @@ static void put_shares(void *to, int64_t row, int64_t left, int64_t right, const
     }
 }
 
-/* The rows [top, bottom) of a polygon without rings that meet. */
+/* Draws rows [top, bottom) of a polygon whose rings do not meet. */
 static void share_simply(area_state *s, const tl_polygons *p, share_output *out, const tl_polygon_box *box, int64_t top,
                          int64_t bottom)
 {
@@ -265,7 +266,7 @@ static void share_simply(area_state *s, const tl_polygons *p, share_output *out,
     }
 }
 
-/* Whether a polygon can be drawn below others: small, and nothing of it outside of the rows. */
+/* Whether a polygon can be stacked: small, and within the rows. */
 static inline int fits_stack(const tl_polygons *p, const tl_share_job *job, int64_t polygon)
 {
     const tl_polygon_box *box = job->boxes + polygon;
@@ -274,7 +275,7 @@ static inline int fits_stack(const tl_polygons *p, const tl_share_job *job, int6
            box->bottom - box->top <= TL_STACK_HEIGHT;
 }
 
-/* How many polygons from the i-th of the job on are drawn one below the other, and the widest of them. */
+/* The number of polygons to stack, from the i-th of the job on; sets the largest width. */
 static int64_t plan_stack(const tl_polygons *p, const share_output *out, int64_t i, int64_t *width)
 {
     const tl_share_job *job = out->job;
@@ -292,7 +293,7 @@ static int64_t plan_stack(const tl_polygons *p, const share_output *out, int64_t
     return n;
 }
 
-/* Draws polygons from the i-th of the job on, as many as fit one below the other.  Returns how many. */
+/* Draws a stack of polygons from the i-th of the job on; returns how many. */
 static int64_t share_stack(area_state *s, const tl_polygons *p, share_output *out, int64_t i)
 {
     const tl_share_job *job = out->job;
@@ -301,7 +302,7 @@ static int64_t share_stack(area_state *s, const tl_polygons *p, share_output *ou
     const tl_window window = {.width = width, .height = TL_STACK_ROWS, .subpixel_bits = p->bits};
     const tl_area target = {.cells = job->cells};
     place_plane(&window, &target, &s->plane);
-    /* nothing is left of a polygon: rows that follow closely stay in the first-level cache */
+    /* no cells left of a polygon: rows close together stay in the first-level cache */
     s->plane.stride = (int32_t)(width + TL_STACK_BEYOND + 15) / 16 * 16;
     for (int64_t k = 0; k < n; k++) {
         const int64_t polygon = job->listed ? job->listed[i + k] : i + k;
@@ -322,7 +323,7 @@ static int64_t share_stack(area_state *s, const tl_polygons *p, share_output *ou
     return n;
 }
 
-/* Clears the rows of a job except the box, which is written over. */
+/* Clears the rows of a job except the box, if that is written later. */
 static void clear_beside(const tl_share_job *job, const tl_polygon_box *box, int is_written)
 {
     for (int64_t row = job->top; row < job->bottom; row++) {
@@ -334,7 +335,6 @@ static void clear_beside(const tl_share_job *job, const tl_polygon_box *box, int
     }
 }
 
-/* Draws the polygons of a job.  Returns how many it has finished: fewer than all when the table is full. */
 static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
 {
     area_state s;
@@ -342,7 +342,7 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
     s.snapped = NULL, s.bad_row = -1;
     s.max_extent = max_edge_extent(p->bits);
     const tl_window whole = {.width = job->width, .height = job->bottom - job->top};
-    s.window = &whole; /* its size alone is read, to count work */
+    s.window = &whole; /* only its size is read, to count work */
     memset(s.n, 0, sizeof s.n);
     for (int64_t i = job->first; i < job->end; i++) {
         const int64_t polygon = job->listed ? job->listed[i] : i;

@@ -1,15 +1,15 @@
-/* Simple: whether the rings of a polygon neither cross nor touch, and then the weight of each ring's area.
+/* Simple: whether the rings of a polygon neither cross nor touch, and if so the weight of each ring's area.
  * In: rings.  Out: a weight for each ring, and a flag for each polygon.
  *
  * Where rings do not meet, the winding number is constant on either side of each: k outside of it and k + s inside, s
  * its direction.  By the rule f (odd, or not 0) its signed area then counts s (f(k + s) - f(k)), and the area of the
- * polygon is the weighted sum of those of its rings, whichever way these run.
+ * polygon is the weighted sum of the areas of its rings, whichever way these run.
  *
- * A ring that turns one way alone, once round, is simple.  Otherwise rings are cut into chains of a few edges, which
- * are the leaves of a tree: neighbours along a ring lie near each other, so no sort is needed.  Two nodes are apart
- * when their boxes are, or when a line parts them.  A chain with edges into one half plane does not meet
- * itself, and the direction in which it always goes on is a good one for such a line: that serves rings of noise,
- * with spikes side by side.  The rest is decided edge by edge.  All in integers, or in doubles that are.
+ * A ring that only turns one way, once round, is simple.  Otherwise rings are cut into chains of a few edges, the
+ * leaves of a tree: neighbours along a ring are near each other, so no sort is needed.  Two nodes are apart when their
+ * boxes are, or when a line separates them.  A chain whose edges point into one half plane does not meet itself, and a
+ * line across its direction is a good candidate to separate it: this suits noisy rings with spikes side by side.  Other
+ * pairs are compared edge by edge.  All in integers, or in doubles that hold integers.
  *
  * Based on: M. I. Shamos, D. Hoey, Geometric Intersection Problems, 1976 (that n log n comparisons do); D. H. Ballard,
  * Strip Trees, 1981 (a tree over the chain itself). */
@@ -25,16 +25,17 @@
 #include "polygons/crossings.c"
 #include "polygons/points.c"
 
-/* Edges of a leaf, as tl_certify_words has it: 32 take a fifth off rings of noise, and add a third to contours. */
+/* Edges of a leaf; tl_certify_words depends on it.  32 saves a fifth on noisy rings, and costs a third more on
+ * contours. */
 #define TL_CHAIN_EDGES 16
 
-/* Points that are compared with a line at most; beyond, the node is split. */
+/* The most points that are compared with a line; a node with more is split. */
 #define TL_LINE_POINTS 128
 
-/* Comparisons for each edge, and some for all: polygons beyond are resolved pixel by pixel. */
+/* Comparisons per edge, and a constant: polygons that need more are resolved pixel by pixel. */
 #define TL_COMPARED_NODES 128
 
-/* On which side of the line from a to b the point c lies: the sign of the area of a, b, c. */
+/* The side of the line from a to b on which c lies: the sign of the area of a, b, c. */
 TL_INLINE int side_of(const tl_polygons *p, int is_wide, int64_t a, int64_t b, int64_t c)
 {
     const int64_t ax = polygon_x(p, is_wide, a), ay = polygon_y(p, is_wide, a);
@@ -46,12 +47,12 @@ TL_INLINE int side_of(const tl_polygons *p, int is_wide, int64_t a, int64_t b, i
     return (area > 0) - (area < 0);
 }
 
-/* 1 or -1 for a ring that is convex with the interior on its right or left, y down; otherwise 0.  Points may repeat,
- * and lie on a line. */
+/* 1 or -1 for a convex ring with the interior on its right or left, y down; otherwise 0.  Points may repeat, and be
+ * collinear. */
 TL_INLINE int convex_turn(const tl_polygons *p, int is_wide, int64_t first, int64_t end)
 {
     int turn = 0, n_extremes = 0, was_down = 0, first_down = 0, has_first = 0;
-    int64_t last = end - 1; /* the point before `i` that is another one */
+    int64_t last = end - 1; /* the last point before `i` that differs from it */
     while (last > first && polygon_x(p, is_wide, last) == polygon_x(p, is_wide, first) &&
            polygon_y(p, is_wide, last) == polygon_y(p, is_wide, first))
         last--;
@@ -67,13 +68,13 @@ TL_INLINE int convex_turn(const tl_polygons *p, int is_wide, int64_t first, int6
             const int64_t dx = x - polygon_x(p, is_wide, last), dy = y - polygon_y(p, is_wide, last);
             const int64_t ex = polygon_x(p, is_wide, next) - x, ey = polygon_y(p, is_wide, next) - y;
             if ((dx > 0) != (ex > 0) || (dx < 0) != (ex < 0) || (dy > 0) != (ey > 0) || (dy < 0) != (ey < 0))
-                return 0; /* back on itself */
+                return 0; /* turns back on itself */
         } else if (turn && side != turn) {
             return 0;
         } else {
             turn = side;
         }
-        /* half-planes that directions point into: once round changes between them twice */
+        /* half planes of directions: a ring that turns once changes between them twice */
         const int64_t dx = polygon_x(p, is_wide, next) - x, dy = polygon_y(p, is_wide, next) - y;
         const int is_down = dy > 0 || (dy == 0 && dx > 0);
         if (!has_first)
@@ -89,7 +90,7 @@ TL_INLINE int convex_turn(const tl_polygons *p, int is_wide, int64_t first, int6
 /* The sign of the area that a ring encloses. */
 static int ring_turn(const tl_polygons *p, int is_wide, int64_t first, int64_t end)
 {
-    /* high 2^64 + low: of wide products there may be more than 128 bits hold */
+    /* high 2^64 + low: sums of wide products may exceed 128 bits */
     tl_int128 high = i128_from(0), low = high;
     const int64_t x0 = polygon_x(p, is_wide, first), y0 = polygon_y(p, is_wide, first);
     for (int64_t i = first + 1; !is_wide && i + 1 < end;) {
@@ -114,14 +115,14 @@ typedef struct {
 
 TL_INLINE int64_t turn_between(direction a, direction b) { return a.x * b.y - a.y * b.x; }
 
-/* The edges [first, first + n) of a ring, and below them those of its two halves; or several whole rings. */
+/* The edges [first, first + n) of a ring, with a node for each half of them; or several whole rings. */
 typedef struct {
     int64_t x0, y0, x1, y1;
-    int32_t first, n;        /* points, from the polygon's first */
-    int32_t ring;            /* from the polygon's first, -1: several */
+    int32_t first, n;        /* points, relative to the polygon's first */
+    int32_t ring;            /* relative to the polygon's first; -1: several */
     int32_t left, right;     /* nodes; -1 for a leaf */
-    int32_t is_monotone;     /* all edges point into one half plane, between these two directions; never when wide */
-    int32_t low[2], high[2]; /* cross(low, high) > 0, or they are one direction; 0: all points are one */
+    int32_t is_monotone;     /* all edges point into one half plane, between `low` and `high`; never when wide */
+    int32_t low[2], high[2]; /* cross(low, high) > 0, or equal directions; 0: all points are equal */
 } chain_node;
 
 _Static_assert(sizeof(chain_node) == 9 * sizeof(int64_t) && TL_CHAIN_EDGES == 16, "tl_certify_words");
@@ -150,12 +151,12 @@ TL_INLINE direction edge_direction(const simple_search *s, int64_t a, int64_t b)
                        polygon_y(s->p, s->is_wide, b) - polygon_y(s->p, s->is_wide, a)};
 }
 
-/* Widens the directions [low, high] by one more, no branch but of parallel ones.  Returns 0 when no half plane holds
+/* Widens the directions [low, high] by d; branches only for parallel directions.  Returns 0 when no half plane holds
  * them all. */
 TL_INLINE int widen_directions(direction *low, direction *high, direction d)
 {
     const int64_t after_low = turn_between(*low, d), before_high = turn_between(d, *high);
-    if ((after_low | before_high) == 0) { /* one direction or its opposite, or no direction at all */
+    if ((after_low | before_high) == 0) { /* equal or opposite directions, or 0 */
         *low = low->x | low->y ? *low : d, *high = high->x | high->y ? *high : d;
         return low->x * d.x + low->y * d.y >= 0;
     }
@@ -165,7 +166,7 @@ TL_INLINE int widen_directions(direction *low, direction *high, direction d)
     return !((is_higher & (after_low <= 0)) | (is_lower & (before_high <= 0)));
 }
 
-/* Directions of two nodes together. */
+/* Joins the directions of two nodes. */
 TL_INLINE int join_directions(const chain_node *a, const chain_node *b, direction *low, direction *high)
 {
     *low = (direction){a->low[0], a->low[1]}, *high = (direction){a->high[0], a->high[1]};
@@ -225,7 +226,7 @@ static int32_t join_nodes(simple_search *s, int32_t left, int32_t right)
     return s->n_nodes++;
 }
 
-/* The tree of n edges of a ring. */
+/* Makes the tree of n edges of a ring. */
 static int32_t make_chain(simple_search *s, int32_t ring, int64_t first, int64_t n)
 {
     if (n <= TL_CHAIN_EDGES)
@@ -235,7 +236,7 @@ static int32_t make_chain(simple_search *s, int32_t ring, int64_t first, int64_t
     return join_nodes(s, left, right);
 }
 
-/* The tree of rings that are in order of place. */
+/* Makes the tree of rings that are sorted by position. */
 static int32_t make_rings(simple_search *s, const keyed *rings, int64_t n)
 {
     if (n == 1)
@@ -244,7 +245,7 @@ static int32_t make_rings(simple_search *s, const keyed *rings, int64_t n)
     return join_nodes(s, left, right);
 }
 
-/* The whole tree; `pairs` has room for two for each ring.  Sets *sorted to their roots in order of place. */
+/* Makes the whole tree; `pairs` has room for two for each ring.  Sets *sorted to their roots, sorted by position. */
 static int32_t make_tree(simple_search *s, int64_t n_rings, keyed *pairs, const keyed **sorted)
 {
     int64_t x0 = INT64_MAX, y0 = INT64_MAX, extent = 1;
@@ -271,7 +272,7 @@ static int32_t make_tree(simple_search *s, int64_t n_rings, keyed *pairs, const 
     return make_rings(s, *sorted, n_rings);
 }
 
-/* The next edge that is no point. */
+/* The next edge with a length. */
 static int64_t next_edge(simple_search *s, int32_t ring, int64_t i)
 {
     int64_t next = edge_end(s, ring, i);
@@ -284,7 +285,7 @@ static int64_t next_edge(simple_search *s, int32_t ring, int64_t i)
     return next;
 }
 
-/* Whether two edges that have a point in common do so only because one ends where the other begins. */
+/* Whether two edges that share a point do so only because one ends where the other begins. */
 static int is_corner(simple_search *s, int32_t ring_e, int64_t e, int32_t ring_f, int64_t f)
 {
     if (ring_e != ring_f)
@@ -301,7 +302,7 @@ static int is_corner(simple_search *s, int32_t ring_e, int64_t e, int32_t ring_f
     return (d.x > 0) == (g.x > 0) && (d.x < 0) == (g.x < 0) && (d.y > 0) == (g.y > 0) && (d.y < 0) == (g.y < 0);
 }
 
-/* Of TL_LANES edges from (ax, ay) to (bx, by), those that have a point in common with one from (px, py) to (qx, qy).
+/* The lanes of TL_LANES edges from (ax, ay) to (bx, by) that share a point with the edge from (px, py) to (qx, qy).
  * Differences have 25 bits, so products are exact. */
 TL_INLINE vm lanes_that_meet(int32_t px, int32_t py, int32_t qx, int32_t qy, vi ax, vi ay, vi bx, vi by)
 {
@@ -338,7 +339,7 @@ static int do_wide_edges_meet(const simple_search *s, int64_t a, int64_t b, int6
            side_of(s->p, 1, c, d, a) * side_of(s->p, 1, c, d, b) <= 0;
 }
 
-/* Compares the edges of two leaves, or of one with each other. */
+/* Whether the edges of two leaves, or of a leaf with itself, do not meet. */
 static int are_leaves_apart(simple_search *s, const chain_node *a, const chain_node *b)
 {
     const tl_polygons *p = s->p;
@@ -374,9 +375,8 @@ static int are_leaves_apart(simple_search *s, const chain_node *a, const chain_n
     return s->n_left >= 0;
 }
 
-/* Whether a line at right angles to the direction in which chain a goes on has all of it on one side and b on the
- * other.  A chain that begins where a ends, or ends where a begins, may reach the line there: only one point of a
- * does. */
+/* Whether a line across the direction of chain a separates a from b.  A chain b that begins where a ends, or ends where
+ * a begins, may reach that line: only one point of a does. */
 static int is_parted(simple_search *s, const chain_node *a, const chain_node *b, int is_next, int is_before)
 {
     const tl_polygons *p = s->p;
@@ -392,7 +392,7 @@ static int is_parted(simple_search *s, const chain_node *a, const chain_node *b,
     const double ay = ((double)b->y0 - y) * dy, by = ((double)b->y1 - y) * dy;
     if ((ax < bx ? ax : bx) + (ay < by ? ay : by) > after || (ax > bx ? ax : bx) + (ay > by ? ay : by) < before)
         return 1;
-    if (b->n > TL_LINE_POINTS || b->ring < 0) /* or of several rings */
+    if (b->n > TL_LINE_POINTS || b->ring < 0) /* b of several rings: not tested */
         return 0;
     s->n_left -= b->n / TL_CHAIN_EDGES;
     const int64_t first = s->base + b->first, last = edge_end(s, b->ring, first + b->n - 1);
@@ -416,7 +416,7 @@ TL_INLINE int follows(const simple_search *s, const chain_node *a, const chain_n
            edge_end(s, a->ring, s->base + a->first + a->n - 1) == s->base + b->first;
 }
 
-/* Whether all edges of a leaf pass beside the box of a node. */
+/* Whether no edge of a leaf meets the box of a node. */
 static int is_clear_of(const simple_search *s, const chain_node *leaf, const chain_node *node)
 {
     const tl_polygons *p = s->p;
@@ -434,7 +434,7 @@ static int is_clear_of(const simple_search *s, const chain_node *leaf, const cha
     return 1;
 }
 
-/* Whether two nodes have no point in common but where one ends and the other begins. */
+/* Whether two nodes share no point, except where one ends and the other begins. */
 static int are_apart(simple_search *s, const chain_node *a, const chain_node *b)
 {
     if (a->x0 > b->x1 || b->x0 > a->x1 || a->y0 > b->y1 || b->y0 > a->y1)
@@ -472,7 +472,7 @@ static int is_free(simple_search *s, const chain_node *a)
            are_apart(s, s->nodes + a->left, s->nodes + a->right);
 }
 
-/* How often the other rings below a node wind round a point that lies on none of them: edges left of it. */
+/* The winding number of the other rings below a node about a point on none of them, from the edges left of it. */
 static int wound_by(simple_search *s, const chain_node *a, int32_t ring, int64_t point)
 {
     const int is_wide = s->is_wide;
@@ -480,7 +480,7 @@ static int wound_by(simple_search *s, const chain_node *a, int32_t ring, int64_t
     if (a->ring == ring || y < a->y0 || y >= a->y1 || x < a->x0)
         return 0;
     s->n_left--;
-    if (x > a->x1) { /* all of it lies left: its ends tell */
+    if (x > a->x1) { /* all of it lies left: its ends suffice */
         if (a->ring < 0)
             return 0;
         const int64_t first = s->base + a->first, last = edge_end(s, a->ring, first + a->n - 1);
@@ -502,7 +502,7 @@ static int wound_by(simple_search *s, const chain_node *a, int32_t ring, int64_t
 
 TL_INLINE int rule_holds(const tl_polygons *p, int winding) { return p->is_nonzero ? winding != 0 : winding & 1; }
 
-/* Whether the rings of a polygon do not meet, by comparison; then also their weights. */
+/* Whether the rings of a polygon do not meet, by comparison; if so, sets their weights. */
 static int compare_rings(const tl_polygons *p, int is_wide, int64_t polygon, int8_t *weights, int64_t *room)
 {
     const int64_t r0 = p->polygons[polygon], n_rings = p->polygons[polygon + 1] - r0, base = p->rings[r0];
@@ -516,12 +516,12 @@ static int compare_rings(const tl_polygons *p, int is_wide, int64_t polygon, int
     if (!is_free(&s, s.nodes + root))
         return 0;
     s.n_left = TL_COMPARED_NODES * n_points + (1 << 16);
-    for (int64_t k = 0; k < n_rings; k++) { /* neighbours read the same nodes */
+    for (int64_t k = 0; k < n_rings; k++) { /* in this order neighbours read nodes in the cache */
         const int32_t ring = s.nodes[roots[k].i].ring;
         const int64_t first = p->rings[r0 + ring];
         const int winding = n_rings == 1 ? 0 : wound_by(&s, s.nodes + root, ring, first);
         const int turn = ring_turn(p, is_wide, first, p->rings[r0 + ring + 1]);
-        /* y down, positive areas run downwards on the right: inside, one less */
+        /* y down, a positive area runs downwards on its right: inside the winding number is one less */
         weights[r0 + ring] = (int8_t)(turn * (rule_holds(p, winding - turn) - rule_holds(p, winding)));
     }
     return s.n_left >= 0;
@@ -539,7 +539,6 @@ TL_INLINE int is_simple(const tl_polygons *p, int is_wide, int64_t polygon, int8
     return compare_rings(p, is_wide, polygon, weights, room);
 }
 
-/* Sets weights and is_simple of polygons [first, end). */
 static void certify_polygons(const tl_polygons *p, int64_t first, int64_t end, int8_t *weights, uint8_t *is_simple_out,
                              int64_t *room)
 {
@@ -548,8 +547,6 @@ static void certify_polygons(const tl_polygons *p, int64_t first, int64_t end, i
             (uint8_t)(p->is_wide[i] ? is_simple(p, 1, i, weights, room) : is_simple(p, 0, i, weights, room));
 }
 
-/* Sets weights and is_simple of polygons that are known to be valid: the first ring of each is its border, the others
- * are holes. */
 static void trust_polygons(const tl_polygons *p, int64_t first, int64_t end, int8_t *weights, uint8_t *is_simple_out)
 {
     for (int64_t i = first; i < end; i++) {

@@ -1,13 +1,13 @@
 /* Slabs: the share of one pixel that lies in a polygon, from the pieces of edges that reach into it.
- * In: pieces, and how winding numbers change left of the pixel.  Out: float64.
+ * In: pieces, and the changes of the winding number left of the pixel.  Out: float64.
  *
- * The heights at which pieces begin, end, enter or leave the pixel cut it into slabs, which no end lies within.  There
- * the pieces are sorted from left to right at the upper end, and swapped where they cross, the highest crossing
- * first, until they are sorted at the lower end: a crossing costs log n, and the order is one at each height,
- * whatever rounding does to the heights.  The trapezoid between two neighbours is inside or not.
+ * The heights at which pieces begin, end, enter or leave the pixel cut it into slabs: within a slab no piece does. The
+ * pieces of a slab are sorted from left to right at its upper end, and swapped where they cross, the highest crossing
+ * first, until they are sorted at its lower end: a crossing costs log n, and the order is unique at each height,
+ * whatever rounding does to the heights.  The trapezoid between two neighbours is inside or outside.
  *
- * Error: heights are off by 2^-50 px where edges cross at all steeply; slabs thinner than TL_THIN count as
- * nothing, and so does the error of a crossing of nearly parallel edges, which is as thin.
+ * Error: heights are off by 2^-50 px unless edges cross at a small angle; slabs thinner than TL_THIN count as nothing,
+ * and so does the error of a crossing of nearly parallel edges, which is as thin.
  *
  * Based on: J. L. Bentley, T. A. Ottmann, Algorithms for Reporting and Counting Geometric Intersections, 1979. */
 #ifndef TL_POLYGON_SLABS_C
@@ -23,33 +23,32 @@
 
 #define TL_THIN 0x1p-44 /* px of height */
 
-#define TL_FEW_NEW 8 /* pieces that are sorted in by insertion */
-/* Slabs of many edges count as crossings, too: so many edges take as long as one. */
+#define TL_FEW_NEW 8 /* new pieces that are sorted by insertion */
+/* Slabs of many edges count as crossings, too: TL_EDGES_OF_CROSSING edges take as long as a crossing. */
 #define TL_FEW_EDGES 64
 #define TL_EDGES_OF_CROSSING 16
 
 #define TL_CROSSINGS_TO_POLL 256 /* between two polls for cancelling; a power of two */
 
-/* A piece that passes the slab. */
+/* A piece in the slab. */
 typedef struct {
     double top, bottom;     /* px right of the pixel's left border, at the ends of the slab */
     double since;           /* the height up to which its area is added */
-    int32_t piece, winding; /* left of it */
+    int32_t piece, winding; /* winding: left of it */
 } slab_edge;
 
-/* An event at a height: the piece 8 times over and one of these, or -1 - k for the k-th change. */
+/* An event at a height: N_KINDS * piece + kind, or -1 - k for the k-th change. */
 enum { COMES_LEFT, ENDS_LEFT, ENTERS, ENTERS_FROM_LEFT, LEAVES, LEAVES_TO_LEFT, N_KINDS = 8 };
 
 /* The pieces of one row, from left to right, and the state of its sweep. */
 typedef struct {
     const tl_polygons *p;
     const tl_edge_piece *pieces;
-    int32_t *active; /* pieces that reach into the pixel */
-    int32_t *at,
-        *change; /* winding numbers left of the pixel: by how much they change at which height, in sub-pixels */
+    int32_t *active;       /* pieces that reach into the pixel */
+    int32_t *at, *change;  /* the winding number left of the pixel changes by `change` at height `at`, in sub-pixels */
     keyed *events, *spare; /* by height */
     slab_edge *edges, *moved;
-    double *crossings; /* a tree: the heights at which neighbours cross, each node the least below it */
+    double *crossings; /* a tree: the heights at which neighbours cross; each node is the least below it */
     int n_active, n_changes, n_events, n_edges, n_new;
     int32_t winding; /* left of the pixel, in the slab */
     int is_given_up;
@@ -77,7 +76,7 @@ static inline double f64_of_key(int64_t key)
     return x;
 }
 
-/* Whether the rings have crossed more often than the call may. */
+/* Whether the rings have crossed more often than the call allows. */
 static inline int cross_too_often(const tl_polygons *p)
 {
     return __atomic_load_n(p->crossings_left, __ATOMIC_RELAXED) < 0;
@@ -95,7 +94,7 @@ static inline void list_event(piece_row *w, double height, int64_t i)
         w->events[w->n_events++] = (keyed){key_of_f64(height), i};
 }
 
-/* Lists where a piece comes into the pixel and goes, from its left, right, upper or lower side. */
+/* Lists the events of a piece: where it enters and leaves the pixel by its left, right, upper or lower side. */
 static void list_ends(piece_row *w, int64_t col, int64_t piece)
 {
     const tl_edge_piece *e = w->pieces + piece;
@@ -145,7 +144,7 @@ static void take_event(piece_row *w, int64_t i)
     }
 }
 
-/* Sorts the edges at the upper end of the slab, equal ones at the lower end. */
+/* Sorts the edges by x at the upper end of the slab, equal ones by x at the lower end. */
 static void sort_slab(piece_row *w)
 {
     const int n = w->n_edges;
@@ -179,7 +178,7 @@ static inline int is_winding_inside(const piece_row *w, int32_t winding)
     return w->p->is_nonzero ? winding != 0 : winding & 1;
 }
 
-/* Sets where the edges k and k + 1 cross in the slab, if they do. */
+/* Sets the height at which the edges k and k + 1 cross in the slab, INFINITY if they do not. */
 static void set_crossing(piece_row *w, int n_leaves, int k, double y, double next)
 {
     if (k < 0 || k + 1 >= w->n_edges)
@@ -193,8 +192,8 @@ static void set_crossing(piece_row *w, int n_leaves, int k, double y, double nex
         tree[k >> 1] = tree[k] < tree[k ^ 1] ? tree[k] : tree[k ^ 1];
 }
 
-/* The area inside that an edge adds, from where it was added to height y: x where its left side alone is inside,
- * -x where its right side is. */
+/* The area inside that an edge adds from e->since to height y: x times the height where only its left side is inside,
+ * -x times it where only its right side is. */
 static inline double area_along(const piece_row *w, int64_t col, slab_edge *e, double y)
 {
     const tl_edge_piece *piece = w->pieces + e->piece;
@@ -204,7 +203,7 @@ static inline double area_along(const piece_row *w, int64_t col, slab_edge *e, d
     return (double)step * x * height;
 }
 
-/* The area in a slab with edges that cross: they are sorted, and know the windings at its upper end. */
+/* The area in a slab whose edges cross; they are sorted at its upper end, with their windings there. */
 static double resolve_crossings(piece_row *w, int64_t col, double y, double next, int32_t right)
 {
     const int n = w->n_edges;

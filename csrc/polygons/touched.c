@@ -1,8 +1,8 @@
 /* Touched: the squares of pixels that meet a polygon in positive area, or lie wholly inside of it.
  * In: rings, and the pixels with their centre inside.  Out: bits.
  *
- * Where rings do not meet, each edge is a border between inside and outside: a square that one passes through meets
- * both, and any other is like its centre.  Where they do, the share of each pixel tells (pieces.c). */
+ * Where rings do not meet, each edge separates inside from outside: a square that an edge passes through meets both,
+ * and any other square is like its centre.  Where rings meet, the share of each pixel decides (pieces.c). */
 #ifndef TL_POLYGON_TOUCHED_C
 #define TL_POLYGON_TOUCHED_C
 
@@ -15,7 +15,7 @@
 #include "polygons/points.c"
 #include "polygons/row_bits.c"
 
-#define TL_NO_SHARE 0x1p-40 /* of a pixel: less is rounding, see pieces.c */
+#define TL_NO_SHARE 0x1p-40 /* smaller shares of a pixel are rounding, see pieces.c */
 
 typedef struct {
     uint64_t *bits; /* of row `top` */
@@ -35,7 +35,7 @@ static inline void mark_squares(const square_bits *s, int64_t row, int64_t begin
         bits[c >> 6] &= ~((uint64_t)1 << (c & 63));
 }
 
-/* The squares that an edge passes through. */
+/* Marks the squares that an edge passes through. */
 TL_INLINE void touch_edge(const tl_polygons *p, int is_wide, int64_t i, int64_t j, int64_t bottom, const square_bits *s)
 {
     const int bits = p->bits;
@@ -75,7 +75,7 @@ static void mark_shares(void *to, int64_t row, int64_t left, int64_t right, cons
         bits[c >> 6] |= (uint64_t)(shares[c - left] > least) << (c & 63);
 }
 
-/* Turns the bits of the pixels with their centre inside, rows [top, bottom), into those of the squares. */
+/* Turns the bits of centres inside, rows [top, bottom), into the bits of squares. */
 static void test_squares(const tl_polygons *p, int64_t polygon, const tl_polygon_box *box, tl_polygon_test test,
                          int64_t width, int64_t top, int64_t bottom, uint64_t *bits, int64_t row_words,
                          const tl_piece_scratch *scratch)
