@@ -19,8 +19,8 @@
 #include "vertex/fixed.h"
 #include "polygons/points.c"
 
-/* Edges of at most so many rows are walked a vector of edges at a time, longer edges a vector of rows at a time: 4 and 8
- * are slower. */
+/* Edges of at most so many rows are walked a vector of edges at a time, longer edges a vector of rows at a time: 4 and
+ * 8 are slower. */
 #define TL_FEW_ROWS 6
 
 #define TL_EDGES_TO_PAUSE 4096 /* between two polls for cancelling; a multiple of TL_LANES */

@@ -1,5 +1,5 @@
-/* Alpha test: triangles with holes in their texture, drawn over a visibility buffer or over layers; samples with too
- * little opacity are left out, so that surfaces behind them stay.
+/* Alpha test: draws alpha-tested triangles over a visibility buffer or over layers.  Samples with too little opacity
+ * are discarded, so that surfaces behind them stay visible.
  * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest remaining sample in every
  * pixel.
  *
@@ -53,15 +53,15 @@ TL_INLINE vf opacity_of(shaded_lanes *p, const tl_material *m)
     return p->s->needs_alpha ? vf_mul(p->alpha, opacity) : opacity;
 }
 
-/* Where triangles with holes go. */
+/* The target of alpha-tested triangles. */
 typedef struct {
     const tl_target *target; /* NEAREST or PEEL */
-    tl_snapped snapped;      /* as the buffer's, but its first id is 0 */
-    int32_t first_id;        /* that of the buffer */
+    tl_snapped snapped;      /* as the target's, but its first id is 0 */
+    int32_t first_id;        /* the first id in the target */
     cutout_tile tile;
 } cutout;
 
-/* Leaves out those of n pixels of a row that the buffer hides. */
+/* Removes those of n pixels of a row that the buffer occludes. */
 TL_INLINE void hide_nearest(const cutout *c, int n, int32_t *own, const float *own_depth, int64_t to)
 {
     const int32_t *ids = (const int32_t *)c->target->pixels + to;
@@ -77,7 +77,7 @@ TL_INLINE void hide_nearest(const cutout *c, int n, int32_t *own, const float *o
     }
 }
 
-/* Puts the remaining ones of n pixels of a row of a tile into the buffer, from its pixel `to` on. */
+/* Tests n pixels of a row of a tile, and stores the remaining pixels in the target, from pixel `to` on. */
 TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64_t row, int64_t column, int n,
                            int64_t from, int64_t to)
 {
@@ -98,7 +98,7 @@ TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64
         const vm is_opaque = vm_and(p.visible, vf_ge(opacity_of(&p, m), vf_set1(m->cutoff)));
         if (!vm_any(is_opaque))
             continue;
-        const int32_t name = s->ints[RUN_ID][TL_LANES] + c->first_id; /* one triangle is drawn at a time */
+        const int32_t name = s->ints[RUN_ID][TL_LANES] + c->first_id; /* all runs show one triangle */
         const vf z = vf_load_masked(is_opaque, own_depth + x);
         if (is_nearest) {
             vi_store_masked((int32_t *)c->target->pixels + to + x, is_opaque, vi_set1(name));
@@ -109,7 +109,7 @@ TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64
     }
 }
 
-/* The pixels of a window that begins at `start` which lie around the points from low to high. */
+/* The pixels of a window from `start` on that contain the interval from low to high, and one more on each side. */
 static void find_pixels_around(double low, double high, int64_t start, int64_t size, int64_t *first, int64_t *end)
 {
     const double most = (double)size;
@@ -117,7 +117,7 @@ static void find_pixels_around(double low, double high, int64_t start, int64_t s
     *end = (int64_t)fmin(fmax(ceil(high) - (double)start + 1.0, 0.0), most);
 }
 
-/* Finds the box of a window that a triangle can reach; returns 0 where there is none. */
+/* Sets the box of a window that a triangle can reach; 0 if it is empty. */
 static int find_cut_box(const tl_vertex_set *set, const int32_t *corners, const tl_window *window, tl_triangle *t)
 {
     t->col0 = 0, t->col1 = window->width, t->row0 = 0, t->row1 = window->height;
@@ -134,7 +134,7 @@ static int find_cut_box(const tl_vertex_set *set, const int32_t *corners, const 
     return t->col0 < t->col1 && t->row0 < t->row1;
 }
 
-/* One triangle, tile by tile of the box that it can reach. */
+/* Draws one triangle, tile by tile of the box that it can reach. */
 static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int32_t id)
 {
     const tl_shading *shading = s->shading;
@@ -159,7 +159,6 @@ static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int3
         }
 }
 
-/* Draws n triangles over a target: a visibility buffer, or the layers of pixels. */
 static void cut_out(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target)
 {

@@ -1,11 +1,11 @@
 /* Full materials: surfaces with more than a colour, a texture and a highlight.
  * In: a vector of pixels.  Out: their light, linear, and their opacity.
  *
- * The tangent frame of a normal map is that of the triangle: where u and v grow by their gradients over it, as
- * per-pixel derivatives would have it, but without their rounding.  The tangent is u's direction less its part
- * along the normal of the pixel, the bitangent is at right angles to both, on the side to which v grows (uv with v up;
- * maps with green up).  Meshes bring no tangents of their own.  A surface that is seen from behind has its bent normal
- * turned round as a whole (glTF 2.0, 3.9.5).
+ * The tangent frame of a normal map is that of the triangle: the directions in which u and v grow, by their gradients
+ * over it; per-pixel derivatives would give the same frame with more rounding.  The tangent is u's direction less its
+ * part along the normal of the pixel; the bitangent is at right angles to both, on the side to which v grows (uv with v
+ * up; maps with green up).  Meshes have no tangents.  Where the back is visible the bent normal is turned round as a
+ * whole (glTF 2.0, 3.9.5).
  *
  * Based on: C. Schuler, Normal Mapping Without Precomputed Tangents, in ShaderX5, 2007; M. Mikkelsen, Simulation of
  * Wrinkled Surfaces Revisited, 2008 (the bitangent). */
@@ -22,7 +22,7 @@
 
 #define TL_MAX_TEXTURES 5 /* of a material */
 
-/* The textures of a material; returns how many it has. */
+/* Lists the textures of a material; returns how many. */
 TL_INLINE int textures_of(const tl_material *m, const tl_texture **textures)
 {
     const tl_texture *const all[TL_MAX_TEXTURES] = {m->texture, m->metallic_roughness, m->occlusion_map, m->normal_map,
@@ -34,7 +34,7 @@ TL_INLINE int textures_of(const tl_material *m, const tl_texture **textures)
     return n;
 }
 
-/* A set of uv with coefficients from `first` on, those of its gradients from `gradient` on. */
+/* Interpolates a set of uv with coefficients from `first` on, and its derivatives from `gradient` on. */
 TL_INLINE void find_uv(const shaded_lanes *p, int first, int gradient, vf *uv, vf *du, vf *dv)
 {
     const vf u = vf_mul(weighed(p, first, first + 1, first + 2), p->inv_q);
@@ -47,7 +47,7 @@ TL_INLINE void find_uv(const shaded_lanes *p, int first, int gradient, vf *uv, v
     }
 }
 
-/* For full materials and holes alone. */
+/* Interpolates what only full materials and cut-outs read. */
 static void set_more(shaded_lanes *p)
 {
     if (p->s->needs_uv1)
@@ -56,7 +56,7 @@ static void set_more(shaded_lanes *p)
         p->alpha = vf_mul(weighed(p, RUN_ALPHA, RUN_ALPHA + 1, RUN_ALPHA + 2), p->inv_q);
 }
 
-/* A texture where its set of uv and its transform lay it. */
+/* Samples a texture by its set of uv and its transform. */
 TL_INLINE void look_up(const shaded_lanes *p, const tl_texture *t, laid_texture *laid, vf *rgba, int n_channels)
 {
     const vf *uv = t->uv_set ? p->uv1 : p->uv, *du = t->uv_set ? p->du1 : p->du, *dv = t->uv_set ? p->dv1 : p->dv;
@@ -81,7 +81,7 @@ static void look_up_rgba(const shaded_lanes *p, const tl_texture *t, laid_textur
     look_up(p, t, laid, rgba, 4);
 }
 
-/* The colour of the back, where that is seen and has one of its own. */
+/* Replaces the colour where the back is visible and the material has a back colour. */
 TL_INLINE void color_back(const shaded_lanes *p, const tl_material *m, vf *rgb)
 {
     if (m->back_side == 0.0f)
@@ -91,7 +91,7 @@ TL_INLINE void color_back(const shaded_lanes *p, const tl_material *m, vf *rgb)
         rgb[c] = vf_select(is_back, vf_set1(m->back_color[c]), rgb[c]);
 }
 
-/* The colour of a material and of vertices. */
+/* The product of the material's colour and the vertices' colour. */
 TL_INLINE void start_base(const shaded_lanes *p, const tl_material *m, vf *rgb)
 {
     for (int c = 0; c < 3; c++) {
@@ -101,7 +101,7 @@ TL_INLINE void start_base(const shaded_lanes *p, const tl_material *m, vf *rgb)
     }
 }
 
-/* The colour that light meets, and the opacity of the surface. */
+/* Sets the base colour and the opacity of the surface. */
 static void find_base(shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *rgb)
 {
     vf texel[4], opacity = vf_set1(m->color[3]);
@@ -122,7 +122,7 @@ static void find_base(shaded_lanes *p, const tl_material *m, laid_texture *laid,
     p->opacity = vf_min(vf_max(opacity, vf_set1(0.0f)), vf_set1(1.0f));
 }
 
-/* The unit normal `n` as the normal map bends it. */
+/* Bends the unit normal `n` by the normal map. */
 TL_INLINE void bend_normal(const shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *n)
 {
     const tl_texture *t = m->normal_map;
@@ -156,7 +156,7 @@ TL_INLINE void bend_normal(const shaded_lanes *p, const tl_material *m, laid_tex
         n[k] = vf_select(has_some, vf_mul(bent[k], unit), n[k]);
 }
 
-/* Where the surface lies, how it is turned, and from where it is seen. */
+/* Sets the point of the surface, its normal, and the direction to the eye. */
 TL_INLINE void find_surface(const shaded_lanes *p, const tl_material *m, laid_texture *laid, lit_surface *s)
 {
     const tl_shading *shading = p->s->shading;
@@ -171,7 +171,7 @@ TL_INLINE void find_surface(const shaded_lanes *p, const tl_material *m, laid_te
         bend_normal(p, m, laid, s->normal);
 }
 
-/* Colours, lights with Blinn's highlight, ambient light and surroundings. */
+/* Light of a surface with diffuse colour and Blinn's highlight: lights, ambient light and surroundings. */
 static void light_plain(const shaded_lanes *p, const tl_material *m, laid_texture *laid, vf occlusion, vf *rgb)
 {
     const tl_shading *shading = p->s->shading;
@@ -214,7 +214,7 @@ static void light_rough(const shaded_lanes *p, const tl_material *m, const vf *f
         add_rough_light(&s, &shading->lights[k], rgb);
 }
 
-/* The light of a full material, as all lanes would see it. */
+/* The light of a full material, computed in all lanes. */
 static void shade_full(shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *rgb)
 {
     vf found[4], occlusion = vf_set1(1.0f);

@@ -1,5 +1,5 @@
-/* Light: how much of each colour a surface sends to the eye.
- * In: a unit normal, where the surface is and from where it is seen.  Out: diffuse light and highlights, linear.
+/* Light: the light of each colour that a surface reflects to the eye.
+ * In: a unit normal, a point of the surface, the direction to the eye.  Out: diffuse light and highlights, linear.
  * Based on: J. H. Lambert, Photometria, 1760; J. F. Blinn, Models of Light Reflection for Computer Synthesized
  * Pictures, 1977; J. Mitchell, G. McTaggart and C. Green, Shading in Valve's Source Engine, 2006 (the wrapped fall-off,
  * there with the power 2); Khronos, glTF extension KHR_lights_punctual, 2018 (the cone of a spot). */
@@ -12,8 +12,8 @@
 
 typedef struct {
     vf normal[3]; /* unit, towards the viewer */
-    vf point[3];  /* read when there are lights at points */
-    vf to_eye[3]; /* unit; read when the material shines */
+    vf point[3];  /* read for point lights and spots */
+    vf to_eye[3]; /* unit; read when the material has a highlight */
 } lit_surface;
 
 TL_INLINE vf dot3(const vf *a, const vf *b) { return vf_fma(a[0], b[0], vf_fma(a[1], b[1], vf_mul(a[2], b[2]))); }
@@ -25,7 +25,7 @@ TL_INLINE void normalize3(vf *a)
         a[k] = vf_mul(a[k], scale);
 }
 
-/* 2^a, within 2^-22 of it; 0 from -126 down. */
+/* 2^a, with a relative error of 2^-22; 0 from -126 down. */
 TL_INLINE vf vf_exp2(vf a)
 {
     const vf low = vf_max(a, vf_set1(-127.0f));
@@ -40,7 +40,7 @@ TL_INLINE vf vf_exp2(vf a)
     return vf_mul(sum, vf_of_bits(vi_shift_left(vi_add(whole, vi_set1(127)), 23)));
 }
 
-/* cos^shininess of the angle between the normal and the middle of light and eye. */
+/* cos^shininess of the angle between the normal and the half vector of light and eye. */
 TL_INLINE vf highlight(const lit_surface *s, const vf *to_light, vf n_dot_l, float shininess)
 {
     vf half[3];
@@ -52,7 +52,7 @@ TL_INLINE vf highlight(const lit_surface *s, const vf *to_light, vf n_dot_l, flo
     return vf_select(vf_lt(zero, n_dot_l), power, zero);
 }
 
-/* The unit vector to a light; returns how strong it is there. */
+/* Sets the unit vector to a light; returns its strength at the surface. */
 TL_INLINE vf find_light(const lit_surface *s, const tl_light *light, vf *to_light)
 {
     if (light->kind != TL_LIGHT_POINT && light->kind != TL_LIGHT_SPOT) {
@@ -75,7 +75,7 @@ TL_INLINE vf find_light(const lit_surface *s, const tl_light *light, vf *to_ligh
     return vf_mul(strength, vf_mul(share, share));
 }
 
-/* The share of a light that a matt surface sends on, from n . l. */
+/* The share of a light that a matt surface reflects, from n . l. */
 TL_INLINE vf diffuse_share(const tl_light *light, vf n_dot_l)
 {
     const vf half = vf_set1(0.5f);
@@ -99,7 +99,7 @@ TL_INLINE void add_light(const lit_surface *s, const tl_light *light, float shin
     }
 }
 
-/* The light of n lights. */
+/* The ambient light and the light of all lights. */
 TL_INLINE void add_lights(const lit_surface *s, const tl_shading *shading, float shininess, vf *diffuse, vf *specular)
 {
     for (int c = 0; c < 3; c++)

@@ -1,15 +1,15 @@
-/* Metallic-rough surfaces, as glTF describes them: microfacets of GGX over a matt ground.
- * In: base colour, metallic, roughness; lights and surroundings.  Out: the light sent to the eye, linear.
+/* Metallic-rough surfaces, as glTF describes them: microfacets of GGX over a matt base.
+ * In: base colour, metallic, roughness; lights and surroundings.  Out: the light reflected to the eye, linear.
  *
  *   f = (1 - F) (1 - metallic) base / pi + F D V,   F = f0 + (1 - f0) (1 - v . h)^5,   f0 = mix(0.04, base, metallic)
  *   D = alpha^2 / (pi ((n . h)^2 (alpha^2 - 1) + 1)^2),   alpha = roughness^2
  *   V = 1 / (2 (n . l sqrt((n . v)^2 (1 - alpha^2) + alpha^2) + n . v sqrt((n . l)^2 (1 - alpha^2) + alpha^2)))
  *
- * A light of intensity 1 makes a white matt surface white that faces it: so its light is pi, which cancels that of f.
- * The denominator of D is (n . h)^2 alpha^2 + |n x h|^2: there nothing cancels.  Roughness counts as at least
+ * A light of intensity 1 makes a white matt surface that faces it white: so its light is pi, which cancels the pi of f.
+ * The denominator of D is (n . h)^2 alpha^2 + |n x h|^2: this form does not cancel.  Roughness counts as at least
  * TL_LEAST_ROUGHNESS, so that alpha^4 stays far from the rounding of float32 and a highlight is no smaller than a lamp.
- * The light of the surroundings is their blurred light in the mirrored direction times the share that a surface mirrors
- * of white surroundings (the split sum); the matt ground gets the rest of it, times the base.
+ * The light of the surroundings is their blurred light in the mirrored direction times the share of white surroundings
+ * that the surface mirrors (the split sum); the matt base reflects the rest of that share.
  *
  * Based on: Khronos, glTF 2.0 Specification, appendix B (BRDF); B. Walter et al., 2007 (GGX); E. Heitz, Understanding
  * the Masking-Shadowing Function in Microfacet-Based BRDFs, 2014 (V, height-correlated); C. Schlick, An Inexpensive
@@ -55,7 +55,7 @@ TL_INLINE void set_rough(rough_surface *s, const vf *base, vf metallic, vf rough
     }
 }
 
-/* The light that one lamp adds. */
+/* Adds the light of one lamp. */
 TL_INLINE void add_rough_light(const rough_surface *s, const tl_light *light, vf *rgb)
 {
     vf to_light[3], half[3], squared_cross = vf_set1(0.0f);
@@ -97,7 +97,7 @@ TL_INLINE void mirrored_share(vf roughness, vf n_dot_v, vf *share)
     share[1] = vf_fma(vf_set1(1.04f), a, vf_fma(vf_set1(0.022f), roughness, vf_set1(-0.04f)));
 }
 
-/* Light from all around: ambient light, which is the same from everywhere, and the surroundings. */
+/* Adds ambient light, equal from all directions, and the light of the surroundings. */
 TL_INLINE void add_rough_surroundings(const rough_surface *s, const tl_shading *shading, vf occlusion, vf *rgb)
 {
     vf share[2], mirrored[3], gathered[3], direction[3];

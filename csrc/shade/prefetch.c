@@ -1,6 +1,5 @@
-/* Vectors of pixels that are started before their turn, so that the texels of large textures are on their way when
- * their light is found.
- * In: the runs of a span.  Out: the light of a vector of its pixels.  Asking changes no value. */
+/* Starts vectors of pixels ahead, so that texels of large textures are prefetched before they are read.
+ * In: the runs of a span.  Out: the light of a vector of its pixels.  Prefetching changes no value. */
 #ifndef TL_PREFETCH_C
 #define TL_PREFETCH_C
 
@@ -14,31 +13,32 @@
 #include "shade/shade_pixels.c"
 #include "shade/texture.c"
 
-/* Textures of fewer texels stay in the second-level cache of many processors. */
+/* Smaller textures stay in the second-level cache of many processors. */
 #define TL_FAR_TEXELS (1 << 19)
 
-#define TL_AHEAD 2   /* how many vectors are started before their turn */
-#define TL_STARTED 4 /* a power of two above it */
+#define TL_AHEAD 2   /* how many vectors are started ahead */
+#define TL_STARTED 4 /* a power of two > TL_AHEAD */
 
 typedef struct {
     shaded_lanes lanes;
     laid_texture laid;
 } started_lanes;
 
-/* The vectors of a span that are started, each at its number modulo TL_STARTED. */
+/* The started vectors of a span; vector i is at i modulo TL_STARTED. */
 typedef struct {
-    int next; /* the first that is not */
+    int next; /* the first vector that is not started */
     started_lanes lanes[TL_STARTED];
 } started_span;
 
-/* Whether its texels are prefetched: they are many, and found by the first set of uv as it is. */
+/* Whether the texels of a texture are prefetched: it is large, and sampled by the first set of uv without a
+ * transform. */
 TL_INLINE int is_far(const tl_texture *t)
 {
     return t->filter != TL_FILTER_NEAREST && !t->uv_set && !t->has_transform &&
            (int64_t)t->width[0] * t->height[0] >= TL_FAR_TEXELS;
 }
 
-/* Finds out whether the materials have such textures. */
+/* Sets whether the materials have textures that are prefetched. */
 static void note_far(shade_runs *s)
 {
     s->has_far_texels = 0;
@@ -50,7 +50,8 @@ static void note_far(shade_runs *s)
     }
 }
 
-/* Asks for texels of the material of the first lane: of its first such texture and of all that are laid alike. */
+/* Prefetches texels of the material of the first lane: of its first texture that `is_far`, and of all that are laid
+ * alike. */
 static void fetch_texels(started_lanes *p)
 {
     const shade_runs *s = p->lanes.s;
@@ -77,7 +78,7 @@ static void fetch_texels(started_lanes *p)
     }
 }
 
-/* The light of vector i, as light_pixels has it. */
+/* The light of vector i, equal to that of `light_pixels`. */
 TL_ONCE void light_started(started_span *span, const shade_runs *s, int i, int n, int64_t column, int64_t row,
                            const float *depth, vf *rgba)
 {
@@ -93,8 +94,8 @@ TL_ONCE void light_started(started_span *span, const shade_runs *s, int i, int n
     shade_pixels(&own->lanes, &own->laid, row, depth, rgba);
 }
 
-/* The light and the opacity of vector i of the n of the span that begins at `column`, which shows something; vectors
- * are taken in order.  `depth` is that of its first pixel. */
+/* The light and the opacity of vector i of n of the span that begins at `column`; some pixel of it is visible.  Vectors
+ * must be shaded in order.  `depth` points to its first pixel. */
 TL_INLINE void light_pixels(started_span *span, const shade_runs *s, int i, int n, int64_t column, int64_t row,
                             const float *depth, vf *rgba)
 {

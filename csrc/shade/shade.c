@@ -1,6 +1,6 @@
-/* Shades a visibility buffer: a picture in light, from light to sRGB; or the normals that shading has, as numbers.
+/* Shades a visibility buffer: a picture in linear light, encoded as sRGB; or the normals of shading, as numbers.
  * In: ids, the mesh they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit
- * vectors, float32, on the side that is seen, 0 where nothing is. */
+ * vectors, float32, on the visible side, 0 for the background. */
 #ifndef TL_SHADE_C
 #define TL_SHADE_C
 
@@ -27,7 +27,7 @@ TL_INLINE vi encode_light(const tl_shading *shading, const vf *rgba)
                    opacity);
 }
 
-/* Writes the words of the pixels of a vector that show something; n are left. */
+/* Writes the words of the visible pixels of a vector; n pixels are left in the span. */
 TL_INLINE void put_shaded(int32_t *pixels, unsigned visible, int n, vi word)
 {
     const vm lanes = vm_from_bits(visible);
@@ -37,7 +37,8 @@ TL_INLINE void put_shaded(int32_t *pixels, unsigned visible, int n, vi word)
         vi_store_masked(pixels, lanes, word);
 }
 
-/* n pixels of a span in grey light: first the light of all, then the words, as either alone overlaps with its like. */
+/* Shades n pixels of a span in grey light: first all light, then all words, because each loop by itself overlaps
+ * better. */
 TL_ONCE void shade_grey(const shade_runs *s, int n, int64_t column, int32_t *pixels)
 {
     _Alignas(64) float light[TL_SPAN_ROOM];
@@ -49,7 +50,7 @@ TL_ONCE void shade_grey(const shade_runs *s, int n, int64_t column, int32_t *pix
             put_shaded(pixels + x, s->visible[i], n - x, grey_word(s, vf_load(light + x)));
 }
 
-/* Fills a span with the background, and prefetches the ids and the pixels of the row below it. */
+/* Fills a span with the background, and prefetches the ids and the pixels of the row below. */
 TL_INLINE void start_span(int32_t *pixels, int32_t word, int n, const int32_t *ids, int64_t to_next)
 {
     for (int x = 0; to_next && x < n; x += 16) {
@@ -63,7 +64,7 @@ TL_INLINE void start_span(int32_t *pixels, int32_t word, int n, const int32_t *i
             vi_store_masked(pixels + x, vm_first(n - x), vi_set1(word));
 }
 
-/* n pixels of a span from `column` on, with their runs set; `depth` is that of the first. */
+/* Shades n pixels of a span from `column` on, whose runs are set; `depth` points to the first pixel. */
 TL_INLINE void shade_runs_of(const shade_runs *s, int n, int64_t column, int64_t row, const float *depth,
                              int32_t *pixels)
 {
@@ -82,7 +83,7 @@ TL_INLINE void shade_runs_of(const shade_runs *s, int n, int64_t column, int64_t
     }
 }
 
-/* The unit normals of n pixels of a span from `column` on, with their runs set: a plane an axis. */
+/* Sets the unit normals of n pixels of a span from `column` on, whose runs are set: a plane an axis. */
 TL_INLINE void find_unit_normals(const shade_runs *s, int n, int64_t column, float (*planes)[TL_SPAN_ROOM], int first)
 {
     const vf zero = vf_set1(0.0f);
@@ -113,7 +114,7 @@ TL_INLINE void store_normals(const float (*planes)[TL_SPAN_ROOM], int n, float *
     }
 }
 
-/* The picture of a visibility buffer, or its normals; rows of window->width. */
+/* Shades a visibility buffer, or writes its normals; rows of window->width. */
 static void shade_buffer(const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx,
                          const int32_t *ids, const float *depth, uint8_t *pixels, float *restrict normals)
 {

@@ -1,5 +1,5 @@
 /* Pixels: the light of a vector of pixels, from the runs they belong to.
- * In: runs with their coefficients.  Out: linear red, green and blue (or values of 0 to 255 that tell a normal). */
+ * In: runs with their coefficients.  Out: linear red, green and blue; or a normal as values of 0 to 255. */
 #ifndef TL_SHADE_PIXELS_C
 #define TL_SHADE_PIXELS_C
 
@@ -15,7 +15,7 @@
 #include "shade/light.c"
 #include "shade/texture.c"
 
-/* Edge functions of the lanes with special runs, run by run. */
+/* Sets the edge functions of the lanes with special runs, run by run. */
 static void set_special_edges(shaded_lanes *p)
 {
     special_lanes own = start_special(p, pick_int(p, RUN_SPECIAL));
@@ -26,7 +26,7 @@ static void set_special_edges(shaded_lanes *p)
     }
 }
 
-/* The lanes of vector i of the span that begins at `column`, and their edge functions as float32, except those of
+/* Sets the lanes of vector i of the span that begins at `column`, and their edge functions as float32, except for
  * special runs. */
 TL_INLINE void find_most_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {
@@ -43,7 +43,7 @@ TL_INLINE void find_most_pixels(shaded_lanes *p, const shade_runs *s, int i, int
     }
 }
 
-/* The lanes of vector i of the span that begins at `column`, and the edge functions of all runs. */
+/* Sets the lanes of vector i of the span that begins at `column`, and their edge functions. */
 TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {
     find_most_pixels(p, s, i, column);
@@ -51,7 +51,7 @@ TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t 
         set_special_edges(p);
 }
 
-/* The normal of a face without normals of vertices to interpolate; 0 if it has no area. */
+/* The normal of a face, for lanes whose interpolated normal is 0; 0 if the face has no area. */
 static void face_normal(const shade_runs *s, int32_t id, double *n)
 {
     const tl_shading *shading = s->shading;
@@ -94,7 +94,7 @@ static void replace_normals(shaded_lanes *p, vm lanes)
         p->normal[axis] = vf_load(n[axis]);
 }
 
-/* Unit normals towards the viewer; returns the lanes that have none, as those of the corners cancel. */
+/* Interpolates unit normals towards the viewer; returns the lanes in which the normals of the corners cancel. */
 TL_INLINE vm find_normals(shaded_lanes *p)
 {
     if (p->s->shading->face_normals) {
@@ -112,7 +112,7 @@ TL_INLINE vm find_normals(shaded_lanes *p)
     return vm_and(p->visible, vf_ge(pick(p, RUN_SHORTEST), squared));
 }
 
-/* Unit normals towards the viewer: those of the corners, or that of the face where they cancel. */
+/* Sets unit normals towards the viewer: interpolated, or that of the face where those of the corners cancel. */
 TL_INLINE void set_normals(shaded_lanes *p)
 {
     const vm has_none = find_normals(p);
@@ -122,7 +122,7 @@ TL_INLINE void set_normals(shaded_lanes *p)
 
 TL_INLINE void set_uv_lanes(shaded_lanes *p) { find_uv(p, RUN_U, RUN_GRADIENT, p->uv, p->du, p->dv); }
 
-/* Vector i of the span that begins at `column`, and the weights of its attributes. */
+/* Sets the lanes of vector i of the span that begins at `column`, q and uv. */
 TL_INLINE void start_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {
     find_pixels(p, s, i, column);
@@ -134,8 +134,8 @@ TL_INLINE void start_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t 
         set_uv_lanes(p);
 }
 
-/* The colours of the vertices: interpolated as sRGB values, rounded to whole ones, then turned to light; or as light
- * alone. */
+/* Sets the colours of the vertices: interpolated as sRGB values, rounded to integers, then decoded; or interpolated as
+ * light. */
 TL_INLINE void set_colors(shaded_lanes *p)
 {
     for (int c = 0; c < 3; c++) {
@@ -149,7 +149,7 @@ TL_INLINE void set_colors(shaded_lanes *p)
     }
 }
 
-/* Where the pixel looks, and the point that it sees. */
+/* Sets the ray of each pixel, and the point of the surface on it. */
 TL_INLINE void set_points(shaded_lanes *p, int64_t row, const float *depth)
 {
     const tl_shading *shading = p->s->shading;
@@ -170,7 +170,7 @@ TL_INLINE void set_points(shaded_lanes *p, int64_t row, const float *depth)
     }
 }
 
-/* The light of one material, as all lanes would see it. */
+/* The light of one material, computed in all lanes. */
 TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *rgb)
 {
     const tl_shading *shading = p->s->shading;
@@ -206,13 +206,13 @@ TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, laid_textur
             rgb[c] = vf_fma(vf_set1(m->specular[c]), specular[c], rgb[c]);
 }
 
-/* Numbers that no material has mean the first one. */
+/* The material of a number; the first material for a number outside of the materials. */
 TL_INLINE const tl_material *material_at(const tl_shading *shading, int32_t number)
 {
     return &shading->materials[number < 0 || number >= shading->n_materials ? 0 : number];
 }
 
-/* Each lane by its own material. */
+/* Shades each lane by its material. */
 static void shade_materials(shaded_lanes *p, laid_texture *laid, vf *rgb)
 {
     vf opacity = vf_set1(1.0f);
@@ -252,8 +252,8 @@ TL_INLINE vf in_eye_space(const shaded_lanes *p, int axis)
     return dot3(row, p->normal);
 }
 
-/* Light and opacity of pixels that are started; `laid` is nothing yet, or where a texture of theirs is read.
- * `depth` is that of the first pixel; it is read without perspective only. */
+/* The light and opacity of pixels after `start_lanes`; `laid` holds the texels of a texture, or `as` is NULL.  `depth`
+ * points to the first pixel; it is read only without perspective. */
 TL_INLINE void shade_pixels(shaded_lanes *p, laid_texture *laid, int64_t row, const float *depth, vf *rgba)
 {
     const shade_runs *s = p->s;

@@ -1,8 +1,7 @@
-/* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each
- * pixel that it shows in, at the first of the samples that see it; the pixel is the mean of the light at its
- * samples, each at most white, as a display and the buffers of graphics hardware have it.
- * In: planes of ids, or one plane and the pixels that show several triangles; the instances.  Out: red, green, blue and
- * opacity, uint8. */
+/* Shades and resolves a visibility buffer with several samples a pixel.  A triangle is shaded once in each pixel that
+ * it shows in, at the first of its samples; the pixel is the mean of the light at its samples, each clamped to white,
+ * as on a display and in the buffers of graphics hardware.
+ * In: planes of ids, or one plane and the split pixels; the instances.  Out: red, green, blue and opacity, uint8. */
 #ifndef TL_SHADE_SAMPLES_C
 #define TL_SHADE_SAMPLES_C
 
@@ -19,14 +18,14 @@
 #include "shade/span_list.c"
 #include "shade/srgb.c"
 
-/* The light of a span of pixels, added up, and how many samples it comes from. */
+/* Sums of light of a span of pixels, and the number of samples in each sum. */
 typedef struct {
     float light[3][TL_SPAN_ROOM], n_lit[TL_SPAN_ROOM];
-    float n_seen[TL_SPAN_ROOM]; /* samples that see the triangle shaded now */
-    int32_t ids[TL_SPAN_ROOM];  /* the triangles that a sample is the first to see, -1 elsewhere */
+    float n_seen[TL_SPAN_ROOM]; /* the number of samples that show the triangle in `ids` */
+    int32_t ids[TL_SPAN_ROOM];  /* the triangles that are shaded at this sample, -1 elsewhere */
 } sample_sums;
 
-/* Finds the triangles of n pixels that sample k is the first to see; returns whether there are any. */
+/* Sets the triangles of n pixels whose first sample is k; returns whether there are any. */
 TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t stride, int sample_bits, int k, int n)
 {
     const vi none = vi_set1(-1);
@@ -50,8 +49,8 @@ TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t str
     return any;
 }
 
-/* Shades n pixels of a span from place `first` on, with their runs set, and adds their light, as a display shows it,
- * times the samples that see it. */
+/* Shades n pixels of a span from pixel `first` on, whose runs are set, and adds their light, clamped, times their
+ * number of samples. */
 TL_INLINE void add_samples(sample_sums *sums, const shade_runs *s, int first, int n, int64_t column, int64_t row,
                            const float *depth)
 {
@@ -88,8 +87,8 @@ TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, span_list *list, con
     }
 }
 
-/* Mean light over the background ("over"), encoded.  A pixel with no or all samples on a triangle owes nothing
- * to rounding. */
+/* The mean light over the background ("over"), encoded.  Pixels with no sample or all samples on triangles have no
+ * rounding error from it. */
 TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, int sample_bits, int x)
 {
     const vf share = vf_mul(vf_load(sums->n_lit + x), vf_set1(1.0f / (float)(1 << sample_bits)));
@@ -115,14 +114,14 @@ typedef struct {
     float depth[TL_MAX_SAMPLES][TL_SPAN_ROOM];
 } span_samples;
 
-/* Writes the ids and depths that the samples of n pixels see.  Of split pixels, [at, end) are the first that may lie
- * there; `ids` and `depth` are those of the first sample.  Returns where the split pixels of the next span begin. */
+/* Writes the ids and depths of the samples of n pixels.  Split pixels from `at` to `end` may lie in the span; `ids` and
+ * `depth` are those of the first sample.  Returns the first split pixel of the next span. */
 static int64_t unpack_span(const tl_split *split, int64_t at, int64_t end, int64_t column, int n, int sample_bits,
                            const int32_t *ids, const float *depth, span_samples *span)
 {
     for (int k = 0; k < 1 << sample_bits; k++)
         memcpy(span->ids[k], ids, (size_t)n * sizeof *ids);
-    memcpy(span->depth[0], depth, (size_t)n * sizeof *depth); /* others are read where a pixel is split */
+    memcpy(span->depth[0], depth, (size_t)n * sizeof *depth); /* others are read only in split pixels */
     for (; at < end && split->columns[at] < column + n; at++) {
         const int64_t x = split->columns[at] - column;
         for (int k = 1; k < 1 << sample_bits; k++) {
@@ -133,7 +132,7 @@ static int64_t unpack_span(const tl_split *split, int64_t at, int64_t end, int64
     return at;
 }
 
-/* All samples of n pixels see the triangle of the first. */
+/* Sets the triangles of n pixels whose samples all show the triangle of the first sample. */
 TL_INLINE int find_whole(sample_sums *sums, const int32_t *ids, int sample_bits, int n)
 {
     const vi none = vi_set1(-1);
@@ -148,8 +147,6 @@ TL_INLINE int find_whole(sample_sums *sums, const int32_t *ids, int sample_bits,
     return vm_any(any);
 }
 
-/* The picture of planes of ids (and depth), `stride` pixels apart, for 2^sample_bits samples at (x, y) sub-pixels from
- * the centre; with `split` of one plane. */
 static void shade_samples(const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
                           int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
                           const tl_split *split, uint8_t *pixels)

@@ -1,5 +1,5 @@
-/* Span list: runs of the instances of a span, one after the other.
- * In: the columns that each instance shows in.  Out: runs that are set for it. */
+/* Span list: sets up runs for the instances of a span, one after the other.
+ * In: the columns in which each instance is visible.  Out: runs that are set up for it. */
 #ifndef TL_SPAN_LIST_C
 #define TL_SPAN_LIST_C
 
@@ -15,7 +15,7 @@
 #include "shade/prefetch.c"
 #include "shade/srgb.c"
 
-/* Notes the needs of a full material. */
+/* Adds what a full material needs of runs. */
 static void note_full(shade_runs *s, const tl_material *m)
 {
     const tl_texture *textures[TL_MAX_TEXTURES];
@@ -28,7 +28,7 @@ static void note_full(shade_runs *s, const tl_material *m)
         s->needs_tangents[m->normal_map->uv_set] = 1;
 }
 
-/* Runs of nothing yet. */
+/* Starts runs without a mesh. */
 static void start_runs(shade_runs *s, const tl_window *window, const tl_view *view)
 {
     s->window = window, s->view = view, s->first_id = 0;
@@ -37,7 +37,7 @@ static void start_runs(shade_runs *s, const tl_window *window, const tl_view *vi
         memset(s->floats[k], 0, TL_MAX_LANES * sizeof(float));
 }
 
-/* Runs of a mesh from now on, and the needs of its shading. */
+/* Sets the mesh of the runs, and what its shading needs. */
 static void set_mesh(shade_runs *s, const tl_snapped *snapped, const tl_shading *shading)
 {
     int shines = 0, has_texture = 0, is_lit = 0, has_points = 0;
@@ -69,7 +69,7 @@ static void set_mesh(shade_runs *s, const tl_snapped *snapped, const tl_shading 
     start_grey(s);
 }
 
-/* Sets up runs for part k of a span, seen from the sample at_fx, or, without one, from where its mesh is seen. */
+/* Sets up runs for part k of a span, for the sample at_fx; NULL: for the sample of its mesh. */
 TL_INLINE void set_part(shade_runs *s, span_list *list, int k, const int32_t *at_fx)
 {
     const tl_shaded *own = list->parts[k].instance;

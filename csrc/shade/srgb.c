@@ -1,12 +1,12 @@
 /* From light to the sRGB values of a picture; and grey light: a surface of one colour under white lights, where all
- * channels are that colour times the same light.
+ * channels are that colour times one light.
  * In: linear light, or the pixels of runs.  Out: whole numbers of 0 to 255.
  *
  * Light is rounded to steps of 2^-16, and a step to the nearest sRGB value of 0 to 255: the polynomial below gives that
- * value for each of the 65537 steps (the tests of shading look at all of them).
+ * value for each of the 65537 steps (the tests of shading check all of them).
  *
- * The curve of sRGB is a power: that of a product is the product of the powers.  So under grey light one root is taken
- * for three channels, of the light as it is, where encode_srgb takes one of each channel's, rounded to a step.
+ * The curve of sRGB is a power: the power of a product is the product of the powers.  So grey light needs one root for
+ * three channels, of the unrounded light, where `encode_srgb` takes a root of each channel's light, rounded to a step.
  * Based on: IEC 61966-2-1, 1999. */
 #ifndef TL_SRGB_C
 #define TL_SRGB_C
@@ -18,7 +18,7 @@
 #include "shade/shade_pixels.c"
 
 #define TL_LIGHT_STEPS 65536.0f
-#define SRGB_SLOPE (12.92f * 255.0f) /* of the line that dark light follows */
+#define SRGB_SLOPE (12.92f * 255.0f) /* of the linear part, for dark light */
 #define SRGB_LINE_END 205.5f         /* in steps */
 #define SRGB_OFFSET (0.055f * 255.0f)
 
@@ -29,7 +29,7 @@ static const float SRGB_SCALE[16] = {
     0x1.c471be00p+6f, 0x1.2df86a00p+7f, 0x1.93150200p+7f, 0x1.52f34400p+1f,
 };
 
-/* The two factors of 255 * 1.055 * (a / 2^16)^(1 / 2.4) for 1 <= a < 2^16; some number elsewhere. */
+/* The two factors of 255 * 1.055 * (a / 2^16)^(1 / 2.4) for 1 <= a < 2^16; undefined elsewhere. */
 TL_INLINE vf srgb_root(vf a, vf *scale)
 {
     const vi bits = vi_bits_of_vf(a);
@@ -44,7 +44,7 @@ TL_INLINE vf srgb_root(vf a, vf *scale)
     return vf_fma(root, m, vf_set1(0x1.66b6eap-2f));
 }
 
-/* Light of 0 to 1 as whole sRGB values. */
+/* Light of 0 to 1 to whole sRGB values. */
 TL_INLINE vi encode_srgb(vf light)
 {
     const vf steps = vf_mul(vf_max(light, vf_set1(0.0f)), vf_set1(TL_LIGHT_STEPS));
@@ -56,7 +56,7 @@ TL_INLINE vi encode_srgb(vf light)
     return vi_nearest(vf_select(vf_lt(whole, vf_set1(SRGB_LINE_END)), line, curve));
 }
 
-/* Values of 0 to 255 as they are, light encoded. */
+/* Rounds values of 0 to 255, or encodes light. */
 TL_INLINE vi to_byte(tl_show show, vf a)
 {
     if (show != TL_SHOW_NORMALS)
@@ -69,17 +69,17 @@ TL_INLINE vi to_word(vi r, vi g, vi b, vi a)
     return vi_or(vi_or(r, vi_shift_left(g, 8)), vi_or(vi_shift_left(b, 16), vi_shift_left(a, 24)));
 }
 
-/* The most light that can be: its root is taken in steps of 2^-10. */
+/* The largest light whose root is taken, in steps of 2^-10. */
 #define TL_MOST_GREY 63.0f
 #define TL_GREY_STEPS 1024.0f
 
-/* 2^(35 / 12) / (255 * 1.055): the factor that the product of two roots lacks, of a colour in steps of 2^-15 and light
- * in those of 2^-10, where srgb_root has those of 2^-16; and its factor, which stands in both. */
+/* 2^(35 / 12) / (255 * 1.055): corrects the product of two results of srgb_root, for a colour in steps of 2^-15 and
+ * light in steps of 2^-10 instead of 2^-16, and with the factor 255 * 1.055 only once. */
 #define TL_GREY_SCALE 0x1.cbddbcp-6f
 
 static int is_white(const float *color) { return color[0] == color[1] && color[1] == color[2]; }
 
-/* Whether the surface has one colour and white light, and not too much of it; the roots of the colour if so. */
+/* Sets whether the surface has one colour and white light up to TL_MOST_GREY; if so, the roots of the colour. */
 static void start_grey(shade_runs *s)
 {
     const tl_shading *shading = s->shading;
@@ -104,19 +104,19 @@ static void start_grey(shade_runs *s)
     }
 }
 
-/* The light of pixels that have their normals, in steps. */
+/* The light of pixels with normals, in steps. */
 TL_INLINE vf grey_light(const shaded_lanes *p)
 {
     lit_surface surface;
     vf diffuse[3], specular[3];
     for (int axis = 0; axis < 3; axis++)
-        /* nothing shines */
+        /* no highlights */
         surface.normal[axis] = p->normal[axis], surface.point[axis] = surface.to_eye[axis] = vf_set1(0.0f);
     add_lights(&surface, p->s->shading, 0.0f, diffuse, specular);
     return vf_mul(diffuse[0], vf_set1(TL_GREY_STEPS));
 }
 
-/* The light of vector i of the span that begins at `column`, whatever its runs and normals are. */
+/* The light of vector i of the span that begins at `column`, for all runs and normals. */
 static void light_any_grey(const shade_runs *s, int i, int64_t column, float *steps)
 {
     shaded_lanes p;
@@ -125,8 +125,8 @@ static void light_any_grey(const shade_runs *s, int i, int64_t column, float *st
     vf_store(steps, grey_light(&p));
 }
 
-/* The light of vector i of the span that begins at `column`.  A call that takes the lanes would store them all for
- * every vector, so the rare cases begin again. */
+/* The light of vector i of the span that begins at `column`.  Rare cases start anew in a call: if the lanes were passed
+ * to a call, every vector would store them. */
 TL_INLINE void light_grey(const shade_runs *s, int i, int64_t column, float *steps)
 {
     shaded_lanes p;
@@ -137,7 +137,7 @@ TL_INLINE void light_grey(const shade_runs *s, int i, int64_t column, float *ste
         vf_store(steps, grey_light(&p));
 }
 
-/* Their words: one root for three channels. */
+/* The words of pixels in grey light: one root for three channels. */
 TL_INLINE vi grey_word(const shade_runs *s, vf steps)
 {
     const vf last = vf_set1(255.0f), line_end = vf_set1(SRGB_LINE_END * SRGB_SLOPE / TL_LIGHT_STEPS);

@@ -1,15 +1,15 @@
-/* Surroundings: the light that comes from all around, as a matt surface gathers it and as a shiny one mirrors it.
+/* Surroundings: light from all directions, as a matt surface gathers it and as a shiny surface mirrors it.
  * In: directions in the shading space, a roughness.  Out: light, linear.
  *
- * A sky over a ground needs no picture.  A matt surface with a normal of height h gets (1 + h) / 2 of the sky.  A
- * rough one sees the horizon blurred: along one axis the slopes of GGX facets have the cumulative distribution
- * (1 + x / sqrt(x^2 + a^2)) / 2, and a facet turns mirrored light by twice its own angle, so x is the slope of the
- * mirrored direction and a twice alpha; for large alpha the half circle ends it.  SPREAD_* fit that: within 0.007 of
- * the integral over the facets for every roughness and height, exact for a mirror and for alpha = 1, which sees
- * (1 + h) / 2 again.
+ * A sky over a ground needs no picture.  A matt surface whose normal has height h gets (1 + h) / 2 of the sky.  A rough
+ * surface mirrors a blurred horizon: along one axis the slopes of GGX facets have the cumulative distribution (1 + x /
+ * sqrt(x^2 + a^2)) / 2, and a facet turns mirrored light by twice its angle, so x is the slope of the mirrored
+ * direction and a twice alpha; for large alpha the half circle limits it.  SPREAD_* fit that: within 0.007 of the
+ * integral over the facets for every roughness and height, exact for a mirror and for alpha = 1, which gets (1 + h) /
+ * 2.
  *
- * Based on: B. Walter et al., Microfacet Models for Refraction through Rough Surfaces, 2007 (the slopes of GGX);
- * B. Karis, Real Shading in Unreal Engine 4, 2013 (blurred levels by roughness); T. Engelhardt and C. Dachsbacher,
+ * Based on: B. Walter et al., Microfacet Models for Refraction through Rough Surfaces, 2007 (the slopes of GGX); B.
+ * Karis, Real Shading in Unreal Engine 4, 2013 (blurred levels by roughness); T. Engelhardt and C. Dachsbacher,
  * Octahedron Environment Maps, 2008. */
 #ifndef TL_SURROUNDINGS_C
 #define TL_SURROUNDINGS_C
@@ -25,7 +25,7 @@
 
 TL_INLINE vf vf_abs(vf a) { return vf_max(a, vf_sub(vf_set1(0.0f), a)); }
 
-/* A direction in the space of the surroundings. */
+/* Rotates a direction into the space of the surroundings. */
 TL_INLINE void turn_around(const tl_surroundings *e, const vf *at, vf *turned)
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -40,7 +40,7 @@ TL_INLINE void mix_sky(const tl_surroundings *e, vf share, vf *light)
         light[c] = vf_fma(share, vf_set1(e->sky[c] - e->ground[c]), vf_set1(e->ground[c]));
 }
 
-/* The share of the sky around a unit direction of the height h, for a surface of this alpha^2. */
+/* The share of the sky around a unit direction of height h, for a surface with alpha. */
 TL_INLINE vf share_of_sky(vf h, vf alpha, vf alpha2)
 {
     const vf one = vf_set1(1.0f), half = vf_set1(0.5f), squared = vf_mul(h, h);
@@ -51,7 +51,7 @@ TL_INLINE vf share_of_sky(vf h, vf alpha, vf alpha2)
     return vf_fma(half, vf_div(h, length), half);
 }
 
-/* Where a direction lies on the unfolded octahedron, 0 to 1. */
+/* Maps a direction to the unfolded octahedron, 0 to 1. */
 TL_INLINE void unfold(const vf *at, vf *x, vf *y)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), half = vf_set1(0.5f), tiny = vf_set1(0x1p-100f);
@@ -65,12 +65,12 @@ TL_INLINE void unfold(const vf *at, vf *x, vf *y)
     *y = vf_fma(half, vf_select(is_below, folded_b, b), half);
 }
 
-/* One level of the picture, which may be another one in each lane. */
+/* Samples a level of the picture; each lane has its level. */
 TL_INLINE void sample_level(const tl_surroundings *e, vi level, vf x, vf y, vf *light)
 {
     const vi size = vi_lookup(e->size, level), stride = vi_add(size, vi_set1(2)), zero = vi_set1(0), one = vi_set1(1);
     const vf length = vf_from_vi(size), half = vf_set1(0.5f);
-    const vf at_x = vf_fma(x, length, half), at_y = vf_fma(y, length, half); /* the border shifts by one */
+    const vf at_x = vf_fma(x, length, half), at_y = vf_fma(y, length, half); /* - 0.5, + 1 for the border */
     const vi column = vi_max(vi_min(vi_floor(at_x), size), zero), row = vi_max(vi_min(vi_floor(at_y), size), zero);
     const vf share_x = vf_sub(at_x, vf_from_vi(column)), share_y = vf_sub(at_y, vf_from_vi(row));
     const vi first = vi_add(vi_lookup(e->offset, level), vi_add(vi_mul(row, stride), column));
@@ -106,7 +106,7 @@ static void gather_light(const tl_surroundings *e, const vf *normal, vf *light)
         light[c] = vf_mul(light[c], vf_set1(e->diffuse));
 }
 
-/* The light that a surface sees in a unit direction. */
+/* The light that a surface mirrors from a unit direction. */
 static void mirror_light(const tl_surroundings *e, const vf *direction, vf roughness, vf *light)
 {
     vf at[3], x, y;

@@ -1,5 +1,5 @@
-/* Textures: the light of a surface at (u, v), filtered; pictures of linear light, so their mean is a mean of light.
- * In: coordinates and how fast they change from pixel to pixel.  Out: red, green, blue and opacity, 0 to 1.
+/* Textures: samples a texture at (u, v), filtered.  Texels are linear light, so their mean is a mean of light.
+ * In: coordinates and their derivatives by pixel.  Out: red, green, blue and opacity, 0 to 1.
  * Based on: L. Williams, Pyramidal Parametrics, 1983 (mipmaps); P. Heckbert, Fundamentals of Texture Mapping and Image
  * Warping, 1989 (the footprint of a pixel from derivatives). */
 #ifndef TL_TEXTURE_C
@@ -10,10 +10,10 @@
 #include "shading.h"
 #include "lanes/lanes.h"
 
-/* log2 of positive numbers, within 2^-22 of it, or of the distance to 1 near 1; of 0: -127. */
+/* log2 of positive numbers, with a relative error of 2^-22, near 1 relative to the distance from 1; of 0: -127. */
 TL_INLINE vf vf_log2(vf a)
 {
-    /* the exponent of a / sqrt(1/2), so that the rest lies round 1 */
+    /* the exponent of a / sqrt(1/2), so that the rest is near 1 */
     const vi bits = vi_sub(vi_bits_of_vf(a), vi_set1(0x3f3504f3)), exponent = vi_shift_right(bits, 23);
     const vf rest = vf_of_bits(vi_add(vi_and(bits, vi_set1(0x007fffff)), vi_set1(0x3f3504f3)));
     const vf t = vf_sub(rest, vf_set1(1.0f));
@@ -29,17 +29,17 @@ TL_INLINE vf vf_log2(vf a)
     return vf_fma(sum, t, vf_from_vi(exponent));
 }
 
-/* Where a coordinate falls: the texel before it, and the share of the one behind. */
+/* The texel before a coordinate, and the share of the texel after it. */
 typedef struct {
     vi first;
     vf share;
 } texel_pair;
 
-/* 0 to 1 for any finite number: the part behind the point. */
+/* The fractional part, 0 to 1, for any finite number. */
 TL_INLINE vf fraction_of(vf a)
 {
     const vf rest = vf_sub(a, vf_from_vi(vi_floor(a)));
-    return vf_min(vf_max(rest, vf_set1(0.0f)), vf_set1(1.0f)); /* the ends, where `a` is too large to have a fraction */
+    return vf_min(vf_max(rest, vf_set1(0.0f)), vf_set1(1.0f)); /* limits it where `a` is too large to have a fraction */
 }
 
 TL_INLINE vf folded(vf a, tl_wrap wrap)
@@ -53,7 +53,7 @@ TL_INLINE vf folded(vf a, tl_wrap wrap)
     return vf_sub(one, vf_max(before, vf_sub(vf_set1(0.0f), before)));
 }
 
-/* `a` is folded; the pair (first, first + 1) may begin in the last column, behind which stands the first one. */
+/* `a` is folded; `first` may be the last column: the texels of the first column follow it. */
 TL_INLINE texel_pair find_pair(vf a, vi size, tl_wrap wrap)
 {
     const vf length = vf_from_vi(size);
@@ -86,13 +86,13 @@ TL_INLINE void sample_nearest(const tl_texture *t, vf u, vf v, vf *rgba)
     rgba[0] = low_channel(rg), rgba[1] = high_channel(rg), rgba[2] = low_channel(ba), rgba[3] = high_channel(ba);
 }
 
-/* The four texels round (u, v) on a level of its own in each lane, and their weights. */
+/* The four texels around (u, v) on a level per lane, and their weights. */
 typedef struct {
-    _Alignas(64) int32_t at[2][TL_MAX_LANES]; /* of the upper two and of the lower two */
+    _Alignas(64) int32_t at[2][TL_MAX_LANES]; /* of the upper two and of the lower two texels */
     vf weight[4];
 } texel_quad;
 
-/* In `sharp` lanes the nearest of them has all the weight. */
+/* In `sharp` lanes the nearest texel has all the weight. */
 TL_INLINE void find_quad(const tl_texture *t, vi level, vf u, vf v, vm sharp, texel_quad *quad)
 {
     const vi width = vi_lookup(t->width, level), height = vi_lookup(t->height, level), one = vi_set1(1);
@@ -111,7 +111,7 @@ TL_INLINE void find_quad(const tl_texture *t, vi level, vf u, vf v, vm sharp, te
     quad->weight[0] = vf_sub(vf_sub(vf_set1(1.0f), x.share), quad->weight[2]);
 }
 
-/* Their weighted sum, in 65535ths. */
+/* The weighted sum of the four texels, in 65535ths. */
 TL_INLINE void filter_quad(const tl_texture *t, const texel_quad *quad, vf *rgba, int n_channels)
 {
     vi row[2][4];
@@ -128,7 +128,7 @@ TL_INLINE void filter_quad(const tl_texture *t, const texel_quad *quad, vf *rgba
     }
 }
 
-/* How many levels down the mipmap the texels are as large as a pixel: log2 of the longer side of its footprint. */
+/* The mipmap level at which texels are as large as a pixel: log2 of the longer side of its footprint. */
 TL_INLINE vf level_of_detail(const tl_texture *t, const vf *du, const vf *dv)
 {
     const vf width = vf_set1((float)t->width[0]), height = vf_set1((float)t->height[0]);
@@ -140,15 +140,15 @@ TL_INLINE vf level_of_detail(const tl_texture *t, const vf *du, const vf *dv)
     return vf_mul(vf_set1(0.5f), vf_log2(vf_max(squared[0], squared[1])));
 }
 
-/* Where a texture is read in each lane: textures of one size that are laid alike share it. */
+/* The texels that each lane reads; textures of one size that are laid alike share them. */
 typedef struct {
-    const tl_texture *as; /* NULL: nothing is found yet */
+    const tl_texture *as; /* NULL: not set */
     texel_quad fine, coarse;
     vf share; /* of the coarser level */
     int has_coarse;
 } laid_texture;
 
-/* Whether one is read where the other is: both by the same uv, as they are. */
+/* Whether two textures read the texels at equal positions: by one set of uv, without a transform. */
 TL_INLINE int is_laid_alike(const tl_texture *a, const tl_texture *b)
 {
     return a == b || (a->width[0] == b->width[0] && a->height[0] == b->height[0] && a->n_levels == b->n_levels &&
@@ -156,7 +156,7 @@ TL_INLINE int is_laid_alike(const tl_texture *a, const tl_texture *b)
                       a->uv_set == b->uv_set && !a->has_transform && !b->has_transform);
 }
 
-/* Not of textures with the filter "nearest". */
+/* Sets the texels to read; not for textures with TL_FILTER_NEAREST. */
 TL_INLINE void find_texels(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, laid_texture *laid)
 {
     u = folded(u, t->wrap_u), v = folded(v, t->wrap_v);
@@ -187,7 +187,7 @@ TL_INLINE void filter_texels(const tl_texture *t, const laid_texture *laid, vf *
     }
 }
 
-/* The texture at (u, v); du, dv: how much they grow from one column and from one row to the next. */
+/* Samples the texture at (u, v); du, dv: derivatives by column and by row. */
 TL_INLINE void sample_laid(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, laid_texture *laid, vf *rgba,
                            int n_channels)
 {
@@ -202,7 +202,7 @@ TL_INLINE void sample_laid(const tl_texture *t, vf u, vf v, const vf *du, const 
         rgba[c] = vf_mul(rgba[c], vf_set1(1.0f / 65535.0f));
 }
 
-/* Samples a texture that shares its layout with no other. */
+/* Samples a texture without a layout to share. */
 TL_INLINE void sample_texture(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, vf *rgba, int n_channels)
 {
     laid_texture laid;
