@@ -1,10 +1,11 @@
-/* Blend: the pass that puts the colours of triangles into the canvas, one triangle after the other.
+/* Blend: the pass that blends the colours of triangles into the canvas, one triangle after the other.
  * In: vertex records, triangles and their colours.  Out: pixels.
  *
- * Nothing is drawn out of order: one queue of triangles.  Setup and row ends are computed a vector of triangles at
- * a time, as in rows.c; rows are then drawn triangle by triangle.  A triangle that lanes cannot take empties the queue
- * and is drawn by itself.  Where clip planes cut triangles that are not snapped, all of them are, and the pieces of one
- * in its place.  Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
+ * Triangles are drawn in order, from one queue.  Setup and row ends are computed a vector of triangles at a time, as in
+ * rows.c; rows are then drawn triangle by triangle.  A triangle that lanes cannot process flushes the queue and is
+ * drawn by itself.  Where clip planes cut triangles that are not snapped, every triangle is drawn by itself, and the
+ * pieces of a cut triangle in its place.  All bands of rows draw the triangles in the same order, so threads change no
+ * bit. */
 #ifndef TL_BLEND_C
 #define TL_BLEND_C
 
@@ -30,11 +31,11 @@
 #include "blend/mix_u8.c"
 
 typedef struct {
-    walk_state walk; /* its queue `rows` holds waiting triangles */
+    walk_state walk; /* its queue `rows` holds triangles that are not drawn yet */
     blend_state mix;
 } blend_pass;
 
-/* Row ends of TL_LANES triangles, which it goes through; returns the lanes with one in doubt. */
+/* Steps through the row ends of TL_LANES triangles; returns the lanes with a row end in doubt. */
 TL_INLINE vm find_blend_rows(tl_geometry g, lane_edges *e, vi sample, vi n_cols, int n_rows, vi stride,
                              blend_rows *rows)
 {
@@ -42,7 +43,7 @@ TL_INLINE vm find_blend_rows(tl_geometry g, lane_edges *e, vi sample, vi n_cols,
     for (int row = 0; row < n_rows; row++) {
         vi begin, end;
         next_row(g, e, n_cols, &begin, &end, &doubted);
-        begin = vi_min(begin, n_cols), end = vi_max(end, vi_set1(0)); /* corners may not be those of the box any more */
+        begin = vi_min(begin, n_cols), end = vi_max(end, vi_set1(0)); /* corners may have changed since the box */
         vi_store(rows->first[row], vi_add(sample, begin));
         vi_store(rows->n[row], vi_sub(end, begin));
         sample = vi_add(sample, stride);
@@ -50,7 +51,7 @@ TL_INLINE vm find_blend_rows(tl_geometry g, lane_edges *e, vi sample, vi n_cols,
     return doubted;
 }
 
-/* Decides the row ends of the lanes in doubt: on the grid by lanes, else by the exact sign. */
+/* Decides the row ends of the lanes in doubt: by lanes where vertices are on the grid, else by the exact sign. */
 static __attribute__((noinline)) void refine_blend_rows(walk_state *s, int i, lane_exact *t, vi n_cols, int n_rows,
                                                         int32_t stride, vm doubted, blend_rows *rows)
 {
@@ -116,7 +117,7 @@ TL_INLINE void flush_blend(blend_pass *p, tl_geometry g)
         flush_blend_float(p);
 }
 
-/* A triangle of the list that is drawn, with the name of one of the mesh; TL_FLOAT. */
+/* Draws triangle or piece `drawn` of the list by itself, with the colour of triangle `name`; TL_FLOAT. */
 static __attribute__((noinline)) void blend_single_float(blend_pass *p, int64_t drawn, int64_t name)
 {
     blend_state *b = &p->mix;
@@ -128,7 +129,7 @@ static __attribute__((noinline)) void blend_single_float(blend_pass *p, int64_t 
     draw_single_float(&p->walk, (int32_t)drawn, TL_SINK_BLEND);
 }
 
-/* Setup and cull of TL_LANES triangles, which come after all that wait. */
+/* Setup and cull of TL_LANES triangles, which are drawn after all in the queue. */
 TL_INLINE void blend_batch(blend_pass *p, tl_geometry g, const int32_t *corners, vi id, vm live)
 {
     walk_state *s = &p->walk;
@@ -139,12 +140,12 @@ TL_INLINE void blend_batch(blend_pass *p, tl_geometry g, const int32_t *corners,
         find_fixed_boxes(s, &b);
     vm drawn = vm_and(b.drawn, has_box(&b)), single = b.single;
     if (g == TL_FIXED) {
-        const vi special = vi_set1(s->limits.special_x); /* of a sample it may be the greatest number, not the least */
+        const vi special = vi_set1(s->limits.special_x); /* relative to a sample it may be the greatest number */
         const vm is_special =
             vm_or(vm_or(vi_eq(b.c.x[0], special), vi_eq(b.c.x[1], special)), vi_eq(b.c.x[2], special));
         single = vm_and(single, vm_or(is_special, has_box(&b)));
     }
-    if (TL_LANES == 1) { /* one lane gains nothing from the rows above */
+    if (TL_LANES == 1) { /* a single lane gains nothing from the queue */
         single = vm_or(single, drawn);
         drawn = vm_and_not(drawn, single);
     }
@@ -169,7 +170,7 @@ TL_INLINE void blend_batch(blend_pass *p, tl_geometry g, const int32_t *corners,
         flush_blend(p, g);
 }
 
-/* Every triangle; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
+/* Draws every triangle; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
 TL_INLINE void blend_batches(blend_pass *p, tl_geometry g)
 {
     walk_state *s = &p->walk;
@@ -184,7 +185,7 @@ TL_INLINE void blend_batches(blend_pass *p, tl_geometry g)
     flush_blend(p, g);
 }
 
-/* Every triangle by itself, of any method and far away. */
+/* Draws every triangle by itself, for any method and far windows. */
 static void blend_each_fixed(blend_pass *p)
 {
     const tl_snapped *snapped = p->mix.snapped;
@@ -196,8 +197,7 @@ static void blend_each_fixed(blend_pass *p)
     }
 }
 
-/* Every triangle by itself, with vertices that are not snapped.  Clip planes cut a triangle into pieces, which are
- * drawn in its place. */
+/* Draws every triangle by itself, with vertices that are not snapped; the pieces of a clipped triangle in its place. */
 static void blend_each_float(blend_pass *p)
 {
     walk_state *s = &p->walk;
@@ -247,7 +247,7 @@ static tl_mix mix_of(const tl_canvas *canvas)
     }
 }
 
-/* A window of fewer than 2^31 samples. */
+/* The window has fewer than 2^31 samples. */
 static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
 {
     blend_pass p;

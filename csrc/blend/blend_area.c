@@ -1,9 +1,9 @@
 /* Blend, by area: the pass that weights each triangle by its area in each pixel's square.
  * In: triangles, one after the other.  Out: pixels.
  *
- * Small triangles take places below one another in an atlas of cells, moved there by whole pixels, which changes no
- * bit: so edges of many triangles fill the lanes of ramp.c.  Only then are the cells summed and the colours blended,
- * triangle by triangle.  A triangle that is too large for that empties the atlas and is drawn by itself. */
+ * Small triangles are stacked in an atlas of cells, shifted by whole pixels, which changes no bit: so edges of many
+ * triangles fill the lanes of ramp.c.  Then the cells are summed and the colours blended, triangle by triangle.  A
+ * triangle that is too large for the atlas flushes it and is drawn by itself. */
 #ifndef TL_BLEND_AREA_C
 #define TL_BLEND_AREA_C
 
@@ -26,12 +26,12 @@
 #define TL_ATLAS_TRIANGLES 256
 
 typedef struct {
-    area_state area; /* its plane: the atlas */
+    area_state area; /* its plane is the atlas */
     blend_state *mix;
-    int n, n_atlas_rows; /* triangles, and rows of theirs */
+    int n, n_atlas_rows; /* triangles, and their rows */
     int32_t id[TL_ATLAS_TRIANGLES + TL_MAX_LANES], top[TL_ATLAS_TRIANGLES + TL_MAX_LANES],
         n_rows[TL_ATLAS_TRIANGLES + TL_MAX_LANES];
-    /* of the window: where their first cells belong */
+    /* in the window: the pixels of their first cells */
     int32_t col[TL_ATLAS_TRIANGLES + TL_MAX_LANES], row[TL_ATLAS_TRIANGLES + TL_MAX_LANES];
 } area_pass;
 
@@ -70,7 +70,7 @@ static __attribute__((noinline)) void flush_atlas(area_pass *p)
     p->n = p->n_atlas_rows = 0;
 }
 
-/* Puts the triangles in m, which span n_rows pixels from (col, row) on, into the atlas. */
+/* Adds the triangles in m, which span n_rows pixels from (col, row) on, to the atlas. */
 static void push_atlas(area_pass *p, vm m, const lane_corners *c, vm turned, vi id, vi col, vi row, vi n_rows)
 {
     const tl_window *window = p->mix->window;
@@ -98,7 +98,7 @@ static void push_atlas(area_pass *p, vm m, const lane_corners *c, vm turned, vi 
 
 /* ---- the mesh ---------------------------------------------------------------------------------------------------- */
 
-/* Setup and cull of TL_LANES triangles, which come after all that wait. */
+/* Setup and cull of TL_LANES triangles, which are drawn after all in the atlas. */
 TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners, vm live)
 {
     const tl_snapped *snapped = p->mix->snapped;
@@ -114,7 +114,7 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     const lane_extents e = extents_of(&c);
     const vi col = vi_shift_right(e.x_min, bits), row = vi_shift_right(e.y_min, bits);
     const vi last_col = vi_shift_right(e.x_max, bits), last_row = vi_shift_right(e.y_max, bits);
-    const vi n_cols = vi_sub(last_col, col), n_rows = vi_sub(last_row, row); /* less one */
+    const vi n_cols = vi_sub(last_col, col), n_rows = vi_sub(last_row, row); /* one less than the number */
     /* the cell right of the last column holds the rest of its area */
     vm single = is_too_large(&e, max_extent);
     single = vm_or(single, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));

@@ -1,8 +1,9 @@
-/* Blend, by area: the rows of a large flat triangle that two edges pass from top to bottom, a vector of rows at a time.
- * In: a triangle.  Out: uint8 pixels, and rows that are left to blend_strip.c.
+/* Blend, by area: the rows of a large flat triangle that two edges cross from top to bottom, a vector of rows at a
+ * time.
+ * In: a triangle.  Out: uint8 pixels; other rows are drawn by blend_strip.c.
  *
- * Such a row is a ramp on the left, a run of whole pixels and a ramp on the right.  The ramps are those of ramp.c, and
- * are not added to cells first: where they share no pixel, each alone is the area. */
+ * Such a row is a ramp on the left, a run of whole pixels and a ramp on the right.  The ramps are those of ramp.c
+ * without cells: where they share no pixel, each ramp is the area. */
 #ifndef TL_BLEND_ROWS_C
 #define TL_BLEND_ROWS_C
 
@@ -20,14 +21,14 @@
 #include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
-/* Fewer rows or columns are no faster so. */
+/* Fewer rows or columns are not faster this way. */
 #define TL_ROWS_AT_LEAST 32
 
 /* An edge, and a vector of its rows. */
 typedef struct {
     edge_one edge;
     int64_t top_fx, bottom_fx;
-    int n_quads; /* of pixels that a row passes; 0: too many */
+    int n_quads; /* groups of four pixels that a row crosses; 0: too many */
     vi col, areas[8];
 } blend_side;
 
@@ -48,7 +49,7 @@ static blend_side place_side(const area_plane *plane, const tl_triangle *t, int 
     return s;
 }
 
-/* The rows from `row` on of an edge that passes all of each. */
+/* Sets the ramps of the rows from `row` on of an edge that crosses all of them. */
 TL_INLINE void find_ramps(blend_side *s, int n_quads, int64_t row, int bits)
 {
     const edge_one *e = &s->edge;
@@ -89,8 +90,8 @@ TL_INLINE void mix_ramps(blend_state *b, const blend_side *s, int q, int32_t bas
         v4_store(b->packed + at[k] + 4 * q, v4_load(mixed + 4 * vi_quad_slot(k)));
 }
 
-/* At most n rows from `row` on; each side passes all.  Returns how many were drawn, or if none, minus how many
- * are left to others: those where the sides share pixels, or reach beyond the window. */
+/* Blends at most n rows from `row` on, which both sides cross.  Returns the number of rows drawn; or minus the number
+ * of rows where the sides share pixels, or reach beyond the window, which are not drawn. */
 TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side *left, blend_side *right, int64_t row,
                             int n, tl_mix mode)
 {
@@ -128,7 +129,7 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
             mix_run(b, first[k], at[1][k] - first[k]);
             continue;
         }
-        /* from the left to the right: right of the triangle before its pixels takes 1.6 times as long */
+        /* from left to right: writing right of the triangle first takes 1.6 times as long */
         if (first[k] > start)
             put_solid(b->packed + start, first[k] - start, b->ground);
         put_solid(b->packed + first[k], at[1][k] - first[k], over_ground[0]);
@@ -154,7 +155,7 @@ static __attribute__((noinline)) int blend_some_rows(blend_state *b, const area_
     return blend_between(b, plane, left, right, row, n, b->mode);
 }
 
-/* Rows [first_row, end_row) of the window, of a triangle with narrow vertices. */
+/* Blends rows [first_row, end_row) of the window, of a triangle with narrow vertices. */
 static __attribute__((noinline)) void blend_rows_of(blend_state *b, const tl_triangle *t, int64_t first_row,
                                                     int64_t end_row, int strip)
 {
@@ -194,7 +195,7 @@ static __attribute__((noinline)) void blend_rows_of(blend_state *b, const tl_tri
         blend_strip(b, t, 1, left_from, (int)min64(strip, end_row - left_from));
 }
 
-/* Triangle i, all of its pieces as one. */
+/* Blends triangle i, with all of its pieces, by itself. */
 static __attribute__((noinline)) void blend_area_single(blend_state *b, int64_t i)
 {
     const tl_window *window = b->window;
@@ -221,7 +222,7 @@ static __attribute__((noinline)) void blend_area_single(blend_state *b, int64_t 
         return;
     if (!b->is_flat)
         begin_gouraud(b, i, &parts.set, parts.corners, parts.is_cut);
-    /* strips of other triangles are as wide as the window */
+    /* strips of triangles with wide vertices are as wide as the window */
     const int n_rows = strip_rows(is_narrow ? min64(window->width, right - left + 4) : window->width);
     tl_count_work(window, 4 * (end_row - first_row) * (16 + min64(window->width, right - left)));
     if (TL_LANES > 1 && n == 1 && is_narrow && b->is_flat && b->canvas->is_u8 && is_near(window) &&

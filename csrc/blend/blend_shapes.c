@@ -1,7 +1,7 @@
-/* Blend of a few large flat triangles over one colour, a row of the picture after the other.
+/* Blend of a few large flat triangles over one colour, row by row of the picture.
  * In: triangles and their colours, the colour behind them.  Out: every pixel, written once.
  *
- * A band of rows is drawn as runs (mix_shapes.c) by the walkers of large triangles, and then written. */
+ * The walkers of large triangles draw a band of rows as runs (mix_shapes.c), which are then written. */
 #ifndef TL_BLEND_SHAPES_C
 #define TL_BLEND_SHAPES_C
 
@@ -18,7 +18,7 @@
 #include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
-/* The rows of a band, from pixel `at` on. */
+/* Writes the rows of a band, from pixel `at` on. */
 TL_INLINE void put_band(blend_state *b, int64_t n_rows, int64_t at, open_run *run, int pixel_bytes)
 {
     shape_state *f = b->shapes;
@@ -39,7 +39,7 @@ TL_INLINE void put_band(blend_state *b, int64_t n_rows, int64_t at, open_run *ru
     }
 }
 
-/* `b` is ready for the window, except for where it draws. */
+/* `b` is set for the window, except for its target. */
 static int64_t blend_large_shapes(blend_state *b)
 {
     const tl_canvas *canvas = b->canvas;
@@ -57,7 +57,7 @@ static int64_t blend_large_shapes(blend_state *b)
     open_run run = start_pixels(canvas->pixels, window->width, window->height, canvas->stride_px);
     f.is_in_place = !canvas->packed;
     if (f.is_in_place)
-        run.n_px = 0; /* nothing is written twice: buffered pixels are there already */
+        run.n_px = 0; /* no pixel is written twice: buffered pixels are in the picture already */
     b->shapes = &f, b->window = &band, b->packed = canvas->packed;
     b->stride = f.is_in_place ? canvas->stride_px : window->width;
     b->n_laid = INT64_MAX;

@@ -1,8 +1,8 @@
 /* Blend, by area: a triangle by itself, by strips of rows with cells that stay in the first-level cache.
- * In: a triangle, or the pieces that clip planes leave of it.  Out: pixels.
+ * In: a triangle, or its pieces at clip planes.  Out: pixels.
  *
  * The areas are those of area.c, in cells that no other triangle shares.  They are summed from the left, and covered
- * pixels blend; between two edges lies a run as it is without areas.
+ * pixels blend; between two edges whole pixels blend as a run.
  *
  * Based on: R. Levien, font-rs, 2015. */
 #ifndef TL_BLEND_STRIP_C
@@ -26,10 +26,10 @@
 #include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
-/* The pixels [col, col + TL_LANES) of a row that begins at `at`; of them those in m that the areas say. */
+/* Blends the pixels [col, col + TL_LANES) of a row, from sample `at` on: those in m with an area > 0. */
 TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, tl_mix mode)
 {
-    const vi area = vi_min(sums, vi_set1(TL_WHOLE)); /* rounding may add a few units, and take as many */
+    const vi area = vi_min(sums, vi_set1(TL_WHOLE)); /* rounding may exceed the whole by a few units */
     const vm on = vm_and(m, vi_gt(area, vi_set1(0)));
     if (!vm_any(on))
         return;
@@ -52,18 +52,18 @@ TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, t
         mix_block_f32(b, at, on, area, mode);
 }
 
-/* Cells of a triangle and where they belong. */
+/* Cells of a triangle and their pixels. */
 typedef struct {
     int32_t *cells; /* of column 0 */
-    int64_t at;     /* its sample; columns outside [first, end) are not drawn */
+    int64_t at;     /* the sample of column 0; columns outside [first, end) are not drawn */
     int32_t stride, n_rows, first, end;
-    int has_left; /* four cells before column 0 count */
-    /* a bit of each TL_MET_CELLS cells of the rows, from met_at on: whether an edge meets them; NULL: not known */
+    int has_left; /* the four cells before column 0 count */
+    /* a bit for each TL_MET_CELLS cells of the rows, from met_at on: whether an edge meets them; NULL: not known */
     const uint64_t *met;
     int64_t met_at;
 } cell_block;
 
-/* The sum of the cells left of column 0, which are cleared. */
+/* Returns the sum of the four cells left of column 0, and clears them. */
 TL_INLINE int32_t take_left_cells(int32_t *cells)
 {
     int32_t sum = 0;
@@ -74,7 +74,7 @@ TL_INLINE int32_t take_left_cells(int32_t *cells)
     return sum;
 }
 
-/* Columns [col, end) of a row that no edge meets, all pixels covered by `sum`. */
+/* Blends columns [col, end) of a row that no edge meets: `sum` is the area of each pixel. */
 TL_INLINE void blend_even(blend_state *b, int64_t at, int64_t col, int64_t end, int32_t sum, int is_u8, tl_mix mode)
 {
     if (sum >= TL_WHOLE) {
@@ -85,7 +85,7 @@ TL_INLINE void blend_even(blend_state *b, int64_t at, int64_t col, int64_t end, 
         mix_block(b, at + col, vm_first(end - col), vi_set1(sum), is_u8, mode);
 }
 
-/* As blend_cells, of rows with a list of the cells that edges meet; no other is looked at. */
+/* `blend_cells` for rows with bits of the cells that edges meet: only those cells are read. */
 TL_INLINE void blend_met_cells(blend_state *b, const cell_block *c, int is_u8, tl_mix mode)
 {
     const vi bias = vi_set1(TL_CELL_ZERO);
@@ -110,8 +110,8 @@ TL_INLINE void blend_met_cells(blend_state *b, const cell_block *c, int is_u8, t
     }
 }
 
-/* Sums the cells of each row from the left, blends, and clears the cells.  Whole pixels from one edge to the
- * next are a run as it is without areas. */
+/* Sums the cells of each row from the left, blends, and clears the cells.  Whole pixels between two edges blend as a
+ * run. */
 TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mix mode)
 {
     const vi bias = vi_set1(TL_CELL_ZERO);
@@ -143,8 +143,8 @@ TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mi
     }
 }
 
-/* Fetches the pixels of n_rows x n_cols samples: the work on a row is too long for the next one's loads to start
- * early. */
+/* Prefetches the pixels of n_rows x n_cols samples: the work on a row is too long for the loads of the next row to
+ * start early. */
 TL_INLINE void fetch_pixels(const blend_state *b, int64_t at, int64_t n_rows, int64_t n_cols)
 {
     const int64_t pixel_bytes = b->canvas->is_u8 ? 4 : 4 * b->n_channels;
@@ -165,7 +165,7 @@ static __attribute__((noinline)) void blend_met_cells_u8(blend_state *b, const c
     TL_MIX_CALL(blend_met_cells, b->mode, b, c, 1)
 }
 
-/* One copy for all modes: memory is the limit. */
+/* one copy for all modes: memory bandwidth is the limit */
 static __attribute__((noinline)) void blend_cells_f32(blend_state *b, const cell_block *c)
 {
     blend_cells(b, c, 0, b->mode);
@@ -187,7 +187,7 @@ static void blend_block(blend_state *b, const cell_block *c)
         blend_cells_f32(b, c);
 }
 
-/* One edge into the cells of a strip.  The bits equal those of a queue of area.c. */
+/* Adds an edge to the cells of a strip.  The bits equal those of a queue of area.c. */
 static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
 {
     edge_record record;
@@ -206,7 +206,7 @@ static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int6
 static inline double lesser(double a, double b) { return a < b ? a : b; }
 static inline double greater(double a, double b) { return a > b ? a : b; }
 
-/* The columns that a triangle may touch between two heights, from `left` to `right` of the picture at most. */
+/* Sets the columns of the picture that a triangle may touch between two heights. */
 static void strip_columns(const tl_triangle *t, double top_fx, double bottom_fx, int bits, double *left, double *right)
 {
     const double unit = (double)((int64_t)1 << bits);
@@ -222,23 +222,22 @@ static void strip_columns(const tl_triangle *t, double top_fx, double bottom_fx,
         const double a = y1 == y0 ? x0 : x0 + (first - y0) * slope, b = y1 == y0 ? x1 : x0 + (end - y0) * slope;
         low = lesser(low, lesser(a, b)), high = greater(high, greater(a, b));
     }
-    /* below 2^30 the error is far below a pixel; beyond, nothing is left out */
+    /* below 2^30 the error is far below a pixel; beyond, all columns are taken */
     *left = t->is_narrow ? floor(low / unit) - 1.0 : -INFINITY;
     *right = t->is_narrow ? floor(high / unit) + 2.0 : INFINITY;
 }
 
-/* Rows of a strip n_cols wide: as many as leave its cells in half of the first-level cache, at least a vector of
- * them. */
+/* The rows of a strip n_cols wide: its cells take half of the first-level cache; at least TL_STRIP_ROWS. */
 static int strip_rows(int64_t n_cols)
 {
     const int64_t rows = 4096 / tl_area_stride(n_cols) / TL_STRIP_ROWS * TL_STRIP_ROWS;
     return (int)max64(rows, TL_STRIP_ROWS);
 }
 
-/* Columns of a strip up to which looking at all cells takes no longer than to note which are met. */
+/* In strips of fewer columns reading all cells takes no longer than setting bits of the cells that edges meet. */
 #define TL_LOOKED_AT 128
 
-/* The parts of up to `n` triangles, the pieces of one, that lie in rows [row, row + n_rows) of the window. */
+/* Blends the parts of n triangles, the pieces of one, in rows [row, row + n_rows) of the window. */
 static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, int64_t row, int n_rows)
 {
     const tl_window *window = b->window;
@@ -284,7 +283,7 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
                        .met = plane.met,
                        .met_at = TL_CELL_PAD / TL_MET_CELLS,
                    });
-    for (int64_t k = 0; k < n_rows; k++) /* cells right of the window, for nobody */
+    for (int64_t k = 0; k < n_rows; k++) /* clears cells right of the window */
         for (int64_t i = plane.n_cols / TL_LANES * TL_LANES; i < plane.stride - TL_CELL_PAD; i += TL_LANES)
             vi_store(plane.cells + k * plane.stride + TL_CELL_PAD + i, vi_set1(TL_CELL_ZERO));
 }

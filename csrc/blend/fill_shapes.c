@@ -1,8 +1,8 @@
 /* Fills a picture with the flat colours of a few large triangles, row by row, with one sample a pixel or several.
  * In: triangles of a snapped mesh, their colours, the colour behind them.  Out: every pixel, written once.
  *
- * A run of pixels has a key: the labels of their samples, one by one, 0 where nothing is.  The colour of a key is
- * the mean of resolve.c, and is kept: edges show the same few of them over and over. */
+ * A run of pixels has a key: the labels of its samples side by side, 0 for the background.  The colour of a key is the
+ * mean of resolve.c, and is cached: edges repeat few keys. */
 #ifndef TL_FILL_SHAPES_C
 #define TL_FILL_SHAPES_C
 
@@ -62,7 +62,7 @@ TL_INLINE const char *color_of_key(shape_colors *f, uint64_t key)
     return f->colors[at];
 }
 
-/* The rows of a band from pixel `at` on; their spans are listed. */
+/* Colours the rows of a band from pixel `at` on, by their listed spans. */
 TL_INLINE void color_band(shape_colors *f, const span_table *t, int64_t n_rows, int64_t at, open_run *run,
                           int pixel_bytes)
 {

@@ -1,7 +1,7 @@
-/* Mix: the colour of the triangle at hand, and its way into runs of pixels.
+/* Mix: the colour of the current triangle, and runs of pixels that it covers.
  * In: a triangle, runs of samples that it covers.  Out: pixels of the canvas, by mix_u8.c or mix_f32.c.
- * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 (over, plus; alpha multiplied by coverage);
- * H. Gouraud, Continuous Shading of Curved Surfaces, 1971. */
+ * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 (over, plus; alpha multiplied by coverage); H.
+ * Gouraud, Continuous Shading of Curved Surfaces, 1971. */
 #ifndef TL_MIX_C
 #define TL_MIX_C
 
@@ -24,7 +24,7 @@
 #include "blend/mix_f32.c"
 #include "blend/mix_u8.c"
 
-/* Takes up triangle `id`.  Returns whether it changes anything where it shows. */
+/* Starts triangle `id`.  Returns 0 if its colour changes no pixel. */
 TL_INLINE int begin_flat(blend_state *b, int64_t id)
 {
     const int n_channels = b->n_channels;
@@ -45,7 +45,7 @@ TL_INLINE int begin_flat(blend_state *b, int64_t id)
     return alpha > 0 || b->mode != TL_MIX_OVER_STRAIGHT;
 }
 
-/* Takes up a triangle of `set`, or a piece of triangle `id`, with colours of its vertices. */
+/* Starts a triangle of `set`, or a piece of triangle `id`, with colours of its vertices. */
 static void begin_gouraud(blend_state *b, int64_t id, const tl_vertex_set *set, const int32_t *corners, int is_piece)
 {
     b->whole_mode = b->mode == TL_MIX_REPLACE_STRAIGHT ? TL_MIX_REPLACE : b->mode;
@@ -57,7 +57,7 @@ static void begin_gouraud(blend_state *b, int64_t id, const tl_vertex_set *set, 
             is_piece ? b->snapped->pieces->weights + 3 * (int64_t)b->resolve.triangle.corner[k] : NULL;
 }
 
-/* Takes up a triangle of the mesh that no plane cuts, with colours of its vertices. */
+/* Starts a triangle of the mesh that no plane cuts, with colours of its vertices. */
 static void begin_gouraud_of_mesh(blend_state *b, int64_t id)
 {
     int32_t corners[3];
@@ -65,7 +65,7 @@ static void begin_gouraud_of_mesh(blend_state *b, int64_t id)
     begin_gouraud(b, id, &b->snapped->mesh, corners, 0);
 }
 
-/* Takes up a triangle of the mesh, or a piece of it, with colours of its vertices, which are not snapped. */
+/* Starts a triangle of the mesh, or a piece of it, with colours of its vertices, which are not snapped. */
 static void begin_exact_gouraud(blend_state *b, int64_t id, int64_t piece)
 {
     const tl_exact_points *points = b->snapped->mesh.exact;
@@ -83,8 +83,8 @@ static void begin_exact_gouraud(blend_state *b, int64_t id, int64_t piece)
     }
 }
 
-/* Colours at the centres of n pixels of a row; the triangle may cover any part of each: where the centre lies outside,
- * each weight below 0 is taken as 0. */
+/* Sets the colours at the centres of n pixels of a row that the triangle covers partly: where a centre lies outside,
+ * weights below 0 count as 0. */
 static void color_partly_covered(blend_state *b, int64_t row, int64_t col, int n, void *out)
 {
     const tl_canvas *canvas = b->canvas;
@@ -93,7 +93,7 @@ static void color_partly_covered(blend_state *b, int64_t row, int64_t col, int n
     double w1[TL_CHUNK], w2[TL_CHUNK];
     t->row0 = row, t->col0 = col;
     setup_weights(t, b->window);
-    /* samples beside the triangle exceed the box that setup_weights has measured */
+    /* samples beside the triangle exceed the box that `setup_weights` assumes */
     t->weights_exact &= fabs(t->w1_col) + fabs(t->w1_row) < 0x1p50 && fabs(t->w2_col) + fabs(t->w2_row) < 0x1p50;
     weights_at(t, b->window, row, col, n, w1, w2);
     for (int k = 0; k < n; k++) {
@@ -124,8 +124,8 @@ static void color_partly_covered(blend_state *b, int64_t row, int64_t col, int n
     }
 }
 
-/* Makes `resolve` describe the piece of the triangle at hand that lies under a pixel's centre, or nearest to it by the
- * least of its weights. */
+/* Loads into `resolve` the piece of the current triangle at a pixel's centre, or nearest to it by the least of its
+ * weights. */
 static void find_piece(blend_state *b, int64_t x_px, int64_t y_px)
 {
     const tl_pieces *p = b->snapped->pieces;
@@ -153,7 +153,7 @@ static void find_piece(blend_state *b, int64_t x_px, int64_t y_px)
     b->resolve = best;
 }
 
-/* The colours of n <= TL_CHUNK pixels from `at` on, into `source`. */
+/* Sets `source` to the colours of n <= TL_CHUNK pixels from `at` on. */
 static __attribute__((noinline)) void color_run(blend_state *b, int64_t at, int n)
 {
     const tl_canvas *canvas = b->canvas;
@@ -201,7 +201,7 @@ static __attribute__((noinline)) void mix_source(blend_state *b, int64_t at, int
     }
 }
 
-/* Runs of pixels that the triangle at hand covers: n[k * step] from first[k * step] on, none where n <= 0. */
+/* Mixes runs of pixels that the current triangle covers: n[k * step] from first[k * step] on, none where n <= 0. */
 static void mix_runs(blend_state *b, const int32_t *first, const int32_t *n, int step, int n_rows)
 {
     if (b->is_flat && b->canvas->is_u8) {
@@ -220,10 +220,10 @@ static void mix_runs(blend_state *b, const int32_t *first, const int32_t *n, int
         }
 }
 
-/* One of them, into pixels. */
+/* Mixes a run of n pixels. */
 static void mix_pixels(blend_state *b, int64_t at, int64_t n)
 {
-    /* long runs, mostly: 1.6 times as fast at 300 px */
+    /* mostly long runs: 1.6 times as fast at 300 px */
     if (b->is_flat && b->canvas->is_u8 && b->whole_mode == TL_MIX_REPLACE) {
         put_solid(b->packed + at, n, b->color);
         return;
@@ -231,7 +231,7 @@ static void mix_pixels(blend_state *b, int64_t at, int64_t n)
     mix_runs(b, &(int32_t){(int32_t)at}, &(int32_t){(int32_t)n}, 1, 1);
 }
 
-/* Triangle i, or its pieces, by itself. */
+/* Blends triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void blend_single_fixed(blend_state *b, int64_t i)
 {
     int32_t own[3];

@@ -1,8 +1,8 @@
-/* Mix, float32: a channel a lane, pixels where they are.
- * In: pixels, a colour, and perhaps how much of each pixel it covers.  Out: pixels.
+/* Mix, float32: a channel a lane, pixels in place.
+ * In: pixels, a colour, and optionally the coverage of each pixel.  Out: pixels.
  *
- * Every operation rounds once, in the order written: the same bits in every build.  A vector starts with the first
- * channel of a pixel unless there are three, and then nothing looks at a neighbour. */
+ * Every operation rounds once, in the order written: equal bits in every build.  A vector starts with the first channel
+ * of a pixel, except with three channels, which have no alpha to read. */
 #ifndef TL_MIX_F32_C
 #define TL_MIX_F32_C
 
@@ -12,7 +12,7 @@
 #include "lanes/lanes.h"
 #include "blend/mix.h"
 
-/* The alpha of each lane's pixel: p is where `a` was loaded from, with channel i of a run in its first lane. */
+/* The alpha of each lane's pixel: `a` was loaded from p, channel i of a run in its first lane. */
 TL_INLINE vf alpha_f32(vf a, const float *p, int64_t i, int n_channels)
 {
     return TL_LANES == 1 ? vf_set1(p[n_channels - 1 - i % n_channels]) : vf_last_of(a, n_channels);
@@ -33,7 +33,7 @@ typedef struct {
 TL_INLINE vf weigh_f32(vf d, vf s, vf above, vf below, vm alpha_lanes)
 {
     const vf sum = vf_add(above, below), weighted = vf_add(vf_mul(s, above), vf_mul(d, below));
-    const int is_opaque = !vm_any(vm_and_not(vm_all(), vf_eq(sum, vf_set1(1.0f)))); /* and x / 1 is x */
+    const int is_opaque = !vm_any(vm_and_not(vm_all(), vf_eq(sum, vf_set1(1.0f)))); /* then x / 1 is x */
     const vf mean = is_opaque ? weighted : vf_div(weighted, sum);
     return vf_select(alpha_lanes, sum, vf_select(vf_eq(sum, vf_set1(0.0f)), d, mean));
 }
@@ -53,7 +53,7 @@ TL_INLINE vf mix_whole_f32(vf d, vf s, const f32_alphas *a, tl_mix mode)
     }
 }
 
-/* 0 < c < 1. */
+/* Mixes with coverage 0 < c < 1. */
 TL_INLINE vf mix_partial_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
 {
     const vf one = vf_set1(1.0f);
@@ -67,8 +67,8 @@ TL_INLINE vf mix_partial_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
     return vf_add(vf_mul(mix_whole_f32(d, s, a, mode), c), vf_mul(d, vf_sub(one, c)));
 }
 
-/* 0 < c <= 1.  A pixel that is covered whole takes the formula without c: with c = 1 an infinity or the sign of a zero
- * would come out otherwise, and which pixels share a vector must not matter. */
+/* Mixes with coverage 0 < c <= 1.  A pixel with c = 1 uses the formula without c: the general formula gives another
+ * result for infinities and signs of zeros, and the result must not depend on which pixels share a vector. */
 TL_INLINE vf mix_part_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
 {
     const vm whole = vf_eq(c, vf_set1(1.0f));
@@ -76,7 +76,7 @@ TL_INLINE vf mix_part_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
     return vm_any(whole) ? vf_select(whole, mix_whole_f32(d, s, a, mode), part) : part;
 }
 
-/* Channels i to i + TL_LANES of a run that begins at `p`; c: their coverage, or NULL where it is 1. */
+/* Mixes channels i to i + TL_LANES of a run that begins at `p`; c: their coverage, or NULL for 1. */
 TL_INLINE void mix_lanes_f32(blend_state *b, float *p, int64_t i, vm m, const float *source, const float *c,
                              tl_mix mode)
 {
@@ -94,7 +94,7 @@ TL_INLINE void mix_lanes_f32(blend_state *b, float *p, int64_t i, vm m, const fl
     vf_store_some(p + i, m, out, has_room);
 }
 
-/* As mix_runs_u8. */
+/* `mix_runs_u8` for float32. */
 TL_INLINE void mix_runs_f32(blend_state *b, const int32_t *first, const int32_t *n, int step, int n_rows, tl_mix mode)
 {
     for (int k = 0; k < n_rows; k++) {
@@ -112,7 +112,7 @@ TL_INLINE void mix_source_f32(blend_state *b, int64_t at, int n, tl_mix mode)
         mix_lanes_f32(b, b->floats + at * b->n_channels, i, vm_first(end - i), b->source_f32, NULL, mode);
 }
 
-/* As mix_block_u8. */
+/* `mix_block_u8` for float32. */
 TL_INLINE void mix_block_f32(blend_state *b, int64_t at, vm m, vi area, tl_mix mode)
 {
     const int n_channels = b->n_channels;

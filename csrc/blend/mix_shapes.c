@@ -1,9 +1,9 @@
-/* Mix of a few large flat triangles over one colour: rows as runs of pixels, which are not in memory yet.
+/* Mix of a few large flat triangles over one colour: rows as runs of pixels that are not written yet.
  * In: pixels that the current triangle covers whole or in part.  Out: runs, and partly covered pixels.
  *
- * A run that a triangle covers whole has its bit in the run's key; the colour of a key is blended once and kept.
- * Partly covered pixels are blended in place, where a pixel of the picture is a lane of four bytes, or else in a band
- * of rows beside it: one triangle after the other, as in a picture without runs. */
+ * A triangle that covers a run wholly sets its bit in the run's key; the colour of a key is blended once and cached.
+ * Partly covered pixels are blended in the picture, where its pixels are four bytes, or else in a side buffer of a band
+ * of rows: one triangle after the other, as in a picture without runs. */
 #ifndef TL_MIX_SHAPES_C
 #define TL_MIX_SHAPES_C
 
@@ -17,10 +17,10 @@
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
 
-#define TL_KEY_BUFFERED (1ull << 63) /* the pixels of the run are in the side buffer, each by itself */
+#define TL_KEY_BUFFERED (1ull << 63) /* the pixels of the run are in the side buffer */
 #define TL_MIXED_KEYS_BITS 4
 
-/* The colour of a key: as it stands in the picture, and as a pixel of the canvas. */
+/* The colour of a key: as bytes of the picture, and as a pixel of the canvas. */
 typedef struct {
     uint64_t key;
     char value[16];
@@ -31,17 +31,17 @@ typedef struct {
 } mixed_color;
 
 typedef struct shape_state {
-    const tl_canvas *canvas; /* the picture; the state of the pass draws into the side buffer */
+    const tl_canvas *canvas; /* the picture; the blend_state draws into the side buffer */
     int pixel_bytes, is_in_place;
-    int64_t id; /* of the triangle at hand */
+    int64_t id; /* of the current triangle */
     mixed_color colors[1 << TL_MIXED_KEYS_BITS];
     row_runs rows[TL_BLENDED_ROWS];
-    blend_state one; /* a picture of one pixel */
+    blend_state one; /* for a picture of one pixel */
 } shape_state;
 
 /* ---- colours ----------------------------------------------------------------------------------------------------- */
 
-/* Blends the triangles of a key over the ground, one pixel. */
+/* Blends the triangles of a key over the ground, for one pixel. */
 static __attribute__((noinline)) void mix_key(shape_state *f, uint64_t key, mixed_color *c)
 {
     blend_state *one = &f->one;
@@ -79,7 +79,7 @@ TL_INLINE const mixed_color *color_of_mix(shape_state *f, uint64_t key)
 
 /* ---- runs -------------------------------------------------------------------------------------------------------- */
 
-/* The run that begins at `col`, which is cut where none does; r->n where col is the end of the row. */
+/* The run that begins at `col`; cuts a run there if needed.  r->n at the end of the row. */
 TL_INLINE int run_from(row_runs *r, int32_t col)
 {
     int k = 0;
@@ -90,7 +90,7 @@ TL_INLINE int run_from(row_runs *r, int32_t col)
     return k;
 }
 
-/* Joins runs [k, end), whose pixels are in the side buffer, and neighbours of that kind. */
+/* Joins runs [k, end), whose pixels are in the side buffer, with neighbouring runs in it. */
 TL_INLINE void join_runs(row_runs *r, int k, int end)
 {
     if (k > 0 && r->key[k - 1] == TL_KEY_BUFFERED)
@@ -104,12 +104,12 @@ TL_INLINE void join_runs(row_runs *r, int k, int end)
     r->n -= n_gone;
 }
 
-/* Puts the pixels [first, end) of a row into the side buffer. */
+/* Blends the pixels [first, end) of a row into the side buffer. */
 static __attribute__((noinline)) void buffer_pixels(blend_state *b, int64_t row, int32_t first, int32_t end)
 {
     shape_state *f = b->shapes;
     row_runs *r = f->rows + row;
-    if (r->n >= TL_BLENDED_RUNS) /* more cuts than convex shapes make: all of the row */
+    if (r->n >= TL_BLENDED_RUNS) /* more cuts than convex shapes make: buffers all of the row */
         first = 0, end = r->col[r->n];
     const int from = run_from(r, first), to = run_from(r, end);
     const int64_t at = row * b->stride, n_channels = b->n_channels;

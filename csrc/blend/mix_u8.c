@@ -1,9 +1,8 @@
 /* Mix, uint8: pixels of four bytes, a pixel a lane.
- * In: pixels, a colour, and perhaps how much of each pixel it covers.  Out: pixels.
+ * In: pixels, a colour, and optionally the coverage of each pixel.  Out: pixels.
  *
- * All of it is integer arithmetic, or float arithmetic on integers that is exact or rounded once where that cannot
- * change the integer that comes out.  Of a quotient by 255 nothing lies nearer than 1/510 to the middle between two
- * integers. */
+ * All of it is integer arithmetic, or float arithmetic on integers that is exact, or rounded once where that cannot
+ * change the resulting integer.  A quotient by 255 is at least 1/510 from the middle between two integers. */
 #ifndef TL_MIX_U8_C
 #define TL_MIX_U8_C
 
@@ -14,7 +13,7 @@
 
 /* ---- a colour over the whole pixel ------------------------------------------------------------------------------- */
 
-/* Bytes 0 and 2, bytes 1 and 3, as 16-bit halves; and back. */
+/* Bytes 0 and 2, and bytes 1 and 3, as 16-bit halves; `join_bytes` is the inverse. */
 TL_INLINE vi even_bytes(vi a) { return vi_and(a, vi_set1(0x00ff00ff)); }
 TL_INLINE vi odd_bytes(vi a) { return vi_upper_bytes(a); }
 TL_INLINE vi join_bytes(vi even, vi odd) { return vi_or(even, vi_shift_left(odd, 8)); }
@@ -25,7 +24,7 @@ TL_INLINE vi byte_of(vi a, int shift) { return vi_and(vi_shift_right(a, shift), 
  * -127..127, that is q + (257 r + 32896 - q) / 65536, and the fraction lies between 2 / 65536 and 65535 / 65536. */
 TL_INLINE vi divide_by_255(vi x) { return vi_mul_high_halves(vi_add(x, vi_set1(0x00800080)), vi_set1(0x01010101)); }
 
-/* Lanes with a pixel that is not opaque. */
+/* The lanes whose pixel is not opaque. */
 TL_INLINE vm translucent(vi pixels) { return vi_gt_unsigned(vi_set1((int32_t)0xff000000), pixels); }
 
 /* (d * (255 - alpha) + s * alpha) / 255, byte by byte. */
@@ -37,12 +36,12 @@ TL_INLINE vi over_opaque(vi d, vi s, vi alpha)
     return join_bytes(divide_by_255(even), divide_by_255(odd));
 }
 
-/* The quotient of integers below 2^24, rounded to nearest, ties to even.  It is at most 255, or the divisor is 255 and
- * it is at most 65536: then half a unit in the last place of float32, 2^-17 or 2^-9, is less than 1 / (2 * 255^2) or 1
- * / 510, the least distance from the middle between two integers. */
+/* The quotient of integers below 2^24, rounded to nearest, ties to even.  The quotient is at most 255, or the divisor
+ * is 255 and the quotient at most 65536: then half a unit in the last place of float32, 2^-17 or 2^-9, is less than 1 /
+ * (2 * 255^2) or 1 / 510, the least distance from the middle between two integers. */
 TL_INLINE vi divide_24_bits(vi a, vi b) { return vi_nearest(vf_div(vf_from_vi(a), vf_from_vi(b))); }
 
-/* Straight alpha over pixels that may be translucent: divides by the alpha that comes out. */
+/* Straight alpha over pixels that may be translucent: divides by the resulting alpha. */
 static __attribute__((noinline)) vi over_translucent(vi d, vi s)
 {
     const vi alpha = byte_of(s, 24), full = vi_set1(255), below = vi_mul(byte_of(d, 24), vi_sub(full, alpha));
@@ -52,7 +51,7 @@ static __attribute__((noinline)) vi over_translucent(vi d, vi s)
         const vi weighted = vi_add(vi_mul(byte_of(s, shift), above), vi_mul(byte_of(d, shift), below));
         out = vi_or(out, vi_shift_left(divide_24_bits(weighted, divisor), shift));
     }
-    return vi_select(vi_eq(sum, vi_set1(0)), d, out); /* nothing over nothing */
+    return vi_select(vi_eq(sum, vi_set1(0)), d, out); /* transparent over transparent */
 }
 
 TL_INLINE vi mix_whole_u8(vi d, vi s, vm m, tl_mix mode)
@@ -91,7 +90,7 @@ TL_INLINE vi weight_15(vi coverage, vi alpha)
     return divide_24_bits(vi_mul(coverage, alpha), vi_set1(255));
 }
 
-/* d + (s - d) * weight / 2^15, byte by byte, ties up.  The weight is negated, for 2^15 itself is no 16-bit number. */
+/* d + (s - d) * weight / 2^15, byte by byte, ties up.  The weight is negated, because 2^15 is no 16-bit number. */
 TL_INLINE vi move_bytes(vi d, vi s, vi weight)
 {
     const vi minus = vi_sub_halves(vi_set1(0), in_both_halves(weight)), even = even_bytes(d), odd = odd_bytes(d);
@@ -112,14 +111,14 @@ TL_INLINE vi trade_bytes(vi d, vi s, vi gain, vi loss)
 }
 
 /* (a * b + c * d) / divisor, rounded to nearest, ties to even: sums below 2^39, the quotient at most 255 and, with the
- * divisor below 2^31, at least 2^-32 from the middle between two integers unless it is there. */
+ * divisor below 2^31, at least 2^-32 from the middle between two integers unless it is the middle. */
 TL_INLINE vi divide_sums(vi color, vd above, vi under, vd below, vd divisor)
 {
     return vi_round(vd_div(vd_add(vd_mul(vd_from_vi(color), above), vd_mul(vd_from_vi(under), below)), divisor));
 }
 
-/* Straight alpha where one of the two is translucent: `alpha`, of the colour in this pixel, and `rest`, the remaining
- * one of the other, in 1 / (255 * 2^15). */
+/* Straight alpha where the colour or the pixel is translucent: `alpha`, of the colour in this pixel, and `rest`, the
+ * remaining share of the pixel, in 1 / (255 * 2^15). */
 static __attribute__((noinline)) vi cover_translucent(vi d, vi s, vi alpha, vi rest)
 {
     const vi under = byte_of(d, 24), zero = vi_set1(0);
@@ -133,7 +132,7 @@ static __attribute__((noinline)) vi cover_translucent(vi d, vi s, vi alpha, vi r
     return vi_select(vm_and(vi_eq(alpha, zero), nothing_under), d, out);
 }
 
-/* A part of each pixel. */
+/* Mixes a colour into a part of each pixel. */
 TL_INLINE vi mix_part_u8(vi d, vi s, vi area, vm m, tl_mix mode)
 {
     const vi opaque = vi_set1((int32_t)0xff000000), coverage = coverage_15(area), alpha = byte_of(s, 24);
@@ -174,8 +173,8 @@ TL_INLINE vi load_u8(const blend_state *b, int64_t at, vm m)
     return vi_load_some(m, b->packed + at, at >= 0 && at + TL_LANES <= b->n_samples);
 }
 
-/* n > 0 pixels of one colour.  A long run is stored in whole vectors: one at its beginning, one at its end, those
- * between at multiples of their size, for a store across two cache lines takes twice as long. */
+/* Writes n > 0 pixels of one colour.  A long run is stored in whole vectors, unaligned at both ends and aligned
+ * between, because a store across two cache lines takes twice as long. */
 TL_INLINE void put_solid(int32_t *pixels, int64_t n, int32_t color)
 {
     const vi colors = vi_set1(color);
@@ -190,15 +189,15 @@ TL_INLINE void put_solid(int32_t *pixels, int64_t n, int32_t color)
     vi_store(last, colors);
 }
 
-/* Sees to it that the ground is laid in rows below end_row. */
+/* Fills rows below end_row with the ground, if they are not filled yet. */
 static inline void lay_ground(blend_state *b, int64_t end_row)
 {
     for (; b->n_laid < end_row; b->n_laid++)
         put_solid(b->packed + b->n_laid * b->stride, b->window->width, b->ground);
 }
 
-/* n_rows runs of pixels that the triangle covers whole: n[k * step] of them from first[k * step] on, none where n <=
- * 0. */
+/* Mixes n_rows runs of pixels that the triangle covers wholly: n[k * step] pixels from first[k * step] on, none where n
+ * <= 0. */
 TL_INLINE void mix_runs_u8(blend_state *b, const int32_t *first, const int32_t *n, int step, int n_rows, tl_mix mode)
 {
     const vi color = vi_set1(b->color);
@@ -214,7 +213,7 @@ TL_INLINE void mix_runs_u8(blend_state *b, const int32_t *first, const int32_t *
     }
 }
 
-/* A run of at most TL_CHUNK pixels, with their own colours. */
+/* Mixes a run of at most TL_CHUNK pixels with the colours in `source`. */
 TL_INLINE void mix_source_u8(blend_state *b, int64_t at, int n, tl_mix mode)
 {
     for (int i = 0; i < n; i += TL_LANES) {
@@ -223,7 +222,7 @@ TL_INLINE void mix_source_u8(blend_state *b, int64_t at, int n, tl_mix mode)
     }
 }
 
-/* The pixels in m of the TL_LANES from `at` on. */
+/* Mixes the pixels in m of TL_LANES pixels from `at` on. */
 TL_INLINE void mix_block_u8(blend_state *b, int64_t at, vm m, vi area, tl_mix mode)
 {
     const vi d = load_u8(b, at, m), s = b->is_flat ? vi_set1(b->color) : vi_load(b->source);
@@ -232,7 +231,7 @@ TL_INLINE void mix_block_u8(blend_state *b, int64_t at, vm m, vi area, tl_mix mo
 
 /* ---- fewer channels ---------------------------------------------------------------------------------------------- */
 
-/* n pixels of 1 to 3 channels as four bytes, and back. */
+/* Packs n pixels of 1 to 3 channels to four bytes; `unpack_u8` is the inverse. */
 static void pack_u8(const uint8_t *pixels, int64_t n, int n_channels, int32_t *restrict out)
 {
     if (n_channels == 1)
