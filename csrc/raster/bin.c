@@ -1,8 +1,8 @@
 /* Bin: which triangles reach into which bands of rows, so that a mesh is set up once for many samples and bands.
- * In: vertex records and triangles.  Out: the triangles that can be seen, and the first and last band of each.
+ * In: vertex records and triangles.  Out: the triangles in the window, and the first and last band of each.
  *
- * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than
- * its samples cover.  Bands are 2^band_bits rows tall. */
+ * A triangle is listed when the centre of a pixel of the window lies within reach_fx of its extent, in x and in y: more
+ * triangles than cover a sample.  Bands are 2^band_bits rows tall. */
 #ifndef TL_BIN_C
 #define TL_BIN_C
 
@@ -19,7 +19,7 @@
 typedef struct {
     const tl_snapped *snapped;
     const tl_window *window;
-    int32_t low_fx, high_fx; /* added to the ends of an extent before they become pixels */
+    int32_t low_fx, high_fx; /* added to the ends of an extent before rounding to pixels */
     int band_bits;
     int32_t max_extent, left, top, right, bottom;
 } bin_limits;
@@ -50,7 +50,7 @@ static void widen_bin(const bin_limits *b, const tl_vertex_set *set, const int32
     box->row0 = min64(box->row0, row0), box->row1 = max64(box->row1, row1);
 }
 
-/* Triangle i, or its pieces, by itself. */
+/* Lists triangle i, with all of its pieces, by itself. */
 static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, tl_bins *bins)
 {
     int32_t own[3];
@@ -125,8 +125,6 @@ static int64_t bin(const tl_snapped *snapped, const tl_window *window, int32_t r
     return -1;
 }
 
-/* Lists the triangles of each band, those of band k from starts[k] on to starts[k + 1]; with listed NULL only
- * counts. */
 static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed)
 {
     if (!listed) {
@@ -138,13 +136,11 @@ static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int
             starts[k + 2] += starts[k + 1];
         return;
     }
-    for (int64_t i = 0; i < bins->n; i++) /* starts[k + 1] is where band k goes on, and ends where band k + 1 begins */
+    for (int64_t i = 0; i < bins->n; i++) /* starts[k + 1] is the next free place of band k */
         for (int32_t k = bins->first_band[i]; k <= bins->last_band[i]; k++)
             listed[starts[k + 1]++] = bins->ids[i];
 }
 
-/* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach, none where there are no
- * triangles. */
 static void find_columns(const tl_bins *bins, int64_t n_bands, int32_t *columns)
 {
     for (int64_t k = 0; k < n_bands; k++)

@@ -1,8 +1,8 @@
 /* Boxes: triangles with boxes of up to 4x4 samples, at every sample of TL_LANES boxes.
- * In: triangles that have been loaded, or a queue.  Out: lists of samples.
+ * In: loaded triangles, or a queue.  Out: lists of samples.
  *
- * TL_FLOAT: a sample at which the least of three edge functions lies beyond the band of doubt is decided by it; the
- * others are refined. */
+ * TL_FLOAT: the least of three edge functions decides a sample if it lies outside of the band of doubt; other samples
+ * are refined. */
 #ifndef TL_BOXES_C
 #define TL_BOXES_C
 
@@ -21,7 +21,7 @@
 
 typedef vm box_masks[TL_SMALL_BOX][TL_SMALL_BOX];
 
-/* The lanes with a sample at a place of their box. */
+/* The lanes whose box has a sample at (row, col). */
 TL_INLINE vm in_box(vm live, vi n_cols, vi n_rows, int row, int col)
 {
     return vm_and(live, vm_and(vi_gt(n_rows, vi_set1(row)), vi_gt(n_cols, vi_set1(col))));
@@ -33,7 +33,8 @@ TL_INLINE vf plane_depth(const lane_planes *p, vd x, vd y)
     return sum_depth(vd_add(p->z0, vd_mul(p->slope_y, y)), vd_mul(p->slope_x, x));
 }
 
-/* The samples of boxes of up to 2x2, to the list.  The first of each go in one go: most triangles cover no other. */
+/* Emits the samples of boxes of up to 2x2.  The first sample of every box is emitted in one step: most triangles cover
+ * no other. */
 TL_INLINE void emit_tiny(walk_state *s, tl_geometry g, tl_sink sink, box_masks in, vi sample, vi id,
                          const lane_planes *p)
 {
@@ -66,7 +67,7 @@ TL_INLINE void emit_tiny(walk_state *s, tl_geometry g, tl_sink sink, box_masks i
 
 /* ---- TL_FIXED -------------------------------------------------------------------------------------------- */
 
-/* Boxes of up to 2x2 samples of triangles that have been loaded. */
+/* Draws boxes of up to 2x2 samples of loaded triangles. */
 TL_INLINE void draw_tiny_fixed(walk_state *s, tl_sink sink, const lane_batch *b, vm live, vi id)
 {
     lane_triangles t;
@@ -145,7 +146,8 @@ TL_LIST_COPIES(flush_small_fixed, (walk_state * s), s)
 
 /* ---- TL_FLOAT -------------------------------------------------------------------------------------------- */
 
-/* Sets `in` to the samples inside, as lanes decide; returns the lanes in doubt at some sample, in the box or beside. */
+/* Sets `in` to the samples inside, as float32 decides; returns the lanes in doubt at some sample, in the box or beside
+ * it. */
 TL_INLINE vm test_boxes(const lane_exact *t, vi n_cols, vi n_rows, int size, box_masks in)
 {
     const vf band = vf_select(t->on_grid, vf_set1(0.0f), t->band);
@@ -166,14 +168,14 @@ TL_INLINE vm test_boxes(const lane_exact *t, vi n_cols, vi n_rows, int size, box
     return vm_and_not(vm_and(t->live, vf_ge(band, closest)), t->on_grid);
 }
 
-/* Samples of a vector of boxes that are in doubt: lane | place << 8, place = row * TL_SMALL_BOX + col. */
+/* Samples in doubt of a vector of boxes: lane | place << 8, place = row * TL_SMALL_BOX + col. */
 typedef struct {
     int n;
     int32_t codes[(TL_SMALL_BOX * TL_SMALL_BOX + 1) * TL_MAX_LANES];
 } doubted_samples;
 
-/* Decides samples in doubt, TL_LANES at a time by float64, then by the exact sign; sets the lanes of those inside in
- * the bits of their places. */
+/* Decides samples in doubt, TL_LANES at a time by float64, then by the exact sign; sets bit `lane` of found[place] for
+ * those inside. */
 TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, unsigned *found, tl_exact_counts *counts)
 {
     picked_points m;
@@ -201,7 +203,7 @@ TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, uns
     }
 }
 
-/* Decides the samples in doubt: on the grid by lanes, then by float64, then by the exact sign. */
+/* Decides the samples in doubt: first lanes on the grid, then by float64, then by the exact sign. */
 static __attribute__((noinline)) void refine_boxes(walk_state *s, lane_exact *t, vi n_cols, vi n_rows, int size,
                                                    box_masks in)
 {
@@ -236,7 +238,7 @@ static __attribute__((noinline)) void refine_boxes(walk_state *s, lane_exact *t,
             in[row][col] = vm_or(in[row][col], vm_from_bits(found[row * TL_SMALL_BOX + col]));
 }
 
-/* Leaves out the samples of triangles that have no depth plane, which are set aside. */
+/* Removes the samples of triangles without a depth plane, which are listed as slivers. */
 TL_INLINE void take_out_sliver_samples(walk_state *s, lane_exact *t, int size, box_masks in)
 {
     const int n = s->n_slivers;
@@ -247,7 +249,7 @@ TL_INLINE void take_out_sliver_samples(walk_state *s, lane_exact *t, int size, b
                 in[row][col] = vm_and(in[row][col], t->live);
 }
 
-/* The samples of TL_LANES boxes that have been loaded and placed, and their planes. */
+/* Finds the samples of TL_LANES boxes that have been loaded and placed, and their planes. */
 TL_INLINE void find_box_samples(walk_state *s, tl_sink sink, lane_exact *t, vi n_cols, vi n_rows, int size,
                                 box_masks in, lane_planes *p)
 {

@@ -1,4 +1,4 @@
-/* Raster: every triangle of a mesh, a vector of them at a time, through setup and cull to the code for its size.
+/* Raster: setup and cull of every triangle of a mesh, a vector of triangles at a time, and the walker for its size.
  * In: vertices and triangles.  Out: the target's buffers. */
 #ifndef TL_RASTER_C
 #define TL_RASTER_C
@@ -40,8 +40,8 @@ TL_INLINE void draw_one_fixed(const tl_snapped *snapped, int64_t i, const tl_win
         TL_SINK_CALL(draw_single_fixed, target->sink, snapped, i, window, target)
 }
 
-/* Loads TL_LANES triangles, and finds those that lanes can take, and of TL_FLOAT the boxes.  Returns 0, with the row in
- * `bad_row`, when an index lies outside the vertices. */
+/* Loads TL_LANES triangles, and finds those that lanes can process, and for TL_FLOAT their boxes.  Returns 0, with the
+ * row in `bad_row`, when an index lies outside the vertices. */
 TL_INLINE int load_batch(walk_state *s, tl_geometry g, tl_sink sink, const int32_t *corners, vi id, vm live,
                          lane_batch *b)
 {
@@ -58,7 +58,7 @@ TL_INLINE int load_batch(walk_state *s, tl_geometry g, tl_sink sink, const int32
     return 1;
 }
 
-/* Lists the triangles that the passes which draw the rest of the picture are to draw, too. */
+/* Lists the triangles that reach rows of the picture that other passes draw. */
 TL_INLINE void list_outside(const walk_state *s, const lane_batch *b, vi id)
 {
     tl_slice *slice = s->slice;
@@ -71,7 +71,7 @@ TL_INLINE void list_outside(const walk_state *s, const lane_batch *b, vi id)
     slice->n_outside += vi_compress(slice->outside + slice->n_outside, m, id);
 }
 
-/* The lesser side of boxes before the window cut them. */
+/* The shorter side of boxes before clipping to the window. */
 TL_INLINE vi shorter_side(const walk_state *s, const lane_batch *b)
 {
     const int bits = s->window->subpixel_bits;
@@ -80,10 +80,10 @@ TL_INLINE vi shorter_side(const walk_state *s, const lane_batch *b)
     return vi_min(vi_sub(end, first), vi_sub(b->bottom, b->top));
 }
 
-/* Moves triangles that lanes could take but should not to the single ones, and drops those turned away for certain. */
+/* Moves triangles that lanes should not process to the single ones, and drops triangles that are certainly culled. */
 TL_INLINE void take_out(const walk_state *s, tl_geometry g, tl_sink sink, lane_batch *b)
 {
-    if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows.c */
+    if (TL_LANES == 1) { /* a single lane gains nothing from rows.c */
         const vm over_small = vm_and(b->drawn, vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX)));
         b->single = vm_or(b->single, over_small);
         b->drawn = vm_and_not(b->drawn, over_small);
@@ -94,7 +94,7 @@ TL_INLINE void take_out(const walk_state *s, tl_geometry g, tl_sink sink, lane_b
         const vi size = vi_mul(vi_sub(b->extents.x_max, b->extents.x_min), vi_sub(b->extents.y_max, b->extents.y_min)),
                  one = vi_set1(1);
         const vi box = vi_shift_right(vi_sub(size, one), TL_SLIVER_BITS);
-        /* box > area * 2^12, as setup_plane */
+        /* box > area * 2^12, as in `setup_plane` */
         const vm sliver = vm_and(b->drawn, vi_gt(box, vi_sub(b->absolute, one)));
         b->single = vm_or(b->single, sliver);
         b->drawn = vm_and_not(b->drawn, sliver);
@@ -127,10 +127,10 @@ TL_FLUSH_QUEUE(small)
 TL_FLUSH_QUEUE(middle)
 TL_FLUSH_QUEUE(rows)
 
-/* The triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
+/* Triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
 enum { BOX_TINY, BOX_SMALL, BOX_MIDDLE, BOX_ROWS, N_BOXES };
 
-/* The most columns of a middle box.  TL_FLOAT: as TL_NEAR_BAND has it; several samples: TL_MAX_WORDS. */
+/* The most columns of a middle box.  TL_FLOAT: TL_NEAR_BAND limits them; several samples: TL_MAX_WORDS does. */
 TL_INLINE int middle_cols(const walk_state *s, tl_geometry g, tl_sink sink)
 {
     const int most = sink_of(s->target, s->target->sink) == TL_SINK_MASK ? TL_BIT_COLS : TL_BLOCK_COLS;
@@ -149,10 +149,10 @@ TL_INLINE void sort_boxes(const lane_batch *b, int most_cols, vm *boxes)
     boxes[BOX_ROWS] = vm_and(over, beyond);
 }
 
-/* TL_FLOAT: fewer boxes of up to 2x2 samples wait with the small ones. */
+/* TL_FLOAT: fewer tiny boxes than this are queued with the small boxes. */
 #define TL_FEW_TINY ((TL_LANES + 3) / 4)
 
-/* Tiny boxes at once; others wait until a vector is full of their kind. */
+/* Draws tiny boxes at once; queues other boxes until a vector of their size is full. */
 TL_INLINE void draw_boxes(walk_state *s, tl_geometry g, tl_sink sink, lane_batch *b, vm *boxes, vi id)
 {
     const vm tiny = boxes[BOX_TINY];
@@ -172,7 +172,7 @@ TL_INLINE void draw_boxes(walk_state *s, tl_geometry g, tl_sink sink, lane_batch
         flush_queue_rows(s, g, sink);
 }
 
-/* Setup and cull of TL_LANES triangles, and each to the code for its size. */
+/* Setup and cull of TL_LANES triangles; then draws or queues each by its size. */
 TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
     lane_batch b;
@@ -201,13 +201,13 @@ TL_INLINE void draw_batch(walk_state *s, tl_geometry g, tl_sink sink, const int3
         draw_boxes(s, g, sink, &b, boxes, id);
 }
 
-/* The triangles of a slice, or of a cluster. */
+/* Draws the triangles of a slice, or of a cluster. */
 TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const tl_slice *part)
 {
     const void *vertices = g == TL_FIXED ? (const void *)s->snapped->mesh.vertices : (const void *)s->points->points;
     const size_t n_bytes = g == TL_FIXED ? sizeof(tl_vertex) : (size_t)s->points->stride * sizeof(double);
     const tl_snapped *snapped = s->snapped;
-    /* of this batch and of the next: it takes a while until a number of a vector that was stored can be loaded */
+    /* of this batch and of the next: a vector load stalls on numbers that were just stored */
     int32_t corners[2][3 * TL_LANES];
     int is_given_up = 0, turn = 0;
     slice_corners(snapped, part, part->first, corners[0]);
@@ -227,13 +227,13 @@ TL_INLINE void draw_triangles(walk_state *s, tl_geometry g, tl_sink sink, const 
             draw_slivers(s);
     }
     if (sink == TL_SINK_CENSUS)
-        return; /* nothing waits */
+        return; /* the queues are empty */
     flush_queue_small(s, g, sink);
     flush_queue_middle(s, g, sink);
     flush_queue_rows(s, g, sink);
 }
 
-/* As start_fixed, for squares and several samples, and for the slices of a picture. */
+/* `start_fixed`, for squares and several samples, and for the slices of a picture. */
 TL_INLINE void start_slice(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                            tl_slice *slice, tl_sink sink)
 {
@@ -249,7 +249,7 @@ TL_INLINE void start_slice(walk_state *s, const tl_snapped *snapped, const tl_wi
         s->limits.last_vertex = vi_set1(TL_CLUSTER - 1);
 }
 
-/* Every triangle of a slice; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
+/* Draws every triangle of a slice; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
 TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                             tl_slice *slice, int64_t *bad_row, tl_sink sink)
 {
@@ -302,7 +302,7 @@ TL_LIST_COPIES(draw_snapped,
                 int64_t *bad_row),
                snapped, window, target, slice, bad_row)
 
-/* Counts the triangles of a mesh by the walkers that draw_snapped sends them to: in its own code. */
+/* Runs the code of `draw_snapped` with a sink that counts. */
 static int64_t count_classes(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                              tl_census *census)
 {
@@ -314,7 +314,7 @@ static int64_t count_classes(const tl_snapped *snapped, const tl_window *window,
     return bad_row;
 }
 
-/* In vectors: a loop over single numbers took several times as long as the memset of the ids. */
+/* With vectors: a loop over single numbers took several times as long as the memset of the ids. */
 static void clear_depth(float *depth, int64_t n, float value)
 {
     int64_t k = 0;
@@ -337,10 +337,10 @@ static void clear(const tl_window *window, const tl_target *target)
     }
     if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES)
         return;
-    /* rows without a gap are one: long fills get lines without reading them */
+    /* rows without gaps are cleared as one: long fills write cache lines without reading them */
     const int is_whole = target->stride_px == window->width;
     const int64_t n_rows = is_whole ? 1 : window->height, n = is_whole ? window->width * window->height : window->width;
-    /* a plane after the other: in turns, row by row, they took 1.07 to 1.5 times as long on Sapphire Rapids */
+    /* plane by plane: alternating by row took 1.07 to 1.5 times as long on Sapphire Rapids */
     for (int64_t row = 0; row < n_rows; row++)
         memset((int32_t *)target->pixels + row * target->stride_px, target->sink == TL_SINK_COUNT ? 0 : 0xff,
                (size_t)n * sizeof(int32_t));
@@ -350,7 +350,7 @@ static void clear(const tl_window *window, const tl_target *target)
         clear_depth(target->bounds, tl_segments(target->stride_px) * window->height, farthest);
 }
 
-/* The pieces of listed triangles. */
+/* Draws the pieces of listed triangles. */
 static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t n_whole, const tl_slice *slice)
 {
     const tl_pieces *pieces = s->snapped->mesh.exact->pieces;
@@ -364,7 +364,7 @@ static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t 
     }
 }
 
-/* Every triangle of a slice without snapped vertices; from n_whole on they are pieces. */
+/* Draws every triangle of a slice without snapped vertices; triangles from n_whole on are pieces. */
 TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
                            tl_slice *slice, tl_exact_counts *counts, int64_t *bad_row, tl_sink sink)
 {
@@ -389,14 +389,14 @@ TL_LIST_COPIES(draw_floats,
                 tl_slice *slice, tl_exact_counts *counts, int64_t *bad_row),
                mesh, n_whole, window, target, slice, counts, bad_row)
 
-/* The mesh with the triangles that are drawn: without those that planes cut, with the pieces behind the others. */
+/* The mesh with the triangles that are drawn: clipped triangles collapsed, then all pieces. */
 static tl_snapped drawn_mesh(const tl_snapped *snapped)
 {
     const tl_exact_points *points = snapped->mesh.exact;
     tl_snapped drawn = *snapped;
     drawn.triangles = points->triangles, drawn.n_triangles = points->n_triangles;
     drawn.mesh.n_vertices = points->n_points;
-    drawn.names = points->names ? points->names : snapped->names; /* pieces are of clip space, where none are given */
+    drawn.names = points->names ? points->names : snapped->names; /* without names in `points` there are no pieces */
     return drawn;
 }
 
@@ -415,7 +415,7 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
     return bad_row;
 }
 
-/* A band of less than 2^31 pixels. */
+/* Draws a band of less than 2^31 pixels. */
 static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice)
 {
     int64_t bad_row = -1;
@@ -430,13 +430,13 @@ static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, con
     return bad_row;
 }
 
-/* Clears bands of less than 2^31 pixels, draws and finishes them. */
+/* Clears, draws and finishes bands of less than 2^31 pixels. */
 static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
     if ((unsigned)target->sink > TL_SINK_PEEL)
-        __builtin_trap(); /* no sink of draw */
+        __builtin_trap(); /* not a sink of `draw` */
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_target part = *target;

@@ -1,5 +1,6 @@
-/* Refine: row ends of vertices that are not snapped which lie in the band of doubt.
- * In: a vector of triangles, and rows.  Out: row ends, by float64 and, where that does not tell, by the exact sign. */
+/* Refine: row ends in the band of doubt, for vertices that are not snapped.
+ * In: a vector of triangles, and rows.  Out: row ends, by float64 and, where its error is too large, by the exact
+ * sign. */
 #ifndef TL_REFINE_C
 #define TL_REFINE_C
 
@@ -13,24 +14,24 @@
 #include "raster/state.h"
 #include "raster/triangles_float.c"
 
-#define TL_NEAR_BAND 0x1.2p-19f /* 36 u: of row ends up to 17 columns away */
-#define TL_FAR_BAND 0x1.04p-17f /* 130 u: up to 62 */
+#define TL_NEAR_BAND 0x1.2p-19f /* 36 u: for row ends up to 17 columns away */
+#define TL_FAR_BAND 0x1.04p-17f /* 130 u: for row ends up to 62 columns away */
 
 /* The samples [first, end) of TL_LANES rows of one triangle. */
 typedef struct {
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
 } row_ends;
 
-/* The row ends of one triangle, to be refined. */
+/* A triangle whose row ends are refined. */
 typedef struct {
     exact_point corners[3];
-    double v[3], dx[3], dy[3], band[3]; /* of the edges in their order; at row 0 of the box */
+    double v[3], dx[3], dy[3], band[3]; /* of edge 0, 1, 2; at row 0 of the box */
     double sample_x, sample_y;          /* the first sample of the box */
     tl_test test;
     int n_cols;
 } refined_triangle;
 
-/* The band of an edge of a triangle: in columns. */
+/* Sets the bands of the edges of a triangle, in columns. */
 TL_INLINE void set_bands(const walk_state *s, const lane_exact *t, float far, vf *inverse, vf *band)
 {
     const vf zero = vf_set1(0.0f), margin = vf_mul(t->xy, vf_set1(TL_ROW_BAND));
@@ -55,7 +56,7 @@ static __attribute__((noinline)) void bisect_row(const refined_triangle *a, int 
                                                  int64_t *end, tl_exact_counts *counts)
 {
     const int is_left = a->dy[i] < 0.0;
-    int64_t low = *first, high = *end; /* the first column that is inside a left edge, or outside a right one */
+    int64_t low = *first, high = *end; /* the first column that is inside a left edge, or outside a right edge */
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
         if (is_column_inside(a, i, y, middle, counts) == is_left)
@@ -66,7 +67,7 @@ static __attribute__((noinline)) void bisect_row(const refined_triangle *a, int 
     *(is_left ? first : end) = low;
 }
 
-/* The columns [*first, *end) of a row with an end in doubt. */
+/* Sets the columns [*first, *end) of a row with an end in doubt. */
 TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first, int64_t *end, tl_exact_counts *counts)
 {
     const double y = a->sample_y + (double)row;
@@ -94,7 +95,7 @@ TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first
     }
 }
 
-/* Lane k of a vector of triangles, in the numbers that lanes have. */
+/* Copies lane k of a vector of triangles, with the lane's numbers. */
 static __attribute__((noinline)) void set_refined(const walk_state *s, const box_queue *q, int i, int k,
                                                   const lane_exact *t, float far, refined_triangle *a)
 {
@@ -112,8 +113,8 @@ static __attribute__((noinline)) void set_refined(const walk_state *s, const box
     a->n_cols = q->size[i + k] & 0xffff, a->test = t->test;
 }
 
-/* floor(q) of edge k in TL_LANES rows, of triangles or of one of them: where q is in its band, by the sign of E at that
- * column in float64.  Adds to *unsure the lanes where that does not tell. */
+/* floor(q) of edge k in TL_LANES rows, of TL_LANES triangles or of one: where q is in its band, by the sign of E at
+ * that column in float64.  Adds to *unsure the lanes where float64 is in doubt, too. */
 TL_INLINE vi decide_floors(const vd *x, const vd *y, int k, tl_test test, vd sample_x, vd py, vm is_left, vf q, vf band,
                            vm *unsure)
 {
@@ -129,14 +130,14 @@ TL_INLINE vi decide_floors(const vd *x, const vd *y, int k, tl_test test, vd sam
 
 /* ---- boxes of up to 16 rows and TL_LANES columns -------------------------------------------------------- */
 
-/* Columns of one edge that are in doubt, in a vector of triangles: lane | row << 8 | col << 16. */
+/* Columns in doubt of one edge in a vector of triangles: lane | row << 8 | col << 16. */
 typedef struct {
     int n;
     int32_t codes[(TL_MIDDLE_BOX + 1) * TL_MAX_LANES];
 } doubted_columns;
 
-/* Decides the columns in doubt of edge k, TL_LANES at a time by float64, then by the exact sign; takes those outside
- * out of the bits of their rows. */
+/* Decides the columns in doubt of edge k, TL_LANES at a time by float64, then by the exact sign; clears the bits of
+ * columns outside. */
 TL_INLINE void decide_columns(const picked_points *m, int k, tl_test test, doubted_columns *d,
                               int32_t (*bits)[TL_MAX_LANES], tl_exact_counts *counts)
 {
@@ -162,8 +163,8 @@ TL_INLINE void decide_columns(const picked_points *m, int k, tl_test test, doubt
     }
 }
 
-/* Sets the bits of a row of the lanes in doubt as if columns in doubt were inside, and lists these; returns the lanes
- * with bands as wide as columns. */
+/* Sets the bits of a row of the lanes in doubt as if columns in doubt were inside, and lists these columns; returns the
+ * lanes whose band is as wide as a column. */
 TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band, vm doubted, vi n_cols, int row,
                           int32_t *bits, doubted_columns *d)
 {
@@ -175,7 +176,7 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
         const vm is_left = vf_lt(t->dy[k], vf_set1(0.0f)), is_right = vf_lt(vf_set1(0.0f), t->dy[k]);
         const vf unclamped = vf_mul(vf_fma(t->dx[k], vf_set1((float)row), t->e[k]), inverse[k]);
         const vf q = vf_max(vf_min(unclamped, far), vf_sub(vf_set1(0.0f), far)), off = vf_off_integer(q);
-        const vf reach = vf_fma(vf_set1(2.0f), band[k], vf_from_vi(n_cols)); /* beyond it, none or all are inside */
+        const vf reach = vf_fma(vf_set1(2.0f), band[k], vf_from_vi(n_cols)); /* beyond it all are inside or none */
         const vm may_end = vf_ge(reach, vf_max(unclamped, vf_sub(vf_set1(0.0f), unclamped)));
         near[k] = vm_and(vm_and(doubted, may_end), vf_ge(band[k], vf_max(off, vf_sub(vf_set1(0.0f), off))));
         wide = vm_or(wide, vm_and(near[k], vf_ge(band[k], vf_set1(0.49f))));
@@ -196,8 +197,8 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
     return wide;
 }
 
-/* Decides all rows of the lanes in doubt: by their grid, by float64 at each column in doubt, by the exact sign; and
- * rows with bands that are wide by themselves. */
+/* Decides all rows of the lanes in doubt: on their grid, by float64 at each column in doubt, by the exact sign; rows
+ * with wide bands one by one. */
 static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const box_queue *q, int i, lane_exact *t,
                                                          vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES])
 {
@@ -234,7 +235,7 @@ static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const bo
     }
 }
 
-/* Decides TL_LANES rows of a triangle from row0 on: by float64, and, of each row where that does not tell, by the exact
+/* Decides TL_LANES rows of a triangle from row0 on: by float64, and where float64 is in doubt, row by row by the exact
  * sign. */
 TL_INLINE void decide_row_ends(const refined_triangle *a, int row0, unsigned doubted, row_ends *ends,
                                tl_exact_counts *counts)
@@ -271,7 +272,7 @@ TL_INLINE void decide_row_ends(const refined_triangle *a, int row0, unsigned dou
     }
 }
 
-/* The rows from row0 on of triangle k of those at i in the queue. */
+/* Decides the rows from row0 on of triangle i + k of the queue. */
 static __attribute__((noinline)) void refine_row_ends(walk_state *s, int i, int k, const lane_exact *t, int row0,
                                                       unsigned doubted, row_ends *ends)
 {

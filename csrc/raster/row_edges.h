@@ -1,16 +1,16 @@
-/* Row edges: the edges of a vector of triangles, as those that end rows on the left and on the right.
+/* Row edges: the edges of a vector of triangles, sorted into edges that end rows on the left and on the right.
  * In: edge functions.  Out: row ends.
  *
  * An edge ends a row at floor(q), q = v / d, d = |dy|: samples up to floor(q) lie inside a right edge, samples from
- * -floor(q) on inside a left one.
+ * -floor(q) on inside a left edge.
  *
- * TL_FIXED: v = E' at the row's first sample.  It is computed in float32 as floor((v + 0.5) * (1 / d)), exactly:
- * v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than 64 * 2^-22 = 2^-16, while
- * (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to the box swallows the error.
- * Squares (triangles_fixed.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included.
+ * TL_FIXED: v = E' at the row's first sample.  It is computed in float32 as floor((v + 0.5) * (1 / d)), exactly: v +
+ * 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than 64 * 2^-22 = 2^-16, while (v + 0.5) / d
+ * is at least 0.5 / d > 2^-15 from an integer.  Farther out the result is clamped to the box.  Squares
+ * (triangles_fixed.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, with the half.
  *
- * TL_FLOAT: v = E there, rounded.  Where q is nearer to an integer than the band says (triangles_float.c), that one
- * column is in doubt, and refine.c decides. */
+ * TL_FLOAT: v = E there, rounded.  Where q is nearer to an integer than the band (triangles_float.c), that column is in
+ * doubt, and refine.c decides. */
 #ifndef TL_ROW_EDGES_H
 #define TL_ROW_EDGES_H
 
@@ -20,20 +20,20 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* The two geometries: vertices that are snapped, and vertices that are not. */
+/* The two geometries: snapped vertices, and vertices that are not snapped. */
 typedef enum { TL_FIXED, TL_FLOAT } tl_geometry;
 
-/* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on
- * either side or horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
+/* For TL_LANES triangles: the first edge on the left, the first on the right, and the third edge, which is on either
+ * side or horizontal.  Each is edge 0 where is0, edge 1 where is1, else edge 2. */
 typedef struct {
     vm is0[3], is1[3];
     vm third_is_left, third_is_right;
 } lane_sides;
 
-/* These edges. */
+/* The edges of TL_LANES triangles, sorted by lane_sides. */
 typedef struct {
     vf start[3], step[3], inverse[3]; /* left, right, third */
-    vf band[3], row;                  /* TL_FLOAT: in columns; the row that is next */
+    vf band[3], row;                  /* TL_FLOAT: in columns; the next row */
     vm third_is_left, third_is_right;
 } lane_edges;
 
@@ -51,7 +51,7 @@ TL_INLINE lane_sides sides_of(const vm *left, const vm *right)
     };
 }
 
-/* Of edges that go by dy, which are integers. */
+/* Sides of edges from their dy, integers. */
 TL_INLINE lane_sides find_sides(const vi *dy)
 {
     vm left[3], right[3];
@@ -66,7 +66,7 @@ TL_INLINE void pick_edges(const lane_sides *sides, const vf *edges, vf *picked)
         picked[side] = vf_select(sides->is0[side], edges[0], vf_select(sides->is1[side], edges[1], edges[2]));
 }
 
-/* band: of TL_FLOAT */
+/* band: TL_FLOAT only */
 TL_INLINE void sort_edges(tl_geometry g, const lane_sides *sides, const vf *start, const vf *step, const vf *inverse,
                           const vf *band, lane_edges *r)
 {
@@ -76,7 +76,7 @@ TL_INLINE void sort_edges(tl_geometry g, const lane_sides *sides, const vf *star
         pick_edges(sides, band, r->band), r->row = vf_set1(0.0f);
 }
 
-/* Of edge functions e at the first samples, in integers: TL_FIXED. */
+/* Sorts edges with edge functions e at the first samples, in integers: TL_FIXED. */
 TL_INLINE void sort_fixed_edges(const vi *e, const vi *dx, const vi *dy, lane_edges *r)
 {
     const lane_sides sides = find_sides(dy);
@@ -90,23 +90,23 @@ TL_INLINE void sort_fixed_edges(const vi *e, const vi *dx, const vi *dy, lane_ed
     sort_edges(TL_FIXED, &sides, start, step, inverse, NULL, r);
 }
 
-/* Whether the end of a row lies in the band. */
+/* Whether a row end lies in the band. */
 TL_INLINE vm is_near_integer(vf q, vf band)
 {
     const vf off = vf_off_integer(q);
     return vf_ge(band, vf_max(off, vf_sub(vf_set1(0.0f), off)));
 }
 
-/* The last samples inside left edges, counted to the left, and inside right ones, from quotients of three edges. */
+/* The last samples inside left edges, counted to the left, and inside right edges, from quotients of three edges. */
 TL_INLINE void meet_third(const vi *quotient, vm third_is_left, vm third_is_right, vi *left, vi *right)
 {
-    /* no branch: which side the third edge is on cannot be predicted */
+    /* without a branch: the side of the third edge is unpredictable */
     *left = vi_select(third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
     *right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
 }
 
-/* The samples from `begin` on, up to `end`, of the row of each triangle that its edges are at; goes on to the next
- * row.  Adds to *doubted the lanes with an end in doubt. */
+/* Sets the samples [begin, end) of the current row of each triangle, and steps its edges to the next row.  Adds to
+ * *doubted the lanes with an end in doubt. */
 TL_INLINE void next_row(tl_geometry g, lane_edges *e, vi n_cols, vi *begin, vi *end, vm *doubted)
 {
     const vi zero = vi_set1(0), one = vi_set1(1);

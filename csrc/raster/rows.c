@@ -1,7 +1,7 @@
 /* Rows: triangles with boxes of 5 to 62 samples a side, by the ends of TL_LANES rows at a time.
  * In: queues of boxes.  Out: rows of samples to the sink.
  *
- * How an edge ends a row, and why that is exact or in doubt, stands in row_edges.h. */
+ * row_edges.h explains how an edge ends a row, and why the row end is exact or in doubt. */
 #ifndef TL_ROWS_C
 #define TL_ROWS_C
 
@@ -21,7 +21,7 @@
 /* TL_LANES triangles of a queue. */
 typedef struct {
     lane_edges edges;
-    lane_planes planes; /* where the sink has depth */
+    lane_planes planes; /* only if the sink has depth */
     vi sample;          /* the first sample: row * stride_px + column */
     unsigned live;
 } row_lanes;
@@ -50,8 +50,8 @@ TL_INLINE void sort_float_edges(const walk_state *s, const lane_exact *t, float 
     sort_edges(TL_FLOAT, &sides, t->e, t->dx, inverse, band, r);
 }
 
-/* The triangles [i, i + TL_LANES) of a queue of n; their rows end up to 17 or 62 columns away, as `far` says.  t: of
- * TL_FLOAT, to refine. */
+/* Loads the triangles [i, i + TL_LANES) of a queue of n; `far` is the band for row ends up to 17 or up to 62 columns
+ * away. t: TL_FLOAT only, for refinement. */
 TL_INLINE void load_rows(walk_state *s, tl_geometry g, tl_sink sink, const box_queue *q, int i, int n, float far,
                          lane_exact *t, row_lanes *r)
 {
@@ -115,7 +115,7 @@ TL_INLINE void find_rows_of_one(tl_geometry g, const row_edges *r, int k, vm thi
     }
     meet_third(quotient, third_is_left, third_is_right, &left, &right);
     *first = vi_sub(zero, left), *end = vi_add(right, one);
-    if (g == TL_FLOAT) /* quotients of level edges are of any size */
+    if (g == TL_FLOAT) /* quotients of level edges are unbounded */
         *first = vi_max(*first, zero), *end = vi_min(*end, vi_set1(n_cols));
 }
 
@@ -129,8 +129,8 @@ TL_INLINE void put_lanes(const tl_target *target, tl_sink sink, int64_t at, vm m
         put_numbers(target, sink, at, m, vi_set1(stored_value(target, sink, id)));
 }
 
-/* Rows of a block of at most TL_BLOCK_COLS columns, of a mask TL_BIT_COLS; the depth of a sample is the sum of its
- * row's and its column's. */
+/* Draws rows of a block of at most TL_BLOCK_COLS columns, in a mask TL_BIT_COLS; the depth of a sample is the sum of
+ * its row's and its column's depth. */
 TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row,
                           int stride_of_rows, int64_t at, int n_rows, int is_half, const double *z_cols, int32_t id)
 {
@@ -171,8 +171,8 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
     }
 }
 
-/* The rows of TL_LANES triangles: of each its covered samples, a bit each, and its depth at column 0.  Column k adds
- * slope_x * ((x + k * step) - x0). */
+/* The rows of TL_LANES triangles: a bit for each covered sample, and the depth at column 0.  Column k adds slope_x *
+ * ((x + k * step) - x0). */
 typedef struct {
     int32_t bits[TL_MIDDLE_BOX][TL_MAX_LANES];
     double z[TL_MIDDLE_BOX][TL_MAX_LANES];
@@ -180,11 +180,11 @@ typedef struct {
     double slope_x[TL_MAX_LANES], x[TL_MAX_LANES], x0[TL_MAX_LANES], step;
 } middle_rows;
 
-/* Draws the triangles in `live` of those at i in a queue. */
+/* Draws triangles i + k of a queue, for the lanes k in `live`. */
 TL_INLINE void draw_middle(const tl_snapped *snapped, const tl_target *shared, const box_queue *q, int i, unsigned live,
                            const middle_rows *m, tl_sink sink)
 {
-    const tl_target target = *shared; /* a copy that no store can change */
+    const tl_target target = *shared; /* a copy that no store can alias */
     for (; live; live &= live - 1) {
         const int k = __builtin_ctz(live);
         const int32_t size = q->size[i + k];
@@ -250,19 +250,19 @@ TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Whether rows are drawn as spans, one after the other, each by as few vectors as it needs.  Else in blocks of TL_LANES
- * rows and columns: more vectors, and fewer branches that are not foreseen.  Zen 4: by spans labels of 20,000 triangles
- * of 40 px take 0.77 of the time with AVX2, 0.96 with AVX-512; ids and depth of a mesh of 100,000 with AVX-512 1.07. */
+/* Whether rows are drawn as spans, one by one, each with as few vectors as it needs; else in blocks of TL_LANES rows
+ * and columns: more vectors, and fewer mispredicted branches.  Zen 4: by spans labels of 20,000 triangles of 40 px take
+ * 0.77 of the time with AVX2, 0.96 with AVX-512; ids and depth of a mesh of 100,000 with AVX-512 1.07. */
 #define TL_BY_SPANS(sink) (TL_LANES < 16 || !sink_has_depth(sink))
 
-/* The depths of columns from col0 on, as sums with those of rows have them. */
+/* The depths of columns from col0 on, to be added to those of rows. */
 TL_INLINE vd depths_of_columns(tl_geometry g, const row_edges *r, int64_t k, int col0, double unit)
 {
     const vd x = vd_add(vd_set1(r->x[k] + col0 * unit), ramp(unit));
     return vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
 }
 
-/* The samples [first, end) of up to TL_LANES rows, where there are some. */
+/* Draws the samples [first, end) of up to TL_LANES rows. */
 TL_INLINE void draw_spans(const tl_target *target, tl_sink sink, vi first, vi end, int n_rows, const double *z_row,
                           int64_t at, const double *z_cols, int32_t id)
 {
@@ -303,8 +303,8 @@ TL_INLINE void draw_blocks(tl_geometry g, const tl_target *target, tl_sink sink,
     }
 }
 
-/* Triangle k of those at i in the queue, TL_LANES rows at a time.  With an int for k, gcc spills a register more of the
- * mask's copy: 3 % of its time on AVX-512. */
+/* Draws triangle i + k of the queue, TL_LANES rows at a time.  With an int for k, gcc spills one more register in the
+ * copy for masks: 3 % of its time on AVX-512. */
 TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
                          const lane_exact *t, int i, int64_t k)
 {
@@ -344,11 +344,11 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
     }
 }
 
-/* The triangles in `live` of those at i in the queue; TL_FIXED: the first n. */
+/* Draws triangles i + k of the queue, for the lanes k in `live`; TL_FIXED: the first n. */
 TL_INLINE void draw_all_rows(walk_state *s, tl_geometry g, const row_edges *r, const lane_exact *t, int i, int n,
                              unsigned live, tl_sink sink)
 {
-    const tl_target target = *s->target; /* a copy that no store can change */
+    const tl_target target = *s->target; /* a copy that no store can alias */
     for (int64_t k = 0; k < n; k++)
         if (g == TL_FIXED || live >> k & 1)
             draw_rows(s, g, &target, sink, r, t, i, k);

@@ -1,10 +1,9 @@
 /* Sampled: triangles in lanes, tested at all samples of a pixel at once.
- * In: triangles that are snapped and queues of boxes, which hold every pixel with a covered sample.  Out: bits of
- * samples.
+ * In: snapped triangles and queues of boxes, which hold every pixel with a covered sample.  Out: bits of samples.
  *
- * A sample moves an edge function by 2 (dx * y - dy * x), from the centre, and nothing else: load, cull, setup and
- * queues are shared.  Ranges are those of squares (triangles_fixed.c).  A box is up to a pixel too large, so where row
- * ends decide, a horizontal edge is tested. */
+ * A sample differs from the centre only by 2 (dx * y - dy * x) in each edge function: load, cull, setup and queues are
+ * shared.  Ranges are those of squares (triangles_fixed.c).  A box is up to a pixel too large, so where row ends
+ * decide, horizontal edges are tested, too. */
 #ifndef TL_SAMPLED_C
 #define TL_SAMPLED_C
 
@@ -18,7 +17,7 @@
 #include "raster/state.h"
 #include "raster/triangles_fixed.c"
 
-#define TL_MAX_WORDS (TL_MIDDLE_BOX * TL_MAX_SAMPLES / 64) /* of a row of a middle box */
+#define TL_MAX_WORDS (TL_MIDDLE_BOX * TL_MAX_SAMPLES / 64) /* in a row of a middle box */
 
 /* The offsets of a sample in the doubled edge functions. */
 TL_INLINE vi sample_shift(vi dx, vi dy, const int32_t *sample_fx)
@@ -26,7 +25,7 @@ TL_INLINE vi sample_shift(vi dx, vi dy, const int32_t *sample_fx)
     return vi_sub(vi_mul(dx, vi_set1(2 * sample_fx[1])), vi_mul(dy, vi_set1(2 * sample_fx[0])));
 }
 
-/* Boxes of up to size x size pixels; t->e are doubled edge functions, not shifted. */
+/* Draws boxes of up to size x size pixels; t->e are doubled edge functions at the centre. */
 TL_INLINE void draw_box_of_samples(walk_state *s, const lane_triangles *t, vm live, vi n_cols, vi n_rows, int size)
 {
     const int bits = s->window->subpixel_bits, n_samples = 1 << s->target->sample_bits;
@@ -132,7 +131,7 @@ TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_lef
     return (lane_span){vi_shift_left(begin, sample_bits), vi_shift_left(stop, sample_bits)};
 }
 
-/* The bits of a sample in the word that begins at a column. */
+/* Adds the bits of a sample to the word that begins at a column. */
 TL_INLINE vw add_span(vw words, lane_span span, int32_t col, int sample_bits, uint64_t pattern)
 {
     const vi zero = vi_set1(0), from = vi_set1(col << sample_bits);
@@ -141,7 +140,7 @@ TL_INLINE vw add_span(vw words, lane_span span, int32_t col, int sample_bits, ui
 
 static __attribute__((noinline)) void flush_middle_of_samples(walk_state *s)
 {
-    const tl_target target = *s->target; /* a copy that no store can change */
+    const tl_target target = *s->target; /* a copy that no store can alias */
     const int bits = s->window->subpixel_bits, sample_bits = target.sample_bits, per_word = 64 >> sample_bits;
     box_queue *q = &s->middle;
     const int n = q->n;
@@ -182,14 +181,15 @@ static __attribute__((noinline)) void flush_middle_of_samples(walk_state *s)
             const int32_t size = q->size[i + k];
             int64_t at = (int64_t)(uint32_t)first[k] << sample_bits;
             for (int row = 0; row < size >> 16; row++, at += target.stride_px << sample_bits)
-                for (int word = 0; word < n_words; word++) /* no branch unless there are several */
+                for (int word = 0; word < n_words; word++) /* no branch if there is only one */
                     if (n_words == 1 || words[row][word][k])
                         cover(&target, at + 64 * word, words[row][word][k]);
         }
     }
 }
 
-/* One triangle of the queue, TL_LANES rows at a time: the spans of all its samples, then a word after the other. */
+/* Draws one triangle of the queue, TL_LANES rows at a time: computes the spans of all samples, then stores word by
+ * word. */
 TL_INLINE void draw_sampled_rows(const tl_target *target, const float (*starts)[3][TL_MAX_LANES],
                                  const float (*steps)[TL_MAX_LANES], const float (*inverses)[TL_MAX_LANES], int k,
                                  vm third_is_left, vm third_is_right, int32_t first, int32_t size)
@@ -223,7 +223,7 @@ TL_INLINE void draw_sampled_rows(const tl_target *target, const float (*starts)[
 
 static __attribute__((noinline)) void flush_rows_of_samples(walk_state *s)
 {
-    const tl_target target = *s->target; /* a copy that no store can change */
+    const tl_target target = *s->target; /* a copy that no store can alias */
     const int bits = s->window->subpixel_bits;
     box_queue *q = &s->rows;
     const int n = q->n;
@@ -254,7 +254,7 @@ static __attribute__((noinline)) void flush_rows_of_samples(walk_state *s)
     }
 }
 
-/* How far samples lie from the centre, at most, in x or y. */
+/* The largest distance of a sample from the centre, in x or y. */
 static int32_t sample_reach(const tl_target *target)
 {
     int32_t reach = 0;

@@ -1,9 +1,9 @@
 /* Sampled single: one triangle by itself, at all samples of a pixel.
  * In: vertex records.  Out: bits of samples.
  *
- * The rows of a large triangle are the same for all samples except their ends: the pixels between these are stored as
- * whole words, and two words at each end are put together from the spans of the samples, a vector of rows at a time.
- * Rows with ends more than two words wide, or that some samples miss, are put together word by word. */
+ * In a row of a large triangle only the ends differ between samples: the pixels between the ends are stored as whole
+ * words, and two words at each end are built from the spans of the samples, a vector of rows at a time.  Rows with ends
+ * more than two words wide, or that some samples miss, are built word by word. */
 #ifndef TL_SAMPLED_SINGLE_C
 #define TL_SAMPLED_SINGLE_C
 
@@ -18,7 +18,7 @@
 #include "sink/covered.c"
 #include "raster/single_fixed.c"
 
-/* Marks the spans of all samples in a row, in the words that hold the pixels [from, to); `at` is the pixel of column
+/* Sets the bits of all samples in a row, in the words that hold the pixels [from, to); `at` is the pixel of column
  * 0. */
 TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int64_t to, const int32_t *first,
                           const int32_t *end)
@@ -38,7 +38,7 @@ TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int
     }
 }
 
-/* A row in which sample k covers the columns [first[k], end[k]). */
+/* Sets the bits of a row in which sample k covers the columns [first[k], end[k]). */
 TL_INLINE void cover_row(const tl_target *target, int64_t at, const int32_t *first, const int32_t *end)
 {
     int32_t least = INT32_MAX, inner = 0, inner_end = INT32_MAX, most = 0;
@@ -60,14 +60,14 @@ TL_INLINE void cover_row(const tl_target *target, int64_t at, const int32_t *fir
     cover_ends(target, at, inner_end, most, first, end);
 }
 
-/* A triangle as each sample sees it, all from one pixel, up to a pixel outside an extent. */
+/* A triangle for each sample, with one origin for all, which may lie a pixel outside an extent. */
 typedef struct {
-    tl_triangle t[TL_MAX_SAMPLES]; /* with an empty box where nothing is covered */
+    tl_triangle t[TL_MAX_SAMPLES]; /* with an empty box if it covers no such sample */
     edges_64 e[TL_MAX_SAMPLES];
     int64_t col0, row0, row1;
 } sampled_triangle;
 
-/* Returns whether the triangle's row ends fit float64. */
+/* Sets the triangle up for all samples; returns whether its row ends fit float64. */
 static int setup_sampled_triangle(const tl_snapped *snapped, const int32_t *corners, const tl_window *window,
                                   const tl_target *target, sampled_triangle *s)
 {
@@ -96,7 +96,7 @@ static int setup_sampled_triangle(const tl_snapped *snapped, const int32_t *corn
     return 1;
 }
 
-/* The columns [first, end) of every sample in TL_LANES rows, from col0: those of sample k at [k]. */
+/* The columns [first, end) of sample k in TL_LANES rows at [k], relative to col0. */
 typedef struct {
     int32_t first[TL_MAX_SAMPLES][TL_MAX_LANES], end[TL_MAX_SAMPLES][TL_MAX_LANES];
 } sampled_ends;
@@ -115,13 +115,15 @@ static void find_sampled_ends(const sampled_triangle *s, int n_samples, int64_t 
     }
 }
 
-/* The words of up to TL_LANES rows: two from `left` on, two from `right` on, and all bits of those between. */
+/* The words of up to TL_LANES rows: two from `left` on, and two from `right` on; all bits of the words between are
+ * set. */
 typedef struct {
     uint64_t left_words[2][TL_MAX_LANES], right_words[2][TL_MAX_LANES];
-    int32_t left[TL_MAX_LANES], right[TL_MAX_LANES]; /* words from the one that holds column 0 */
+    int32_t left[TL_MAX_LANES], right[TL_MAX_LANES]; /* words from the word that holds column 0 */
 } word_rows;
 
-/* Returns the lanes with rows that can be put so.  `skip`: pixels of the first word before column 0. */
+/* Sets the words of rows; returns the lanes whose ends fit two words.  `skip`: pixels of the first word before column
+ * 0. */
 TL_INLINE unsigned find_words(const sampled_ends *ends, int sample_bits, vi skip, word_rows *w)
 {
     const int word_shift = 6 - sample_bits;
@@ -159,7 +161,7 @@ TL_INLINE unsigned find_words(const sampled_ends *ends, int sample_bits, vi skip
     return vm_bits(fits);
 }
 
-/* n rows, `at` is the pixel of the first at column 0. */
+/* Stores n rows; `at` is the pixel of the first row at column 0. */
 TL_INLINE void cover_rows(const tl_target *target, int64_t at, int n, const sampled_ends *ends, int sample_bits)
 {
     const int64_t per_word = 64 >> sample_bits;
@@ -186,17 +188,17 @@ TL_INLINE void cover_rows(const tl_target *target, int64_t at, int n, const samp
     }
 }
 
-/* Returns whether the triangle could be drawn so. */
+/* Draws a triangle by its words; returns 0, and draws nothing, if its row ends do not fit float64. */
 static int walk_samples(const tl_snapped *snapped, const int32_t *corners, const tl_window *window,
                         const tl_target *shared)
 {
-    const tl_target own = *shared, *target = &own; /* a copy that no store can change */
+    const tl_target own = *shared, *target = &own; /* a copy that no store can alias */
     sampled_triangle s;
-    sampled_ends ends = {{{0}}, {{0}}}; /* compilers cannot tell that there is a sample */
+    sampled_ends ends = {{{0}}, {{0}}}; /* for compilers, which cannot prove that there is a sample */
     if (!setup_sampled_triangle(snapped, corners, window, target, &s))
         return 0;
     tl_count_work(window, max64(s.row1 - s.row0, 0)
-                              << (target->sample_bits + 4)); /* a row end of a sample: 16 pixels */
+                              << (target->sample_bits + 4)); /* a row end of a sample counts as 16 pixels */
     for (int64_t row = s.row0; row < s.row1; row += TL_LANES) {
         const int n = s.row1 - row < TL_LANES ? (int)(s.row1 - row) : TL_LANES;
         const int64_t at = row * target->stride_px + s.col0;
@@ -211,7 +213,7 @@ static int walk_samples(const tl_snapped *snapped, const int32_t *corners, const
     return 1;
 }
 
-/* Triangle i by itself. */
+/* Draws triangle i by itself. */
 static __attribute__((noinline)) void draw_single_each_sample(const tl_snapped *snapped, int64_t i,
                                                               const tl_window *window, const tl_target *target)
 {

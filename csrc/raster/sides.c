@@ -1,6 +1,6 @@
-/* Sides: which side of a triangle shows.
- * In: a mesh of either kind.  Out: its triangles; single-sided ones are collapsed where they show the other side, or
- * their pieces, in place, if a plane cuts them. */
+/* Sides: which side of a triangle is visible.
+ * In: a mesh of either kind.  Out: its triangles; single-sided triangles are collapsed where they show the culled side,
+ * or their pieces, in place, if a plane cuts them. */
 #ifndef TL_SIDES_C
 #define TL_SIDES_C
 
@@ -12,7 +12,7 @@
 #include "vertex/setup.c"
 #include "exact/sign.c"
 
-/* The sign of the area of a triangle of points `stride` numbers apart, or of vertex records where there are none. */
+/* The sign of the area of a triangle of points `stride` numbers apart; without points, of vertex records. */
 static int turn_of(const double *points, int stride, const tl_vertex_set *set, const int32_t *corners)
 {
     tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
@@ -34,8 +34,8 @@ static int shows_whole(const tl_snapped *snapped, const int32_t *corners)
            wanted_turn(snapped);
 }
 
-/* Whether a triangle of vertex records shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts
- * it. */
+/* Whether a triangle of vertex records shows the side that is drawn, or a piece of it does if a plane cuts it; agrees
+ * with `draw_triangle`. */
 static int shows_side(const tl_snapped *snapped, int64_t i)
 {
     int32_t own[3];
@@ -46,7 +46,7 @@ static int shows_side(const tl_snapped *snapped, int64_t i)
     return 0;
 }
 
-/* Collapses the pieces of a triangle that a plane cuts which do not show the side that is drawn. */
+/* Collapses the pieces of a clipped triangle that show the culled side. */
 static void drop_pieces(const tl_snapped *snapped, int64_t i)
 {
     const tl_pieces *p = snapped->mesh.exact ? snapped->mesh.exact->pieces : snapped->pieces;
@@ -60,8 +60,6 @@ static void drop_pieces(const tl_snapped *snapped, int64_t i)
     }
 }
 
-/* Copies triangles [first, end), those collapsed to a point that are single-sided and do not show the side that the
- * cull of the mesh leaves; of a clipped one the pieces instead, in place. */
 static void drop_sides(const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
                        int32_t *triangles)
 {

@@ -1,5 +1,5 @@
-/* Single: one triangle by itself, of any size, range and method, through setup and a walker to the sink.
- * In: vertex records, the pieces of cut triangles.  Out: samples to the sink. */
+/* Single: one triangle by itself, of any size, range and method: setup and a walker to the sink.
+ * In: vertex records, the pieces of clipped triangles.  Out: samples to the sink. */
 #ifndef TL_SINGLE_FIXED_C
 #define TL_SINGLE_FIXED_C
 
@@ -24,8 +24,7 @@
 #define TL_WALK(name) name##_128
 #include "raster/walk.h"
 
-/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for
- * then |v / d| * 2^-52 < 0.5 / d. */
+/* Whether float64 row ends are exact, as in row_edges.h: while |2E| < 2^51, because |v / d| * 2^-52 < 0.5 / d. */
 TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_border)
 {
     const double around = with_border ? (double)((int64_t)2 << window->subpixel_bits) : 0.0;
@@ -34,7 +33,7 @@ TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_b
     return TL_LANES > 1 && t->is_narrow && 2.0 * (width + around) * (height + around) < 0x1p50;
 }
 
-/* The columns [first, end) of TL_LANES rows, all within [low, high]. */
+/* Sets the columns [first, end) of TL_LANES rows, within [low, high]. */
 TL_INLINE void find_row_ends(const edges_64 *e, vd rows, double low, double high, int32_t *first, int32_t *end)
 {
     vd begins = vd_set1(low), ends = vd_set1(high);
@@ -54,7 +53,7 @@ TL_INLINE void find_row_ends(const edges_64 *e, vd rows, double low, double high
 
 TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl_target *shared, tl_sink sink)
 {
-    const tl_target own = *shared, *target = &own; /* a copy that no store can change */
+    const tl_target own = *shared, *target = &own; /* a copy that no store can alias */
     const edges_64 e = setup_edges_64(t, window);
     const vd lanes = vd_from_vi(vi_iota());
     const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
@@ -107,7 +106,7 @@ TL_INLINE int32_t name_of(const tl_snapped *snapped, int32_t id)
     return (snapped->names ? snapped->names[id] : id) + snapped->first_id;
 }
 
-/* Whether a triangle that is set up is walked by float64 row ends; if not, sample by sample or by exact row ends. */
+/* Whether a set-up triangle is walked by float64 row ends; if not, sample by sample or by exact row ends. */
 TL_INLINE int takes_rows(const tl_triangle *t, const tl_snapped *snapped, const tl_window *window, tl_sink sink)
 {
     return snapped->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) &&
@@ -155,7 +154,7 @@ TL_ONCE void walk_wide(const tl_triangle *t, const tl_window *window, const tl_t
         walk_scanline_128(t, window, target, sink);
 }
 
-/* One triangle by itself: any range, any method. */
+/* Draws one triangle by itself: any range, any method. */
 TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_snapped *snapped,
                              const tl_window *window, const tl_target *target, tl_sink sink)
 {
@@ -204,10 +203,10 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
     return span;
 }
 
-/* Counts the squares of a row that lie in any of some spans, once each. */
+/* Counts the squares of a row in the union of spans, once each. */
 static void count_spans(const row_span *spans, int n, const tl_window *window, const tl_target *target, int64_t row)
 {
-    for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of their beginnings */
+    for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of `first` */
         int64_t first = window->width, end = 0;
         for (int i = 0; i < n; i++) {
             const int64_t begin = max64(spans[i].first, done);
@@ -221,7 +220,7 @@ static void count_spans(const row_span *spans, int n, const tl_window *window, c
     }
 }
 
-/* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
+/* Counts the squares that any of a triangle's pieces meets, or holds; a square that several meet counts once. */
 static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces,
                                                     const tl_snapped *snapped, const tl_window *window,
                                                     const tl_target *target)
@@ -245,7 +244,7 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
     }
 }
 
-/* Triangle i, or its pieces, by itself. */
+/* Draws triangle i, or its pieces, by itself. */
 TL_INLINE void draw_single_fixed(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
                                  tl_sink sink)
 {

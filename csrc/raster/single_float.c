@@ -1,9 +1,9 @@
 /* Single: one triangle of any finite float64 vertices by itself, by the ends of rows in float64.
  * In: points in pixels.  Out: spans of samples to the sink.
  *
- * As rows.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
- * itself, 3 u for each column of the box.  What is not finite is refined.  Extents of any size may come: a box is the
- * samples of the window, and the first of them lies in the extent. */
+ * As in rows.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
+ * itself, 3 u for each column of the box.  Results that are not finite are refined.  Extents may have any size: a box
+ * is the samples of the window, and its first sample lies in the extent. */
 #ifndef TL_SINGLE_FLOAT_C
 #define TL_SINGLE_FLOAT_C
 
@@ -35,7 +35,7 @@ typedef struct {
     int32_t id;
 } single_triangle;
 
-/* The first pixel of [low, high) with a sample, so far from its upper left corner, not left of x; `high` if none is.
+/* The first pixel of [low, high) whose sample, `centre` from its upper left corner, is not left of x; else `high`.
  * Exact: x - centre can only round to an integer that is too low. */
 static int64_t first_pixel(double x, double centre, int64_t low, int64_t high)
 {
@@ -48,7 +48,7 @@ static int64_t first_pixel(double x, double centre, int64_t low, int64_t high)
     return (double)n + centre < x ? n + 1 : n;
 }
 
-/* The first square of [low, high) that reaches right of x; `high` if none does. */
+/* The first square of [low, high) that reaches right of x; else `high`. */
 static int64_t first_square(double x, int64_t low, int64_t high)
 {
     if (x < (double)low || x >= (double)high)
@@ -57,8 +57,8 @@ static int64_t first_square(double x, int64_t low, int64_t high)
     return n - ((double)n > x);
 }
 
-/* The pixels of [low, high) with samples in an extent, or with squares that meet it in more than a line, or lie in
- * it. */
+/* Sets the pixels of [low, high) whose samples lie in an extent, or whose squares meet it in more than a line, or lie
+ * in it. */
 static int64_t find_single_box(double x0, double x1, tl_test test, double centre, int64_t low, int64_t high,
                                int64_t *first)
 {
@@ -91,7 +91,7 @@ static void plane_of_points(single_triangle *t, double width, double height)
 /* The work of a depth by weights, in pixels of a plane. */
 #define TL_WEIGHTED_PX 256
 
-/* The depth of a sample by weights: parts of the area, each within 2^-49 of its size. */
+/* The depth of a sample by weights: shares of the area, each within 2^-49 of its size. */
 static float weighted_depth(const single_triangle *t, exact_point sample)
 {
     const exact_point *p = t->edges.corners;
@@ -100,7 +100,7 @@ static float weighted_depth(const single_triangle *t, exact_point sample)
     return (float)(t->z[0] + (w1 * (t->z[1] - t->z[0]) + w2 * (t->z[2] - t->z[0]))) + 0.0f;
 }
 
-/* The edge functions at the first sample of the box, with their bands. */
+/* Sets the edge functions at the first sample of the box, with their bands. */
 static void setup_single_edges(const walk_state *s, single_triangle *t, double width, double height)
 {
     refined_triangle *e = &t->edges;
@@ -124,13 +124,13 @@ static void setup_single_edges(const walk_state *s, single_triangle *t, double w
 /* The nearest integer of a number below 2^51. */
 TL_INLINE double nearest_of(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
 
-/* The edge functions from vertices that lie on 2^-8 px, near enough that 2E < 2^51: without a band.  Returns whether
- * they do. */
+/* Sets the edge functions without a band if vertices lie on 2^-8 px, near enough that 2E < 2^51.  Returns whether they
+ * do. */
 static int setup_on_grid(single_triangle *t)
 {
     refined_triangle *e = &t->edges;
     const double unit = (double)(1 << TL_GRID_BITS);
-    int64_t x[3], y[3]; /* doubled, from the first sample */
+    int64_t x[3], y[3]; /* doubled, relative to the first sample */
     for (int k = 0; k < 3; k++) {
         const double x_fx = e->corners[k].x * unit, y_fx = e->corners[k].y * unit;
         if (!(fabs(x_fx) < 0x1p23 && fabs(y_fx) < 0x1p23 && x_fx == nearest_of(x_fx) && y_fx == nearest_of(y_fx)))
@@ -142,7 +142,7 @@ static int setup_on_grid(single_triangle *t)
         const int64_t dx = (x[next] - x[k]) / 2, dy = (y[next] - y[k]) / 2;
         const int top_left = dy < 0 || (dy == 0 && dx > 0), is_outer = e->test == TL_TEST_OUTER;
         const int is_square = e->test != TL_TEST_SAMPLE, bias = is_square ? is_outer : !top_left;
-        const int64_t side = is_square ? 2 << TL_GRID_BITS : 0; /* as tested_point */
+        const int64_t side = is_square ? 2 << TL_GRID_BITS : 0; /* as in `tested_point` */
         const int64_t px = is_outer == (dy < 0) ? side : 0, py = is_outer == (dx > 0) ? side : 0;
         e->v[k] = (double)((dy * (x[k] - px) - dx * (y[k] - py) - bias) >> (TL_GRID_BITS + 1)) + 0.5;
         e->dx[k] = (double)dx, e->dy[k] = (double)dy, e->band[k] = -1.0;
@@ -151,8 +151,8 @@ static int setup_on_grid(single_triangle *t)
     return 1;
 }
 
-/* The columns [*first, *end) of a row; returns whether it is in doubt.  0x1.8p52 makes the nearest integer: floor() is
- * a call where there are no lanes. */
+/* Sets the columns [*first, *end) of a row; returns whether the row is in doubt.  Adding 0x1.8p52 rounds to the nearest
+ * integer: floor() is a call on the scalar set. */
 TL_INLINE unsigned find_single_end(const single_triangle *t, int64_t row, int32_t *first, int32_t *end)
 {
     const refined_triangle *e = &t->edges;
@@ -165,7 +165,7 @@ TL_INLINE unsigned find_single_end(const single_triangle *t, int64_t row, int32_
         const double any_q = (e->v[k] + e->dx[k] * (double)row) * t->inverse[k], low_q = any_q < far ? any_q : far;
         const double q = low_q > -far ? low_q : -far, nearest = (q + magic) - magic, off = q - nearest;
         const double quotient = off < 0.0 ? nearest - 1.0 : nearest;
-        is_doubted |= (fabs(off) <= e->band[k]) & (q == any_q); /* beyond the box nothing is in doubt */
+        is_doubted |= (fabs(off) <= e->band[k]) & (q == any_q); /* beyond the box no column is in doubt */
         if (e->dy[k] < 0.0)
             begin = -quotient > begin ? -quotient : begin;
         else
@@ -175,20 +175,20 @@ TL_INLINE unsigned find_single_end(const single_triangle *t, int64_t row, int32_
     return (unsigned)is_doubted;
 }
 
-/* Row ends where there are no lanes, in steps of 2^-TL_STEP_BITS columns from row to row: as walk_scanline, but that
- * quotients are rounded, once and in each step. */
+/* Row ends without lanes, in steps of 2^-TL_STEP_BITS columns from row to row: like `walk_scanline`, but quotients are
+ * rounded, once and in each step. */
 #define TL_STEP_BITS 40
 typedef struct {
     int n;
     int is_left[3];
     int64_t at[3], step[3]; /* q, and its step from row to row */
-    int64_t band[3];        /* q so near to an integer is refined */
-    int64_t twice[3];       /* twice of it, or -1: nothing is */
+    int64_t band[3];        /* q is refined if it is as near to an integer */
+    int64_t twice[3];       /* 2 * band, or -1: not refined */
 } row_steps;
 
-/* Returns 0 where steps of 64 bits do not reach.  Beside the errors that the band allows for, q at the first row and
- * each step err by 2^-52 of the most that |q| gets, and by one unit when they become integers.  On the grid, where
- * nothing is refined, q is at least 0.5 / |dy| away from integers. */
+/* Sets the steps; returns 0 where 64 bits do not suffice.  Besides the errors that the band covers, q at the first row
+ * and each step err by 2^-52 of the largest |q|, and by one unit in the conversion to integers.  On the grid, where
+ * nothing is refined, q is at least 0.5 / |dy| from an integer. */
 static int setup_steps(const single_triangle *t, row_steps *r)
 {
     const refined_triangle *e = &t->edges;
@@ -212,7 +212,8 @@ static int setup_steps(const single_triangle *t, row_steps *r)
     return 1;
 }
 
-/* The columns [*first, *end) of the row that the steps are at; returns whether it is in doubt.  Goes on to the next. */
+/* Sets the columns [*first, *end) of the current row, and steps to the next row; returns whether the row is in
+ * doubt. */
 TL_INLINE unsigned take_step(row_steps *r, int32_t n_cols, int32_t *first, int32_t *end)
 {
     const int64_t below_1 = ((int64_t)1 << TL_STEP_BITS) - 1;
@@ -231,7 +232,7 @@ TL_INLINE unsigned take_step(row_steps *r, int32_t n_cols, int32_t *first, int32
     return (unsigned)is_doubted;
 }
 
-/* The columns [first, end) of TL_LANES rows; returns the rows in doubt. */
+/* Sets the columns [first, end) of TL_LANES rows; returns the rows in doubt. */
 TL_INLINE unsigned find_single_ends(const single_triangle *t, int64_t row0, int32_t *first, int32_t *end)
 {
     const refined_triangle *e = &t->edges;
@@ -257,7 +258,7 @@ TL_INLINE unsigned find_single_ends(const single_triangle *t, int64_t row0, int3
     return vm_bits(doubted);
 }
 
-/* The samples [first, end) of a row of the box, with depth; `at` is the first sample of the row. */
+/* Draws the samples [first, end) of a row of the box, with depth; `at` is the first sample of the row. */
 TL_INLINE void put_single_depths(const tl_target *target, tl_sink sink, const single_triangle *t, int64_t row,
                                  int64_t at, int32_t first, int32_t end)
 {
@@ -278,7 +279,7 @@ TL_INLINE void put_single_depths(const tl_target *target, tl_sink sink, const si
     }
 }
 
-/* Sets up triangle i; returns whether there is anything to draw.  A vertex that is not finite ends the pass. */
+/* Sets up triangle i; returns whether there is something to draw.  A vertex that is not finite ends the pass. */
 static int setup_single_float(walk_state *s, int32_t i, single_triangle *t, tl_test test, int with_depth)
 {
     refined_triangle *e = &t->edges;
@@ -322,7 +323,7 @@ static int setup_single_float(walk_state *s, int32_t i, single_triangle *t, tl_t
     return 1;
 }
 
-/* The ends of the rows in doubt, by the exact sign. */
+/* Decides the ends of the rows in doubt, by the exact sign. */
 static __attribute__((noinline)) void refine_single_ends(const refined_triangle *a, int64_t row0, unsigned doubted,
                                                          int32_t *first, int32_t *end, tl_exact_counts *counts)
 {
@@ -337,7 +338,7 @@ static __attribute__((noinline)) void refine_single_ends(const refined_triangle 
 
 TL_INLINE void draw_single_float(walk_state *s, int32_t i, tl_sink sink)
 {
-    const tl_target target = *s->target; /* copies that no store can change */
+    const tl_target target = *s->target; /* copies that no store can alias */
     single_triangle found;
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
     if (!setup_single_float(s, i, &found, test_of(s, sink), sink_has_depth(sink)))
@@ -401,7 +402,7 @@ static void count_squares_of_pieces(walk_state *s, int64_t first, int64_t end)
     }
 }
 
-/* The triangles [first, end), which are pieces: those of one triangle have one name. */
+/* Counts triangles [first, end), which are pieces: the pieces of one triangle have one name. */
 static __attribute__((noinline)) void count_pieces(walk_state *s, int64_t first, int64_t end)
 {
     for (int64_t i = first, next; i < end && s->bad_row < 0 && !tl_is_given_up(s->window); i = next) {
@@ -416,7 +417,7 @@ static __attribute__((noinline)) void draw_one_float(walk_state *s, int32_t i)
     TL_SINK_CALL(draw_single_float, s->target->sink, s, i)
 }
 
-/* Draws the slivers that queues set aside: they have no depth plane. */
+/* Draws the queued slivers, which have no depth plane. */
 static __attribute__((noinline)) void draw_slivers(walk_state *s)
 {
     for (int k = 0; k < s->n_slivers && s->bad_row < 0 && !tl_is_given_up(s->window); k++)

@@ -1,9 +1,9 @@
-/* Fixed: TL_LANES triangles at a time with snapped vertices, in 32-bit lanes.
- * In: vertex records and triangles.  Out: boxes, edge functions, depth planes; the triangles that 32 bits cannot take.
+/* Fixed: TL_LANES triangles at a time with snapped vertices, in 32-bit lanes. In: vertex records and triangles.  Out:
+ * boxes, edge functions, depth planes; the triangles that do not fit 32 bits.
  *
  * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits,
  * products 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and at
- * most 8 bits, so that all this holds of corners of pixels up to a pixel outside the extent, but that doubled edge
+ * most 8 bits, so that this holds for corners of pixels up to a pixel outside the extent, except that doubled edge
  * functions are below 2^30. */
 #ifndef TL_TRIANGLES_FIXED_C
 #define TL_TRIANGLES_FIXED_C
@@ -29,7 +29,7 @@ TL_INLINE void load_corners(const walk_state *s, const int32_t *corners, lane_co
     }
 }
 
-/* Twice the signed area; exact where the extents are. */
+/* Twice the signed area; exact where the extents are in range. */
 TL_INLINE vi area_lanes(const lane_corners *c)
 {
     const vi x1 = vi_sub(c->x[1], c->x[0]), y1 = vi_sub(c->y[1], c->y[0]);
@@ -37,13 +37,13 @@ TL_INLINE vi area_lanes(const lane_corners *c)
     return vi_sub(vi_mul(x1, y2), vi_mul(y1, x2));
 }
 
-/* As round_extent tells. */
+/* The pixels of an extent, see `round_extent`. */
 TL_INLINE vi extent_pixels(vi x_fx, int32_t round, int bits)
 {
     return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits);
 }
 
-/* Loads TL_LANES triangles, and finds those that lanes can take and that show the side which is drawn. */
+/* Loads TL_LANES triangles, and finds those that fit lanes and show the side that is drawn. */
 TL_INLINE void load_fixed_batch(const walk_state *s, const int32_t *corners, vm live, lane_batch *b)
 {
     const batch_limits *limits = &s->limits;
@@ -72,7 +72,7 @@ TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_
     const int of_squares = (sink == TL_SINK_MASK || sink == TL_SINK_COUNT) && window->test != TL_TEST_SAMPLE;
     for (int k = 0; k < 3; k++) {
         const vi doubled = vi_sub(vi_mul(t->dy[k], t->x[k]), vi_mul(t->dx[k], t->y[k]));
-        if (of_squares) { /* from the centre to the corner that counts: half a pixel in x and in y */
+        if (of_squares) { /* from the centre to the tested corner: half a pixel in x and in y */
             const vi zero = vi_set1(0), is_outer = vi_set1(window->test == TL_TEST_OUTER);
             const vi sides = vi_add(vi_max(t->dx[k], vi_sub(zero, t->dx[k])), vi_max(t->dy[k], vi_sub(zero, t->dy[k])));
             const vi reach = vi_shift_left(sides, bits);
@@ -87,7 +87,7 @@ TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_
     }
 }
 
-/* Turns the triangles so that their areas are positive, and measures them from the first samples of their boxes. */
+/* Swaps corners so that areas are positive, and places the triangles relative to the first samples of their boxes. */
 TL_INLINE void place_triangles(const walk_state *s, tl_sink sink, const lane_corners *c, vi col, vi row,
                                lane_triangles *t, vd *z)
 {
@@ -137,7 +137,7 @@ TL_INLINE lane_planes plane_lanes(const lane_triangles *t, const vd *z)
     };
 }
 
-/* The triangles [i, i + TL_LANES) of a queue of n. */
+/* Loads the triangles [i, i + TL_LANES) of a queue of n. */
 TL_INLINE void pop_fixed(const walk_state *s, tl_sink sink, const box_queue *q, int i, int n, lane_triangles *t, vd *z)
 {
     int32_t corners[3 * TL_LANES];
@@ -147,7 +147,7 @@ TL_INLINE void pop_fixed(const walk_state *s, tl_sink sink, const box_queue *q, 
     place_triangles(s, sink, &c, vi_load(q->col + i), vi_load(q->row + i), t, z);
 }
 
-/* For triangles that cover the centres of pixels. */
+/* Starts a pass for triangles that cover the centres of pixels. */
 static void start_fixed(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target)
 {
     const int bits = window->subpixel_bits, is_back = snapped->cull == TL_CULL_BACK;

@@ -2,9 +2,9 @@
  * doubt.
  * In: points in pixels and triangles.  Out: boxes, edge functions, depth planes; which lanes lie on a grid.
  *
- * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers that stand in the
- * array, with the top-left rule where one is 0.  Boxes are exact: the samples in the extent.  centre - x is
- * exact from column 0 on; left of it a rounded one may be one too low, and is compared.
+ * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers in the array, with the
+ * top-left rule where an edge function is 0.  Boxes are exact: the samples in the extent.  centre - x is exact from
+ * column 0 on; left of it the rounded column may be one too low, and is compared.
  *
  * Points are measured in float64 from the first sample of the box.  Extents are at most TL_MAX_BOX_PX.  u = 2^-24;
  * X = max(width, 1), Y = max(height, 1) of the extent.  The first sample lies in the extent, so every |x - cx| <= X,
@@ -16,13 +16,13 @@
  * 2. Boxes of up to 4x4 samples: the distances of the points are rounded to float32, and the rest is float32.  Points
  *    moved by u X and u Y move E = (A - S) x (B - S) by 4 u XY.  The setup rounds dx, dy, two products and their
  *    difference: 5 u XY; i dx and k dy err by 2 u XY; six additions of values up to XY by 6 u XY.  Squares subtract
- *    their corner: 2 u XY; of an edge that float32 takes for level or upright they may take the wrong one, where E
+ *    their corner: 2 u XY; for an edge that float32 takes for level or upright the wrong corner may be taken, where E
  *    differs by 4 u XY at most.  That is 23 u XY: E within 24 u XY of 0 is refined (TL_BOX_BAND).  Twice the
- *    area errs by 13 u XY: three points moved, 6; four differences, two products and theirs, 7.
- *    Places (exact.h) stand up to 2^-19 px beside points, and are measured without an error: that moves E by
+ *    area errs by 13 u XY: three points moved, 6; four differences, two products and their difference, 7.
+ *    Places (exact.h) are up to 2^-19 px from points, and are measured without an error: that moves E by
  *    2^-18 (X + Y) <= 128 u XY instead of 4 u XY.  Together 147 u XY: E within 156 u XY is refined
  *    (TL_PLACE_BAND), and twice the area errs by less than twice that.  Boxes are those of the places and a unit around
- *    them; a sample beside the extent lies outside of some edge as any other does.
+ *    them; a sample beside the extent lies outside of some edge.
  * 3. Rows: v = e0 + i dx, rounded once or twice, errs by 5 u XY at most from E at column 0, the errors of k dy for any
  *    column k included: |v - k d - E| <= 5 u XY < M = 6 u XY, d = |dy|.  q = v * (1 / d) errs by 2.01 u |q|.
  *    Where |q - k| > M / d + 2.01 u |q| the sign of v - k d is that of E.  So a row end is refined where
@@ -31,11 +31,10 @@
  * 4. A band above 1/2, of a nearly level edge, refines every row: |q - nearest integer| <= 1/2.  A level edge is never
  *    refined: the exact box decides.  A difference that only float32 takes for 0 is set to 1e-30.
  *    Squares are tested at corners up to a pixel outside the extent: X and Y are then two pixels more.
- * 5. Vertices on 2^-8 px: ties are systematic, so lanes in doubt are looked at, and the band of those on the grid is 0.
+ * 5. Vertices on 2^-8 px: ties are systematic, so lanes in doubt are tested, and the band of lanes on the grid is 0.
  *    Boxes of up to 4x4 samples: points are measured without an error, edge functions are multiples of 2^-16, and while
- *    XY <= 64 nothing is rounded in 2., as all its numbers are below 2^7; they are moved by half a unit where a tie is
- *    not within, and otherwise the other way.  Larger boxes: integers of 2^-8 px, as triangles_fixed.c and rows.c have
- *    them.
+ *    XY <= 64 nothing is rounded in 2., because all its numbers are below 2^7; they are shifted by half a unit, inwards
+ *    where ties are outside and else outwards.  Larger boxes: integers of 2^-8 px, as in triangles_fixed.c and rows.c.
  *
  * tests/raster/test_exact.py draws with bands four times narrower, which give wrong pictures. */
 #ifndef TL_TRIANGLES_FLOAT_C
@@ -58,11 +57,11 @@
 #define TL_PLACE_UNIT 0x1p-18f
 #define TL_PLACE_BAND 0x1.38p-17f /* 156 u */
 #define TL_GRID_BITS 8
-#define TL_GRID_VECTORS 64    /* on fine grids few vectors have a tie */
+#define TL_GRID_VECTORS 64    /* few vectors of a fine grid have a tie */
 #define TL_EXACT_BOX 64.0f    /* pixels */
 #define TL_HALF_UNIT 0x1p-17f /* half of the unit of edge functions on the grid */
 
-/* The corners of a triangle that is turned, or not. */
+/* Loads the corners of a triangle, swapped if is_turned. */
 TL_INLINE void load_turned(const walk_state *s, int32_t id, int is_turned, exact_point *p)
 {
     int32_t corners[3];
@@ -72,7 +71,7 @@ TL_INLINE void load_turned(const walk_state *s, int32_t id, int is_turned, exact
     p[2] = point_of(s->points, corners[is_turned ? 1 : 2]);
 }
 
-/* The corners of TL_LANES triangles. */
+/* Loads the corners of TL_LANES triangles. */
 TL_INLINE void load_points(const tl_exact_points *points, tl_sink sink, const int32_t *corners, vd *x, vd *y, vd *z)
 {
     for (int k = 0; k < 3; k++) {
@@ -91,7 +90,7 @@ TL_INLINE void load_points(const tl_exact_points *points, tl_sink sink, const in
     }
 }
 
-/* Twice the area; deterministic up to the sign when corners change places. */
+/* Twice the area; deterministic up to the sign when corners are swapped. */
 TL_INLINE vd area_of_points(const vd *x, const vd *y)
 {
     const vd x1 = vd_sub(x[1], x[0]), y1 = vd_sub(y[1], y[0]), x2 = vd_sub(x[2], x[0]), y2 = vd_sub(y[2], y[0]);
@@ -115,8 +114,8 @@ static __attribute__((noinline)) void refine_turns(const walk_state *s, vi all_i
     }
 }
 
-/* Finds the triangles that are to be turned, and those without an area: of a float64 area the sign holds beyond 2^-51
- * of its terms (J. R. Shewchuk), and is refined otherwise.  Of vertices on 2^-8 px it is exact. */
+/* Finds the triangles to be swapped, and removes those without an area: the sign of a float64 area is right beyond
+ * 2^-51 of its terms (J. R. Shewchuk), and is refined otherwise.  For vertices on 2^-8 px it is exact. */
 TL_INLINE void find_turns(const walk_state *s, lane_exact *t, vm on_grid)
 {
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
@@ -139,7 +138,7 @@ TL_INLINE void find_turns(const walk_state *s, lane_exact *t, vm on_grid)
     t->to_turn = t->turned;
 }
 
-/* Lets corners change places. */
+/* Swaps corners 1 and 2 in the lanes of to_turn. */
 TL_INLINE void turn_points(lane_exact *t)
 {
     const vd x = t->x[1], y = t->y[1];
@@ -148,7 +147,7 @@ TL_INLINE void turn_points(lane_exact *t)
     t->to_turn = vm_first(0);
 }
 
-/* Leaves out the side that is culled. */
+/* Removes the side that is culled. */
 TL_INLINE void cull_turned(const walk_state *s, lane_exact *t)
 {
     if (s->snapped->cull == TL_CULL_BACK)
@@ -157,7 +156,7 @@ TL_INLINE void cull_turned(const walk_state *s, lane_exact *t)
         t->live = vm_and_not(t->live, t->turned);
 }
 
-/* Where edge k of TL_LANES triangles is tested: as tested_point. */
+/* Moves the point at which edge k of TL_LANES triangles is tested, as in `tested_point`. */
 TL_INLINE void move_to_corners(const vd *x, const vd *y, int k, tl_test test, vd *px, vd *py)
 {
     const int next = k == 2 ? 0 : k + 1;
@@ -165,11 +164,11 @@ TL_INLINE void move_to_corners(const vd *x, const vd *y, int k, tl_test test, vd
     if (test == TL_TEST_SAMPLE)
         return;
     const vd inside = test == TL_TEST_OUTER ? one : zero, outside = test == TL_TEST_OUTER ? zero : one;
-    *px = vd_add(*px, vd_select(vd_ge(y[k], y[next]), inside, outside)); /* of equal ones either corner will do */
+    *px = vd_add(*px, vd_select(vd_ge(y[k], y[next]), inside, outside)); /* of equal corners either will do */
     *py = vd_add(*py, vd_select(vd_ge(x[next], x[k]), inside, outside));
 }
 
-/* Edge functions in float32, as the head of this file tells. */
+/* Sets edge functions in float32, see the head of this file. */
 TL_INLINE void set_float_edges(lane_exact *t)
 {
     const vd zero = vd_set1(0.0), least = vd_set1(0x1p-1074);
@@ -191,7 +190,7 @@ TL_INLINE void set_float_edges(lane_exact *t)
     }
 }
 
-/* The first step of set_box_edges. */
+/* Sets the points of set_box_edges: relative to the first sample. */
 TL_INLINE void measure_points(lane_exact *t)
 {
     for (int k = 0; k < 3; k++) {
@@ -201,7 +200,7 @@ TL_INLINE void measure_points(lane_exact *t)
     t->band = vf_mul(t->xy, vf_set1(TL_BOX_BAND));
 }
 
-/* The first step of set_box_edges, of points that are rounded to places. */
+/* Sets the points of set_box_edges from places, relative to the first sample. */
 TL_INLINE void measure_places(const walk_state *s, const vi *x_fx, const vi *y_fx, vi col, vi row, lane_exact *t)
 {
     const vf unit = vf_set1(TL_PLACE_UNIT);
@@ -214,7 +213,8 @@ TL_INLINE void measure_places(const walk_state *s, const vi *x_fx, const vi *y_f
     t->band = vf_mul(t->xy, vf_set1(TL_PLACE_BAND));
 }
 
-/* The edge functions over boxes of up to 4x4 samples, from points in float32; finds the turns, too. */
+/* Sets the edge functions over boxes of up to 4x4 samples, from points in float32, and finds the triangles to be
+ * swapped. */
 TL_INLINE void set_box_edges(const walk_state *s, lane_exact *t, vm on_grid)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f);
@@ -237,7 +237,7 @@ TL_INLINE void set_box_edges(const walk_state *s, lane_exact *t, vm on_grid)
     }
     for (int k = 0; k < 3; k++) {
         vf px = x[k], py = y[k];
-        if (t->test != TL_TEST_SAMPLE) { /* as move_to_corners */
+        if (t->test != TL_TEST_SAMPLE) { /* as in `move_to_corners` */
             px = vf_sub(px, vf_select(vf_lt(zero, t->dy[k]), outside, inside));
             py = vf_sub(py, vf_select(vf_lt(t->dx[k], zero), outside, inside));
         }
@@ -245,7 +245,7 @@ TL_INLINE void set_box_edges(const walk_state *s, lane_exact *t, vm on_grid)
     }
 }
 
-/* The triangles with all vertices on 2^-8 px; of_boxes: and that are so small that set_box_edges is exact. */
+/* The triangles with all vertices on 2^-8 px; of_boxes: and small enough that `set_box_edges` is exact. */
 TL_INLINE vm find_on_grid(const walk_state *s, const lane_exact *t, int of_boxes)
 {
     vd off = vd_set1(0.0);
@@ -255,8 +255,8 @@ TL_INLINE vm find_on_grid(const walk_state *s, const lane_exact *t, int of_boxes
     return of_boxes ? vm_and(good, vf_ge(vf_set1(TL_EXACT_BOX * (float)s->points->band), t->xy)) : good;
 }
 
-/* Moves edge functions of set_box_edges, in lanes of m, by half a unit, outwards where an edge owns its ties and else
- * inwards: none is ever 0 at a sample then. */
+/* Shifts the edge functions of set_box_edges, in lanes of m, by half a unit, outwards where ties are inside and else
+ * inwards: then none is 0 at a sample. */
 TL_INLINE void set_ties(lane_exact *t, vm m)
 {
     const vf zero = vf_set1(0.0f), half = vf_set1(TL_HALF_UNIT), wide = vf_set1(0x1p15f);
@@ -270,11 +270,11 @@ TL_INLINE void set_ties(lane_exact *t, vm m)
     t->on_grid = vm_or(t->on_grid, m);
 }
 
-/* Sets the edge functions of the lanes in m to those of triangles_fixed.c, half a unit inwards: none is ever 0 at a
+/* Sets the edge functions of the lanes in m to those of triangles_fixed.c, half a unit inwards: none is 0 at a
  * sample. */
 static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
 {
-    vi x[3], y[3]; /* doubled, from the first sample */
+    vi x[3], y[3]; /* doubled, relative to the first sample */
     const vd unit2 = vd_set1((double)(2 << TL_GRID_BITS));
     for (int k = 0; k < 3; k++) {
         x[k] = vi_round(vd_mul(vd_sub(t->x[k], t->sample_x), unit2));
@@ -289,7 +289,7 @@ static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
         const vi doubled = vi_sub(vi_mul(dy, x[k]), vi_mul(dx, y[k])), zero = vi_set1(0), one = vi_set1(1);
         const vm top_left = vi_gt(zero, vi_sub(vi_shift_left(dy, 16), dx));
         vi biased = vi_select(top_left, doubled, vi_sub(doubled, one));
-        if (t->test != TL_TEST_SAMPLE) { /* as tested_point */
+        if (t->test != TL_TEST_SAMPLE) { /* as in `tested_point` */
             const vi inside = t->test == TL_TEST_OUTER ? one : zero, outside = vi_sub(one, inside);
             const vi right = vi_select(vi_gt(zero, dy), inside, outside);
             const vi down = vi_select(vi_gt(dx, zero), inside, outside);
@@ -304,7 +304,7 @@ static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
     t->on_grid = m;
 }
 
-/* Looks whether triangles in doubt lie on the grid, and if so takes their edges from it; returns which. */
+/* Finds triangles in doubt that lie on the grid, and sets their edges exactly; returns their lanes. */
 static __attribute__((noinline)) vm try_grid(walk_state *s, lane_exact *t, int of_boxes)
 {
     const vm good = vm_and_not(find_on_grid(s, t, of_boxes), t->on_grid);
@@ -319,7 +319,7 @@ static __attribute__((noinline)) vm try_grid(walk_state *s, lane_exact *t, int o
 }
 
 /* Whether points lie inside edge k of TL_LANES triangles, or outside, beyond the error of float64 (Shewchuk's bound A);
- * in neither where the exact sign decides. */
+ * where neither is set the exact sign decides. */
 typedef struct {
     vm inside, outside;
 } lane_sides_of_edge;
@@ -335,7 +335,7 @@ TL_INLINE lane_sides_of_edge sides_of_edge(const vd *x, const vd *y, int k, vd p
     return (lane_sides_of_edge){vd_ge(e, bound), vd_ge(vd_sub(vd_set1(0.0), e), bound)};
 }
 
-/* Points and first samples of TL_LANES triangles, to be picked from. */
+/* Points and first samples of TL_LANES triangles, for vd_pick. */
 typedef struct {
     double x[3][TL_MAX_LANES], y[3][TL_MAX_LANES], sample_x[TL_MAX_LANES], sample_y[TL_MAX_LANES];
 } picked_points;
@@ -347,13 +347,13 @@ TL_INLINE void store_points_to_pick(const lane_exact *t, picked_points *m)
     vd_store(m->sample_x, t->sample_x), vd_store(m->sample_y, t->sample_y);
 }
 
-/* When a triangle covers a pixel, by the sink: squares have masks and counts alone. */
+/* The test of the window for masks and counts; a constant for other sinks, which never test squares. */
 TL_INLINE tl_test test_of(const walk_state *s, tl_sink sink)
 {
     return sink == TL_SINK_MASK || sink == TL_SINK_COUNT ? s->window->test : TL_TEST_SAMPLE;
 }
 
-/* The first pixels with samples not left of x. */
+/* The first pixels whose samples are not left of x. */
 TL_INLINE vi first_pixels(vd x, vd centre, int is_left_of_0)
 {
     const vi n = vi_ceil(vd_sub(x, centre));
@@ -363,7 +363,7 @@ TL_INLINE vi first_pixels(vd x, vd centre, int is_left_of_0)
     return vi_add(n, vi_select(is_low, vi_set1(1), vi_set1(0)));
 }
 
-/* The pixels from *first to *end with samples in extents, or with squares that meet them in more than a line, or lie
+/* Sets the pixels [*first, *end) whose samples lie in extents, or whose squares meet them in more than a line, or lie
  * in them. */
 TL_INLINE void find_pixels_of(vd low, vd high, tl_test test, double centre, int is_left_of_0, vi *first, vi *end)
 {
@@ -376,10 +376,10 @@ TL_INLINE void find_pixels_of(vd low, vd high, tl_test test, double centre, int 
     *end = test == TL_TEST_OUTER ? vi_ceil(high) : vi_round(vd_floor(high));
 }
 
-/* The pixels around the extent of a triangle in which edges are tested. */
+/* The pixels outside the extent of a triangle up to which edges are tested. */
 TL_INLINE double border_of(tl_test test) { return test == TL_TEST_SAMPLE ? 0.0 : 2.0; }
 
-/* The boxes of the points. */
+/* Sets the boxes of triangles from their points. */
 TL_INLINE void find_boxes_of_points(const walk_state *s, tl_sink sink, vm live, lane_batch *b)
 {
     const vd *x = b->t.x, *y = b->t.y;
@@ -391,7 +391,7 @@ TL_INLINE void find_boxes_of_points(const walk_state *s, tl_sink sink, vm live, 
     const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test));
     const vd widest = vd_set1(s->is_far ? -1.0 : TL_MAX_BOX_PX - border_of(test));
     const vd farthest = vd_max(vd_max(x_max, y_max), vd_sub(vd_set1(0.0), vd_min(x_min, y_min)));
-    const vm in_range = vm_and(vd_ge(vd_set1(0x1p30), farthest), vd_ge(vd_set1(0x1p33), sum)); /* not where it is NaN */
+    const vm in_range = vm_and(vd_ge(vd_set1(0x1p30), farthest), vd_ge(vd_set1(0x1p33), sum)); /* false for NaN */
     const vm fits = vm_and(in_range, vd_ge(widest, vd_max(width, height)));
     const int is_left_of_0 = s->limits.left < 0 || s->limits.top < 0;
     vi left, right;
@@ -402,7 +402,7 @@ TL_INLINE void find_boxes_of_points(const walk_state *s, tl_sink sink, vm live, 
     b->xy = vf_mul(vf_max(vf_add(vf_from_vd(width), border), one), vf_max(vf_add(vf_from_vd(height), border), one));
 }
 
-/* The pixels with samples between places, or up to a unit beside them. */
+/* Sets the pixels with samples between places, or up to a unit beside them. */
 TL_INLINE void find_pixels_of_places(vi low, vi high, double centre, vi *first, vi *end)
 {
     const int32_t at = place_of(centre), unit = 1 << TL_PLACE_BITS;
@@ -410,7 +410,7 @@ TL_INLINE void find_pixels_of_places(vi low, vi high, double centre, vi *first, 
     *end = vi_shift_right(vi_add(high, vi_set1(unit + 1 - at)), TL_PLACE_BITS);
 }
 
-/* The boxes of the places; returns 0 where one has more than 4x4 samples and has to be exact. */
+/* Sets the boxes of triangles from their places; returns 0 if a box has more than 4x4 samples and must be exact. */
 TL_INLINE int find_boxes_of_places(const walk_state *s, vm live, lane_batch *b)
 {
     const vi *x = b->x_fx, *y = b->y_fx;
@@ -419,7 +419,7 @@ TL_INLINE int find_boxes_of_places(const walk_state *s, vm live, lane_batch *b)
     const vi width = vi_sub(x_max, x_min), height = vi_sub(y_max, y_min);
     const vi widest = vi_set1(TL_MAX_BOX_PX << TL_PLACE_BITS);
     const vf one = vf_set1(1.0f), unit = vf_set1(TL_PLACE_UNIT);
-    /* a special vertex has TL_SPECIAL for x: its triangle is too wide, or special throughout */
+    /* a special vertex has TL_SPECIAL for x: its triangle is too wide, or all of its vertices are special */
     const vm too_large = vm_or(vi_gt_unsigned(width, widest), vi_gt_unsigned(height, widest));
     vi left, right;
     b->single = vm_and(live, vm_or(too_large, vi_eq(x_min, vi_set1(TL_SPECIAL)))),
@@ -431,7 +431,7 @@ TL_INLINE int find_boxes_of_places(const walk_state *s, vm live, lane_batch *b)
     return !vm_any(vm_and(vm_and(b->drawn, has_box(b)), vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX))));
 }
 
-/* Loads TL_LANES triangles, and finds their boxes. */
+/* Loads TL_LANES triangles, and sets their boxes. */
 TL_INLINE void load_float_batch(const walk_state *s, tl_sink sink, const int32_t *corners, vm live, lane_batch *b)
 {
     b->is_placed = 0;
@@ -447,7 +447,7 @@ TL_INLINE void load_float_batch(const walk_state *s, tl_sink sink, const int32_t
         find_boxes_of_points(s, sink, live, b);
 }
 
-/* The first samples of boxes. */
+/* Sets the first samples of boxes. */
 TL_INLINE void place_float(const walk_state *s, tl_sink sink, vi col, vi row, vf xy, lane_exact *t)
 {
     t->sample_x = vd_add(vd_from_vi(col), vd_set1(s->centre_x));
@@ -458,12 +458,12 @@ TL_INLINE void place_float(const walk_state *s, tl_sink sink, vi col, vi row, vf
     t->on_grid = vm_first(0);
 }
 
-/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64. */
+/* Planes give depth except for slivers, and where products leave the range of float64. */
 #define TL_LEAST_BOX 1e-250
 #define TL_MOST_EXTENT 1e120
 
-/* Sets aside triangles that lanes could draw except for the depth; as plane_of_points: extents of lanes are in range.
- * */
+/* Lists triangles without a depth plane as slivers, and removes them from the lanes; as in `plane_of_points`: extents
+ * of lanes are in range. */
 TL_INLINE void take_out_slivers(walk_state *s, lane_exact *t)
 {
     const vd width = vd_sub(vd_max(vd_max(t->x[0], t->x[1]), t->x[2]), vd_min(vd_min(t->x[0], t->x[1]), t->x[2]));
@@ -478,7 +478,7 @@ TL_INLINE void take_out_slivers(walk_state *s, lane_exact *t)
     }
 }
 
-/* The triangles [i, i + TL_LANES) of a queue of n. */
+/* Loads the triangles [i, i + TL_LANES) of a queue of n. */
 TL_INLINE void pop_float(const walk_state *s, tl_sink sink, const box_queue *q, int i, int n, lane_exact *t)
 {
     int32_t corners[3 * TL_LANES];
@@ -489,7 +489,7 @@ TL_INLINE void pop_float(const walk_state *s, tl_sink sink, const box_queue *q, 
     place_float(s, sink, vi_load(q->col + i), vi_load(q->row + i), vf_load(q->xy + i), t);
 }
 
-/* Edge functions of triangles that have been loaded.  of_boxes, a constant: of up to 4x4 samples. */
+/* Sets the edge functions of loaded triangles.  of_boxes, a constant: boxes have up to 4x4 samples. */
 TL_INLINE void setup_float(walk_state *s, tl_sink sink, lane_exact *t, int of_boxes)
 {
     const vm good = s->may_be_on_grid ? find_on_grid(s, t, of_boxes) : vm_first(0);
@@ -526,7 +526,7 @@ TL_INLINE lane_planes plane_of_lanes(const walk_state *s, const lane_exact *t)
     if (s->points->stride < 3)
         return p;
     const vd *z = t->z;
-    /* which corner comes second changes the sign of both products and of the area, and no bit else */
+    /* swapping two corners changes the sign of both products and of the area, and no other bit */
     const vm is_turned = vm_and_not(t->turned, t->to_turn);
     const vd z1 = vd_select(is_turned, z[2], z[1]), z2 = vd_select(is_turned, z[1], z[2]);
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
@@ -539,7 +539,7 @@ TL_INLINE lane_planes plane_of_lanes(const walk_state *s, const lane_exact *t)
     return p;
 }
 
-/* Leaves out triangles that are turned away for certain. */
+/* Removes triangles that are certainly culled. */
 TL_INLINE void drop_turned(const walk_state *s, lane_batch *b)
 {
     if (s->snapped->cull == TL_CULL_NONE)
@@ -559,7 +559,7 @@ TL_INLINE int is_near_0(const tl_window *window)
     return is_near(window) && window->x_px + window->width < farthest && window->y_px + window->height < farthest;
 }
 
-/* The window lies within 2^48 pixels of 0, where centres and samples are float64. */
+/* The window lies within 2^48 pixels of 0, where centres and samples are exact in float64. */
 static void start_float(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                         tl_exact_counts *counts)
 {

@@ -1,13 +1,13 @@
 /* The two walkers, written once and compiled for 64-bit and 128-bit integers: single_fixed.c includes this file twice,
- * which has no guard therefore.
- * In: a set-up triangle.  Out: the covered span of each row.  TL_INT is the integer, TL_OP(name) its
- * operation in base/integers.h, TL_WALK(name) names its copy.
+ * so it has no guard.
+ * In: a set-up triangle.  Out: the covered span of each row.  TL_INT is the integer, TL_OP(name) its operation in
+ * base/integers.h, TL_WALK(name) the name of its copy.
  *
  * Both walk E' = (2E + bias) >> (bits + 1), bias -1 on edges that are neither top nor left.  2E changes by multiples of
  * 2^(bits+1) from sample to sample, so the floor keeps its sign at every sample, and E' changes by exactly -dy a column
- * and dx a row.  Squares are tested at one corner an edge: the square meets the triangle only where the corner that
- * lies farthest inside does not lie on the edge or outside, and is held by it only where the one farthest outside
- * does.  No more is needed: with the box, these are all the axes that can separate the two. */
+ * and dx a row.  Squares are tested at one corner an edge: the square meets the triangle only where its corner farthest
+ * inside the edge is strictly inside, and the triangle holds it only where its corner farthest outside is inside.  That
+ * suffices: with the box, these are all the axes that can separate the two. */
 #include <stdint.h>
 
 #include "topleft.h"
@@ -16,7 +16,7 @@
 #include "vertex/setup.c"
 #include "sink/sink.c"
 
-#ifndef TL_WALK /* read by itself, as an editor does */
+#ifndef TL_WALK /* for editors, which read this file alone */
 #define TL_INT int64_t
 #define TL_OP(name) i64_##name
 #define TL_WALK(name) name##_64
@@ -27,7 +27,7 @@ typedef struct {
     TL_INT dx[3], dy[3];
 } TL_WALK(edges);
 
-/* The edge function of an edge by (dx, dy) from its start, at a point that is (x, y) from there. */
+/* The edge function of an edge with direction (dx, dy), at a point (x, y) from its start. */
 static inline TL_INT TL_WALK(edge_at)(TL_INT x, TL_INT y, int64_t dx, int64_t dy)
 {
     return TL_OP(wrapping_sub)(TL_OP(wrapping_times)(y, dx), TL_OP(wrapping_times)(x, dy));
@@ -85,8 +85,8 @@ TL_INLINE void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *window,
 }
 
 /* Row ends by a digital differential analyser: E'(col) = value - dy * col >= 0 ends at floor(value / |dy|); one floor
- * division an edge, then quotient and remainder are stepped from row to row.  Horizontal edges say nothing that the box
- * does not.  Based on: J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965. */
+ * division an edge, then quotient and remainder are stepped from row to row.  The box replaces horizontal edges.
+ * Based on: J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965. */
 TL_INLINE void TL_WALK(walk_scanline)(const tl_triangle *t, const tl_window *window, const tl_target *target,
                                       tl_sink sink)
 {
