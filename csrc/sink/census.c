@@ -1,4 +1,4 @@
-/* Census: how many triangles each part of the drawing code would take, counted where it decides.
+/* Census: counts the triangles that each part of the drawing code would draw, where it decides.
  * In: the decisions of raster.c and single_fixed.c.  Out: tl_census. */
 #ifndef TL_CENSUS_C
 #define TL_CENSUS_C
@@ -10,15 +10,15 @@
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
 
-/* The sink that triangles are drawn, or counted, for. */
+/* The sink that triangles are drawn for, or counted for. */
 TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink)
 {
     return sink == TL_SINK_CENSUS ? target->census->sink : sink;
 }
 
-/* The rest is empty for all sinks but the census, so that the code that draws reads without it. */
+/* The functions below do nothing for all sinks but the census, so that drawing code has no test for it. */
 
-/* Triangles without positive area: of none, or turned away. */
+/* Counts triangles that are degenerate or culled. */
 TL_INLINE void count_faceless(const tl_target *target, tl_sink sink, vm m, vi area)
 {
     if (sink != TL_SINK_CENSUS)
@@ -29,7 +29,7 @@ TL_INLINE void count_faceless(const tl_target *target, tl_sink sink, vm m, vi ar
     census->n[TL_CLASS_CULLED] += __builtin_popcount(vm_bits(vm_and_not(m, is_flat)));
 }
 
-/* Triangles with an empty box; side: the lesser one of the box before the window cut it. */
+/* Counts triangles with an empty box; side: the shorter side of the box before clipping to the window. */
 TL_INLINE void count_unseen(const tl_target *target, tl_sink sink, vm m, vi side)
 {
     if (sink != TL_SINK_CENSUS)
@@ -47,7 +47,7 @@ static inline void count_box(tl_census *census, tl_class k, double n_samples, do
     census->covered[k] += area_px < n_samples ? area_px : n_samples;
 }
 
-/* Triangles that lanes draw; doubled_area in square units. */
+/* Counts triangles that lanes draw; doubled_area in square units. */
 static void count_boxes(tl_census *census, const vm *classes, vi n_cols, vi n_rows, vi doubled_area, int bits)
 {
     int32_t cols[TL_MAX_LANES], rows[TL_MAX_LANES], areas[TL_MAX_LANES];
@@ -60,14 +60,14 @@ static void count_boxes(tl_census *census, const vm *classes, vi n_cols, vi n_ro
         }
 }
 
-/* A triangle of no area, or turned away. */
+/* Counts a triangle that is degenerate or culled. */
 TL_INLINE void count_faceless_one(const tl_target *target, tl_sink sink, int sign)
 {
     if (sink == TL_SINK_CENSUS)
         target->census->n[sign ? TL_CLASS_CULLED : TL_CLASS_DEGENERATE]++;
 }
 
-/* A triangle that clip_box leaves nothing of. */
+/* Counts a triangle whose box in the window is empty. */
 TL_INLINE void count_unseen_one(const tl_target *target, tl_sink sink, const tl_triangle *t, const tl_window *window)
 {
     if (sink != TL_SINK_CENSUS)

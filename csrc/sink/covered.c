@@ -1,10 +1,9 @@
-/* Coverage while it is drawn, a bit a sample, and its picture at the end.
- * In: samples as they are drawn.  Out: a byte of 0 or 1 each; or, of 2 to 16 samples a pixel, the covered share,
- * float32.
+/* Coverage while drawing, a bit a sample, and its picture at the end.
+ * In: covered samples.  Out: a byte of 0 or 1 each; or, for 2 to 16 samples a pixel, the covered share, float32.
  *
- * An eighth of the memory stays in a nearer cache while triangles are drawn over one another, and the bytes are written
- * once instead of being cleared first.  Bits lie in the order of the pixels, row * stride_px + column, those of a pixel
- * side by side in the order of its samples: bit (pixel << sample_bits) + sample. */
+ * An eighth of the memory stays in a nearer cache while triangles overdraw each other, and the bytes are written once
+ * instead of being cleared first.  Bits are in the order of the pixels, row * stride_px + column; those of a pixel are
+ * side by side, in the order of its samples: bit (pixel << sample_bits) + sample. */
 #ifndef TL_COVERED_C
 #define TL_COVERED_C
 
@@ -15,9 +14,9 @@
 #include "lanes/lanes.h"
 
 _Static_assert(4 * 64 / TL_MAX_SAMPLES >= TL_LANES, "the pixels of four words are whole vectors");
-#define TL_EVEN_WORDS 8 /* that are worth a call */
+#define TL_EVEN_WORDS 8 /* the least number that is worth a call */
 
-/* Marks samples from `at` on, one a bit. */
+/* Sets the bits of samples from `at` on. */
 TL_INLINE void cover(const tl_target *target, int64_t at, uint64_t bits)
 {
     uint64_t *words = target->covered + (at >> 6);
@@ -26,14 +25,14 @@ TL_INLINE void cover(const tl_target *target, int64_t at, uint64_t bits)
     words[1] |= bits >> 1 >> (63 - shift);
 }
 
-/* The part of the samples [at, at + n) that lies in the word which begins at sample `word`. */
+/* The bits of samples [at, at + n) in the word that begins at sample `word`. */
 TL_INLINE uint64_t word_bits(int64_t at, int64_t n, int64_t word)
 {
     const int64_t first = at - word, rest = word + 64 - (at + n);
     return ~0ull << (first > 0 ? first : 0) & ~0ull >> (rest > 0 ? rest : 0);
 }
 
-/* Marks [at, at + n), n > 0. */
+/* Sets the bits [at, at + n), n > 0. */
 TL_INLINE void cover_span(const tl_target *target, int64_t at, int64_t n)
 {
     uint64_t *const words = target->covered;
@@ -45,7 +44,7 @@ TL_INLINE void cover_span(const tl_target *target, int64_t at, int64_t n)
         words[last] |= word_bits(at, n, last << 6);
 }
 
-/* How many words from `words` on, of at most n, equal the first one; 0 when that has both bits. */
+/* How many of n words equal the first word; 0 when that has both 0 and 1 bits. */
 TL_INLINE int64_t even_words(const uint64_t *words, int64_t n)
 {
     const uint64_t value = words[0];
@@ -60,7 +59,7 @@ TL_INLINE int64_t even_words(const uint64_t *words, int64_t n)
     return k;
 }
 
-/* The bytes of the samples [at, at + n).  Long runs of one value are left to `memset`: an empty frame of 8 MB takes
+/* Writes the bytes of the samples [at, at + n).  `memset` writes long runs of one value: an empty frame of 8 MB takes
  * 0.15 ms instead of 0.19. */
 static void expand_span(const tl_target *target, int64_t at, int64_t n)
 {
@@ -94,7 +93,7 @@ static void expand_covered(const tl_window *window, const tl_target *target)
         expand_span(target, row * target->stride_px, window->width);
 }
 
-/* Every 2^sample_bits-th bit, from the first. */
+/* Bits 0, 2^sample_bits, 2 * 2^sample_bits, ... */
 TL_INLINE uint64_t sample_pattern(int sample_bits)
 {
     static const uint64_t patterns[5] = {~0ull, 0x5555555555555555u, 0x1111111111111111u, 0x0101010101010101u,
@@ -102,7 +101,7 @@ TL_INLINE uint64_t sample_pattern(int sample_bits)
     return patterns[sample_bits];
 }
 
-/* Marks the sample of the pixels [at, at + n), n > 0. */
+/* Sets the bits of the current sample of the pixels [at, at + n), n > 0. */
 TL_INLINE void cover_samples(const tl_target *target, int64_t at, int64_t n)
 {
     uint64_t *const words = target->covered;
@@ -116,7 +115,7 @@ TL_INLINE void cover_samples(const tl_target *target, int64_t at, int64_t n)
         words[last] |= pattern & word_bits(begin, length, last << 6);
 }
 
-/* Sums of 2^sample_bits bits each, where those lay. */
+/* The number of set bits in each group of 2^sample_bits bits, in place of the group. */
 TL_INLINE uint64_t count_bits(uint64_t v, int sample_bits)
 {
     v -= v >> 1 & 0x5555555555555555u;
@@ -129,8 +128,8 @@ TL_INLINE uint64_t count_bits(uint64_t v, int sample_bits)
     return v;
 }
 
-/* The pixels [at, at + n), at a multiple of 32.  Long runs that are covered whole, or not at all, are filled: eight
- * words of four samples are 128 pixels. */
+/* Writes the shares of the pixels [at, at + n), at a multiple of 32.  Long runs that are wholly covered, or not
+ * covered, are filled: eight words of four samples are 128 pixels. */
 TL_INLINE void share_span(const tl_target *target, int64_t at, int64_t n, int sample_bits)
 {
     const int per_word = 64 >> sample_bits, width = 1 << sample_bits;
@@ -157,7 +156,7 @@ TL_INLINE void share_span(const tl_target *target, int64_t at, int64_t n, int sa
         pixels[k] = (float)(int32_t)(counts >> (k * width) & (2 * (unsigned)width - 1)) * share;
 }
 
-/* Writes the share of covered samples of every pixel; rows of the window follow one another. */
+/* Writes the share of covered samples of every pixel; the window has no gaps between rows. */
 static void share_samples(const tl_window *window, const tl_target *target)
 {
     const int64_t n = window->width * window->height;

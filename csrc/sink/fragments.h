@@ -1,5 +1,5 @@
 /* The list of covered samples of small triangles, and a sample as one integer.
- * In: samples with id and depth.  Out: a list that a sink writes out when it is full. */
+ * In: samples with id and depth.  Out: a list that a sink flushes when it is full. */
 #ifndef TL_FRAGMENTS_H
 #define TL_FRAGMENTS_H
 
@@ -8,7 +8,7 @@
 
 #include "lanes/lanes.h"
 
-/* Covered samples of small triangles wait in a list of this many. */
+/* The length of the list at which it is flushed. */
 #define TL_FRAGMENTS 1024
 #define TL_PREFETCH 16
 
@@ -19,7 +19,8 @@ typedef struct {
     float depth[TL_FRAGMENTS + 8 * TL_MAX_LANES];
 } fragment_list;
 
-/* A sample as one integer, smaller if it wins: depth bits in the order of the numbers, then id.  And back. */
+/* A sample as one integer, smaller if it wins: depth bits in the order of the numbers, then id; `key_depth` is the
+ * inverse. */
 TL_INLINE int64_t sample_key(float depth, int32_t id, int32_t turn)
 {
     int32_t bits;

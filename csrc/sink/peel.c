@@ -1,10 +1,10 @@
 /* Peel: the nearest layers of every pixel, in one pass; or bits of columns that cross the surface.
- * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id, or
+ * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id; or
  * bits.
  *
- * Depth peeling draws the mesh once a layer, each time the surfaces behind the last layer.  Here a sample goes through
- * the planes from the first to the last: where it comes before the one there it takes the place, and the old one
- * goes on, until an empty place ends it.  Neighbours on a surface do so together, a vector of them.
+ * Depth peeling draws the mesh once a layer, each time the surfaces behind the last layer.  Here a sample is inserted
+ * by one pass over the planes: where it comes before the sample of a plane, the two are swapped, until an empty plane
+ * ends the pass.  A vector inserts neighbouring pixels together.
  *
  * Based on: C. Everitt, Interactive Order-Independent Transparency, 2001 (depth peeling); L. Carpenter, The A-buffer,
  * 1984 (the fragments of a pixel in a list). */
@@ -32,7 +32,7 @@ static void clear_layers(const tl_window *window, const tl_target *target)
         }
 }
 
-/* Notes where a column crosses a surface. */
+/* Flips or sets the bit where a column crosses a surface. */
 TL_INLINE void note_crossing(const tl_crossings *c, int64_t at, float depth)
 {
     const float end = (float)c->n_steps, z = c->is_set ? floorf(depth) : ceilf(depth - 0.5f);
@@ -43,11 +43,11 @@ TL_INLINE void note_crossing(const tl_crossings *c, int64_t at, float depth)
         *word ^= 1ull << (step & 63);
     else if (is_step)
         *word |= 1ull << (step & 63);
-    else if (depth == end) /* the far side of the grid belongs to its last step */
+    else if (depth == end) /* the end of the grid belongs to its last step */
         c->bits[at * c->n_words + ((c->n_steps - 1) >> 6)] |= 1ull << ((c->n_steps - 1) & 63);
 }
 
-/* The lanes in m of a triangle. */
+/* Adds the crossings of the lanes in m of a triangle. */
 static void cross_lanes(const tl_crossings *c, int64_t at, vm m, vf depth)
 {
     float depths[TL_MAX_LANES];
@@ -58,7 +58,7 @@ static void cross_lanes(const tl_crossings *c, int64_t at, vm m, vf depth)
     }
 }
 
-/* Adds the lanes in m of a triangle to the layers of their pixels. */
+/* Inserts the lanes in m of a triangle into the layers of their pixels. */
 static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int32_t id)
 {
     const tl_peeled *p = target->peeled;
@@ -94,7 +94,7 @@ static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int3
     }
 }
 
-/* Samples of small triangles, one after the other: without branches, whatever wins. */
+/* Inserts samples of small triangles, one by one, without branches on who wins. */
 static void peel_fragments(const tl_peeled *p, const fragment_list *f, int n)
 {
     const int32_t turn = p->is_farthest ? -1 : 0;

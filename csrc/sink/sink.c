@@ -1,7 +1,7 @@
 /* Sinks: write covered samples to the buffers.  The walkers do not depend on the sink.
  * In: lanes, spans or lists of samples.  Out: mask, counts, bits of samples, or ids with depth.
- * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so
- * that each copy of the code keeps one case. */
+ * The result does not depend on the order of triangles: ids decide ties.  `sink` is always a constant, so that each
+ * copy of the code has one case. */
 #ifndef TL_SINK_C
 #define TL_SINK_C
 
@@ -16,13 +16,12 @@
 #include "sink/hooks.h"
 #include "sink/peel.c"
 
-/* Samples interpolated by weights at a time. */
+/* Samples per call of weights_at. */
 #define TL_CHUNK 64
 
-/* A copy of a function for each sink of whole samples, a constant of its inner loops, and a call of the right
- * one.  Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...),
- * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND, TL_SINK_SPANS and TL_SINK_CENSUS have code of their
- * own. */
+/* Copies of a function, one for each sink of whole samples, as a constant of its inner loops, and a call of the right
+ * copy.  Such a function has the sink as its last parameter: TL_SINK_COPIES(f, (declared parameters), parameters ...),
+ * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND, TL_SINK_SPANS and TL_SINK_CENSUS have separate code. */
 #define TL_SINK_COPY(f, name, sink, declared, ...) \
     static __attribute__((noinline)) void f##_##name declared { f(__VA_ARGS__, sink); }
 #define TL_SINK_COPIES(f, declared, ...)                               \
@@ -48,8 +47,8 @@
     case TL_SINK_CENSUS: __builtin_trap();                                    \
     }
 
-/* Code that only lists samples needs fewer copies: a list holds places, places and ids, or depths, too.  A copy
- * has one sink of its kind for all. */
+/* Code that only lists samples needs fewer copies: a list has places; places and ids; or places, ids and depths.  One
+ * sink of each kind stands for all. */
 #define TL_LIST_COPIES(f, declared, ...)                         \
     TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)   \
     TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__) \
@@ -74,10 +73,10 @@ TL_INLINE int sink_has_depth(tl_sink sink)
     return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST || sink == TL_SINK_PEEL;
 }
 
-/* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors
- * and, where there are such, for half vectors.  Ids that are only stored are asked for at once: stores leave in order,
- * and one after the other would wait for memory.  AVX-512, 200,000 triangles of 8 px in any order: 16 -> 12.6 ms, a
- * mesh of 100,000 3.5 -> 3.1.  The stores of other lanes load them. */
+/* Writes ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole
+ * vectors and, where they exist, half vectors.  Ids that are only stored are prefetched first: stores retire in order,
+ * and one by one would wait for memory.  AVX-512, 200,000 triangles of 8 px in any order: 16 -> 12.6 ms, a mesh of
+ * 100,000 3.5 -> 3.1.  On other sets the masked store loads them. */
 #define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                              \
     TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)       \
     {                                                                                                \
@@ -103,7 +102,7 @@ TL_PUT_DEPTHS(put_buffers, vm, vf, vi, v)
 TL_PUT_DEPTHS(put_depths_half, hm, hf, hi, h)
 #endif
 
-/* The lanes in m of a triangle. */
+/* Writes the lanes in m of a triangle. */
 TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, int32_t id)
 {
     if (sink == TL_SINK_PEEL)
@@ -118,7 +117,7 @@ TL_INLINE int32_t stored_value(const tl_target *target, tl_sink sink, int32_t id
     return sink == TL_SINK_COUNT ? 1 : id ^ target->flip;
 }
 
-/* Counts or labels of the lanes in m: `number` of each. */
+/* Adds to counts, or writes labels, in the lanes in m: `number` of each. */
 #define TL_PUT_NUMBERS(NAME, M, I, P)                                                                                \
     TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, I number)                            \
     {                                                                                                                \
@@ -132,7 +131,8 @@ TL_PUT_NUMBERS(put_numbers, vm, vi, v)
 TL_PUT_NUMBERS(put_numbers_half, hm, hi, h)
 #endif
 
-/* Samples of a word, of labels that come from the last triangle to the first: `covered` ones can no longer change. */
+/* Writes labels to the samples of a word, when triangles are drawn from the last to the first: samples in `covered` are
+ * final. */
 TL_INLINE void put_word(const tl_target *target, int64_t word, uint64_t samples, vi name)
 {
     const uint64_t fresh = samples & ~target->covered[word];
@@ -156,7 +156,7 @@ TL_INLINE void put_uncovered(const tl_target *target, int64_t at, int64_t n, int
     put_word(target, last, samples & ~0ull >> (63 - ((at + n - 1) & 63)), name);
 }
 
-/* A span of samples without depth. */
+/* Writes a span of samples without depth. */
 TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
 {
     if (sink == TL_SINK_MASK) {
@@ -190,8 +190,8 @@ TL_INLINE vf sum_depth(vd row, vd col) { return vf_add(vf_from_vd(vd_add(row, co
 /* 0, 1, 2, ... times a step. */
 TL_INLINE vd ramp(double step) { return vd_mul(vd_from_vi(vi_iota()), vd_set1(step)); }
 
-/* The centre of a picture pixel in half sub-pixels from a corner of a triangle that holds it: terms may wrap, the
- * difference of a triangle with a depth plane does not. */
+/* The centre of a pixel in half sub-pixels from a corner of a triangle that covers it: terms may wrap, but not the
+ * difference, for a triangle with a depth plane. */
 TL_INLINE double half_units(int64_t pixel, int64_t corner_fx, int bits)
 {
     return (double)(int64_t)((((uint64_t)pixel * 2 + 1) << bits) - 2 * (uint64_t)corner_fx);
@@ -205,7 +205,7 @@ TL_INLINE double sample_y(const tl_triangle *t, const tl_window *window, int64_t
     return half_units(row + window->y_px, t->y_fx[0], window->subpixel_bits);
 }
 
-/* A row of a triangle's plane of depth: z + slope_x * x, x at column 0 of the window and from column to column. */
+/* A row of a triangle's plane of depth: z + slope_x * x; x at column 0 of the window, and its step by column. */
 typedef struct {
     double z, slope_x, x, step;
     int32_t id;
@@ -220,7 +220,8 @@ TL_INLINE vf row_depths(const plane_row *r, int64_t first, int64_t apart)
 
 #define TL_QUAD (4 * TL_LANES)
 
-/* As put_depths of TL_QUAD columns that are covered whole: equal depths are looked for once. */
+/* `put_depths` for TL_QUAD columns that are wholly covered; returns 0, and writes nothing, if a depth equals an old
+ * one. */
 TL_INLINE int put_quad(const tl_target *target, tl_sink sink, int64_t at, const vf *depth, vi id)
 {
     float *depths = target->depth + at;
@@ -249,7 +250,7 @@ TL_INLINE void put_some_columns(const plane_row *r, const tl_target *target, tl_
     }
 }
 
-/* Columns [first, end) of the row that begins at `at`, in vectors that begin at multiples of TL_LANES columns. */
+/* Writes columns [first, end) of a row from `at` on, in vectors at multiples of TL_LANES columns. */
 TL_INLINE void put_columns(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, int64_t first,
                            int64_t end)
 {
@@ -288,9 +289,9 @@ static __attribute__((noinline)) void put_columns_farthest(const plane_row *r, c
     put_columns(r, target, TL_SINK_FARTHEST, at, first, end);
 }
 
-/* Puts a row of columns without segments where all depths lie before the triangle.  Along a row depths as they are
- * rounded never turn back, so those at the ends of a segment bound the others, to the bit.  A segment covered
- * whole has a bound from then on: other depths only come before it.  Returns whether anything was left out. */
+/* Writes a row of columns except segments where all depths are nearer than the triangle.  Rounded depths along a row
+ * are monotonic, so those at the ends of a segment bound the others exactly.  A wholly covered segment gets a bound:
+ * later depths only come nearer.  Returns whether any segment was skipped. */
 TL_INLINE int put_bounded(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, float *bounds,
                           int64_t first, int64_t end)
 {
@@ -325,9 +326,9 @@ TL_INLINE int put_bounded(const plane_row *r, const tl_target *target, tl_sink s
 /* The sinks that keep the nearest or farthest depth, in any order. */
 TL_INLINE int sink_keeps_order(tl_sink sink) { return sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST; }
 
-/* Columns of a triangle from which on its rows may look at bounds, and of a row from which on it does, or is drawn by
- * whole vectors.  To look takes as long as to draw 40 columns; so a shorter row looks only if none of the last
- * TL_UNLOOKED rows did without leaving anything out. */
+/* A triangle with so many columns tests bounds, or uses whole vectors, in rows of TL_LONG_ROW columns or more.  A test
+ * takes as long as 40 columns; so shorter rows test only if none of the last TL_UNLOOKED rows has tested without
+ * skipping. */
 #define TL_LEAST_WIDE 128
 #define TL_LONG_ROW 192
 #define TL_UNLOOKED 3
@@ -336,7 +337,7 @@ TL_INLINE int looks_wide(const tl_target *target, int64_t n, int n_left)
     return n >= TL_LONG_ROW || (target->bounds && n_left == 0);
 }
 
-/* Such a row, [first, end).  Returns how many shorter ones then do not look. */
+/* Writes a row [first, end) that `looks_wide`.  Returns how many shorter rows are not to test bounds. */
 #define TL_PUT_WIDE(NAME, SINK, PUT_COLUMNS)                                                                           \
     static __attribute__((noinline)) int NAME(const plane_row *r, const tl_target *target, int64_t row, int64_t first, \
                                               int64_t end)                                                             \
@@ -359,7 +360,7 @@ TL_INLINE int put_wide(const plane_row *r, const tl_target *target, tl_sink sink
                                    : put_wide_farthest(r, target, row, first, end);
 }
 
-/* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x. */
+/* Writes a span with depth from the plane: (z0 + slope_y * y) + slope_x * x. */
 TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
                          int64_t row, int64_t first, int64_t end)
 {
@@ -379,7 +380,7 @@ TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl
     }
 }
 
-/* A span with depth from the exact weights. */
+/* Writes a span with depth from the exact weights. */
 TL_ONCE void put_weighted(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
                           int64_t row, int64_t first, int64_t end)
 {
@@ -398,7 +399,7 @@ TL_ONCE void put_weighted(const tl_triangle *t, const tl_window *window, const t
     }
 }
 
-/* The plane and place of a triangle, for depth. */
+/* Sets what a triangle needs for depth: the plane, or the weights. */
 TL_INLINE void setup_sink(tl_triangle *t, const tl_window *window, tl_sink sink)
 {
     if (!sink_has_depth(sink))
@@ -408,7 +409,7 @@ TL_INLINE void setup_sink(tl_triangle *t, const tl_window *window, tl_sink sink)
         setup_weights(t, window);
 }
 
-/* The samples [first, end) of a row; the window's own columns and rows. */
+/* Writes the samples [first, end) of a row; columns and rows of the window. */
 TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
                         int64_t row, int64_t first, int64_t end)
 {
@@ -420,7 +421,7 @@ TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_
         put_weighted(t, window, target, sink, row, first, end);
 }
 
-/* Writes a list of n out, one sample after the other: without branches, whatever wins. */
+/* Writes a list of n samples, one by one, without branches on who wins. */
 TL_INLINE void write_list(const tl_target *target, const fragment_list *f, int n, tl_sink sink)
 {
     if (sink == TL_SINK_PEEL) {
@@ -432,7 +433,7 @@ TL_INLINE void write_list(const tl_target *target, const fragment_list *f, int n
     const int32_t flip = target->flip;
     for (int k = 0; k < n; k++) {
         const int64_t at = (uint32_t)f->sample[k];
-        if (sink_has_depth(sink)) { /* 6 % of a million-triangle mesh; nothing for sinks of one plane */
+        if (sink_has_depth(sink)) { /* 6 % of a million-triangle mesh; no gain for sinks of one plane */
             __builtin_prefetch(pixels + f->sample[k + TL_PREFETCH], 1);
             __builtin_prefetch(depths + f->sample[k + TL_PREFETCH], 1);
         }
@@ -464,7 +465,7 @@ TL_SINK_COPY(write_list, samples, TL_SINK_SAMPLES, (const tl_target *target, con
              n)
 TL_SINK_COPIES(write_list, (const tl_target *target, const fragment_list *f, int n), target, f, n)
 
-/* Writes a list of n out. */
+/* Flushes a list of n samples. */
 static void flush_fragments(const tl_target *target, const fragment_list *f, int n)
 {
     if (target->sink == TL_SINK_SAMPLES)
