@@ -2,9 +2,9 @@
  * cells.
  * In: cells (ramp.c).  Out: pixels, and whether every sum is right.
  *
- * 32 bits hold sums below 192.  From a sum in [-2^-4, 192 - 2^-4) one cell, below 2^30 units, leads to where the two
- * upper bits of sum + 2^20 are both set before it can lead around: such a sum is seen, and the mesh is drawn again in
- * 64 bits, with the same result wherever both are right.
+ * 32 bits hold sums below 192.  A cell is below 2^30 units.  So a sum that leaves [-2^-4, 192 - 2^-4) first has the two
+ * upper bits of sum + 2^20 set, before it can wrap: the overflow is detected, and the mesh is drawn again in 64 bits,
+ * with equal results wherever both are right.
  *
  * Based on: R. Levien, font-rs, 2015. */
 #ifndef TL_ACCUMULATE_C
@@ -19,8 +19,8 @@
 #include "large_shapes/row_runs.c"
 #include "area/ramp.c"
 
-#define TL_SUM_MARGIN (1 << 20) /* rounding may leave a few units less than nothing */
-/* Pixels of a run that is looked at as a whole: inside of a shape it is filled. */
+#define TL_SUM_MARGIN (1 << 20) /* rounding may give a few units less than 0 */
+/* Pixels of a run that is tested as a whole: inside of a shape it is filled. */
 #define TL_RUN_LANES (4 * TL_LANES)
 #define TL_SUM_UNIT (1.0f / (1 << TL_AREA_BITS))
 
@@ -34,14 +34,14 @@ TL_INLINE vf area_of_sums(vi sums, int is_clamped)
     return vf_mul(vf_from_unsigned(positive), vf_set1(TL_SUM_UNIT));
 }
 
-/* Bit 31 is set where a sum has come near the end of its range. */
+/* Bit 31 is set where a sum is near the end of its range. */
 TL_INLINE vi sum_alarm(vi sums)
 {
     const vi shifted = vi_add(sums, vi_set1(TL_SUM_MARGIN));
     return vi_and(shifted, vi_add(shifted, shifted));
 }
 
-/* The sum of the four cells left of column 0.  Only the whole of it is an area: in between it may be anything. */
+/* The sum of the four cells left of column 0.  Only the whole sum is an area; partial sums may have any value. */
 TL_INLINE vi left_sum(int32_t *row, vi *seen)
 {
     int64_t sum = 0;
@@ -54,8 +54,8 @@ TL_INLINE vi left_sum(int32_t *row, vi *seen)
     return vi_set1((int32_t)(uint32_t)sum);
 }
 
-/* The sums of the next TL_LANES cells; the first n are pixels.  Cells right of the window may hold anything,
- * as the same edges are moved there by different widths. */
+/* The sums of the next TL_LANES cells; the first n are pixels.  Cells right of the window may have any value, because
+ * edges are clamped there. */
 TL_INLINE vi accumulate_lanes(int32_t *cells, int64_t n, vi *carry, vi *seen)
 {
     const vi bias = vi_set1(TL_CELL_ZERO), sums = vi_add(vi_prefix_sum(vi_sub(vi_load(cells), bias)), *carry);
@@ -66,7 +66,7 @@ TL_INLINE vi accumulate_lanes(int32_t *cells, int64_t n, vi *carry, vi *seen)
     return sums;
 }
 
-/* A masked store costs AMD twenty cycles with AVX2: only for the last vector of a row. */
+/* A masked store costs 20 cycles on AMD with AVX2: only for the last vector of a row. */
 TL_INLINE void store_areas(float *out, int64_t n, vf areas)
 {
     if (n >= TL_LANES)
@@ -91,7 +91,7 @@ TL_INLINE void fill_areas(float *out, vf areas)
         vf_store(out + k, areas);
 }
 
-/* Two rows at a time hide how long a carry takes. */
+/* Two rows at a time hide the latency of the carry. */
 TL_INLINE int accumulate_narrow(const area_plane *plane, const tl_area *target, int is_clamped)
 {
     const int64_t stride = plane->stride, n_cols = plane->n_cols;
@@ -139,8 +139,8 @@ TL_INLINE int64_t next_met(const uint64_t *met, int64_t k, int64_t end)
     return end;
 }
 
-/* Accumulates the areas of a plane whose cells that edges meet are listed as bits: the cells between them are written
- * as runs, unread. */
+/* Accumulates the areas of a plane with bits of the cells that edges meet: the cells between them are written as runs,
+ * unread. */
 TL_INLINE int accumulate_met(const area_plane *plane, const tl_area *target, int is_clamped)
 {
     const int64_t stride = plane->stride, n_cols = plane->n_cols;
@@ -161,7 +161,7 @@ TL_INLINE int accumulate_met(const area_plane *plane, const tl_area *target, int
             }
             if (line == n_lines)
                 break;
-            close_run(&run, 4); /* it may pass its end */
+            close_run(&run, 4); /* it may overrun its end */
             run.first = run.end;
             const int64_t end = min64((line + 1) * TL_MET_CELLS, n_cols);
             for (int64_t k = line * TL_MET_CELLS; k < end; k += TL_LANES) {

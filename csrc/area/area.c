@@ -1,9 +1,9 @@
 /* Area: the exact area of each pixel that the triangles of a mesh cover, added up over the triangles.
  * In: vertex records and triangles.  Out: float32 pixels.
  *
- * Triangles become edges, edges become differences in cells (ramp.c), and one pass over the rows sums these up
- * (accumulate.c): the cost goes with the edges, not with the area.  Sums are integers, so order, threads and
- * vectors do not matter, and where a mesh tiles the plane they are 2^24 to the last bit. */
+ * Triangles become edges, edges become differences in cells (ramp.c), and one pass over the rows sums these
+ * (accumulate.c): the cost grows with the edges, not with the area.  Sums are integers, so order, threads and vectors
+ * do not matter, and where a mesh tiles the plane they are exactly 2^24. */
 #ifndef TL_AREA_C
 #define TL_AREA_C
 
@@ -21,7 +21,7 @@
 
 #define TL_MAX_EDGE_BITS 14 /* pixels of an edge in lanes: see the error bound of ramp.c */
 #define TL_SHORT_ROWS 8
-#define TL_SPARSE_PX 4096     /* for each triangle: then most runs of pixels meet no edge */
+#define TL_SPARSE_PX 4096     /* pixels for each triangle: then most runs of pixels meet no edge */
 #define TL_MOST_MET (1 << 16) /* bits of cells that edges meet: 2^20 cells */
 #define TL_EDGE_QUEUE 112
 
@@ -31,7 +31,7 @@ static inline int32_t max_edge_extent(int bits)
     return 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
 }
 
-/* Whether lanes can take an edge. */
+/* Whether lanes can process an edge. */
 static inline int is_lane_edge(int64_t x0, int64_t y0, int64_t x1, int64_t y1, int32_t max_extent)
 {
     const int64_t limit = (int64_t)1 << 30;
@@ -39,8 +39,8 @@ static inline int is_lane_edge(int64_t x0, int64_t y0, int64_t x1, int64_t y1, i
            max64(x1 - x0, x0 - x1) <= max_extent && max64(y1 - y0, y0 - y1) <= max_extent;
 }
 
-/* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to
- * 6; or any number.  The last kind are no edges at all: horizontal, or without an effect here. */
+/* The queues of edges, until a vector is full: edges of 1 to 8 rows, or more; that cross up to 2 columns a row, up to
+ * 6, or more.  The last queue is for edges without effect: horizontal, or outside. */
 enum {
     TL_EDGES_LONG = TL_SHORT_ROWS,
     TL_EDGES_FLAT = TL_SHORT_ROWS + 1,
@@ -74,16 +74,16 @@ TL_ONCE void flush_kind(area_plane *plane, const edge_record *edges, int kind, i
         add_flat_edges(plane, edges, n);
 }
 
-/* Draws the whole vectors of a kind and keeps the rest; at the end of the mesh the rest as well. */
+/* Draws the whole vectors of a queue and keeps the rest; at the end of the mesh draws the rest, too. */
 static void flush_edges(area_state *s, int kind, int is_end)
 {
     int n = s->n[kind];
     const int n_rest = is_end ? 0 : n % TL_LANES;
     n -= n_rest;
-    for (int k = n; is_end && k < n + TL_LANES; k++) /* below the window: no height */
+    for (int k = n; is_end && k < n + TL_LANES; k++) /* below the window: without height */
         s->edges[kind][k] = (edge_record){0, s->plane.bottom_fx, 0, 1};
     if (n > 0 && (kind == TL_EDGES_LONG || kind >= TL_EDGES_FLAT + TL_EDGES_LONG))
-        tl_count_work(s->window, 8 * n * s->window->height); /* at most: as long as eight pixels each row */
+        tl_count_work(s->window, 8 * n * s->window->height); /* at most as long as eight pixels in each row */
     if (n > 0)
         flush_kind(&s->plane, s->edges[kind], kind, n);
     memmove(s->edges[kind], s->edges[kind] + n, sizeof(edge_record) * (size_t)n_rest);
@@ -98,13 +98,13 @@ static void make_room_for_edges(area_state *s)
     s->n[TL_EDGES_NONE] = 0;
 }
 
-/* One edge of a triangle of positive area (y down) as lanes take it.  Its kind depends on the edge alone, or triangles
- * that share it would not agree.  Returns the kind, TL_EDGES_NONE where it adds nothing; -1 if it is too long for
- * lanes: it is then drawn here. */
+/* Converts one edge of a triangle of positive area (y down) to a record for lanes.  Its kind depends on the edge alone,
+ * so that triangles that share it agree.  Returns the kind, TL_EDGES_NONE where it adds nothing; or -1 if it does not
+ * fit lanes: it is then drawn here. */
 static int take_edge(area_plane *p, int32_t max_extent, int64_t x0, int64_t y0, int64_t x1, int64_t y1,
                      edge_record *record)
 {
-    const int sign = y0 < y1 ? -1 : 1; /* the interior is right of edges that run upwards */
+    const int sign = y0 < y1 ? -1 : 1; /* the interior is right of upward edges */
     if (sign > 0) {
         const int64_t x = x0, y = y0;
         x0 = x1, y0 = y1, x1 = x, y1 = y;
@@ -144,7 +144,7 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
     make_room_for_edges(s);
 }
 
-/* Triangle i, or its pieces, by itself. */
+/* Pushes the edges of triangle i, or of its pieces, by itself. */
 static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
 {
     int32_t own[3];
@@ -153,10 +153,10 @@ static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
         push_triangle(s, &parts.set, parts.corners + 3 * k);
 }
 
-/* TL_LANES edges from their upper ends on; those that are `on` add to areas in the window. */
+/* TL_LANES edges from their upper ends on; edges in `on` add to areas in the window. */
 typedef struct {
     vi x0, y0, dx, dy, width;
-    vm on, is_up; /* is_up: the edge runs from its lower end to the upper one */
+    vm on, is_up; /* is_up: the edge runs from its lower end to its upper end */
 } area_edges;
 
 TL_INLINE area_edges edges_between(const area_plane *p, vi ax, vi ay, vi bx, vi by, vm live)
@@ -170,8 +170,8 @@ TL_INLINE area_edges edges_between(const area_plane *p, vi ax, vi ay, vi bx, vi 
     return (area_edges){x0, y0, dx, dy, vi_max(dx, vi_sub(zero, dx)), on, is_up};
 }
 
-/* Puts edges into the queues of their kinds.  `height`: dy, less than 0 where the area right of the edge is taken
- * away. */
+/* Appends edges to the queues of their kinds.  `height`: dy, negative where the area right of the edge is
+ * subtracted. */
 TL_INLINE void queue_edges(area_state *s, const area_edges *e, vm on, vi height)
 {
     const int bits = s->plane.bits;
@@ -183,15 +183,15 @@ TL_INLINE void queue_edges(area_state *s, const area_edges *e, vm on, vi height)
     int32_t kinds[TL_LANES], records[4 * TL_LANES];
     vi_store(kinds, kind);
     vi_store_quads(records, (const vi[4]){e->x0, e->y0, e->dx, height});
-    for (int lane = 0; lane < TL_LANES; lane++) /* no branch: edges without effect go to a queue that is emptied */
+    for (int lane = 0; lane < TL_LANES; lane++) /* no branch: edges without effect are queued and dropped */
         v4_store(&s->edges[kinds[lane]][s->n[kinds[lane]]++].x_fx, v4_load(records + 4 * vi_quad_slot(lane)));
 }
 
-/* The edges of the triangles in `drawn`; `turned` ones have negative area. */
+/* Queues the edges of the triangles in `drawn`; those in `turned` have negative area. */
 TL_INLINE void push_edges(area_state *s, const lane_corners *c, vm drawn, vm turned)
 {
     const vi zero = vi_set1(0), one = vi_set1(1);
-    const vi down = vi_select(turned, one, vi_set1(-1)); /* sign of an edge that runs downwards */
+    const vi down = vi_select(turned, one, vi_set1(-1)); /* the sign of a downward edge */
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
         const area_edges e = edges_between(&s->plane, c->x[k], c->y[k], c->x[next], c->y[next], drawn);
@@ -216,8 +216,7 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     for (unsigned lanes = vm_bits(single); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
         push_alone(s, slice_id(s->slice, i + __builtin_ctz(lanes)));
     const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), e.y_min), vi_gt(e.y_max, vi_set1(p->top_fx)));
-    /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing
-     * there */
+    /* heights are whole numbers of units: the edges of a triangle left of the window add up to 0 there */
     const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), e.x_min), vi_gt(e.x_max, vi_set1(p->left_fx)));
     vm drawn = vm_and(vm_and_not(live, single), vm_and(meets_rows, meets_cols));
     if (!vm_any(drawn))
@@ -231,7 +230,7 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
 static void place_plane(const tl_window *window, const tl_area *area, area_plane *p)
 {
     const int bits = window->subpixel_bits;
-    const int64_t far = (int64_t)1 << 30, beyond = (int64_t)1 << 29; /* no narrow edge, and no window that wide */
+    const int64_t far = (int64_t)1 << 30, beyond = (int64_t)1 << 29; /* beyond narrow edges and the widest window */
     p->cells = area->is_wide ? NULL : area->cells;
     p->wide_cells = area->is_wide ? area->cells : NULL;
     p->stride = (int32_t)tl_area_stride(window->width);

@@ -1,18 +1,18 @@
 /* Ramp: adds one pixel row of an edge to the area of the pixels, as differences from each pixel to the next.
  * In: edges, top to bottom.  Out: cells; their sums from the left are the area right of the edges.
  *
- * In its row an edge runs from `low` to `high` and is `height` tall.  Of pixel [k, k + 1) the area right of it is
- * Q(k + 1) - Q(k), where Q(x) = steep * (min(x, high) - low)^2 + height * max(x - high, 0), steep = height / (2 (high -
- * low)).  It is computed in float64 and rounded once, to 2^-24 px^2.  Nothing in it depends on the triangle but the
- * sign, nor on the window: shared edges of two triangles cancel to the last bit.
+ * In its row an edge runs from `low` to `high` and is `height` tall.  In pixel [k, k + 1) the area right of it is Q(k +
+ * 1) - Q(k), where Q(x) = steep * (min(x, high) - low)^2 + height * max(x - high, 0), steep = height / (2 (high -
+ * low)).  It is computed in float64 and rounded once, to 2^-24 px^2.  Only its sign depends on the triangle, and
+ * nothing on the window: shared edges of two triangles cancel exactly.
  *
  * Error: x is off by less than 2^-36 px (three roundings of numbers below 2^14 + 1), Q by less than 2^-11 of a unit, so
  * an area is off by less than 0.501 units of 2^-24 px^2, and is exact right of `high`: a height is a whole number of
  * units.
  *
- * An edge of any length and anywhere, |x_fx| < 2^62, has the same differences (add_exact_edge): where it enters and
- * leaves a row is then an exact quotient of 128-bit integers; only its fraction is rounded to float64, and the
- * length of the ramp.
+ * An edge of any length and position, |x_fx| < 2^62, has equal differences (`add_exact_edge`): where it enters and
+ * leaves a row is then an exact quotient of 128-bit integers; only its fraction is rounded to float64, and the length
+ * of the ramp.
  *
  * Based on: R. Levien, font-rs (signed area, accumulated along rows), 2015; D. Turner, FreeType's smooth rasterizer
  * (cells of area and cover), 2001. */
@@ -27,39 +27,39 @@
 #include "vertex/fixed.h"
 
 #define TL_AREA_BITS 24
-/* cells before column 0: rows start on a cache line, and the last four take areas left of it */
+/* cells before column 0: rows start on a cache line, and the last four cells get areas left of it */
 #define TL_CELL_PAD 16
-/* A cell holds this much more than its value.  No addition changes it by more than 2^24 + 1, so a value that leaves
- * [-2^30, 2^30) shows as a sign bit before it can wrap, and `seen` keeps it. */
+/* The bias of a cell.  No addition changes a cell by more than 2^24 + 1, so a value that leaves [-2^30, 2^30) sets the
+ * sign bit before it can wrap, and `seen` keeps that bit. */
 #define TL_CELL_ZERO TL_CELL_CLEAR
 
 #define TL_WAITING_QUADS 256 /* 64 and 512 are slower */
 
-#define TL_MET_CELLS 16 /* a cache line: rows are whole ones */
+#define TL_MET_CELLS 16 /* a cache line: rows are whole lines */
 
 /* The cells of a window. */
 typedef struct {
-    int32_t *cells;      /* (n_rows, stride), TL_CELL_ZERO where nothing is; or NULL */
-    int64_t *wide_cells; /* the same in 64 bits, which cannot overflow, 0 where nothing is */
+    int32_t *cells;      /* (n_rows, stride), TL_CELL_ZERO if empty; or NULL */
+    int64_t *wide_cells; /* as `cells` in 64 bits, which cannot overflow, 0 if empty */
     int32_t stride, n_cols, n_rows;
     int64_t x_px, y_px;                           /* picture pixel of the first cell */
-    int32_t left_px, top_px;                      /* the same, as near as lanes need it */
-    int32_t top_fx, bottom_fx, left_fx, right_fx; /* the window's border, likewise */
+    int32_t left_px, top_px;                      /* x_px, y_px, clamped for lanes */
+    int32_t top_fx, bottom_fx, left_fx, right_fx; /* the window's border, clamped for lanes */
     int bits;
-    int is_sparse; /* most cells are met by no edge; read by accumulate alone */
-    uint64_t *met; /* a bit of each TL_MET_CELLS cells: whether an edge has been added to any of them; or NULL */
-    int n_waiting; /* cells [at, at + 4) and their sums to be added, in the order of vi_store_quads */
+    int is_sparse; /* most cells are met by no edge; for `accumulate` */
+    uint64_t *met; /* a bit for each TL_MET_CELLS cells: whether an edge has been added to them; or NULL */
+    int n_waiting; /* quads to be added to cells [at, at + 4), in the order of vi_store_quads */
     int32_t at[TL_WAITING_QUADS], quads[4 * TL_WAITING_QUADS];
-    v4 seen; /* every value that a cell ever had, or-ed */
+    v4 seen; /* bitwise or of all values that cells have had */
 } area_plane;
 
-/* An edge that 32-bit lanes can take, upper end first. */
+/* An edge that fits 32-bit lanes, upper end first. */
 typedef struct {
     int32_t x_fx, y_fx, dx;
-    int32_t signed_dy; /* > 0: the area right of it is added */
+    int32_t signed_dy; /* > 0: the area right of it is added, < 0: subtracted */
 } edge_record;
 
-/* An edge ready for its rows; edge_lanes: TL_LANES edges. */
+/* The setup of an edge; edge_lanes: of TL_LANES edges. */
 typedef struct {
     double x, slope;           /* px from the pixel column of the upper end; px per unit of y_fx */
     double steep, height;      /* cell units per px of x, halved; cell units per unit of y_fx */
@@ -101,7 +101,7 @@ TL_INLINE edge_lanes setup_edge_lanes(const area_plane *plane, const int32_t *re
     return e;
 }
 
-/* The operations of setup_edge_lanes for a single edge: equal bits. */
+/* `setup_edge_lanes` for a single edge: equal bits. */
 static inline edge_one setup_edge(const area_plane *plane, const edge_record *r)
 {
     const int32_t mask = (1 << plane->bits) - 1, dy = r->signed_dy < 0 ? -r->signed_dy : r->signed_dy;
@@ -119,7 +119,7 @@ static inline edge_one setup_edge(const area_plane *plane, const edge_record *r)
     };
 }
 
-/* Notes that cells [first, end) are met. */
+/* Sets the bits of cells [first, end). */
 TL_INLINE void note_met(uint64_t *met, int64_t first, int64_t end)
 {
     for (int64_t k = first / TL_MET_CELLS; k <= (end - 1) / TL_MET_CELLS; k++)
@@ -132,8 +132,8 @@ static __attribute__((noinline)) void note_quads(const area_plane *plane, int n)
         note_met(plane->met, plane->at[i], plane->at[i] + 4);
 }
 
-/* Adds waiting sums to the cells.  They are all over the memory, and beyond the second-level cache: to compute first,
- * fetch meanwhile and add later takes a third off 200,000 triangles of 8 px. */
+/* Adds buffered quads to the cells.  The cells are scattered beyond the second-level cache: to compute first, prefetch
+ * meanwhile and add later saves a third for 200,000 triangles of 8 px. */
 TL_ONCE void flush_quads(area_plane *plane)
 {
     const int n = plane->n_waiting;
@@ -157,7 +157,7 @@ TL_ONCE void flush_quads(area_plane *plane)
     plane->seen = seen;
 }
 
-/* Adds four numbers a lane to the cells [at, at + 4) of that lane. */
+/* Buffers four numbers a lane, to be added to the cells [at, at + 4) of that lane. */
 TL_INLINE void add_quads(area_plane *plane, vi at, const vi *columns)
 {
     const int n = plane->n_waiting;
@@ -171,8 +171,8 @@ TL_INLINE void add_quads(area_plane *plane, vi at, const vi *columns)
         flush_quads(plane);
 }
 
-/* A row of TL_LANES edges that pass from xa to xb, less than 4 * n_quads - 2 px: the area right of them in 4 * n_quads
- * pixels from the column that is returned on.  In the last of these all of the ramp lies left. */
+/* The areas of a row of TL_LANES edges that run from xa to xb, less than 4 * n_quads - 2 px apart: right of them, in 4
+ * * n_quads pixels; returns their first column.  The ramp ends left of the last of these pixels. */
 TL_INLINE vi ramp_areas(int n_quads, vd xa, vd xb, vd steep, vd height, vi *areas)
 {
     const vd low = vd_min(xa, xb), high = vd_max(xa, xb), first = vd_floor(low), zero = vd_set1(0.0);
@@ -184,7 +184,7 @@ TL_INLINE vi ramp_areas(int n_quads, vd xa, vd xb, vd steep, vd height, vi *area
         if (k < n - 1) {
             const vd x = vd_set1(k), width = vd_sub(vd_min(hi, x), lo);
             q = vd_add(vd_mul(vd_mul(width, width), steep), vd_mul(vd_max(vd_sub(x, hi), zero), height));
-        } else { /* all of the ramp lies left of here */
+        } else { /* all of the ramp is left of here */
             q = vd_mul(height, vd_sub(vd_set1(k), vd_mul(vd_set1(0.5), vd_add(lo, hi))));
         }
         areas[k - 1] = vi_round(vd_sub(q, before));
@@ -194,7 +194,7 @@ TL_INLINE vi ramp_areas(int n_quads, vd xa, vd xb, vd steep, vd height, vi *area
     return vi_round(first);
 }
 
-/* Adds the areas of ramp_areas to the cells of a plane, as differences from cell to cell. */
+/* Buffers the areas of `ramp_areas` for the cells of a plane, as differences from cell to cell. */
 TL_INLINE void add_row(area_plane *plane, int n_quads, vd xa, vd xb, vd steep, vd height, vi col, vi row)
 {
     const int n = 4 * n_quads;
@@ -204,14 +204,14 @@ TL_INLINE void add_row(area_plane *plane, int n_quads, vd xa, vd xb, vd steep, v
         cells[k] = k ? vi_sub(areas[k], areas[k - 1]) : areas[k];
     const vi start = vi_add(vi_mul(row, vi_set1(plane->stride)), vi_set1(TL_CELL_PAD));
     const vi c = vi_add(col, first);
-    /* cells beside the frame: all that is left of it counts as one, the rest as none */
+    /* cells outside: all to the left go to the four cells before column 0, all to the right to unread cells */
     for (int k = 0; k < n; k += 4) {
         const vi at = vi_clamp(vi_add(c, vi_set1(k)), vi_set1(-4), vi_set1(plane->n_cols));
         add_quads(plane, vi_add(start, at), cells + k);
     }
 }
 
-/* TL_LANES edges at a time, all of n_rows rows. */
+/* Draws TL_LANES edges at a time, all of n_rows rows. */
 TL_INLINE void add_short_edges(area_plane *plane, int n_quads, const edge_record *records, int n, int n_rows)
 {
     const vi last_row = vi_set1(plane->n_rows - 1), zero = vi_set1(0);
@@ -231,7 +231,7 @@ TL_INLINE void add_short_edges(area_plane *plane, int n_quads, const edge_record
     }
 }
 
-/* Edges of many rows, TL_LANES rows of one edge at a time. */
+/* Draws edges of many rows, TL_LANES rows of one edge at a time. */
 TL_INLINE void add_long_edges(area_plane *plane, int n_quads, const edge_record *records, int n)
 {
     const vi last_row = vi_set1(plane->n_rows - 1), zero = vi_set1(0), rows = vi_iota();
@@ -251,14 +251,14 @@ TL_INLINE void add_long_edges(area_plane *plane, int n_quads, const edge_record 
     }
 }
 
-/* One row of one edge that passes many pixels, from low to high px right of column col; TL_LANES pixels at a time. */
+/* Draws one row of one edge that crosses many pixels, from low to high px right of column col; TL_LANES pixels at a
+ * time. */
 TL_INLINE void add_wide_row(area_plane *plane, int64_t row, int64_t col, double low, double high, double steep,
                             double height)
 {
     if (col >= plane->n_cols)
         return;
-    /* the area left of column 0 belongs to the cell before it: left_sum would take the rest there for less than
-     * nothing */
+    /* the cell before column 0 gets the area left of it: `left_sum` would take negative parts for an overflow */
     const int64_t first = col < 0 ? -col - 1 : 0, passed = (int64_t)high + 2;
     const int64_t visible = passed < plane->n_cols - col ? passed : plane->n_cols - col;
     const int64_t end = visible > first ? visible : first + 1;
@@ -291,7 +291,7 @@ TL_INLINE void add_wide_row(area_plane *plane, int64_t row, int64_t col, double 
         plane->seen = v4_or(plane->seen, v4_load((const int32_t[4]){INT32_MIN, 0, 0, 0}));
 }
 
-/* Edges of many rows that pass up to 2 columns a row, or up to 6. */
+/* Draw edges of many rows that cross up to 2 columns a row, or up to 6. */
 TL_ONCE void add_steep_edges(area_plane *plane, const edge_record *records, int n)
 {
     add_long_edges(plane, 1, records, n);
@@ -301,7 +301,7 @@ TL_ONCE void add_flat_edges(area_plane *plane, const edge_record *records, int n
     add_long_edges(plane, 2, records, n);
 }
 
-/* Edges that pass any number. */
+/* Draws edges that cross any number of columns a row. */
 TL_ONCE void add_shallow_edges(area_plane *plane, const edge_record *records, int n)
 {
     for (int i = 0; i < n; i++) {
@@ -321,7 +321,7 @@ TL_ONCE void add_shallow_edges(area_plane *plane, const edge_record *records, in
 /* The area right of a ramp from low to high in pixel k, in cell units: Q(k + 1) - Q(k). */
 static inline int32_t exact_area(int64_t k, double low, double high, double steep, double height)
 {
-    if (k >= (int64_t)1 << 50) { /* k + 1 may not exist; here the ramp is so long that its ends do not show */
+    if (k >= (int64_t)1 << 50) { /* k + 1 may not exist; the ramp is so long that its ends have no effect */
         const double mean = 2.0 * (double)k * steep;
         return (int32_t)rint(fabs(mean) < fabs(height) ? mean : height);
     }
@@ -331,7 +331,7 @@ static inline int32_t exact_area(int64_t k, double low, double high, double stee
     return (int32_t)rint((a + b - (low + low)) * steep * (b - a) + right * height);
 }
 
-/* One row, from low to high px right of column col. */
+/* Draws one row of an edge, from low to high px right of column col. */
 static void add_exact_row(area_plane *plane, int64_t row, int64_t col, double low, double high, double steep,
                           double height)
 {
@@ -356,7 +356,7 @@ static void add_exact_row(area_plane *plane, int64_t row, int64_t col, double lo
     plane->seen = v4_or(plane->seen, v4_load((const int32_t[4]){seen, 0, 0, 0}));
 }
 
-/* An edge from its upper to its lower end; sign > 0: the area right of it is added. */
+/* Draws an edge from its upper to its lower end; sign > 0: adds the area right of it. */
 static void add_exact_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1, int sign)
 {
     const int bits = plane->bits;

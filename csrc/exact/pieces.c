@@ -1,4 +1,4 @@
-/* Pieces: triangles cut by clip planes, as fans over vertices of their own, snapped or not.
+/* Pieces: cuts triangles by clip planes into fans over new vertices, snapped or not.
  * In: the caller's vertices, a matrix, the projected vertices.  Out: pieces of triangles. */
 #ifndef TL_PIECES_C
 #define TL_PIECES_C
@@ -34,7 +34,7 @@ typedef struct {
     double size;
 } fan_area;
 
-/* That of triangle i of the fan from an apex. */
+/* The area of triangle i of the fan from an apex. */
 static fan_area area_in_fan(const tl_pieces *p, int64_t first, int n, int apex, int i)
 {
     const int64_t corners[3] = {first + apex, first + (apex + i) % n, first + (apex + i + 1) % n};
@@ -56,13 +56,13 @@ static fan_area area_in_fan(const tl_pieces *p, int64_t first, int n, int apex, 
     return area;
 }
 
-/* Whether an area is less than another one, both of the same pieces. */
+/* Whether an area is less than another area of the same polygon. */
 static int is_less_area(const fan_area *a, const fan_area *b)
 {
     return a->size < b->size || i128_less(a->size_fx, b->size_fx);
 }
 
-/* The areas of a fan that turn one way, added up, and the other way. */
+/* Sums the areas of a fan by sign. */
 static void add_up_fan(const tl_pieces *p, int64_t first, int n, int apex, fan_area *negative, fan_area *positive)
 {
     *negative = *positive = (fan_area){.size_fx = i128_from(0)};
@@ -76,9 +76,10 @@ static void add_up_fan(const tl_pieces *p, int64_t first, int n, int apex, fan_a
     }
 }
 
-/* Rounding may dent a corner of the convex polygon inwards; a fan from that corner still turns one way only.  Corners
- * that changed places leave no such fan: then the one with the least area turned over; its triangles that turn
- * against the source triangle are left out.  Returns the apex, and in *turn the sign of the triangles to draw. */
+/* Finds the apex of a fan whose triangles all have one sign: rounding may dent a corner of the convex polygon inwards,
+ * and then the fan from that corner is such a fan.  If corners have swapped, none exists: then the fan with the least
+ * area of the wrong sign is taken, and its triangles that turn against the source triangle are dropped.  Returns the
+ * apex; *turn is the sign of the triangles to draw. */
 static int fan_apex(const tl_pieces *p, int64_t first, int n, int source_turn, int *turn)
 {
     fan_area least;
@@ -100,7 +101,8 @@ static int fan_apex(const tl_pieces *p, int64_t first, int n, int source_turn, i
     return best;
 }
 
-/* The turn of a triangle as drawn (y down) from its clip-space corners: the sign of its homogeneous determinant. */
+/* The sign of a triangle's area as drawn (y down) from its clip-space corners: the sign of its homogeneous
+ * determinant. */
 static inline int clip_turn(const tl_source *source, const int32_t *corners)
 {
     double a[4], b[4], c[4];
@@ -130,7 +132,7 @@ static void append_pieces(tl_pieces *p, const clip_corner *polygon, int n, int32
         memcpy(p->weights + 3 * (first + k), polygon[k].weights, sizeof polygon[k].weights);
     }
     if (counts.n_bad)
-        return; /* beyond 2^62 in spite of the guard band, or left the range of float64: beyond any picture */
+        return; /* beyond 2^62 in spite of the guard band, or outside of float64: beyond any picture */
     int turn;
     const int apex = fan_apex(p, first, n, source_turn, &turn);
     for (int i = 1; i < n - 1; i++) {

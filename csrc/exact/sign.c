@@ -1,10 +1,10 @@
-/* Sign: on which side of an edge a point lies, and how far, of any finite float64 numbers, exactly.
+/* Sign: on which side of an edge a point lies, and how far, for any finite float64 numbers, exactly.
  * In: two ends of an edge and a point.  Out: the sign of E = (x1 - x0)(py - y0) - (y1 - y0)(px - x0), or E itself to
  * within 2^-50 of its size.
  *
- * Four ways, each taken where the one before it cannot tell: the rounded E and a bound on its error; exact differences,
- * with products compared by rounded value and then by error; sums of floating-point numbers that do not overlap;
- * integers of 2176 bits: every finite float64 is one, counted in 2^-1074.
+ * Four methods, each used where the method before it cannot decide: the rounded E and a bound on its error; exact
+ * differences, with products compared by rounded value and then by error; sums of floating-point numbers that do not
+ * overlap; integers of 2176 bits: every finite float64 is an integer in units of 2^-1074.
  *
  * Based on: J. R. Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997. */
 #ifndef TL_SIGN_C
@@ -64,12 +64,12 @@ typedef struct {
 static void set_big(double value, big_number *out)
 {
     memset(out, 0, sizeof *out);
-    if (value == 0.0 || !isfinite(value)) /* not finite: a vertex that has changed since it was looked at */
+    if (value == 0.0 || !isfinite(value)) /* not finite: the vertex has changed since the check */
         return;
     int exponent;
     uint64_t mantissa = (uint64_t)ldexp(frexp(fabs(value), &exponent), 53);
     int shift = exponent - 53 - TL_LEAST_EXPONENT;
-    if (shift < 0) { /* denormal: the bits that go are 0 */
+    if (shift < 0) { /* denormal: the bits shifted out are 0 */
         mantissa >>= -shift;
         shift = 0;
     }
@@ -146,7 +146,7 @@ static int big_edge(exact_point a, exact_point b, exact_point p, big_product *ou
     const int n = 2 * TL_BIG_WORDS;
     multiply_big(&factors[0], &factors[1], &left);
     multiply_big(&factors[2], &factors[3], &right);
-    if (sign_left != sign_right) { /* of two signs, or one is 0 */
+    if (sign_left != sign_right) { /* different signs, or one is 0 */
         add_words(left.words, right.words, n, out->words);
         return sign_left > sign_right ? 1 : -1;
     }
@@ -165,7 +165,7 @@ static scaled_number big_edge_value(exact_point a, exact_point b, exact_point p)
     int top = 2 * TL_BIG_WORDS - 1;
     while (top > 2 && !size.words[top])
         top--;
-    double mantissa = 0.0; /* of the first 65 bits or more: the rest is below 2^-64 of them */
+    double mantissa = 0.0; /* from the first 65 bits or more: the rest is below 2^-64 of them */
     for (int k = 0; k < 3; k++)
         mantissa = mantissa * 0x1p32 + size.words[top - k];
     return (scaled_number){sign < 0 ? -mantissa : mantissa, 32 * (top - 2) + 2 * TL_LEAST_EXPONENT};
@@ -175,8 +175,7 @@ static scaled_number big_edge_value(exact_point a, exact_point b, exact_point p)
 
 #define TL_EXPANSION 17
 
-/* Adds a number to a sum of n numbers of rising size that do not overlap; returns how many it has then.  Zeros are left
- * out. */
+/* Adds a number to a sum of n numbers of ascending size that do not overlap; returns the new n.  Zeros are dropped. */
 TL_INLINE int grow_sum(double *sum, int n, double term)
 {
     int n_kept = 0;
@@ -192,9 +191,9 @@ TL_INLINE int grow_sum(double *sum, int n, double term)
     return n_kept;
 }
 
-/* E as a sum of up to 16 numbers of rising size that do not overlap, so that the last one has its sign; returns their
- * number.  Exact while no number but 0 is below 2^-440 or above 2^500: every product of parts is then a multiple of
- * 2^-1074 and below 2^1004. */
+/* E as a sum of up to 16 numbers of ascending size that do not overlap, so that the last number has its sign; returns
+ * their number.  Exact while no number but 0 is below 2^-440 or above 2^500: every product of parts is then a multiple
+ * of 2^-1074 and below 2^1004. */
 static int expand_edge(exact_point a, exact_point b, exact_point p, double *sum)
 {
     double left[2][2], right[2][2], terms[16];
@@ -236,8 +235,8 @@ static __attribute__((noinline)) int slow_sign(exact_point a, exact_point b, exa
     const int is_safe =
         size == 0.0 ? (dx == 0.0 || py == 0.0) && (dy == 0.0 || px == 0.0) : size > 1e-200 && size < 1e300;
     if (dx_error == 0.0 && dy_error == 0.0 && px_error == 0.0 && py_error == 0.0 && is_safe) {
-        /* Products round in the order of their values; where they round to one number, their errors decide.  A product
-         * may underflow only where the other is larger by far. */
+        /* Products round monotonically; where they round to one number, their errors decide.  A product may underflow
+         * only where the other is larger by far. */
         double left, right, left_error, right_error;
         two_product(dx, py, &left, &left_error);
         two_product(dy, px, &right, &right_error);
@@ -255,7 +254,7 @@ static __attribute__((noinline)) int slow_sign(exact_point a, exact_point b, exa
     return big_edge(a, b, p, &size_of_edge);
 }
 
-/* The rounded E, and in *bound its greatest error (Shewchuk's A); where nothing overflows or underflows. */
+/* The rounded E; *bound is its largest error (Shewchuk's A), if nothing overflows or underflows. */
 TL_INLINE double rounded_edge(exact_point a, exact_point b, exact_point p, double *bound)
 {
     const double left = (b.x - a.x) * (p.y - a.y), right = (b.y - a.y) * (p.x - a.x);
@@ -273,8 +272,8 @@ TL_INLINE int edge_sign(exact_point a, exact_point b, exact_point p, tl_exact_co
     return slow_sign(a, b, p, counts);
 }
 
-/* The point at which an edge is tested: the sample; of the square that has its upper left corner there, the corner that
- * lies farthest inside (OUTER) or outside (INNER), as walk.h tells. */
+/* The point at which an edge is tested: the sample; or for the square with its upper left corner there, the corner
+ * farthest inside (OUTER) or outside (INNER), see walk.h. */
 TL_INLINE exact_point tested_point(exact_point a, exact_point b, exact_point p, tl_test test)
 {
     const int is_outer = test == TL_TEST_OUTER;
@@ -283,9 +282,9 @@ TL_INLINE exact_point tested_point(exact_point a, exact_point b, exact_point p, 
     return (exact_point){p.x + (is_outer == (b.y < a.y)), p.y + (is_outer == (b.x > a.x))};
 }
 
-/* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge where it is a top
- * or a left one.  Two triangles that share the edge decide by the same number with opposite signs, and one of them owns
- * a tie: nothing is left open and nothing is covered twice.  Of squares a tie is within for INNER alone. */
+/* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge if it is a top or
+ * left edge.  Two triangles that share the edge decide by one number with opposite signs, and exactly one of them owns
+ * a tie: no gaps, no overlap.  For squares a tie is inside for INNER alone. */
 TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_test test, tl_exact_counts *counts)
 {
     const int sign = edge_sign(a, b, tested_point(a, b, p, test), counts);
@@ -361,7 +360,7 @@ static int terms_sign(const edge_term *terms, int n)
     return n_sum ? (sum[n_sum - 1] > 0.0) - (sum[n_sum - 1] < 0.0) : 0;
 }
 
-/* The quotient of two of them; both are within the range of a float64 after one shift. */
+/* The quotient of two scaled numbers; both are within the range of a float64 after one shift. */
 TL_INLINE double scaled_quotient(scaled_number a, scaled_number b)
 {
     int shift_a, shift_b;

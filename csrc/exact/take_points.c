@@ -1,5 +1,5 @@
-/* Take: vertices as they are, or rounded to a grid, as float64, looked at once.  In: the caller's numbers.  Out: the
- * same, and how many of them cannot be drawn. */
+/* Take: checks vertices and converts them to float64, as they are or rounded to a grid.
+ * In: the caller's numbers.  Out: points, and how many of the numbers cannot be drawn. */
 #ifndef TL_TAKE_POINTS_C
 #define TL_TAKE_POINTS_C
 
@@ -14,7 +14,7 @@
 static int64_t take_f32(const float *v, int64_t n, double *out)
 {
     int64_t n_bad = 0;
-    for (int64_t i = 0; i < n; i++) { /* the compiler makes vectors of it */
+    for (int64_t i = 0; i < n; i++) { /* without a branch, so that the compiler vectorises */
         n_bad += !(fabsf(v[i]) <= FLT_MAX);
         out[i] = (double)v[i];
     }
@@ -32,7 +32,7 @@ static int64_t take_i64(const int64_t *v, int64_t n, double *out)
     return n_bad;
 }
 
-/* float64 is taken where it lies. */
+/* float64 is checked in place. */
 static int64_t look_at_f64(const double *v, int64_t n, int n_components)
 {
     int64_t n_bad = 0;
@@ -44,7 +44,7 @@ static int64_t look_at_f64(const double *v, int64_t n, int n_components)
     return n_bad;
 }
 
-/* n numbers, rounded to a grid as snap.c rounds them, and so in its range; a power of two scales without loss. */
+/* Rounds n numbers to a grid as snap.c does, so in its range; a power of two scales without loss. */
 static int64_t take_on_grid(const tl_source *source, int64_t at, int64_t n, int bits, double *out)
 {
     const double scale = (double)(1 << bits), inverse = 1.0 / scale;

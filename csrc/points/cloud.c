@@ -1,9 +1,9 @@
 /* Clouds: points drawn as discs or squares, the nearest in every pixel.
- * In: snapped vertices, a size each.  Out: ids and depth, as those of triangles.
+ * In: snapped vertices with sizes.  Out: ids and depth, as for triangles.
  *
- * A point covers the samples in its disc, the rim included, or in its square: its left and its upper side
- * count; and in any case those in the square of a pixel's size round it, so that no point is too small to show.
- * All of it is decided in whole numbers, doubled: the sample of a pixel lies half a pixel off the grid. */
+ * A point covers the samples in its disc, including the rim, or in its square, including the left and the upper side;
+ * and always the samples in a square of a pixel's size round it, so that no point is too small to show.  All of it is
+ * decided in doubled integers: the sample of a pixel lies half a pixel off the grid. */
 #ifndef TL_CLOUD_C
 #define TL_CLOUD_C
 
@@ -22,8 +22,8 @@ static inline int64_t floor_root(int64_t a)
     return root + ((root + 1) * (root + 1) <= a);
 }
 
-/* Pixels of a row, or rows of a window, with samples off a centre by low to high: first to last, cut to [0, n).
- * `sample` is that of pixel 0 in units of half a sub-pixel, pixels are 2^shift apart. */
+/* Sets the pixels of a row, or the rows of a window, whose samples lie from low to high of a centre: first to last,
+ * clipped to [0, n).  `sample` is the sample of pixel 0 in half sub-pixels, pixels are 2^shift apart. */
 static inline void span_of(int64_t center, int64_t low, int64_t high, int64_t sample, int shift, int64_t n,
                            int64_t *first, int64_t *last)
 {
@@ -45,7 +45,7 @@ TL_INLINE void keep_span(const tl_target *target, int64_t at, int64_t n, float d
     }
 }
 
-/* How far samples of a row, off the centre by y, may be off to the sides: low to high. */
+/* Sets the distances along a row, low to high, of covered samples from the centre, for a row at distance y. */
 static inline void reach_of(const tl_cloud *cloud, int64_t size, int64_t unit, int64_t y, int64_t *low, int64_t *high)
 {
     *low = 0, *high = -1;

@@ -1,5 +1,5 @@
-/* Corners: those of some triangles of a mesh, three rows of numbers each, as they stand in memory or in a mapped file.
- * In: vertices and triangles at any distance from row to row.  Out: the corners, one after the other. */
+/* Corners: copies the corners of some triangles of a mesh, three rows of numbers each, from memory or a mapped file.
+ * In: vertices and triangles with any row stride.  Out: the corners, contiguous. */
 #ifndef TL_CORNERS_C
 #define TL_CORNERS_C
 
@@ -9,7 +9,7 @@
 #include "topleft.h"
 #include "lanes/inline.h"
 
-/* n_bytes is a constant where this is inlined, so that a row is a move or two. */
+/* n_bytes is a constant at each call, so that a row is copied by one or two moves. */
 TL_INLINE int64_t copy_corners(const tl_corners *c, const int32_t *which, int64_t first, int64_t n, char *out,
                                const size_t n_bytes)
 {

@@ -1,8 +1,8 @@
-/* Merge: visibility buffers of shares of the triangles to the one of all; names of triangles.
- * In: ids and depth of two buffers.  Out: those of the nearer triangle, of the lower index at equal depth.
+/* Merge: merges visibility buffers of shares of the triangles into that of all triangles; renames triangles.
+ * In: ids and depth of two buffers.  Out: those of the nearer triangle; at equal depth of the lower index.
  *
- * The depth of a pixel is that of its triangle alone, whatever else is drawn, so the least of (depth, index) over the
- * buffers is the least over all triangles: any split, in any order, gives the same bits.
+ * The depth of a pixel depends on its triangle alone, so the least (depth, index) over the buffers is the least over
+ * all triangles: any split, in any order, gives equal bits.
  *
  * Based on: S. Molnar, M. Cox, D. Ellsworth, H. Fuchs, A Sorting Classification of Parallel Rendering, 1994
  * (sort-last). */
@@ -13,7 +13,7 @@
 
 #include "topleft.h"
 
-/* No branch inside the loops: the compiler makes vectors of them. */
+/* No branch inside the loops, so that the compiler vectorises. */
 static void merge_fragments(const tl_merge *m, int64_t first, int64_t end)
 {
     int32_t *restrict ids = m->ids;
@@ -30,7 +30,7 @@ static void merge_fragments(const tl_merge *m, int64_t first, int64_t end)
         }
         return;
     }
-    const float sign = m->rule == TL_MERGE_GREATER ? -1.0f : 1.0f; /* exact, and turns the order round */
+    const float sign = m->rule == TL_MERGE_GREATER ? -1.0f : 1.0f; /* exact; -1 reverses the order */
     for (int64_t i = first; i < end; i++) {
         const int32_t id = other_ids[i] < 0 ? -1 : (int32_t)((uint32_t)other_ids[i] + (uint32_t)first_id);
         const float mine = sign * depth[i], other = sign * other_depth[i];
@@ -41,7 +41,7 @@ static void merge_fragments(const tl_merge *m, int64_t first, int64_t end)
     }
 }
 
-/* names[0] is for nothing, names[1 + i] for triangle i: they take the place of ids [first, end). */
+/* names[0] is for the background, names[1 + i] for triangle i. */
 static void name_triangles(int32_t *restrict ids, int64_t first, int64_t end, const int32_t *restrict names)
 {
     for (int64_t i = first; i < end; i++)

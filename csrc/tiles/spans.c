@@ -1,11 +1,11 @@
-/* Spans: which windows of a raster each triangle may touch, a span of windows for each row of them.
+/* Spans: the windows of a raster that each triangle may touch, a span of windows for each row of windows.
  * In: corners in pixels, before the snap.  Out: spans sorted by rows of windows, by index within a row.
  *
  * A span may have windows too many, never too few: the box of a triangle is widened by TL_SPAN_MARGIN_PX, which is more
- * than the move of the snap (half a pixel at most) and a pixel's square together.  A triangle of more than one row and
- * column of windows is cut by each row, so that a long thin one is listed along its way and not in all of its box.  The
- * point where an edge enters a row is computed in float64: its error is below 2^-50 of the largest coordinate, and
- * TL_SPAN_SLACK of it is added. */
+ * than the snap can move a vertex (half a pixel at most) plus a pixel's square.  A triangle of more than one row and
+ * column of windows is cut by each row, so that a long thin triangle is not listed in all of its box.  The point where
+ * an edge enters a row is computed in float64: its error is below 2^-50 of the largest coordinate, and TL_SPAN_SLACK of
+ * it is added. */
 #ifndef TL_SPANS_C
 #define TL_SPANS_C
 
@@ -18,8 +18,8 @@
 #define TL_SPAN_MARGIN_PX 2.0
 #define TL_SPAN_SLACK 0x1p-44
 
-/* Windows [*first, *end) of `side` pixels each that the pixels from low to high touch.  The quotient is a product with
- * the reciprocal: it is off by less than 2^-20 px, which the margin has room for, and a division takes longer. */
+/* Sets the windows [*first, *end) of `side` pixels each that the pixels from low to high touch.  A product with the
+ * reciprocal replaces the division: its error of less than 2^-20 px is within the margin. */
 static inline void windows_between(double low, double high, int64_t length_px, double per_px, int32_t *first,
                                    int32_t *end)
 {
@@ -34,13 +34,13 @@ static inline void windows_between(double low, double high, int64_t length_px, d
     *end = (int32_t)(to * per_px) + 1;
 }
 
-/* Of numbers: fmin and fmax, which handle NaN, are calls. */
+/* fmin and fmax, which handle NaN, are calls. */
 static inline double min_f64(double a, double b) { return a < b ? a : b; }
 static inline double max_f64(double a, double b) { return a > b ? a : b; }
 static inline double min3_f64(double a, double b, double c) { return min_f64(a, min_f64(b, c)); }
 static inline double max3_f64(double a, double b, double c) { return max_f64(a, max_f64(b, c)); }
 
-/* The x of a triangle between two rows of pixels: low and high, which are crossed where there is nothing. */
+/* Sets the x of a triangle between two rows of pixels: low and high; low > high where there is no part of it. */
 static void reach_between(const double *p, double top, double bottom, double *low, double *high)
 {
     *low = DBL_MAX, *high = -DBL_MAX;
@@ -62,7 +62,7 @@ static void reach_between(const double *p, double top, double bottom, double *lo
     }
 }
 
-/* The windows of row `row` that a triangle may touch. */
+/* Sets the windows of row `row` that a triangle may touch. */
 static void span_of_row(const tl_tiling *t, const double *p, int64_t row, int32_t *first, int32_t *end)
 {
     double low, high;
@@ -94,7 +94,6 @@ static inline tl_window_box box_of(const tl_tiling *t, const double *p, double p
     return box;
 }
 
-/* Counts the spans of each row into starts[row + 1], or with `out` writes them from starts[row] on, which moves. */
 static int64_t list_spans(const tl_tiling *t, const double *corners_px, int64_t n, int64_t first_triangle,
                           tl_window_box *boxes, int64_t *starts, tl_window_span *out)
 {
@@ -124,8 +123,7 @@ static int64_t list_spans(const tl_tiling *t, const double *corners_px, int64_t 
     return -1;
 }
 
-/* Counts the spans of a row by their windows, or with `out` writes their triangles in that order.  Those of more than
- * TL_SHORT_SPAN windows are left out: the list is at most so many times as long as the spans. */
+/* The list is at most TL_SHORT_SPAN times as long as the spans. */
 static int64_t sort_spans(const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out)
 {
     int64_t n_long = 0;
@@ -145,7 +143,6 @@ static int64_t sort_spans(const tl_window_span *spans, int64_t n, int64_t *start
     return n_long;
 }
 
-/* Counts the triangles of windows, as differences from one to the next. */
 static void count_windows(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
                           int32_t *steps)
 {

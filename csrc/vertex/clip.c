@@ -1,4 +1,4 @@
-/* Clip: the triangles that a clip plane cuts.
+/* Clip: cuts triangles by the clip planes.
  * In: homogeneous vertices.  Out: convex polygons; and readers of the pieces that exact/pieces.c makes of them.
  * Based on: I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974. */
 #ifndef TL_CLIP_C
@@ -20,7 +20,7 @@ typedef struct {
     double weights[3]; /* barycentrics in the source triangle */
 } clip_corner;
 
-/* Puts a cut exactly on its plane, which rounding may have missed: far from the eye by more than the picture. */
+/* Moves a cut point exactly onto its plane: far from the eye rounding may miss the plane by more than the picture. */
 static inline void put_on_plane(double *p, int plane, const tl_view *view)
 {
     switch (plane) {
@@ -34,7 +34,8 @@ static inline void put_on_plane(double *p, int plane, const tl_view *view)
     }
 }
 
-/* The point where the edge from a (inside) to b (outside) meets the plane: both weights are positive, so w stays so. */
+/* The point where the edge from a (inside) to b (outside) meets the plane: both weights are positive, so w stays
+ * positive. */
 static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, double da, double db, int plane,
                                    const tl_view *view)
 {
@@ -48,7 +49,7 @@ static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, d
     return cut;
 }
 
-/* Cuts a convex polygon by one plane; returns the new number of corners. */
+/* Clips a convex polygon by one plane; returns the new number of corners. */
 static int clip_polygon(const clip_corner *in, int n_in, int plane, const tl_view *view, clip_corner *out)
 {
     int n = 0;
@@ -65,7 +66,7 @@ static int clip_polygon(const clip_corner *in, int n_in, int plane, const tl_vie
     return n;
 }
 
-/* One triangle, cut; 0 corners when nothing of it is left. */
+/* Clips one triangle; returns the number of corners, 0 when nothing of it is left. */
 static int clip_triangle(const tl_source *source, const int32_t *corners, const tl_view *view, clip_corner *polygon)
 {
     clip_corner other[TL_MAX_CORNERS];
@@ -88,12 +89,12 @@ static int clip_triangle(const tl_source *source, const int32_t *corners, const 
         memcpy(polygon, other, sizeof *polygon * (size_t)n);
     }
     for (int k = 0; k < n; k++)
-        if (!(polygon[k].pos[3] >= TL_MIN_W * 0.5)) /* overflowed or underflowed in the cut: beyond any picture */
+        if (!(polygon[k].pos[3] >= TL_MIN_W * 0.5)) /* overflow or underflow: beyond any picture */
             return 0;
     return n < 3 ? 0 : n;
 }
 
-/* Readers of the pieces. */
+/* Whether a corner of a triangle is outside a clip plane. */
 static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 {
     int clipped = 0;
@@ -107,14 +108,14 @@ static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
     return clipped;
 }
 
-/* The vertices of the pieces, seen from the same sample. */
+/* The vertices of the pieces, for the sample of the mesh. */
 static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
 {
     return (tl_vertex_set){p->vertices,   p->wide,           p->inv_w,          NULL,
                            p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx, NULL};
 }
 
-/* First of n pieces of a triangle, by bisection in their ascending sources. */
+/* The first of n pieces of a triangle, by bisection; sources ascend. */
 static int64_t first_piece(const int32_t *source, int64_t n, int64_t id)
 {
     int64_t low = 0, high = n;
@@ -128,15 +129,15 @@ static int64_t first_piece(const int32_t *source, int64_t n, int64_t id)
     return low;
 }
 
-/* The parts of a triangle that are drawn: itself, or the pieces that clip planes leave of it; n of them, three of
- * `corners` each. */
+/* The parts of a triangle that are drawn: the triangle, or its pieces at clip planes; n parts, three of `corners`
+ * each. */
 typedef struct {
     tl_vertex_set set;
     const int32_t *corners;
     int n, is_cut;
 } triangle_parts;
 
-/* The corners of a triangle that no plane cuts are put into `own`. */
+/* `own` holds the corners of a triangle that no plane cuts. */
 static inline triangle_parts parts_of(const tl_snapped *snapped, int64_t i, int32_t *own)
 {
     const tl_pieces *pieces = snapped->pieces;

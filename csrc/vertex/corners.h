@@ -1,5 +1,5 @@
-/* Corners: the vertices of a triangle, read from the indices of the caller, which another thread may write to.
- * In: indices that have been checked.  Out: the same, or others that name vertices. */
+/* Corners: the vertices of a triangle, read from indices of the caller, which another thread may write to.
+ * In: indices that have been checked.  Out: these indices, clamped to the vertices. */
 #ifndef TL_CORNERS_H
 #define TL_CORNERS_H
 
@@ -14,7 +14,7 @@ static inline int32_t corner_within(int32_t corner, int64_t n_vertices)
 }
 
 /* Code that uses the corners of a triangle more than once reads them once, here: a mesh that changes while it is drawn
- * gives a wrong picture, and nothing is read or written outside of arrays. */
+ * gives a wrong picture, but no access outside of arrays. */
 static inline void read_corners(const tl_snapped *snapped, int64_t i, int32_t *own)
 {
     const int32_t *given = snapped->triangles + 3 * i;

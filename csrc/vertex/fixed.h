@@ -7,7 +7,7 @@
  * triangle in a rectangle is at most the rectangle), so
  *   |x_fx| < 2^30:  width, height <= 2^31 - 2,  |2E| <= 2 (2^31 - 2)^2 < 2^63;
  *   |x_fx| < 2^62:  width, height <= 2^63 - 2,  |2E| <= 2 (2^63 - 2)^2 < 2^127.
- * The two products may each wrap; their difference, taken modulo 2^64 or 2^128, is right.
+ * The two products may each wrap; their difference, modulo 2^64 or 2^128, is right.
  */
 #ifndef TL_FIXED_H
 #define TL_FIXED_H
@@ -49,8 +49,8 @@ static inline int is_near(const tl_window *window)
     return window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
 }
 
-/* Writes vertex i: its record, and its row of the wide table where there is one.  x_fx and y_fx are integers, infinite
- * or NaN. */
+/* Writes vertex i: its record, and its row of the wide table if there is one.  x_fx and y_fx are integers, infinite or
+ * NaN. */
 static inline void store_vertex(double x_fx, double y_fx, double z, int64_t i, tl_vertex *out, tl_wide *wide,
                                 tl_vertex_counts *n)
 {

@@ -1,4 +1,4 @@
-/* Project: object space to clip space to vertices in pixels, snapped or not, those outside a clip plane marked.
+/* Project: object space to clip space to vertices in pixels, snapped or not; marks vertices outside a clip plane.
  * In: the caller's vertices, a matrix.  Out: vertex records, or points (x, y, z). */
 #ifndef TL_PROJECT_C
 #define TL_PROJECT_C
@@ -13,10 +13,10 @@
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
 
-/* w, near, far, -x, +x, -y, +y: the order in which a polygon meets the planes */
+/* w, near, far, -x, +x, -y, +y: the order in which polygons are clipped */
 #define TL_N_PLANES 7
 #define TL_MIN_W 0x1p-500 /* keeps 1/w and x/w from overflowing */
-#define TL_MAX_W 0x1p500  /* of a vertex that vd_quotients can take */
+#define TL_MAX_W 0x1p500  /* the largest w that vd_quotients can divide by */
 
 /* Vertex i in clip space.  float32 is transformed in float32, float64 in float64. */
 static inline void clip_position(const tl_source *source, int64_t i, double *p)
@@ -62,7 +62,7 @@ static inline void set_projected(const double *p, const tl_view *view, int was_c
 {
     double z = view->zero_to_one ? p[2] / p[3] : (p[2] / p[3] + 1.0) * 0.5;
     if (was_cut && view->near_clip)
-        z = z < 0.0 ? 0.0 : z; /* a cut lies on its plane up to rounding */
+        z = z < 0.0 ? 0.0 : z; /* a cut point lies on its plane up to rounding */
     if (was_cut && view->far_clip)
         z = z > 1.0 ? 1.0 : z;
     out[0] = (p[0] / p[3] + 1.0) * view->half_width_px;
@@ -94,7 +94,7 @@ static inline int32_t place_of(double v)
     return (int32_t)rint((v > most ? most : v < -most ? -most : v) * (double)(1 << TL_PLACE_BITS));
 }
 
-/* A vertex that is not drawn where it lies. */
+/* Stores a vertex that cannot be drawn, with the reason. */
 static inline void store_special(const tl_projected *out, int64_t i, tl_special what)
 {
     double *point = out->points + TL_PLACED * i;
@@ -104,7 +104,7 @@ static inline void store_special(const tl_projected *out, int64_t i, tl_special 
         set_placed(point, TL_NAN, what, 0.0, TL_SPECIAL, 0);
 }
 
-/* One vertex, whatever it is. */
+/* Projects one vertex of any kind. */
 static void project_one(const tl_source *source, int64_t i, const tl_view *view, const tl_projected *out,
                         tl_vertex_counts *counts)
 {
@@ -125,7 +125,7 @@ static void project_one(const tl_source *source, int64_t i, const tl_view *view,
     }
 }
 
-/* clip_position of TL_LANES vertices; matrix may be NULL. */
+/* `clip_position` for TL_LANES vertices; matrix may be NULL. */
 TL_INLINE void clip_lanes_f32(const float *data, const float *m, int stride, vf *p)
 {
     vf v[4];
@@ -153,7 +153,6 @@ TL_INLINE void clip_lanes_f64(const double *data, const double *m, int stride, v
     }
 }
 
-/* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
 static void set_inverse_w(const tl_source *source, const float *rows, int64_t first, int64_t end, float *restrict out)
 {
     int64_t i = first;
@@ -179,8 +178,8 @@ static void set_inverse_w(const tl_source *source, const float *rows, int64_t fi
     }
 }
 
-/* Lanes inside the planes of w, near and far; a sum and its rounding have the same sign, so these are the tests of
- * plane_distance.  Whatever lands within 2^30 sub-pixels is inside the guard band. */
+/* The lanes inside the planes of w, near and far; a sum and its rounding have equal signs, so these are the tests of
+ * `plane_distance`.  Any vertex within 2^30 sub-pixels is inside the guard band. */
 TL_INLINE vm inside_lanes(const vd *p, const tl_view *view)
 {
     const vd z = p[2], w = p[3], zero = vd_set1(0.0);
@@ -192,7 +191,7 @@ TL_INLINE vm inside_lanes(const vd *p, const tl_view *view)
     return inside;
 }
 
-/* Lanes of float32 inside the planes of w, near and far: 0 < w < infinity equals the two tests of w. */
+/* The lanes of float32 inside the planes of w, near and far: 0 < w < infinity equals the two tests of w. */
 TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
 {
     const vf z = p[2], w = p[3], zero = vf_set1(0.0f);
@@ -204,9 +203,9 @@ TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
     return inside;
 }
 
-#define TL_SURELY_INSIDE_PX 0x1p50 /* of the guard band, which begins 2^52 px from the middle of the picture */
+#define TL_SURELY_INSIDE_PX 0x1p50 /* the guard band begins 2^52 px from the middle of the picture */
 
-/* Stores TL_LANES points as they are; returns those that surely lie inside the guard band. */
+/* Stores TL_LANES points without a snap; returns those that surely lie inside the guard band. */
 TL_INLINE vm store_points(double *out, vd x, vd y, vd z)
 {
     const vd farthest = vd_set1(TL_SURELY_INSIDE_PX), scale = vd_set1((double)(1 << TL_PLACE_BITS));
@@ -216,7 +215,7 @@ TL_INLINE vm store_points(double *out, vd x, vd y, vd z)
     return vm_and(vd_ge(farthest, vd_abs(x)), vd_ge(farthest, vd_abs(y)));
 }
 
-/* Names that begin with `scalar` are constants: a copy for each keeps the matrix in registers. */
+/* `scalar` and the flags after it are constants: a copy for each keeps the matrix in registers. */
 TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
                                 const tl_projected *out, tl_vertex_counts *counts, tl_scalar scalar, int has_matrix,
                                 int is_affine, int is_snapped)
@@ -245,7 +244,7 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
             clip_lanes_f64((const double *)source->data + i * stride, has_matrix ? m64 : NULL, stride, p);
             good = inside_lanes(p, view);
         }
-        if (out->rows) /* vd_quotients has the inverse of float64, too */
+        if (out->rows) /* vd_quotients computes the inverse of float64, too */
             vf_store_fourths(out->rows + 4 * i,
                              scalar == TL_F32 ? vf_div(vf_set1(1.0f), vf_from_vd(p[3]))
                                               : vf_from_vd(vd_div(vd_set1(1.0), p[3])),

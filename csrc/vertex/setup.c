@@ -1,4 +1,4 @@
-/* Triangle setup: the three corners in a fixed turn, the box of samples they can cover, the weights of a sample.
+/* Triangle setup: the three corners in one winding, the box of samples they can cover, the weights of a sample.
  * In: a triangle of vertex records.  Out: tl_triangle, or nothing when it is culled, degenerate or outside.
  * Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988. */
 #ifndef TL_SETUP_C
@@ -14,12 +14,12 @@
 typedef struct {
     int64_t x_fx[3], y_fx[3];
     double z[3];
-    int32_t corner[3]; /* vertex indices, in the same order */
+    int32_t corner[3]; /* vertex indices, in the order of x_fx */
     int32_t id;
     int is_narrow;                  /* every |x_fx| < 2^30: edge functions fit 64 bits */
     int64_t col0, col1, row0, row1; /* half-open box of samples, relative to the window */
     /* Weights: the doubled edge functions opposite corners 1 and 2 at sample (row0, col0), their steps, and the sum
-     * over all three corners, which is the same everywhere.  Integers, exact in float64 when `weights_exact`. */
+     * over all three corners, which is constant.  Integers, exact in float64 when `weights_exact`. */
     int weights_exact;
     double w1, w2, w1_col, w2_col, w1_row, w2_row, w_sum;
     /* Depth: z[0] + slope_y * (2py - 2y0) + slope_x * (2px - 2x0) when `has_plane`, by weights otherwise. */
@@ -27,13 +27,13 @@ typedef struct {
     double slope_x, slope_y;
 } tl_triangle;
 
-/* Rounds an extent [low, high] to pixels: those from (low + first) >> bits on, up to (high + end) >> bits. */
+/* Rounds an extent [low, high] to pixels [(low + first) >> bits, (high + end) >> bits). */
 typedef struct {
     int32_t first, end;
 } extent_rounding;
 
-/* The centres at or right of low and left of high; the squares that the extent meets in more than a line; those inside
- * it. */
+/* The centres at or right of low and left of high; the squares that the extent meets in more than a line; or the
+ * squares inside it. */
 static inline extent_rounding round_extent(const tl_window *window)
 {
     const int32_t unit = (int32_t)1 << window->subpixel_bits, half = unit > 1 ? unit / 2 - 1 : 0;
@@ -45,7 +45,7 @@ static inline extent_rounding round_extent(const tl_window *window)
 static inline tl_wide vertex_fx(const tl_vertex_set *set, int32_t i)
 {
     const tl_vertex v = set->vertices[i];
-    /* without a table: a mesh that has changed since it was looked at */
+    /* without a table: the mesh has changed since the snap */
     const tl_wide p = v.x_fx == TL_SPECIAL && set->wide ? set->wide[i] : (tl_wide){v.x_fx, v.y_fx};
     return (tl_wide){p.x_fx - set->sample_x_fx, p.y_fx - set->sample_y_fx};
 }
@@ -66,7 +66,7 @@ static inline tl_int128 weight_sum(const tl_triangle *t)
     return i128_wrapping_times(i128_wrapping_sub(i128_product(x1, y2), i128_product(y1, x2)), 2);
 }
 
-/* +1 or -1 by the turn of the corners, 0 when they lie on a line. */
+/* 1 or -1 by the winding of the corners, 0 when they lie on a line. */
 static inline int area_sign(const tl_triangle *t)
 {
     if (t->is_narrow) {
@@ -77,7 +77,8 @@ static inline int area_sign(const tl_triangle *t)
     return i128_sign(weight_sum(t));
 }
 
-/* Reads the corners and turns them so that the area is positive; returns the sign it had, 0 if degenerate. */
+/* Loads the corners, and swaps two of them if the area is negative; returns the sign of the area before, 0 if
+ * degenerate. */
 static inline int load_triangle(const tl_vertex_set *set, const int32_t *corners, tl_triangle *t)
 {
     t->is_narrow = 1;
@@ -105,8 +106,8 @@ static inline int is_culled(int sign, tl_cull cull)
     return sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT);
 }
 
-/* The box of pixels in the triangle's extent and the window.  Half-open on the right and at the bottom: no centre
- * exactly at the largest x or y can be covered under the top-left rule.  Returns whether any is left. */
+/* Sets the box of pixels in the triangle's extent and the window.  Half-open on the right and at the bottom: no centre
+ * exactly at the largest x or y can be covered under the top-left rule.  Returns whether the box has pixels. */
 static inline int clip_box(tl_triangle *t, const tl_window *window)
 {
     const int bits = window->subpixel_bits;
@@ -124,8 +125,8 @@ static inline int clip_box(tl_triangle *t, const tl_window *window)
  * steep that float64 would lose bits that float32 shows, and the exact weights are used. */
 #define TL_SLIVER_BITS 12
 
-/* The depth plane over the corners, per half sub-pixel.  The operations are those of plane_lanes in triangles_fixed.c:
- * equal bits. */
+/* The depth plane over the corners, per half sub-pixel.  The operations are those of `plane_lanes` in
+ * triangles_fixed.c: equal bits. */
 static inline void setup_plane(tl_triangle *t)
 {
     const double x1 = (double)(t->x_fx[1] - t->x_fx[0]), y1 = (double)(t->y_fx[1] - t->y_fx[0]), z1 = t->z[1] - t->z[0];
@@ -142,7 +143,7 @@ static inline void setup_plane(tl_triangle *t)
     t->slope_y = (z2 * x1 - z1 * x2) * inverse;
 }
 
-/* Prepares weights_at, the weights of colours and of the depth of slivers. */
+/* Sets the weights for `weights_at`: for colours and for the depth of slivers. */
 static inline void setup_weights(tl_triangle *t, const tl_window *window)
 {
     const int bits = window->subpixel_bits;
@@ -162,7 +163,7 @@ static inline void setup_weights(tl_triangle *t, const tl_window *window)
     t->w2_row = step * ((double)t->x_fx[1] - (double)t->x_fx[0]);
 }
 
-/* The weights of corners 1 and 2, as parts of w_sum, for n samples of a row: correctly rounded integers. */
+/* The weights of corners 1 and 2, with the sum w_sum, for n samples of a row: correctly rounded integers. */
 static inline void weights_at(const tl_triangle *t, const tl_window *window, int64_t row, int64_t col, int n,
                               double *restrict w1, double *restrict w2)
 {

@@ -45,14 +45,14 @@ static void snap_integer(const tl_source *source, int64_t i, int subpixel_bits, 
     }
 }
 
-/* |a| < 2^30, INT32_MIN not */
+/* Whether |a| < 2^30; false for INT32_MIN. */
 TL_INLINE vm is_narrow_lanes(vi a)
 {
     const vi limit = vi_set1((1 << 30) - 1);
     return vm_and_not(vm_all(), vi_gt_unsigned(vi_add(a, limit), vi_add(limit, limit)));
 }
 
-/* x, y and z of TL_LANES float vertices. */
+/* Loads x, y and z of TL_LANES float vertices. */
 TL_INLINE void pixel_lanes(const tl_source *source, int64_t i, vd *v)
 {
     const int stride = source->n_components;
@@ -99,7 +99,7 @@ static int64_t first_bad_row(const int32_t *triangles, int64_t n_triangles, int6
     const int64_t chunk = 3 * 1024;
     for (int64_t first = 0; first < 3 * n_triangles; first += chunk) {
         const int64_t end = first + chunk < 3 * n_triangles ? first + chunk : 3 * n_triangles;
-        uint32_t bad = 0; /* no branch inside: the compiler makes vectors of it */
+        uint32_t bad = 0; /* no branch inside, so that the compiler vectorises */
         for (int64_t i = first; i < end; i++)
             bad |= (uint32_t)((uint32_t)triangles[i] >= n);
         for (int64_t i = first; bad && i < end; i++)
@@ -109,7 +109,6 @@ static int64_t first_bad_row(const int32_t *triangles, int64_t n_triangles, int6
     return -1;
 }
 
-/* int64 indices as int32, checked: the first row with one outside [0, n_vertices), or -1. */
 static int64_t narrow_triangles(const int64_t *restrict triangles, int64_t n_triangles, int64_t n_vertices,
                                 int32_t *restrict out)
 {
@@ -117,7 +116,7 @@ static int64_t narrow_triangles(const int64_t *restrict triangles, int64_t n_tri
     const int64_t chunk = 3 * 1024;
     for (int64_t first = 0; first < 3 * n_triangles; first += chunk) {
         const int64_t end = first + chunk < 3 * n_triangles ? first + chunk : 3 * n_triangles;
-        uint64_t bad = 0; /* no branch inside: the compiler makes vectors of it */
+        uint64_t bad = 0; /* no branch inside, so that the compiler vectorises */
         for (int64_t i = first; i < end; i++) {
             bad |= (uint64_t)((uint64_t)triangles[i] >= n);
             out[i] = (int32_t)triangles[i];
