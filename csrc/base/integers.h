@@ -1,9 +1,8 @@
-/* Integers of 128 bits: the compiler's where it has them, otherwise a struct of two words; both give the same bits.
- * And of 64 bits under the same names, for code that is written once for both.
+/* Integers of 128 bits: the compiler's where it has them, otherwise a struct of two words; both give equal bits.
+ * Also of 64 bits with like names, for code that is written once for both.
  *
- * No function but those named `wrapping` may overflow.  The struct serves 32-bit machines, and Windows: its
- * libraries cannot divide 128 bits; TL_NO_INT128 forces it.  tests/engine/test_integers.py holds both to Python's
- * integers. */
+ * Only functions named `wrapping` may overflow.  The struct serves 32-bit machines, and Windows: its libraries cannot
+ * divide 128 bits; TL_NO_INT128 forces it.  tests/engine/test_integers.py holds both to Python's integers. */
 #ifndef TL_INTEGERS_H
 #define TL_INTEGERS_H
 
@@ -77,14 +76,14 @@ static inline tl_int128 i128_wrapping_sub(tl_int128 a, tl_int128 b)
 }
 static inline tl_int128 i128_sub(tl_int128 a, tl_int128 b) { return i128_wrapping_sub(a, b); }
 
-/* Both words of a product of two, by halves of 32 bits: no sum of them reaches 2^64. */
+/* Both words of a product of two words, by halves of 32 bits: no sum of them reaches 2^64. */
 static inline tl_int128 i128_product_u64(uint64_t a, uint64_t b)
 {
     const uint64_t half = 0xffffffffu, a0 = a & half, a1 = a >> 32, b0 = b & half, b1 = b >> 32;
     const uint64_t middle = a1 * b0 + (a0 * b0 >> 32), other = a0 * b1 + (middle & half);
     return (tl_int128){other << 32 | (a0 * b0 & half), (int64_t)(a1 * b1 + (middle >> 32) + (other >> 32))};
 }
-/* A negative factor counts 2^64 too much of the other one. */
+/* A negative factor counts 2^64 times the other factor too much. */
 static inline tl_int128 i128_wrapping_times(tl_int128 a, int64_t b)
 {
     const tl_int128 low = i128_product_u64(a.low, (uint64_t)b);
@@ -111,11 +110,11 @@ static inline tl_int128 i128_shift_right(tl_int128 a, int n)
     return (tl_int128){a.low >> n | (uint64_t)a.high << (64 - n), a.high >> n};
 }
 
-/* Rounded to nearest, ties to even: of more than 64 bits the first 64 are converted, the last of them set when any
- * other is, which float64 has no room for but rounds by. */
+/* Rounded to nearest, ties to even.  A number of more than 64 bits is converted from its first 64, with the last of
+ * them set if any later bit is: float64 has no room for it, but rounds by it. */
 static inline double i128_to_f64(tl_int128 a)
 {
-    tl_int128 size = a.high < 0 ? i128_wrapping_sub(i128_from(0), a) : a; /* unsigned from here on: 2^127 may stand */
+    tl_int128 size = a.high < 0 ? i128_wrapping_sub(i128_from(0), a) : a; /* unsigned from here on: may be 2^127 */
     int exponent = 0;
     if (size.high != 0) {
         uint64_t high = (uint64_t)size.high, low = size.low;
@@ -127,7 +126,7 @@ static inline double i128_to_f64(tl_int128 a)
     return a.high < 0 ? -value : value;
 }
 
-/* Quotient and remainder for b > 0, rounded down: of two words that fit one by the machine, otherwise bit by bit. */
+/* Quotient and remainder for b > 0, rounded down: by the machine if both fit one word, otherwise bit by bit. */
 static inline void i128_floor_divide(tl_int128 a, tl_int128 b, tl_int128 *quotient, tl_int128 *remainder)
 {
     const int is_negative = a.high < 0;
@@ -136,7 +135,7 @@ static inline void i128_floor_divide(tl_int128 a, tl_int128 b, tl_int128 *quotie
     if (high == 0 && b.high == 0) {
         q.low = low / b.low, r.low = low % b.low;
     } else {
-        for (int k = 0; k < 128; k++) { /* r < b < 2^127: twice it stays below 2^128 */
+        for (int k = 0; k < 128; k++) { /* r < b < 2^127, so 2 r < 2^128 */
             const uint64_t next = high >> 63;
             high = high << 1 | low >> 63, low <<= 1;
             uint64_t r_high = (uint64_t)r.high << 1 | r.low >> 63, r_low = r.low << 1 | next;

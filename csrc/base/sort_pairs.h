@@ -8,8 +8,8 @@ typedef struct {
     int64_t key, i;
 } keyed;
 
-/* Sorts n pairs by key, equal ones as they stand: runs by insertion, then merges between `a` and `room`.  Returns
- * where they are. */
+/* Sorts n pairs by key, stable: runs by insertion, then merges between `a` and `room`.  Returns the one of the two that
+ * holds the result. */
 static keyed *sort_pairs(keyed *a, keyed *room, int64_t n)
 {
     const int64_t run = 16;

@@ -1,12 +1,12 @@
-/* Angles from their tangents, the same on every instruction set. */
+/* Angles from their tangents, equal on every instruction set. */
 #ifndef TL_ANGLE_H
 #define TL_ANGLE_H
 
 #include "lanes/lanes.h"
 
-/* The angle with tangent y / x, of y >= 0 and an x that is positive up to rounding; 0 of 0 and 0.  The quotient
- * is turned back by 0, 45 or 90 degrees to within tan(22.5 degrees) of 0, where the polynomial is within 2^-56 of
- * atan(q) / q. */
+/* The angle with tangent y / x, for y >= 0 and an x that is positive up to rounding; 0 for 0 and 0.  The quotient is
+ * rotated by 0, 45 or 90 degrees to within tan(22.5 degrees) of 0, where the polynomial is within 2^-56 of atan(q) /
+ * q. */
 TL_INLINE vd angle_of(vd y, vd x)
 {
     const vd slope = vd_set1(0x1.a827999fcef32p-2), zero = vd_set1(0.0);

@@ -1,5 +1,5 @@
-/* How functions are declared: in lanes and inner loops, compiled into each caller; and long or rare ones, compiled
- * once, whatever constants they are called with.  And how many lanes there are at most. */
+/* How functions are declared: in lanes and inner loops, compiled into each caller; long or rare functions, compiled
+ * once, whatever their constant arguments.  Also the most lanes there are. */
 #ifndef TL_INLINE_H
 #define TL_INLINE_H
 

@@ -1,19 +1,19 @@
-/* Vector lanes: the same names for every instruction set, so that each kernel is written once.
+/* Vector lanes: one set of names for every instruction set, so that each kernel is written once.
  *
  *   vi  TL_LANES int32      vf  TL_LANES float32      vd  TL_LANES float64      vm  TL_LANES bits
  *
- * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives the same bits.  The
+ * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives equal bits.  The
  * scalar lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q, are_f32) divides three numbers by one, each
  * correctly rounded.  Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
  *
  *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
- *   v?_load_some(m, p, has_room)    the lanes in m; with room for a vector the others are read, too, or are anything
- *   v?_store_some(p, m, a, has_room)    the lanes in m; with room for a vector the others may be written as they are
+ *   v?_load_some(m, p, has_room)    the lanes in m; with room for a vector other lanes are read, too, or undefined
+ *   v?_store_some(p, m, a, has_room)    the lanes in m; with room for a vector other lanes may be written unchanged
  *   vi_gather(m, p, i)      p[i] in the lanes of m
- *   vi_stream(p, v)         a store past the caches to an aligned place; end_stream() after the last of them
- *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector, and returns how many they are
+ *   vi_stream(p, v)         a non-temporal store to an aligned address; end_stream() after the last store
+ *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector, and returns how many lanes
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
  *   v4_, vi_load_quads, vi_store_quads    four int32; TL_LANES of them as four vectors, lane k in slot vi_quad_slot(k)
  *   vw_zero, vw_load, vw_store, vw_add_range    TL_LANES words of 64 bits
@@ -21,9 +21,9 @@
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   vf_fma(a, b, c)         a * b + c, rounded once
  *   vf_min, vf_max          the second number when one is NaN
- *   vf_min_size(a, b)       the lesser of a >= 0 and |b|, which are numbers
+ *   vf_min_size(a, b)       the lesser of a >= 0 and |b|, which are not NaN
  *   v?_lookup(table, i)     table[i & 15] of sixteen numbers
- *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
+ *   v?_pick(p, i)           p[i] of TL_LANES consecutive numbers
  *   vi_prefix_count(bits)   how many of the bits [0, k] are set
  *   vi_spill(p, a)          a store of lanes that are then read one by one
  *   vd_power(a, sum, mask)  the number with bits of `sum` less the bits of a in `mask`
@@ -32,17 +32,17 @@
  *   vd_load_pairs(base, stride, first, x, y)    two doubles at base + 8 * stride * first[3 * k], as columns
  *   vd_load_triples(base, first, x, y, z)    three doubles at base + 24 * first[3 * k], as columns
  *   vd_load_places(base, first, x, y, z, a, b)    three doubles and two int32 at base + 32 * first[3 * k], as columns
- *   vd_store_places(base, x, y, z, a, b)          the same, TL_LANES of them one after the other
+ *   vd_store_places(base, x, y, z, a, b)          TL_LANES such rows, consecutive
  *   vi_ceil(vd)             the next integer that is not less
  *   vi_low_bits(vd)         the last 32 bits of each number
  *   vf_off_integer, vd_off_integer    a finite number less the nearest integer; the sign of 0 may be either
  *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8; the sign of 0 may be either
  *   vd_or(a, b)             the bits of both: 0 where both are
- *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
+ *   vf_store_pairs, vf_store_triples    consecutive pixels of two or three numbers
  *   vi_load_records(base, scale, i, c)    16 bytes at base + scale * i[k], as columns; i are unsigned
  *   vf_load_pairs(base, i, c)    8 bytes at base + 8 * i[k], as columns
- *   vi_load_rows(base, i, c)    the same at base + 8 * i[k]
- *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
+ *   vi_load_rows(base, i, c)    16 bytes at base + 8 * i[k], as columns
+ *   hm_, hf_, hi_, hd_      what short rows need, in half vectors of TL_HALF_LANES (0: no half vectors)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
  *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1
  *   vi_add_halves, vi_sub_halves    modulo 2^16
@@ -69,8 +69,8 @@
 #include "lanes/lanes_scalar.h"
 #endif
 
-/* Where memory cannot be masked, a masked load takes a branch a lane.  One of AVX2 waits for its mask, and a masked
- * store of AVX2 costs AMD's cores more than five times a load, a blend and a store. */
+/* Where memory cannot be masked, a masked load takes a branch a lane.  An AVX2 masked load waits for its mask, and an
+ * AVX2 masked store on AMD costs more than five times a load, a blend and a store. */
 #define TL_LOADS_WHOLE (TL_LANES == 4 || TL_LANES == 8)
 #define TL_STORES_WHOLE (TL_LANES == 4 || TL_LANES == 8)
 #define TL_SOME(V, M, NUMBER)                                                    \
@@ -107,20 +107,20 @@ TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi
 #if TL_LANES != 16
 TL_INLINE vd vd_off_256th(vd a)
 {
-    const vd shift = vd_set1(0x1.8p44); /* next to it are the multiples of 2^-8 */
+    const vd shift = vd_set1(0x1.8p44); /* adding it rounds to multiples of 2^-8 */
     return vd_sub(a, vd_sub(vd_add(a, shift), shift));
 }
 #endif
 
-/* Stores lanes that are then read one by one.  Compilers that see both take them out of the vector, one shuffle each,
- * which is slower than memory: so they may not see it. */
+/* Stores lanes that are then read one by one.  Compilers that see both extract lanes from the vector, one shuffle each,
+ * which is slower than memory: the asm hides the store. */
 TL_INLINE void vi_spill(int32_t *p, vi a)
 {
     vi_store(p, a);
     __asm__("" : "+m"(*(int32_t (*)[TL_LANES])p));
 }
 
-/* Where vi_store_quads puts the four numbers of a lane, in units of four. */
+/* The slot in which vi_store_quads stores the four numbers of a lane, in units of four. */
 TL_INLINE int vi_quad_slot(int lane) { return TL_LANES == 1 ? 0 : (lane & 3) * (TL_LANES / 4) + (lane >> 2); }
 
 #endif

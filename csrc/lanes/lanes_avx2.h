@@ -66,9 +66,9 @@ TL_INLINE vf vf_from_unsigned(vi a)
     const vf low = _mm256_cvtepi32_ps(_mm256_and_si256(a, _mm256_set1_epi32(0xffff)));
     return _mm256_add_ps(_mm256_mul_ps(high, _mm256_set1_ps(65536.0f)), low);
 }
-/* Loads: hardware gathers are microcode on Zen 1 and 2, and on Intel's cores with the cure of Downfall; a Zen 3 draws
- * `photometric_loss` of 70,000 triangles at 0.93 of their time.  Lanes that are not in m read p[0], which is there if
- * any lane is in m. */
+/* Loads one by one: hardware gathers are microcode on Zen 1 and 2, and on Intel's cores with the fix for Downfall; Zen
+ * 3 draws `photometric_loss` of 70,000 triangles in 0.93 of the time of gathers.  Lanes that are not in m read p[0],
+ * which exists if any lane is in m. */
 TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
 {
     if (_mm256_testz_si256(m, m))
@@ -103,8 +103,8 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         _mm256_storeu_si256((__m256i *)(p + 32 * k), _mm256_and_si256(on, one));
     }
 }
-/* Tables by the bits of a mask, for pdep and pext are microcode on Zen 1 and 2: up to 290 cycles each.  A row has a
- * byte for each lane and is built from the highest lane down: with(row, lane) is the row after a lane that is set. */
+/* Tables by the bits of a mask, because pdep and pext are microcode on Zen 1 and 2: up to 290 cycles each.  A row has a
+ * byte for each lane and is built from the highest lane down: with(row, lane) is the row with a set lane inserted. */
 #define TL_ROWS_0(with, row) row, with(row, 0)
 #define TL_ROWS_1(with, row) TL_ROWS_0(with, row), TL_ROWS_0(with, with(row, 1))
 #define TL_ROWS_2(with, row) TL_ROWS_1(with, row), TL_ROWS_1(with, with(row, 2))
@@ -142,7 +142,7 @@ TL_INLINE vd vd_abs(vd a)
     return (vd){_mm256_andnot_pd(sign, a.lo), _mm256_andnot_pd(sign, a.hi)};
 }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm256_floor_pd(a.lo), _mm256_floor_pd(a.hi)}; }
-/* The even and the odd numbers of the 16 that two vectors hold; and back. */
+/* The even and the odd numbers of the 16 in two vectors; and the inverse. */
 TL_INLINE vi evens_of(vd a)
 {
     const __m256 packed = _mm256_shuffle_ps(_mm256_castpd_ps(a.lo), _mm256_castpd_ps(a.hi), 0x88); /* 0 1 4 5 2 3 6 7 */
@@ -183,7 +183,7 @@ TL_INLINE vd vd_from_vz(vz z) { return (vd){front_pairs(z.even, z.odd), back_pai
 TL_INLINE vi join_quarters(const __m128i *a) { return join_halves(a[0], a[1]); }
 TL_INLINE wd join_pairs(const __m128d *a) { return _mm256_insertf128_pd(_mm256_castpd128_pd256(a[0]), a[1], 1); }
 
-/* Four numbers of a row: other lanes hold two, TL_LANES / 4 rows apart; and back. */
+/* Loads four numbers of a row: other instruction sets load two rows, TL_LANES / 4 apart; and stores them. */
 TL_INLINE wd load_rows_f64(const double *p, const double *other) { return (void)other, _mm256_loadu_pd(p); }
 TL_INLINE void store_rows_f64(double *p, double *other, wd row) { (void)other, _mm256_storeu_pd(p, row); }
 
@@ -222,7 +222,7 @@ TL_INLINE vi vi_pick(const int32_t *p, vi i)
 }
 TL_INLINE vi vi_prefix_count(unsigned bits) { return row_of_bytes(prefix_counts[bits]); }
 
-/* Writes the fourth column over that of TL_LANES rows of four. */
+/* Writes TL_LANES rows of four with the fourth column replaced. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
     for (int k = 0; k < 4; k++) {
@@ -231,7 +231,7 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
                          _mm256_blend_ps(_mm256_loadu_ps(rows + 8 * k), _mm256_permutevar8x32_ps(fourth, at), 0x88));
     }
 }
-/* Pixels of three numbers, one after the other. */
+/* Stores consecutive pixels of three numbers. */
 TL_INLINE void vf_store_triples(float *p, const vf *c)
 {
     static const int32_t from[24] = {0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 5, 5, 5, 6, 6, 6, 7, 7, 7};
@@ -248,14 +248,14 @@ TL_INLINE void vf_store_triples(float *p, const vf *c)
 #include "lanes/lanes_x86.h"
 
 TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
-/* a less the nearest integer */
+/* a minus the nearest integer */
 TL_INLINE vf vf_off_integer(vf a)
 {
     return _mm256_sub_ps(a, _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC));
 }
 TL_INLINE vd vd_off_integer(vd a)
 {
-    enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
+    enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang needs a constant expression */
     return vd_sub(a, (vd){_mm256_round_pd(a.lo, nearest), _mm256_round_pd(a.hi, nearest)});
 }
 TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns) { columns_of_rows_f32(p, stride, columns); }
@@ -267,7 +267,7 @@ TL_INLINE __m256d load_four_thirds(const double *base, const int32_t *first)
             _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[6 * k] * 3 + 2), base + (int64_t)first[6 * k + 3] * 3 + 2);
     return join_pairs(third);
 }
-/* Two loads a row: a masked one of 32 bytes takes longer. */
+/* Two loads a row: a masked load of 32 bytes takes longer. */
 TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
 {
     vd_load_pairs(base, 3, first, x, y);

@@ -89,7 +89,7 @@ TL_INLINE vd vd_from_vf(vf a)
 {
     return (vd){_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps(a, 1))};
 }
-/* The even and the odd numbers of the 32 that two vectors hold; and back. */
+/* The even and the odd numbers of the 32 in two vectors; and the inverse. */
 TL_INLINE vi evens_of(vd a)
 {
     const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
@@ -128,7 +128,7 @@ TL_INLINE vi join_quarters(const __m128i *a)
     return join_halves(low, high);
 }
 
-/* Four numbers of each of two rows, which stand TL_LANES / 4 rows apart; and back. */
+/* Loads four numbers of each of two rows, TL_LANES / 4 rows apart; and stores them. */
 TL_INLINE wd load_rows_f64(const double *p, const double *other)
 {
     return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p)), _mm256_loadu_pd(other), 1);
@@ -154,7 +154,7 @@ TL_INLINE void store_half(tl_vertex *v, wd xy, wd z)
     _mm512_storeu_pd(v, _mm512_permutex2var_pd(xy, front, z));
     _mm512_storeu_pd(v + 4, _mm512_permutex2var_pd(xy, back, z));
 }
-/* Half vectors: a 64-byte load or store at any column crosses a cache line, one of 32 bytes every other time. */
+/* Half vectors: a 64-byte load or store at any column crosses a cache line, of 32 bytes every other time. */
 typedef __m256i hi;
 typedef __m256 hf;
 typedef __m512d hd;
@@ -173,7 +173,7 @@ TL_INLINE hm hf_lt(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE hm hf_eq(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
 TL_INLINE hi hi_lower(vi a) { return _mm512_castsi512_si256(a); }
 TL_INLINE hd hd_lower(vd a) { return a.lo; }
-/* as sum_depth in sink.c */
+/* as `sum_depth` in sink.c */
 TL_INLINE hf hf_sum_depth(double row, hd col)
 {
     return _mm256_add_ps(_mm512_cvtpd_ps(_mm512_add_pd(_mm512_set1_pd(row), col)), _mm256_setzero_ps());
@@ -197,7 +197,7 @@ TL_INLINE vi vi_prefix_count(unsigned bits)
     return _mm512_cvtepu8_epi32(_mm_set_epi64x((long long)high, (long long)low));
 }
 
-/* Writes the fourth column over that of TL_LANES rows of four. */
+/* Writes TL_LANES rows of four with the fourth column replaced. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
     for (int k = 0; k < 4; k++) {
@@ -206,7 +206,7 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
         _mm512_storeu_ps(out + 16 * k, _mm512_mask_permutexvar_ps(_mm512_loadu_ps(rows + 16 * k), 0x8888, at, fourth));
     }
 }
-/* Pixels of three numbers, one after the other. */
+/* Stores consecutive pixels of three numbers. */
 TL_INLINE void vf_store_triples(float *p, const vf *c)
 {
     static const int32_t from[48] = {0,  16, 0,  1,  17, 1,  2,  18, 2,  3,  19, 3,  4,  20, 4,  5,
@@ -230,11 +230,11 @@ TL_INLINE wd join_pairs(const __m128d *a)
     return _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1);
 }
 TL_INLINE vi vi_ceil(vd a) { return join_halves(ceil_eight(a.lo), ceil_eight(a.hi)); }
-/* a less the nearest integer */
+/* a minus the nearest integer */
 TL_INLINE vf vf_off_integer(vf a) { return _mm512_reduce_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
 TL_INLINE vd vd_off_integer(vd a)
 {
-    enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
+    enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang needs a constant expression */
     return (vd){_mm512_reduce_pd(a.lo, nearest), _mm512_reduce_pd(a.hi, nearest)};
 }
 TL_INLINE vd vd_off_256th(vd a)
@@ -252,7 +252,7 @@ TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
         columns_of_rows_f32(p, stride, columns);
         return;
     }
-    /* three whole loads, two permutations a column; there is no fourth number */
+    /* three whole loads, two permutations a column; a fourth number does not exist */
     const __m512 a = _mm512_loadu_ps(p), b = _mm512_loadu_ps(p + 16), c = _mm512_loadu_ps(p + 32);
     const __m512i x0 = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
     const __m512i x1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);

@@ -204,7 +204,7 @@ TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }
 TL_INLINE vi vi_round(vd a)
 {
-    const vd nearest = rint(a); /* which may be 2^31 where a is less */
+    const vd nearest = rint(a); /* 2^31 if a is less: out of range */
     return fabs(nearest) < 0x1p31 ? (vi)nearest : INT32_MIN;
 }
 TL_INLINE vi vi_low_bits(vd a)
@@ -216,7 +216,7 @@ TL_INLINE vi vi_low_bits(vd a)
 TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 
-/* The vertices first[step * lane] of TL_LANES pairs or triangles.  z is left in the order of the loads until it is
+/* Loads the vertices first[step * lane] of TL_LANES pairs or triangles.  z stays in the order of the loads until it is
  * needed. */
 typedef double vz;
 TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
@@ -285,14 +285,14 @@ TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
 {
     memcpy(c, (const char *)base + (int64_t)*i * 8, 8);
 }
-/* Writes the fourth column over that of TL_LANES rows of four. */
+/* Writes TL_LANES rows of four with the fourth column replaced. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
     for (int k = 0; k < 3; k++)
         out[k] = rows[k];
     out[3] = fourth;
 }
-/* Pixels of two and of three numbers, one after the other. */
+/* Stores consecutive pixels of two and of three numbers. */
 TL_INLINE void vf_store_pairs(float *p, const vf *c) { p[0] = c[0], p[1] = c[1]; }
 TL_INLINE void vf_store_triples(float *p, const vf *c) { p[0] = c[0], p[1] = c[1], p[2] = c[2]; }
 /* Four doubles at base + 8 * stride * i[k], as columns. */
@@ -328,9 +328,9 @@ TL_INLINE void vd_store_places(double *row, vd x, vd y, vd z, vi a, vi b)
     row[0] = x, row[1] = y, row[2] = z;
     memcpy(row + 3, &a, sizeof a), memcpy((char *)(row + 3) + sizeof a, &b, sizeof b);
 }
-/* ceil() is a call where there are no lanes */
+/* ceil() is a call on the scalar set */
 TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p31 ? (vi)((uint32_t)(vi)a + ((double)(vi)a < a)) : INT32_MIN; }
-/* a less the nearest integer */
+/* a minus the nearest integer */
 TL_INLINE vf vf_off_integer(vf a) { return a - rintf(a); }
 TL_INLINE vd vd_or(vd a, vd b)
 {

@@ -1,7 +1,7 @@
 /* Four lanes in 128 bits, masks as whole vectors of ones: NEON of aarch64, SIMD128 of WebAssembly, SSE4.1.
  *
- * Arithmetic, comparisons and shuffles are vectors of gcc and clang, the same text for all three; intrinsics stand
- * where the three differ: minima, masks to bits, tables of bytes, roundings and conversions. */
+ * Arithmetic, comparisons and shuffles are vectors of gcc and clang, one text for all three; intrinsics are used where
+ * the three differ: minima, masks to bits, tables of bytes, roundings and conversions. */
 #ifndef TL_LANES_SIMD128_H
 #define TL_LANES_SIMD128_H
 
@@ -36,7 +36,7 @@ typedef uint16_t v8u __attribute__((vector_size(16)));
 typedef uint8_t v16u __attribute__((vector_size(16)));
 typedef int64_t v2l __attribute__((vector_size(16)));
 typedef uint64_t v2u __attribute__((vector_size(16)));
-/* the same in memory, at any address */
+/* in memory, at any address */
 typedef int32_t vi_there __attribute__((vector_size(16), aligned(1), may_alias));
 typedef float vf_there __attribute__((vector_size(16), aligned(1), may_alias));
 typedef double v2d_there __attribute__((vector_size(16), aligned(1), may_alias));
@@ -112,7 +112,7 @@ TL_INLINE vi vi_mul_high_halves(vi a, vi b)
     const uint32x4_t low = vmull_u16(vget_low_u16(x), vget_low_u16(y)), high = vmull_high_u16(x, y);
     return (vi)vuzp2q_u16(vreinterpretq_u16_u32(low), vreinterpretq_u16_u32(high));
 }
-/* (-2^15)^2 saturates; a is a difference of bytes */
+/* (-2^15)^2 would saturate, but a is a difference of bytes */
 TL_INLINE vi vi_scale_halves(vi a, vi b) { return (vi)vqrdmulhq_s16((int16x8_t)a, (int16x8_t)b); }
 TL_INLINE vi vi_add_bytes(vi a, vi b) { return (vi)vqaddq_u8((uint8x16_t)a, (uint8x16_t)b); }
 TL_INLINE vi vi_max_bytes(vi a, vi b) { return (vi)vmaxq_u8((uint8x16_t)a, (uint8x16_t)b); }
@@ -122,7 +122,7 @@ TL_INLINE v2d v2d_sqrt(v2d a) { return (v2d)vsqrtq_f64((float64x2_t)a); }
 TL_INLINE v2d v2d_floor(v2d a) { return (v2d)vrndmq_f64((float64x2_t)a); }
 TL_INLINE v2d v2d_nearest(v2d a) { return (v2d)vrndnq_f64((float64x2_t)a); }
 TL_INLINE vf vf_nearest(vf a) { return (vf)vrndnq_f32((float32x4_t)a); }
-/* the first number unless the second is not greater: fmin and fmax are others for NaN */
+/* the first number if it is less: fmin and fmax differ for NaN */
 TL_INLINE vf vf_min(vf a, vf b) { return (vf)vbslq_f32((uint32x4_t)vf_lt(a, b), (float32x4_t)a, (float32x4_t)b); }
 TL_INLINE vf vf_max(vf a, vf b) { return (vf)vbslq_f32((uint32x4_t)vf_lt(b, a), (float32x4_t)a, (float32x4_t)b); }
 TL_INLINE v2d v2d_min(v2d a, v2d b) { return v2d_select((v2l)(a < b), a, b); }
@@ -248,7 +248,7 @@ TL_INLINE vi vi_min_bytes(vi a, vi b) { return (vi)_mm_min_epu8((__m128i)a, (__m
 TL_INLINE vf vf_sqrt(vf a) { return (vf)_mm_sqrt_ps((__m128)a); }
 TL_INLINE v2d v2d_sqrt(v2d a) { return (v2d)_mm_sqrt_pd((__m128d)a); }
 TL_INLINE v2d v2d_floor(v2d a) { return (v2d)_mm_floor_pd((__m128d)a); }
-enum { TL_NEAREST = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
+enum { TL_NEAREST = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang needs a constant expression */
 TL_INLINE v2d v2d_nearest(v2d a) { return (v2d)_mm_round_pd((__m128d)a, TL_NEAREST); }
 TL_INLINE vf vf_nearest(vf a) { return (vf)_mm_round_ps((__m128)a, TL_NEAREST); }
 TL_INLINE vf vf_min(vf a, vf b) { return (vf)_mm_min_ps((__m128)a, (__m128)b); }
@@ -429,7 +429,7 @@ TL_INLINE vi vi_bit_ranges(vi begin, vi end)
                          vshlq_u32(ones, (int32x4_t)end));
 }
 #else
-#if defined(TL_ON_WASM) /* the one byte in which bit n is */
+#if defined(TL_ON_WASM) /* the one byte that has bit n */
 TL_INLINE vi power_of_two(vi n)
 {
     const v16u every =
@@ -497,17 +497,17 @@ TL_INLINE vd vd_or(vd a, vd b) { return (vd){(v2d)((v2l)a.lo | (v2l)b.lo), (v2d)
 TL_INLINE vd vd_off_integer(vd a) { return (vd){a.lo - v2d_nearest(a.lo), a.hi - v2d_nearest(a.hi)}; }
 
 #ifndef TL_ON_NEON
-/* The double nearest to a product, which float64 holds, and a sum, but odd where it is not exact: rounded once more, to
- * float32, it is rounded as the exact sum.  Based on: S. Boldo, G. Melquiond, Emulation of a FMA and correctly rounded
- * sums: proved algorithms using rounding to odd, 2008. */
+/* The double nearest to the sum of a product, which float64 holds, and a number, but odd if it is not exact: then
+ * rounding it to float32 rounds the exact sum.  Based on: S. Boldo, G. Melquiond, Emulation of a FMA and correctly
+ * rounded sums: proved algorithms using rounding to odd, 2008. */
 TL_INLINE v2d sum_to_odd(v2d a, v2d b)
 {
     const v2d sum = a + b, rest = sum - a, error = (a - (sum - rest)) + (b - rest);
     const v2u bits = (v2u)sum, away = (((v2u)error ^ bits) >> 63) * 2; /* 0: the exact sum is farther from zero */
-    const v2u is_odd = (v2u)((v2l)(error < 0) | (v2l)(error > 0)) & ((bits & 1) - 1); /* of infinities it is NaN */
+    const v2u is_odd = (v2u)((v2l)(error < 0) | (v2l)(error > 0)) & ((bits & 1) - 1); /* NaN for infinities */
     return (v2d)(bits + ((1 - away) & is_odd));
 }
-/* Once in 2^29 the sum in float64 lies in the middle between two float32; below 2^-126 the middles lie elsewhere. */
+/* Once in 2^29 the sum in float64 is the middle between two float32; below 2^-126 other sums are middles. */
 TL_INLINE vf vf_fma(vf a, vf b, vf c)
 {
     const vd product = vd_mul(vd_from_vf(a), vd_from_vf(b)), addend = vd_from_vf(c);
@@ -543,7 +543,7 @@ TL_INLINE vd vd_pick(const double *p, vi i)
 TL_INLINE v2d low_two(v2d a, v2d b) { return TL_SHUFFLE_64(a, b, 0, 2); }
 TL_INLINE v2d high_two(v2d a, v2d b) { return TL_SHUFFLE_64(a, b, 1, 3); }
 
-/* The vertices first[step * lane] of TL_LANES pairs or triangles. */
+/* Loads the vertices first[step * lane] of TL_LANES pairs or triangles. */
 typedef vd vz;
 TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
@@ -604,7 +604,7 @@ TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
     const vf low = (vf)(v2d){pair[0], pair[1]}, high = (vf)(v2d){pair[2], pair[3]};
     c[0] = TL_SHUFFLE(low, high, 0, 2, 4, 6), c[1] = TL_SHUFFLE(low, high, 1, 3, 5, 7);
 }
-/* Writes the fourth column over that of TL_LANES rows of four. */
+/* Writes TL_LANES rows of four with the fourth column replaced. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
     vf_store(out, TL_SHUFFLE(vf_load(rows), fourth, 0, 1, 2, 4));
@@ -612,7 +612,7 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
     vf_store(out + 8, TL_SHUFFLE(vf_load(rows + 8), fourth, 0, 1, 2, 6));
     vf_store(out + 12, TL_SHUFFLE(vf_load(rows + 12), fourth, 0, 1, 2, 7));
 }
-/* Pixels of two and of three numbers, one after the other. */
+/* Stores consecutive pixels of two and of three numbers. */
 TL_INLINE void vf_store_pairs(float *p, const vf *c)
 {
     vf_store(p, TL_SHUFFLE(c[0], c[1], 0, 4, 1, 5)), vf_store(p + 4, TL_SHUFFLE(c[0], c[1], 2, 6, 3, 7));

@@ -1,9 +1,9 @@
-/* Lanes that AVX2 and AVX-512 share: TL_MM(add_ps) is the intrinsic of the width at hand.
- * In: lanes_avx2.h or lanes_avx512.h, which include this file.  Out: the names of lanes.h that they do not have. */
+/* Lanes that AVX2 and AVX-512 share: TL_MM(add_ps) is the intrinsic of the included width.
+ * In: lanes_avx2.h or lanes_avx512.h, which include this file.  Out: the names of lanes.h that they lack. */
 #ifndef TL_LANES_X86_H
 #define TL_LANES_X86_H
 
-#ifdef TL_MM /* else it is read by itself */
+#ifdef TL_MM /* if not, an editor reads this file alone */
 
 TL_INLINE vi vi_set1(int32_t a) { return TL_MM(set1_epi32)(a); }
 TL_INLINE vi vi_add(vi a, vi b) { return TL_MM(add_epi32)(a, b); }
@@ -112,9 +112,9 @@ TL_INLINE vd vd_mul(vd a, vd b) { return (vd){TL_MM(mul_pd)(a.lo, b.lo), TL_MM(m
 TL_INLINE vd vd_sqrt(vd a) { return (vd){TL_MM(sqrt_pd)(a.lo), TL_MM(sqrt_pd)(a.hi)}; }
 TL_INLINE vd vd_div(vd a, vd b) { return (vd){TL_MM(div_pd)(a.lo, b.lo), TL_MM(div_pd)(a.hi, b.hi)}; }
 /* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes
- * the quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the
- * quotient, which is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of
- * elementary functions on the IBM RISC System/6000 processor, 1990. */
+ * the quotient faithful, the second correct.  For float32 numbers one step suffices: it errs by less than 2^-100 of the
+ * quotient, which is at least 2^-77 from the middle of two float64.  Based on: P. Markstein, Computation of elementary
+ * functions on the IBM RISC System/6000 processor, 1990. */
 TL_INLINE wd one_quotient(wd a, wd b, wd inverse, int are_f32)
 {
     wd q = TL_MM(mul_pd)(a, inverse);
@@ -134,13 +134,13 @@ TL_INLINE vd vd_max(vd a, vd b) { return (vd){TL_MM(max_pd)(a.lo, b.lo), TL_MM(m
 /* Rows of memory as columns: plain loads of rows and transposes in registers, for hardware gathers are three times as
  * slow.  Indices are unsigned. */
 
-/* 16 bytes at base + scale * i[step * lane], of every fourth lane. */
+/* Loads 16 bytes at base + scale * i[step * lane], of every fourth lane. */
 TL_INLINE vi load_quarter(const void *base, int scale, int step, const int32_t *i)
 {
     __m128i rows[TL_LANES / 4];
     for (int k = 0; k < TL_LANES / 4; k++) {
         uint64_t at = (uint32_t)i[4 * step * k];
-        __asm__("" : "+r"(at)); /* or GCC loads it into a vector and takes it from there */
+        __asm__("" : "+r"(at)); /* else GCC loads it into a vector and extracts it from there */
         rows[k] = _mm_loadu_si128((const __m128i *)((const char *)base + at * (uint64_t)scale));
     }
     return join_quarters(rows);
@@ -174,7 +174,7 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
 }
 TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
 {
-    __asm__("" : "+r"(i)); /* or GCC keeps the address of each lane's index, in more registers than there are */
+    __asm__("" : "+r"(i)); /* else GCC keeps the address of each lane's index, in more registers than exist */
     vi_load_records(base, 8, i, c);
 }
 TL_INLINE void columns_of_rows_f32(const float *p, int stride, vf *columns)
@@ -190,8 +190,8 @@ TL_INLINE void columns_of_rows_f32(const float *p, int stride, vf *columns)
     for (int k = 0; k < 4; k++)
         columns[k] = vf_of_bits(c[k]);
 }
-#define TL_ROWS_APART (TL_LANES / 2 - 4) /* of the rows that load_rows_f64 takes */
-/* TL_LANES / 2 rows of four as columns, or back. */
+#define TL_ROWS_APART (TL_LANES / 2 - 4) /* between the two rows of load_rows_f64 */
+/* Turns TL_LANES / 2 rows of four into columns, or back. */
 TL_INLINE void transpose_rows(const wd *row, wd *c)
 {
     for (int k = 0; k < 2; k++) {
@@ -259,7 +259,7 @@ TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *firs
     *x = (vd){TL_MM(unpacklo_pd)(even, odd), TL_MM(unpacklo_pd)(even2, odd2)};
     *y = (vd){TL_MM(unpackhi_pd)(even, odd), TL_MM(unpackhi_pd)(even2, odd2)};
 }
-/* Pairs of float32 at base + 8 * i[lane]; and of TL_LANES pixels, one after the other. */
+/* Loads pairs of float32 at base + 8 * i[lane]; and stores those of TL_LANES consecutive pixels. */
 TL_INLINE wd load_half_pairs(const char *base, const int32_t *i)
 {
     __m128d pairs[TL_LANES / 4];

@@ -12,7 +12,7 @@
  *   TL_VQ4_PERMUTE(a, i, j, k, l)      the lanes i, j, k, l of each quad
  *   TL_VQ4_BLEND(a, b, bits)    lane k of each quad from b where bit k is set
  *   vq4_pixels()                0, 1, 2, 3: each in all lanes of its quad
- *   vq4_spread(a)               the same of the numbers of a quad
+ *   vq4_spread(a)               the numbers of a quad: each in all lanes of its quad
  *   vq4_first(a, n)             the first n quads, zeros beyond
  *   vq4_fold(a)                 the sum of the four: the first and the third, the second and the fourth, both
  *   vq4_load(p, n, columns)     n rows of so many numbers, at most four, zeros beyond; and vq4_store.  n = TL_VQ4_ROOM
@@ -106,7 +106,7 @@ TL_INLINE vq vq4_fold(vq4 a)
     const __m256 half = _mm256_add_ps(_mm512_castps512_ps256(a), _mm512_extractf32x8_ps(a, 1));
     return (vq)_mm_add_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps(half, 1));
 }
-/* Which number of rows lies in which lane, and which lanes have one. */
+/* The index of the number in each lane, and the lanes that have a number. */
 TL_INLINE __m512i vq4_order(int columns)
 {
     const int c = columns;
@@ -235,7 +235,7 @@ TL_INLINE vq vq4_at(vq4 a, int k) { return a.of[k]; }
 #endif
 
 #ifdef TL_VQ4_HAS_NO_STORE
-/* Three numbers are four, of which the next pixel writes over the last. */
+/* Three numbers are stored as four: the next pixel overwrites the last number. */
 TL_INLINE void vq4_store(float *p, vq4 a, int64_t n, int columns)
 {
     for (int k = 0; k < 4 && k < n; k++) {
@@ -248,7 +248,7 @@ TL_INLINE void vq4_store(float *p, vq4 a, int64_t n, int columns)
 }
 #endif
 
-/* The sum of each quad in all its lanes: of the first and the third, the second and the fourth, both. */
+/* The sum of each quad in all of its lanes: first + third, second + fourth, then both. */
 TL_INLINE vq4 vq4_sum(vq4 a)
 {
     a = vq4_add(a, TL_VQ4_PERMUTE(a, 2, 3, 0, 1));

@@ -1,11 +1,10 @@
-/* The edges of the triangles that are not culled, each shared one once, by ascending lower index; and where the line of
- * an edge begins and ends, and which parts of it are hidden.
+/* The edges of the triangles that are not culled, each shared edge once, by ascending lower index; the ends of the line
+ * of an edge, and which of its pixels are visible.
  * In: triangles; two vertices, snapped or cut by a clip plane.  Out: pairs of vertices, the lower index first; two ends
- * in fixed point, in an order that is the edge's own.
+ * in fixed point, in an order that depends on the edge alone.
  *
- * A counting sort by the lower index, then a look at each vertex's own list: 2.9 ns an edge of a triangle of
- * blob(100k), where sorting all pairs takes twenty times as long, and a table of the edges seen last forgets half of
- * them. */
+ * A counting sort by the lower index, then a scan of the list of each vertex: 2.9 ns an edge of a triangle of
+ * blob(100k), where sorting all pairs takes twenty times as long, and a table of recent edges misses half of them. */
 #ifndef TL_EDGES_C
 #define TL_EDGES_C
 
@@ -17,7 +16,7 @@
 #include "vertex/project.c"
 #include "raster/sides.c"
 
-/* The corners in ascending order: the lowest is the lower index of two edges, the middle one of the third. */
+/* Sorts the corners: the lowest is the lower index of two edges, the middle corner of the third. */
 static inline void sort_corners(const int32_t *c, int32_t *sorted)
 {
     const int32_t low = c[0] < c[1] ? c[0] : c[1], high = c[0] < c[1] ? c[1] : c[0];
@@ -27,9 +26,9 @@ static inline void sort_corners(const int32_t *c, int32_t *sorted)
     sorted[2] = middle < high ? high : middle;
 }
 
-/* Writes the numbers of edges by lower index to counts[1 + index], 0 there before, and the sorted corners of the
- * triangles that are not culled: low | middle << 32 and high, of *n_listed triangles.  Returns the first row with an
- * index outside the vertices, or -1. */
+/* Adds the number of edges of each lower index to counts[1 + index], and lists the sorted corners of the *n_listed
+ * triangles that are not culled: low | middle << 32 and high.  Returns the first row with an index outside the
+ * vertices, or -1. */
 static int64_t count_edges(const tl_snapped *snapped, int64_t *restrict counts, uint64_t *restrict listed,
                            int64_t *n_listed)
 {
@@ -75,7 +74,7 @@ static int64_t list_edges(const tl_snapped *snapped, const tl_edge_scratch *scra
     int32_t *restrict highs = scratch->highs, *restrict last_low = scratch->last_low;
     memset(starts, 0, (size_t)(n_vertices + 1) * sizeof *starts);
     memset(last_low, 0xff, (size_t)n_vertices * sizeof *last_low);
-    /* corners wait in the memory of the edges, two numbers of the three that each triangle has there */
+    /* corners are stored in the memory of the edges: two of the three numbers that each triangle has there */
     const int64_t bad_row = count_edges(snapped, starts, edges, &n_listed);
     if (bad_row >= 0)
         return bad_row;
@@ -86,14 +85,14 @@ static int64_t list_edges(const tl_snapped *snapped, const tl_edge_scratch *scra
         for (; k < starts[low]; k++) {
             const int32_t high = highs[k];
             edges[n] = (uint64_t)high << 32 | (uint64_t)low;
-            n += last_low[high] != (int32_t)low; /* no branch: it cannot be predicted */
+            n += last_low[high] != (int32_t)low; /* without a branch: it is unpredictable */
             last_low[high] = (int32_t)low;
         }
     *n_edges = n;
     return -1;
 }
 
-#define TL_MAX_PIXELS 4096 /* pixels that are listed before they are stored: 16 KB a list, in the first-level cache */
+#define TL_MAX_PIXELS 4096 /* pixels listed before they are stored: 16 KB a list, in the first-level cache */
 
 typedef struct {
     int64_t x_fx, y_fx;
@@ -105,8 +104,8 @@ static inline line_end snapped_end(tl_vertex v, tl_wide wide)
     return v.x_fx == TL_SPECIAL ? (line_end){wide.x_fx, wide.y_fx, v.z} : (line_end){v.x_fx, v.y_fx, v.z};
 }
 
-/* An edge cut by the clip planes: the cuts are those of clip_polygon along the same edge.  Only planes that an
- * end is outside of cut it, so the line does not depend on the triangles that share it. */
+/* Clips an edge as `clip_polygon` cuts it.  Only planes that an end is outside of cut it, so the line does not depend
+ * on the triangles that share it. */
 static int cut_line(const tl_source *source, const int32_t *edge, const tl_view *view, line_end *ends)
 {
     clip_corner p[2];
@@ -141,8 +140,8 @@ static int cut_line(const tl_source *source, const int32_t *edge, const tl_view 
     return counts.n_bad == 0;
 }
 
-/* The ends of an edge, the upper one first, of a level edge the left one: both sides of an edge then draw the same
- * line.  Returns 0 when the clip planes leave nothing. */
+/* Sets the ends of an edge, the upper end first, for a level edge the left end: both triangles of an edge then draw one
+ * line.  Returns 0 when the clip planes remove it. */
 static int find_ends(const tl_edges *lines, const int32_t *edge, line_end *ends)
 {
     const tl_vertex *v = lines->mesh.vertices;
@@ -162,7 +161,7 @@ static int find_ends(const tl_edges *lines, const int32_t *edge, line_end *ends)
     return 1;
 }
 
-/* Whether a line at this depth shows at a pixel. */
+/* Whether a line at this depth is visible at a pixel. */
 static inline int shows_depth(const tl_line_target *target, int64_t at, float z)
 {
     const double away = target->is_farthest ? -1.0 : 1.0;

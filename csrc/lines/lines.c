@@ -1,11 +1,10 @@
-/* Lines: the edges of a mesh, each pixel of a line once, between the pixels that hold its ends.
- * In: snapped vertices, pairs of them.  Out: a byte 1 for each pixel that a line holds and nothing hides.
+/* Lines: the edges of a mesh, each pixel of a line once, from the pixel of one end to the pixel of the other.
+ * In: snapped vertices, pairs of them.  Out: 1 for each visible pixel of a line.
  * Based on: J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965.
  *
  * A line of d steps along its longer side and q <= d across is, at step k, floor((q k + floor(d / 2)) / d) pixels
- * across: a half step is taken.  The steps inside the window follow by floor divisions.  |x_px| < 2^62, so d < 2^63 and
- * every product of two of these is below 2^126; the remainder is below d and a step adds at most d, which fits 64
- * bits. */
+ * across: halves round up.  Floor divisions give the steps inside the window.  |x_px| < 2^62, so d < 2^63 and every
+ * product of two of these is below 2^126; the remainder is below d and a step adds at most d, which fits 64 bits. */
 #ifndef TL_LINES_C
 #define TL_LINES_C
 
@@ -18,10 +17,10 @@
 #include "lines/edges.c"
 #include "lines/smooth_lines.c"
 
-/* longer lines are drawn by themselves: the lanes step together, and most lines of a mesh are short */
+/* longer lines are drawn one by one: lanes step together, and most lines of a mesh are short */
 #define TL_MAX_STEPS 63
 
-/* Pixels of the lines of some vectors: storing bytes next to the arithmetic would stall it. */
+/* Pixels of the lines of several vectors: storing bytes next to the arithmetic would stall it. */
 typedef struct {
     const tl_edges *lines;
     const tl_window *window;
@@ -42,7 +41,7 @@ static void flush_plain(line_state *s)
     uint8_t *restrict pixels = s->target->pixels;
     const int32_t *restrict at = s->at, n = s->n;
     int32_t k = 0;
-    /* four loads for eight stores: a load waits for any store before it with the same last 12 bits of address; 30 % of
+    /* four loads, then eight stores: a load waits for any earlier store with equal last 12 bits of address; 30 % of
      * blob(100k) */
     for (; k + 8 <= n; k += 8) {
         uint64_t pairs[4];
@@ -57,10 +56,10 @@ static void flush_plain(line_state *s)
     s->n = 0;
 }
 
-/* No branch: hidden pixels cannot be predicted; a third of the time. */
+/* Without a branch: hidden pixels are unpredictable; a third of the time. */
 static void flush_hidden(line_state *s)
 {
-    const tl_line_target own = *s->target, *target = &own; /* a copy that no store can change */
+    const tl_line_target own = *s->target, *target = &own; /* a copy that no store can alias */
     uint8_t *restrict pixels = target->pixels;
     const int32_t *restrict at = s->at, *restrict z_bits = s->z, n = s->n;
     for (int32_t k = 0; k < n; k++) {
@@ -84,7 +83,7 @@ typedef struct {
     int64_t first, last;
 } step_range;
 
-/* Steps along the longer side: the line is at u0, goes by +1 or -1, and [0, extent) is inside. */
+/* The steps along the longer side inside [0, extent): the line starts at u0, and each step adds +1 or -1. */
 static inline step_range steps_along(int64_t u0, int direction, int64_t extent, int64_t d)
 {
     if (direction > 0)
@@ -100,7 +99,7 @@ static inline int64_t floor_of_share(int64_t a, int64_t b, int64_t c, int64_t q)
     return i128_low(quotient);
 }
 
-/* Of these the ones where the line is inside across: at step k it is at v0 + direction * floor((q k + d / 2) / d). */
+/* The steps of r at which the line is inside across: at step k it is at v0 + direction * floor((q k + d / 2) / d). */
 static inline step_range steps_across(step_range r, int64_t v0, int direction, int64_t extent, int64_t d, int64_t q)
 {
     const int64_t low = direction > 0 ? -v0 : v0 - (extent - 1), high = direction > 0 ? extent - 1 - v0 : v0;
@@ -113,7 +112,7 @@ static inline step_range steps_across(step_range r, int64_t v0, int direction, i
     return r;
 }
 
-/* One line, wherever its ends are. */
+/* Draws one line with any ends. */
 static void draw_line(const line_state *s, const int32_t *edge)
 {
     const tl_window *w = s->window;
@@ -129,7 +128,7 @@ static void draw_line(const line_state *s, const int32_t *edge)
     const int is_steep = dy > size_x, right = dx < 0 ? -1 : 1;
     step_range r = is_steep ? steps_along(y0, 1, w->height, d) : steps_along(x0, right, w->width, d);
     r = is_steep ? steps_across(r, x0, right, w->width, d, q) : steps_across(r, y0, 1, w->height, d, q);
-    tl_count_work(w, TL_SETUP_PX + 4 * max64(0, r.last - r.first)); /* a pixel takes as long as four of a row */
+    tl_count_work(w, TL_SETUP_PX + 4 * max64(0, r.last - r.first)); /* a pixel counts as four pixels of a row */
     if (r.first > r.last)
         return;
     tl_int128 steps = i128_from(0), left = i128_from(0);
@@ -144,7 +143,7 @@ static void draw_line(const line_state *s, const int32_t *edge)
     for (int64_t k = r.first; k <= r.last; k++) {
         put_pixel(s, at, (float)(ends[0].z + (double)k * slope));
         rest += (uint64_t)q;
-        const int64_t turn = -(int64_t)(rest >= (uint64_t)d); /* no branch: it cannot be predicted */
+        const int64_t turn = -(int64_t)(rest >= (uint64_t)d); /* without a branch: it is unpredictable */
         rest -= (uint64_t)(d & turn);
         at += along + (aside & turn);
     }
@@ -152,7 +151,7 @@ static void draw_line(const line_state *s, const int32_t *edge)
 
 /* TL_LANES lines inside the window. */
 typedef struct {
-    vi x, y, steps, across, along, aside; /* along, aside: added to the number of a pixel by a step */
+    vi x, y, steps, across, along, aside; /* along, aside: added to the index of a pixel by a step */
     vd z, slope;
 } lane_lines;
 
@@ -183,7 +182,7 @@ TL_INLINE void walk_lines(line_state *s, const lane_lines *l, vm live, int has_d
     s->n = n;
 }
 
-/* The lines of TL_LANES edges, `live` of them; `edges` holds TL_LANES pairs. */
+/* Draws the lines of TL_LANES edges, of which `live` exist; `edges` holds TL_LANES pairs. */
 TL_INLINE void draw_lanes(line_state *s, const int32_t *edges, vm live, int has_depth)
 {
     const tl_vertex *v = s->lines->mesh.vertices;

@@ -1,11 +1,11 @@
-/* Smooth lines: the edges of a mesh as lines one pixel wide with round ends, between the snapped ends themselves.
+/* Smooth lines: the edges of a mesh as lines one pixel wide with round ends, between the snapped ends.
  * In: snapped vertices, pairs of them.  Out: float coverage, max(0, 1 - distance of the pixel's centre from the edge),
- * which is the share of a box one pixel wide, across the line; of several lines the largest counts.
+ * which is the share of a box one pixel wide, across the line; the largest coverage of all lines counts.
  * Based on: S. Gupta, R. F. Sproull, Filtering Edges for Gray-Scale Displays, 1981.
  *
  * u runs along the longer side of the line, v across, both from its first end in half sub-pixels.  The line is at most
- * as steep as a diagonal, so a centre nearer than 1 is in the line's pixel of its column or a neighbour of that across:
- * the next ones are at least 1.5 away across, and 1.5 / sqrt(2) > 1. */
+ * as steep as a diagonal, so a centre nearer than 1 is in the line's pixel of its column or a neighbour of it across:
+ * other pixels are at least 1.5 away across, and 1.5 / sqrt(2) > 1. */
 #ifndef TL_SMOOTH_LINES_C
 #define TL_SMOOTH_LINES_C
 
@@ -26,17 +26,17 @@ typedef struct {
     int32_t at[TL_MAX_PIXELS + TL_MAX_LANES], value[TL_MAX_PIXELS + TL_MAX_LANES], z[TL_MAX_PIXELS + TL_MAX_LANES];
 } smooth_state;
 
-/* One line: u is x, or y of a steep line. */
+/* A line: u is x, or y for a steep line. */
 typedef struct {
     int is_steep;
     int64_t u_fx, v_fx; /* the first end */
     int64_t du, dv;     /* to the other end, sub-pixels */
     double z, dz;
-    int64_t first, end;         /* columns along u that can hold anything, of the window */
+    int64_t first, end;         /* columns along u that may have coverage, in the window */
     int64_t u_px, v_px, size_v; /* the window's origin along u and v, its extent along v */
 } smooth_line;
 
-/* No branch: which line is nearest cannot be predicted. */
+/* Without a branch: the nearest line is unpredictable. */
 TL_INLINE void put_smooth(const tl_line_target *target, int64_t at, float value, float z, int has_depth)
 {
     float *pixel = (float *)target->pixels + at;
@@ -47,7 +47,7 @@ TL_INLINE void put_smooth(const tl_line_target *target, int64_t at, float value,
 
 TL_INLINE void flush_smooth(smooth_state *s, int has_depth)
 {
-    const tl_line_target own = *s->target, *target = &own; /* a copy that no store can change */
+    const tl_line_target own = *s->target, *target = &own; /* a copy that no store can alias */
     for (int32_t k = 0; k < s->n; k++) {
         float value, z = 0.0f;
         memcpy(&value, s->value + k, sizeof value);
@@ -58,7 +58,7 @@ TL_INLINE void flush_smooth(smooth_state *s, int has_depth)
     s->n = 0;
 }
 
-/* Returns 0 when nothing of the line is in the window. */
+/* Sets a line up; returns 0 when no part of it is in the window. */
 static int setup_smooth_line(const smooth_state *s, const int32_t *edge, smooth_line *l)
 {
     const tl_window *w = s->window;
@@ -80,7 +80,8 @@ static int setup_smooth_line(const smooth_state *s, const int32_t *edge, smooth_
     return l->first < l->end && (v1 >> bits) + 1 >= l->v_px && (v0 >> bits) - 1 < l->v_px + l->size_v;
 }
 
-/* How far along the line, of twice the square of its length, a centre is; and the square of its distance. */
+/* Returns the square of a centre's distance from the line; *along: its position along the line, times the squared
+ * length of the line. */
 TL_INLINE vd lane_square(vd u, vd v, vd du, vd dv, vd inverse, vd end, vd *along)
 {
     const vd zero = vd_set1(0.0), two = vd_set1(2.0);
@@ -93,7 +94,7 @@ TL_INLINE vd lane_square(vd u, vd v, vd du, vd dv, vd inverse, vd end, vd *along
     return vd_select(before, vd_add(vd_mul(u, u), vd_mul(v, v)), square);
 }
 
-/* A line of less than 2^24 sub-pixels: products of two distances are exact in float64. */
+/* Draws a line of less than 2^24 sub-pixels: products of two distances are exact in float64. */
 TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_depth)
 {
     const int bits = s->window->subpixel_bits;
@@ -138,7 +139,7 @@ TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_d
     }
 }
 
-/* Any other line: its distances in 128-bit integers, rounded once where float64 takes over. */
+/* Draws any other line: distances in 128-bit integers, rounded once to float64. */
 static void walk_far_line(const smooth_state *s, const smooth_line *l)
 {
     const int bits = s->window->subpixel_bits;

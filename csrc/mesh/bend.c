@@ -1,13 +1,13 @@
-/* Bend: triangles in parts with straight sides in the picture of a lens, to within a tolerance.
- * In: points in eye space, their records, triangles.  Out: which triangles are drawn as they are, which cannot show,
- * and the parts of the others.
+/* Bend: splits triangles into parts with straight sides in the picture of a lens, to within a tolerance.
+ * In: points in eye space, their records, triangles.  Out: triangles that are drawn unsplit, triangles outside of the
+ * view, and the parts of the others.
  *
  * An edge is straight where its chord, on the sphere of directions, is within the lens's limit at both ends: the
  * largest second derivative of the lens in the rings there, times the square of the chord over 8, is then less than
- * half of the tolerance.  Other edges are looked at at a quarter, half and three quarters of their length, and halved
- * where the picture, its depth too, is off by more than the tolerance from that of a straight edge; unless
- * that is shorter than a pixel there.  Both are questions to the edge alone, and its ends may change places: triangles
- * that share an edge, by index or by position, split it alike, and no gap opens. */
+ * half of the tolerance.  Other edges are tested at a quarter, half and three quarters of their length, and halved
+ * where the picture, or its depth, is off by more than the tolerance from that of a straight edge; unless the edge is
+ * shorter than a pixel there.  Both tests depend on the edge alone, whichever end is first: triangles that share an
+ * edge, by index or by position, split it alike, and no gap opens. */
 #ifndef TL_BEND_C
 #define TL_BEND_C
 
@@ -31,14 +31,14 @@ typedef struct {
 typedef struct {
     lens_corner corner[3];
     double weights[3][3];
-    int outline; /* bit k: side k lies on a side of the whole */
+    int outline; /* bit k: side k lies on a side of the whole triangle */
     int n_halvings;
 } bent_part;
 
 #define TL_MOST_WAITING (3 * TL_MAX_HALVINGS + 4)
 
 /* Corners 0, 1, 2 and the middles 3, 4, 5 of sides 0-1, 1-2, 2-0.  For each set of halved sides (bit k: side k) the
- * triangles that come of it, in the winding of the whole. */
+ * triangles of the split, in the winding of the whole triangle. */
 static const int8_t TL_SPLITS[8][4][3] = {
     {{0, 1, 2}},
     {{0, 3, 2}, {3, 1, 2}},
@@ -50,7 +50,7 @@ static const int8_t TL_SPLITS[8][4][3] = {
     {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}},
 };
 
-/* The side of the whole on which a side from corner a to corner b lies, or -1. */
+/* The side of the whole triangle on which a side from corner a to corner b lies, or -1. */
 static int side_between(int a, int b)
 {
     for (int k = 0; k < 3; k++) {
@@ -63,7 +63,7 @@ static int side_between(int a, int b)
 
 /* ---- triangles and edges --------------------------------------------------------------------------------- */
 
-/* The corners of TL_LANES triangles, as the columns of their records. */
+/* Loads the corners of TL_LANES triangles, as the columns of their records. */
 TL_INLINE void load_records(const float *records, const int32_t corners[3][TL_MAX_LANES], vf columns[3][4])
 {
     for (int k = 0; k < 3; k++) {
@@ -74,7 +74,7 @@ TL_INLINE void load_records(const float *records, const int32_t corners[3][TL_MA
     }
 }
 
-/* The corners of TL_LANES triangles from the i-th on; n are there. */
+/* Loads the corners of TL_LANES triangles from the i-th on, of which n exist. */
 TL_INLINE void load_corner_columns(const int32_t *triangles, int64_t i, int64_t n, int32_t corners[3][TL_MAX_LANES])
 {
     if (TL_LANES > 1 && i > 0 && n >= TL_LANES) { /* 16 bytes, from the number before each triangle on */
@@ -97,8 +97,8 @@ TL_INLINE vf chord_squared(const vf *a, const vf *b)
     return vf_add(vf_add(vf_mul(x, x), vf_mul(y, y)), vf_mul(z, z));
 }
 
-/* The triangles that cannot show for certain: they lie in a cap round the middle of their directions that ends before
- * the picture begins, or are nearer than the near plane throughout.  1e-5: ten times the error of float32. */
+/* The triangles that are certainly outside: their directions lie in a cap around the middle that ends before the
+ * picture begins, or all are nearer than the near plane.  1e-5: ten times the error of float32. */
 TL_INLINE vm find_outside(const tl_lens *lens, const vf corner[3][4])
 {
     const vf one = vf_set1(1.0f), half = vf_set1(0.5f);
@@ -124,8 +124,6 @@ TL_INLINE vm find_outside(const tl_lens *lens, const vf corner[3][4])
     return vm_or(is_near, is_outside);
 }
 
-/* Lists the triangles [first, end) that may have to be split, and those that cannot show; either has room for 16 more.
- * Returns how many may. */
 static int64_t find_bent(const tl_lens *lens, const float *records, int64_t n_vertices, const int32_t *triangles,
                          int64_t first, int64_t end, int32_t *bent, int32_t *outside, int64_t *n_outside)
 {
@@ -192,8 +190,8 @@ static void set_corner(const tl_lens *lens, lens_corner *c)
     c->index = TL_NEW_POINT;
 }
 
-/* False where no point of a part can be in the picture: its directions lie in the cap round their middle that holds the
- * corners (caps below 90 degrees are convex). */
+/* Whether a point of a part may be in the picture.  If not, its directions lie in a cap around their middle that holds
+ * the corners (caps below 90 degrees are convex). */
 static int may_show(const tl_lens *lens, const bent_part *part)
 {
     const lens_corner *c = part->corner;
@@ -204,16 +202,16 @@ static int may_show(const tl_lens *lens, const bent_part *part)
     for (int k = 0; k < 3; k++)
         cosine = fmin(cosine, dot_rows(c[k].direction, middle) / fmax(length, 1e-300));
     const double sine = sqrt(fmax(0.0, (1.0 - cosine) * (1.0 + cosine)));
-    const double least = lens->cap_cosine * cosine - lens->cap_sine * sine; /* of the sum of both angles */
+    const double least = lens->cap_cosine * cosine - lens->cap_sine * sine; /* cosine of the sum of both angles */
     const int is_below_180 = lens->cap_sine * cosine + lens->cap_cosine * sine > 0.0;
     const int is_outside = length > 1e-6 && cosine > 1e-6 && is_below_180 && middle[2] < least * length;
     return !is_outside && !(c[0].reach < lens->near && c[1].reach < lens->near && c[2].reach < lens->near);
 }
 
-/* The larger of both sides of a step. */
+/* The larger component of a step. */
 static double largest_step(const double *a, const double *b) { return fmax(fabs(a[0] - b[0]), fabs(a[1] - b[1])); }
 
-/* Whether an edge has to be halved. */
+/* Whether an edge is to be halved. */
 static int is_edge_bent(const tl_lens *lens, const lens_corner *a, const lens_corner *b)
 {
     const float x = a->record[0] - b->record[0], y = a->record[1] - b->record[1], z = a->record[2] - b->record[2];
@@ -251,7 +249,7 @@ static int is_edge_bent(const tl_lens *lens, const lens_corner *a, const lens_co
     return off > 1.0 && spread > TL_SHORT_PX;
 }
 
-/* Gives a corner a point of its own. */
+/* Gives a corner a new point. */
 static void add_point(tl_bent_parts *parts, lens_corner *c)
 {
     if (parts->points)
@@ -272,7 +270,7 @@ static void add_part(tl_bent_parts *parts, const bent_part *part, int32_t source
     parts->n_parts++;
 }
 
-/* Puts the pieces of a part on the stack, the first on top; bit k of `halved`: side k.  Returns the new height. */
+/* Pushes the pieces of a part on the stack, the first on top; bit k of `halved`: side k.  Returns the new height. */
 static int split_part(const tl_lens *lens, const bent_part *whole, int halved, tl_bent_parts *parts, bent_part *stack,
                       int height)
 {
@@ -306,7 +304,7 @@ static int split_part(const tl_lens *lens, const bent_part *whole, int halved, t
     return height;
 }
 
-/* The parts of one triangle. */
+/* Splits one triangle. */
 static void bend_triangle(const tl_lens *lens, const double *points, const float *records, int64_t n_vertices,
                           const int32_t *triangle, int32_t source, tl_bent_parts *parts)
 {
@@ -319,7 +317,7 @@ static void bend_triangle(const tl_lens *lens, const double *points, const float
         const double *p = points + 3 * (int64_t)corner;
         stack[0].corner[k].point[0] = p[0], stack[0].corner[k].point[1] = -p[1], stack[0].corner[k].point[2] = -p[2];
         set_corner(lens, &stack[0].corner[k]);
-        if (records[4 * (int64_t)corner + 3] >= 0.0f) /* bend_vertices has bent it */
+        if (records[4 * (int64_t)corner + 3] >= 0.0f) /* `bend_vertices` has bent it */
             stack[0].corner[k].index = corner;
         stack[0].weights[k][k] = 1.0;
     }
@@ -341,7 +339,6 @@ static void bend_triangle(const tl_lens *lens, const double *points, const float
     }
 }
 
-/* The parts of n listed triangles, or how many there are. */
 static void split_bent(const tl_lens *lens, const double *points, const float *records, int64_t n_vertices,
                        const int32_t *triangles, const int32_t *ids, int64_t n, tl_bent_parts *parts)
 {

@@ -1,15 +1,14 @@
 /* Creases: normals of corners, where a surface bends at an edge by more than an angle.
- * In: triangles, their normals and angles.  Out: the groups that the corners of each vertex fall into, and a normal a
- * group.
+ * In: triangles, their normals and angles.  Out: the groups of the corners of each vertex, and a normal for each group.
  *
- * Two corners of a vertex belong together when their triangles share a side at the vertex and their normals differ by
- * at most the angle; so do those that a chain of such pairs joins.  A triangle without an area has no normal: its two
- * sides at the vertex count as one, so that the triangles on either side of it are neighbours.  Sides that more than
- * TL_MOST_AT_SIDE triangles share join nothing.
+ * Two corners of a vertex are in one group when their triangles share a side at the vertex and their normals differ by
+ * at most the angle; so are corners that a chain of such pairs joins.  A triangle without an area has no normal: its
+ * two sides at the vertex count as one side, so that the triangles on either side of it are neighbours.  Sides that
+ * more than TL_MOST_AT_SIDE triangles share join no corners.
  *
- * Each vertex is worked on by itself, and sums have the order of the triangles: threads change no bit.
- * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools
- * 3(1), 1998 (the weights). */
+ * Each vertex is computed by itself, and sums have the order of the triangles: threads change no bit. Based on: G.
+ * Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools 3(1), 1998 (the
+ * weights). */
 #ifndef TL_CREASES_C
 #define TL_CREASES_C
 
@@ -20,7 +19,7 @@
 #include "lanes/lanes.h"
 #include "mesh/normals.c"
 
-/* Corners in the order of their vertices, those of a vertex in the order of the triangles. */
+/* Lists corners in the order of their vertices, for each vertex in the order of the triangles. */
 static void list_corners(const int32_t *triangles, int64_t n_triangles, int64_t n_vertices, int32_t *starts,
                          int32_t *corners)
 {
@@ -28,7 +27,7 @@ static void list_corners(const int32_t *triangles, int64_t n_triangles, int64_t 
     for (int64_t i = 0; i < 3 * n_triangles; i++)
         starts[triangles[i]]++;
     for (int64_t v = 1; v <= n_vertices; v++)
-        starts[v] += starts[v - 1]; /* their ends, which go down to their starts */
+        starts[v] += starts[v - 1]; /* the ends of the vertices, which count down to their starts */
     for (int64_t i = 3 * n_triangles - 1; i >= 0; i--)
         corners[--starts[triangles[i]]] = (int32_t)i;
 }
@@ -55,10 +54,10 @@ static int64_t face_angles(const tl_source *source, const int32_t *triangles, in
 typedef struct {
     int n;
     const int32_t *corners;
-    uint64_t *sides; /* (2 n,): the other vertex of a side in the upper half; in the lower 2 * corner, + 1 or not */
-    int32_t *group;  /* (n,): a corner that it belongs to, itself or a lower one */
-    int32_t *run_of; /* (2 n,): the run of equal sides that each side of a corner lies in; then numbers of groups */
-    int32_t *joined; /* (2 n,): a run that the run is joined to */
+    uint64_t *sides; /* (2 n,): upper half: the other vertex of a side; lower half: 2 * corner, or that + 1 */
+    int32_t *group;  /* (n,): a corner of its group, itself or a lower one */
+    int32_t *run_of; /* (2 n,): the run of equal sides of each side of a corner; later numbers of groups */
+    int32_t *joined; /* (2 n,): a run that each run is joined to */
 } vertex_fan;
 
 static inline int has_area(const tl_fans *fans, int32_t corner)
@@ -67,7 +66,7 @@ static inline int has_area(const tl_fans *fans, int32_t corner)
     return (n[0] != 0.0) | (n[1] != 0.0) | (n[2] != 0.0);
 }
 
-/* The lowest that i is joined to. */
+/* The lowest index that i is joined to. */
 static inline int32_t root_of(int32_t *joined, int32_t i)
 {
     while (joined[i] != i)
@@ -81,7 +80,7 @@ static inline void join(int32_t *joined, int32_t a, int32_t b)
     joined[a > b ? a : b] = a > b ? b : a;
 }
 
-/* Restores the heap below place i of n keys. */
+/* Restores the heap below index i of n keys. */
 static inline void sift_down(uint64_t *keys, int64_t i, int64_t n)
 {
     const uint64_t own = keys[i];
@@ -96,7 +95,7 @@ static inline void sift_down(uint64_t *keys, int64_t i, int64_t n)
 
 static void sort_sides(uint64_t *keys, int64_t n)
 {
-    if (n <= 64) { /* by insertion: few vertices have more corners */
+    if (n <= 64) { /* insertion sort: few vertices have more corners */
         for (int64_t i = 1; i < n; i++) {
             const uint64_t own = keys[i];
             int64_t k = i;
@@ -115,7 +114,7 @@ static void sort_sides(uint64_t *keys, int64_t n)
     }
 }
 
-/* Has the two sides of each triangle without an area count as one: sides get the number of their run. */
+/* Joins the two sides of each triangle without an area; sides get the number of their run. */
 static void join_sides(const tl_fans *fans, vertex_fan *f)
 {
     int32_t run = 0;
@@ -134,7 +133,7 @@ static void join_sides(const tl_fans *fans, vertex_fan *f)
     sort_sides(f->sides, 2 * (int64_t)f->n);
 }
 
-/* Joins the corners that n equal sides belong to. */
+/* Joins the corners of n equal sides. */
 static inline void join_corners(const tl_fans *fans, vertex_fan *f, const uint64_t *sides, int n)
 {
     for (int a = 0; a < n; a++)
@@ -148,7 +147,7 @@ static inline void join_corners(const tl_fans *fans, vertex_fan *f, const uint64
         }
 }
 
-/* Sets the groups of the corners of a vertex; returns how many there are. */
+/* Sets the groups of the corners of a vertex; returns how many. */
 static int32_t group_corners(const tl_fans *fans, vertex_fan *f, int32_t *groups)
 {
     int n_flat = 0;
@@ -198,7 +197,6 @@ static void find_creases(const tl_fans *fans, int64_t first, int64_t end, uint64
     }
 }
 
-/* Sums of vertices [first, end) and of their groups; both are then made unit vectors. */
 static void sum_creases(const tl_fans *fans, const tl_creases *creases, int64_t first, int64_t end)
 {
     const int64_t first_row = creases->starts[first], end_row = creases->starts[end];

@@ -1,14 +1,15 @@
-/* Ears: polygons with any number of corners, cut into triangles.
- * In: points in space, and faces as corners one after the other.  Out: triangles.
+/* Ears: cuts polygons with any number of corners into triangles.
+ * In: points in space, and faces as consecutive corners.  Out: triangles.
  *
- * A face is seen along its area vector.  One without a reflex corner becomes a fan; of others ears are cut off: a
- * corner that is not reflex, whose triangle with its neighbours holds no reflex corner.  The next ear is the first one
- * from the corner behind the last, or where there is none, that corner's successor.
+ * A face is projected along its area vector.  A face without a reflex corner becomes a fan; from other faces ears are
+ * cut off: a corner that is not reflex, whose triangle with its neighbours holds no reflex corner.  The next ear is the
+ * first ear after the last one; if there is none, the next corner.
  *
- * A corner that is no ear is blocked by a reflex corner in its triangle, and looked at again when that one is reflex
- * no longer or its own neighbours change.  Which one that is, of several, changes nothing but the time: it is sought
- * from another place for each corner, so that no reflex corner blocks all.  Corners that may be ears are bits of a
- * tree of words; reflex ones are leaves of a tree of boxes, in the order of a curve through the plane.
+ * A corner that is no ear is blocked by a reflex corner in its triangle, and is tested again when that corner stops
+ * being reflex or its neighbours change.  If several reflex corners block it, any of them may be stored; only the time
+ * depends on it: the search starts at another position for each corner, so that no reflex corner blocks all. Corners
+ * that may be ears are bits of a tree of words; reflex corners are leaves of a tree of boxes, in the order of a
+ * space-filling curve.
  *
  * Based on: G. H. Meisters, Polygons Have Ears, American Mathematical Monthly 82(6), 1975; Newell's area vector as in
  * I. E. Sutherland, R. F. Sproull, R. A. Schumacker, A Characterization of Ten Hidden-Surface Algorithms, 1974; G. M.
@@ -23,11 +24,11 @@
 #include "topleft.h"
 #include "base/sort_pairs.h"
 
-#define TL_EAR_LEVELS 11 /* of either tree: 8^11 corners are more than int32 counts */
+#define TL_EAR_LEVELS 11 /* of either tree: 8^11 is more than int32 corners */
 #define TL_EAR_STEPS_TO_POLL 16384
 #define TL_EAR_WIDTH 8 /* children of a box, and corners of a leaf */
 
-/* Of the area of a polygon: corners that turn by less are straight, whatever the rounding says. */
+/* Relative to the area of a polygon: corners that turn by less count as straight, against rounding. */
 #define TL_TURN_TOO_SMALL 1e-12
 
 typedef struct {
@@ -35,17 +36,17 @@ typedef struct {
     int64_t n; /* reflex corners in it */
 } ear_box;
 
-/* A face while its ears are cut off. */
+/* A face during the cutting of its ears. */
 typedef struct {
-    double *x, *y;                        /* to the right and up; the face turns to the left */
-    int32_t *before, *after;              /* the neighbours that are left */
-    int32_t *first_blocked;               /* by a reflex corner, or -1 */
+    double *x, *y;                        /* to the right and up; the face turns left */
+    int32_t *before, *after;              /* neighbours that are not cut off */
+    int32_t *first_blocked;               /* the first corner that a reflex corner blocks, or -1 */
     int32_t *blocker;                     /* the reflex corner that blocks a corner, or -1 */
-    int32_t *next_blocked, *prev_blocked; /* by the same one, or -1 */
-    int32_t *place;                       /* of a reflex corner along the curve, or -1: not reflex */
-    uint64_t *bits[TL_EAR_LEVELS];        /* corners that may be ears; a bit for each word of the level below */
+    int32_t *next_blocked, *prev_blocked; /* in the list of its blocker, or -1 */
+    int32_t *place;                       /* position of a reflex corner along the curve; -1: not reflex */
+    uint64_t *bits[TL_EAR_LEVELS];        /* corners that may be ears; above level 0 a bit for each word below */
     int n_bit_levels;
-    keyed *curve; /* the corners that were reflex */
+    keyed *curve; /* the corners that were reflex at first */
     int64_t n_curve;
     ear_box *boxes[TL_EAR_LEVELS];
     int n_box_levels;
@@ -65,7 +66,7 @@ static void clear_bit(ear_face *f, int64_t i)
             return;
 }
 
-/* The first bit from i on, or -1; the bit behind the last is there, and 0. */
+/* The first bit from i on, or -1; there is one bit more after the last, which is 0. */
 static int64_t next_bit(const ear_face *f, int64_t i)
 {
     for (int level = 0; level < f->n_bit_levels; level++) {
@@ -86,13 +87,13 @@ static inline double turn_at(const ear_face *f, int32_t i)
     return (f->x[i] - f->x[a]) * (f->y[c] - f->y[a]) - (f->y[i] - f->y[a]) * (f->x[c] - f->x[a]);
 }
 
-/* Sorts the reflex corners along the curve, and makes the boxes. */
+/* Sorts the reflex corners along the curve, and sets the boxes. */
 static void make_ear_boxes(ear_face *f, int32_t k, keyed *pairs, int64_t *room)
 {
     int64_t n = 0;
     for (int32_t i = 0; i < k; i++) {
         f->place[i] = -1;
-        if (turn_at(f, i) < 0) { /* coordinates are relative to one of size 1 */
+        if (turn_at(f, i) < 0) { /* coordinates have size 1 */
             const int64_t x = (int64_t)((f->x[i] + 1) * 0x7fff), y = (int64_t)((f->y[i] + 1) * 0x7fff);
             pairs[n++] = (keyed){interleave_zeros(x) | interleave_zeros(y) << 1, i};
         }
@@ -126,7 +127,7 @@ static void make_ear_boxes(ear_face *f, int32_t k, keyed *pairs, int64_t *room)
     }
 }
 
-/* Takes a corner out of the list of its blocker. */
+/* Removes a corner from the list of its blocker. */
 static void unblock(ear_face *f, int32_t i)
 {
     if (f->blocker[i] < 0)
@@ -150,7 +151,7 @@ static void block(ear_face *f, int32_t i, int32_t blocker)
     f->first_blocked[blocker] = i;
 }
 
-/* A reflex corner is one no longer. */
+/* Removes a corner from the reflex corners. */
 static void end_reflex(ear_face *f, int32_t i)
 {
     int64_t at = f->place[i];
@@ -165,9 +166,9 @@ static void end_reflex(ear_face *f, int32_t i)
 }
 
 /* A triangle that may be an ear.  A point is in it when (bx - ax) (y - ay) >= (by - ay) (x - ax) for each side, in
- * float64; its products and differences are monotone: a box's ends tell for all its points.  Those are off by less
- * than 2^-49 for coordinates of size 1, so a point that counts as inside lies in the triangle's box, larger by as much
- * of its sides as that is of its area. */
+ * float64; products and differences are monotone, so the ends of a box decide for all of its points.  They are off by
+ * less than 2^-49 for coordinates of size 1, so a point that counts as inside lies in the triangle's box, widened by
+ * the share of its sides that this error is of its area. */
 typedef struct {
     double x[3], y[3], dx[3], dy[3];
     ear_box box;
@@ -184,7 +185,7 @@ static ear_triangle ear_of(const ear_face *f, int32_t i)
     t.box = (ear_box){fmin(fmin(t.x[0], t.x[1]), t.x[2]), fmin(fmin(t.y[0], t.y[1]), t.y[2]),
                       fmax(fmax(t.x[0], t.x[1]), t.x[2]), fmax(fmax(t.y[0], t.y[1]), t.y[2]), 0};
     const double more =
-        0x1p-46 / fabs(turn_at(f, i)); /* infinite for a straight corner: all of the line counts as inside */
+        0x1p-46 / fabs(turn_at(f, i)); /* infinite for a straight corner: points on its line count as inside */
     const double more_x = more * (t.box.x1 - t.box.x0) + 0x1p-50, more_y = more * (t.box.y1 - t.box.y0) + 0x1p-50;
     t.box.x0 -= more < 1 ? more_x : 8, t.box.x1 += more < 1 ? more_x : 8;
     t.box.y0 -= more < 1 ? more_y : 8, t.box.y1 += more < 1 ? more_y : 8;
@@ -211,7 +212,7 @@ static inline int is_in_ear(const ear_triangle *t, double x, double y)
     return 1;
 }
 
-/* A reflex corner in the triangle, with its border but not its corners, or -1. */
+/* A reflex corner in the triangle or on its border, except its corners; or -1. */
 static int32_t find_blocker(ear_face *f, const ear_triangle *t, uint32_t seed)
 {
     int64_t stack[TL_EAR_WIDTH * TL_EAR_LEVELS];
@@ -242,7 +243,7 @@ static int32_t find_blocker(ear_face *f, const ear_triangle *t, uint32_t seed)
     return -1;
 }
 
-/* The first ear from a corner on; where there is none its successor. */
+/* The first ear from a corner on; if there is none, the next corner. */
 static int32_t find_ear(ear_face *f, int32_t from)
 {
     for (;;) {
@@ -263,7 +264,7 @@ static int32_t find_ear(ear_face *f, int32_t from)
     }
 }
 
-/* Takes a corner off; its neighbours are looked at anew. */
+/* Cuts a corner off, and tests its neighbours again. */
 static void cut_off(ear_face *f, int32_t i)
 {
     const int32_t sides[2] = {f->before[i], f->after[i]};
@@ -283,7 +284,7 @@ static void cut_off(ear_face *f, int32_t i)
     }
 }
 
-/* Makes room for a face of k corners, to fill in their x and y. */
+/* Sets up the arrays of a face of k corners; x and y are to be filled in. */
 static void open_ears(ear_face *f, int32_t k, int64_t *room)
 {
     f->x = (double *)room, f->y = f->x + k, room += 2 * (int64_t)k;
@@ -315,7 +316,7 @@ static void link_ears(ear_face *f, int32_t k)
             set_bit(f, i);
 }
 
-/* The area vector of a face, and whether it has a reflex corner (of four the second or the last). */
+/* Sets the area vector of a face; returns whether it has a reflex corner (of four corners the second or the last). */
 static int measure_face(const tl_faces *faces, const int64_t *corners, int64_t k, double *area)
 {
     const double *origin = faces->points + 3 * corners[0];
@@ -341,7 +342,7 @@ static int measure_face(const tl_faces *faces, const int64_t *corners, int64_t k
     return 0;
 }
 
-/* The corners seen from the end of the area vector: x to the right, y up, the farthest 1 away from the first. */
+/* Projects the corners along the area vector: x to the right, y up, scaled so that the farthest is 1 from the first. */
 static void flatten_face(ear_face *f, const tl_faces *faces, const int64_t *corners, int64_t k, const double *area)
 {
     int axis = 0;
@@ -366,8 +367,8 @@ static int64_t *put_ear(int64_t *triangles, int64_t start, int64_t a, int64_t b,
     return triangles + 3;
 }
 
-/* Cuts all faces: three rows of corners for each triangle, the winding and the order of the faces.  Returns how many
- * faces are finished: fewer than all when they take more steps than they may, or are given up. */
+/* Triangles keep the winding and the order of the faces.  Fewer faces than all are finished when they exceed
+ * most_steps, or the call is given up. */
 static int64_t cut_faces(const tl_faces *faces, int64_t *triangles, int64_t *room)
 {
     int64_t start = 0, n_polled = 0;

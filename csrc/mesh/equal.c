@@ -1,8 +1,8 @@
-/* Equal rows: which rows of words are the same, by a table of hashes with open addressing.
+/* Equal rows: finds equal rows of words by a table of hashes with open addressing.
  * In: rows of 32-bit words.  Out: groups in the order of their first rows.
  *
- * Hashes of a block of rows are found before the rows are looked up, so that the cache lines of the table are on their
- * way: 1,500,000 corners of an STL file take a third of the time of sorting them.
+ * Hashes of a block of rows are computed before the rows are looked up, so that the cache lines of the table are
+ * prefetched: 1,500,000 corners of an STL file take a third of the time of sorting them.
  *
  * Based on: D. E. Knuth, The Art of Computer Programming 3, 6.4, 1973 (linear probing). */
 #ifndef TL_EQUAL_C
@@ -15,7 +15,7 @@
 
 enum {
     TL_HASHED_TOGETHER = 32,
-    TL_MOST_PROBES = 64, /* of a row on average: files can be made to have equal hashes */
+    TL_MOST_PROBES = 64, /* for a row, on average: malicious files may have equal hashes */
 };
 
 TL_INLINE uint64_t hash_of(const uint32_t *row, int n_words)
@@ -28,8 +28,7 @@ TL_INLINE uint64_t hash_of(const uint32_t *row, int n_words)
     return key * 0xBF58476D1CE4E5B9u;
 }
 
-/* The slots of the table are -1 or groups; 2^table_bits of them, more than n.  Returns how many groups there are, or -1
- * if it takes too long. */
+/* The 2^table_bits slots of the table are -1 or groups. */
 static int64_t group_rows(const uint32_t *rows, int n_words, int64_t n, int table_bits, int32_t *table, int32_t *first,
                           int32_t *group)
 {

@@ -1,6 +1,6 @@
-/* Lens: where directions are seen in the picture of a lens, a vector of points at a time.
- * In: points in eye space, a lens.  Out: points that a camera without the lens would show there; records of those that
- * lie well in the picture, by which edges are found to be straight.
+/* Lens: projects points by a lens, a vector of points at a time.
+ * In: points in eye space, a lens.  Out: points that a camera without the lens would project there; records of those
+ * well inside the picture, by which edges are tested for straightness.
  *
  * Based on: D. C. Brown, Close-Range Camera Calibration, 1971 (radial and tangential terms); J. Kannala and S. S.
  * Brandt, A Generic Camera Model, 2006 (the fisheye); both with the terms and names of OpenCV. */
@@ -17,11 +17,11 @@
 #define TL_PI 0x1.921fb54442d18p+1
 #define TL_LEAST_RANGE 0x1p-1022
 
-/* Records: the unit direction, and the squared chord within which edges are straight; or one of these instead. */
+/* Records: the unit direction, and the squared chord within which edges are straight; or one of these constants. */
 #define TL_NOT_PLAIN -1.0f
-#define TL_TOO_NEAR -2.0f /* nearer than the near plane, too */
+#define TL_TOO_NEAR -2.0f /* and nearer than the near plane */
 
-/* Points in camera axes, and where the lens shows them. */
+/* Points in camera axes, and their projection by the lens. */
 typedef struct {
     vd p[3], far, off_axis, direction[3];
     vd place[2], reach;
@@ -29,7 +29,7 @@ typedef struct {
 
 TL_INLINE vd vd_fixed(double a, vd b, double c) { return vd_add(vd_mul(vd_set1(a), b), vd_set1(c)); }
 
-/* The plane that a tilt turns about its axes x, then y, seen from the lens. */
+/* Projects onto the plane that tau_x, then tau_y tilt. */
 static void tilt_lanes(const tl_lens *lens, vd *place)
 {
     const double cos_x = lens->tilt[0], sin_x = lens->tilt[1], cos_y = lens->tilt[2], sin_y = lens->tilt[3];
@@ -88,7 +88,7 @@ TL_INLINE void distort_fisheye(const tl_lens *lens, const vd *p, vd off_axis, vd
     place[0] = vd_mul(p[0], scale), place[1] = vd_mul(p[1], scale);
 }
 
-/* Measures points: distances, directions, ranges. */
+/* Sets distances, directions and ranges of points. */
 TL_INLINE void measure_lanes(const tl_lens *lens, lens_lanes *l)
 {
     const vd *p = l->p, zero = vd_set1(0.0), one = vd_set1(1.0);
@@ -110,7 +110,7 @@ TL_INLINE void distort_lanes(const tl_lens *lens, const vd *p, vd off_axis, vd *
         distort_opencv(lens, p, place);
 }
 
-/* The places of points beyond the limit in m: those on the limit, and from there on outwards. */
+/* Places points beyond the limit, in m: from their place at the limit on outwards, evenly. */
 static void go_on_outwards(const tl_lens *lens, lens_lanes *l, vm m)
 {
     const vd zero = vd_set1(0.0), one = vd_set1(1.0);
@@ -127,7 +127,7 @@ static void go_on_outwards(const tl_lens *lens, lens_lanes *l, vm m)
     l->place[1] = vd_select(m, vd_add(place[1], vd_mul(outwards, y)), l->place[1]);
 }
 
-/* Where points are seen, whatever they are. */
+/* Projects any points. */
 static void see_lanes(const tl_lens *lens, lens_lanes *l)
 {
     measure_lanes(lens, l);
@@ -137,8 +137,7 @@ static void see_lanes(const tl_lens *lens, lens_lanes *l)
         go_on_outwards(lens, l, beyond);
 }
 
-/* Records of points, by float32: their users leave more room than that.  A point that is too near is so for
- * certain. */
+/* Makes the records of points in float32: their users allow for its error.  TL_TOO_NEAR is certain. */
 TL_INLINE void make_records(const tl_lens *lens, const vd *p, vf *record)
 {
     const vf x = vf_from_vd(p[0]), y = vf_from_vd(p[1]), z = vf_from_vd(p[2]);
@@ -147,7 +146,7 @@ TL_INLINE void make_records(const tl_lens *lens, const vd *p, vf *record)
     record[0] = vf_mul(x, inverse), record[1] = vf_mul(y, inverse), record[2] = vf_mul(z, inverse);
     const vf ahead = vf_sub(one, record[2]);
     const vf sides = vf_add(vf_mul(record[0], record[0]), vf_mul(record[1], record[1]));
-    const vf from_axis = vf_add(sides, vf_mul(ahead, ahead)); /* as a chord, squared */
+    const vf from_axis = vf_add(sides, vf_mul(ahead, ahead)); /* squared chord */
     const vi ring = vi_floor(vf_sqrt(vf_mul(from_axis, vf_set1(lens->ring_scale))));
     const vi last = vi_set1(TL_LENS_RINGS - 1);
     const vf allowed = vf_lookup(lens->allowed, vi_max(vi_min(ring, last), vi_set1(0)));
@@ -159,7 +158,7 @@ TL_INLINE void make_records(const tl_lens *lens, const vd *p, vf *record)
     record[3] = vf_select(is_far, record[3], vf_set1(TL_TOO_NEAR));
 }
 
-/* Loads up to TL_LANES rows of float32 or float64, the last of them again where there are fewer. */
+/* Loads up to TL_LANES rows of float32 or float64; other lanes repeat the last row. */
 TL_INLINE void load_rows_of_three(const void *rows, int is_f32, int64_t i, int64_t n, vd *p)
 {
     const float *f32 = (const float *)rows + 3 * i;
@@ -185,14 +184,14 @@ TL_INLINE void load_rows_of_three(const void *rows, int is_f32, int64_t i, int64
     }
 }
 
-/* From eye space to camera axes. */
+/* From eye space to camera axes, or back. */
 TL_INLINE void flip_axes(vd *p)
 {
     const vd zero = vd_set1(0.0);
     p[1] = vd_sub(zero, p[1]), p[2] = vd_sub(zero, p[2]);
 }
 
-/* Moves points as move_points does, by the rows of an affine matrix. */
+/* Transforms points by the rows of an affine matrix, as `move_points` does. */
 TL_INLINE void move_lanes(const double *matrix, vd *p)
 {
     const vd x = p[0], y = p[1], z = p[2];
@@ -203,7 +202,7 @@ TL_INLINE void move_lanes(const double *matrix, vd *p)
     }
 }
 
-/* Writes TL_LANES rows of three, or fewer. */
+/* Writes n rows of three, TL_LANES at most. */
 TL_INLINE void store_eye_points(double *rows, int64_t n, const vd *columns)
 {
     double lanes[3][TL_MAX_LANES];
@@ -214,8 +213,7 @@ TL_INLINE void store_eye_points(double *rows, int64_t n, const vd *columns)
             rows[3 * lane + k] = lanes[k][lane];
 }
 
-/* Bends vertices [first, end), moved to eye space, as far as they are plain: others have some place.  Writes the
- * records of all. */
+/* Points that are not plain get an arbitrary place. */
 static void bend_vertices(const tl_lens *lens, const tl_source *source, const double *eye_from, int64_t first,
                           int64_t end, double *bent, float *records)
 {
@@ -252,7 +250,6 @@ static void bend_vertices(const tl_lens *lens, const tl_source *source, const do
     }
 }
 
-/* The places (n, 2) in the image plane of points (n, 3) in eye space. */
 static void see_points(const tl_lens *lens, const double *points, int64_t n, double *places)
 {
     for (int64_t i = 0; i < n; i += TL_LANES) {

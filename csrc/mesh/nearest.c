@@ -1,8 +1,8 @@
-/* Nearest: the point of a surface that is nearest to a point, by a tree of boxes over triangles in an order that keeps
- * neighbours together.
- * In: points and triangles.  Out: the tree; the nearest triangle of each point, and where on it.
+/* Nearest: the point of a surface that is nearest to a point, by a tree of boxes over triangles sorted so that
+ * neighbours are together.
+ * In: points and triangles.  Out: the tree; the nearest triangle of each point, and the nearest point of it.
  *
- * The point that is found lies on its triangle whatever happens in the tree, so the distance to it is never too small.
+ * The result lies on its triangle whatever the tree does, so the distance to it is never too small.
  *
  * Based on: N. Roussopoulos, S. Kelley, F. Vincent, Nearest Neighbor Queries, 1995 (boxes in the order of their
  * distance); C. Ericson, Real-Time Collision Detection, 2005 (the point of a segment nearest to a point). */
@@ -16,7 +16,7 @@
 #include "nearest.h"
 #include "lanes/lanes.h"
 
-/* Where a point is nearest to the surface. */
+/* The nearest point of the surface to a point. */
 typedef struct {
     double at[3];
     double squared; /* distance */
@@ -43,7 +43,7 @@ TL_INLINE double nearest_of_segment(const double p[3], const double a[3], const 
     return squared_between(p, at);
 }
 
-/* The point of the triangle that p is above or below, and its squared distance; infinity where that is not inside. */
+/* The projection of p onto the triangle, and its squared distance; infinity where it is outside. */
 TL_INLINE double above_inside(const double p[3], const double a[3], const double b[3], const double c[3], double at[3])
 {
     const double ab[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, ac[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
@@ -59,8 +59,8 @@ TL_INLINE double above_inside(const double p[3], const double a[3], const double
     return squared_between(p, at);
 }
 
-/* The point of the triangle that is nearest to p: above its inside, or on a side.  A needle with its inside lost in
- * rounding has its sides. */
+/* The point of the triangle that is nearest to p: its projection, or on a side.  For a needle whose inside is lost in
+ * rounding, on a side. */
 static double nearest_of_triangle(const double p[3], const double a[3], const double b[3], const double c[3],
                                   double at[3])
 {
@@ -83,7 +83,7 @@ TL_INLINE const double *corner_of(const tl_surface *s, int64_t triangle, int k)
     return s->points + 3 * (int64_t)s->triangles[3 * triangle + k];
 }
 
-/* The foot of p on one triangle. */
+/* Sets the foot of p on one triangle. */
 static void set_foot(const tl_surface *s, const double p[3], int64_t triangle, foot *out)
 {
     out->triangle = triangle;
@@ -91,7 +91,7 @@ static void set_foot(const tl_surface *s, const double p[3], int64_t triangle, f
                                        corner_of(s, triangle, 2), out->at);
 }
 
-/* No more than the squared distances of p from the boxes of a node: a sum and its parts are rounded 8 times. */
+/* Lower bounds of the squared distances of p from the boxes of a node: a sum and its parts are rounded 8 times. */
 TL_INLINE void box_distances(const tl_tree_node *node, const float p[3], float out[TL_TREE_WIDTH])
 {
     for (int k = 0; k < TL_TREE_WIDTH; k++) {
@@ -106,8 +106,8 @@ TL_INLINE void box_distances(const tl_tree_node *node, const float p[3], float o
     }
 }
 
-/* Improves the foot of p to the nearest of all triangles, the first of those equally near; it must be one already.
- * So it does not depend on where the search begins, which is on the triangle of the point before. */
+/* Improves a foot of p to the nearest of all triangles, the first of those equally near.  So the result does not depend
+ * on the start, which is the triangle of the point before. */
 static void improve_foot(const tl_surface *s, const double p[3], foot *best)
 {
     struct {
@@ -206,7 +206,6 @@ static void build_tree(tl_surface *s)
     }
 }
 
-/* The foot of each of n points on one triangle: where it is, and its squared distance. */
 static void set_feet(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle,
                      const int32_t *point, int64_t n, double *at, double *squared)
 {
@@ -217,7 +216,6 @@ static void set_feet(const double *points, const int32_t *triangles, const doubl
     }
 }
 
-/* The nearest triangle of points [first, end), and where on it; `at` may be NULL.  Returns the largest distance. */
 static double nearest_of_points(const tl_surface *s, const double *points, int64_t first, int64_t end,
                                 int32_t *triangle, double *at)
 {

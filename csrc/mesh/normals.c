@@ -1,12 +1,11 @@
-/* Normals of triangles and of vertices, which side these are on, and the box round a mesh; and rows of three numbers as
- * unit vectors, turned, moved, and as the rows of four that shading reads.
+/* Normals of triangles and of vertices, which side these point to, and the box of a mesh; and rows of three numbers as
+ * unit vectors, rotated, transformed, and as the rows of four that shading reads.
  * In: vertices, triangles, vectors or colours of a mesh.  Out: unit vectors, flags, a box; rows of float64 (n, 3), or
- * of float32 (n, 4) with 1 as last number.
+ * of float32 (n, 4) with 1 as the fourth number.
  *
- * Triangles go by blocks: corners are gathered one by one, all that follows is computed a vector of triangles at a
- * time, and sums are scattered one by one.  Angles have an arctangent of their own, as those of C libraries differ.
- * All else is sums, products, quotients and roots, each rounded once, in the order that is written: every machine has
- * the same bits.
+ * Triangles are processed by blocks: corners are gathered one by one, normals are computed a vector of triangles at a
+ * time, and sums are scattered one by one.  Angles use angle.h, because arctangents of C libraries differ.  All else is
+ * sums, products, quotients and roots, each rounded once, in the written order: every machine gives equal bits.
  *
  * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools
  * 3(1), 1998; W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014. */
@@ -22,8 +21,8 @@
 #include "lanes/angle.h"
 #include "lanes/lanes.h"
 
-/* The powers of two, 2^-1 to 2^1022, that take numbers up to 2^1022 to [1/2, 1): products with them are exact down
- * to 2^-1074; and their inverses. */
+/* Powers of two, 2^-1 to 2^1022, that scale numbers up to 2^1022 to [1/2, 1): products with them are exact down to
+ * 2^-1074; and their inverses. */
 TL_INLINE vd power_to_one(vd a) { return vd_power(a, 2045ull << 52, 2047ull << 52); }
 TL_INLINE vd power_from_one(vd power) { return vd_power(power, 2046ull << 52, 2047ull << 52); }
 
@@ -34,7 +33,7 @@ TL_INLINE vd dot_of(const vd *a, const vd *b)
     return vd_add(vd_add(vd_mul(a[0], b[0]), vd_mul(a[1], b[1])), vd_mul(a[2], b[2]));
 }
 
-/* Vectors, of numbers below 2^1022, scaled to length 1, however long they are; zero stays zero.  Returns their
+/* Scales vectors, of numbers below 2^1022, to length 1, whatever their length; zero stays zero.  Returns their
  * lengths. */
 TL_INLINE vd to_unit(vd *v)
 {
@@ -42,7 +41,7 @@ TL_INLINE vd to_unit(vd *v)
     for (int k = 0; k < 3; k++)
         v[k] = vd_mul(v[k], power);
     const vd length = vd_sqrt(dot_of(v, v));
-    const vm is_any = vd_ge(length, vd_set1(0x1p-60)); /* the largest number is 2^-52 or more, then */
+    const vm is_any = vd_ge(length, vd_set1(0x1p-60)); /* the largest number is then 2^-52 or more */
     const vd divisor = vd_select(is_any, length, vd_set1(1.0));
     for (int k = 0; k < 3; k++)
         v[k] = vd_select(is_any, vd_div(v[k], divisor), vd_set1(0.0));
@@ -58,7 +57,7 @@ static inline void load_three(const tl_source *source, int64_t i, double *p)
 
 #define TL_DIRECTIONS 64 /* at a time, whole vectors of lanes */
 
-/* Scales down vectors with squares that would overflow; those that are not finite become zero. */
+/* Loads vectors, scaled down if their squares would overflow; vectors that are not finite become zero. */
 static void gather_vectors(const tl_source *vectors, int64_t first, int n, double (*v)[TL_DIRECTIONS])
 {
     for (int i = 0; i < n; i++) {
@@ -148,7 +147,7 @@ typedef struct {
     double angle[3][TL_FACES];     /* by corner */
 } face_block;
 
-/* The first of some triangles with an index outside the vertices, -1 if there is none. */
+/* The first of triangles [first, end) with an index outside the vertices, or -1. */
 static int64_t bad_face(const int32_t *triangles, int64_t first, int64_t end, int64_t n_vertices)
 {
     const uint32_t limit = (uint32_t)(n_vertices < INT32_MAX ? n_vertices : INT32_MAX);
@@ -161,7 +160,8 @@ static int64_t bad_face(const int32_t *triangles, int64_t first, int64_t end, in
     return -1;
 }
 
-/* Differences of numbers beyond 2^1000 might overflow: such a face is made smaller, exactly. */
+/* Loads the corners of a block.  Differences of numbers beyond 2^1000 might overflow: such a face is scaled down,
+ * exactly. */
 TL_INLINE void gather_as(const void *data, int is_f32, const int32_t *triangles, face_block *b)
 {
     for (int i = 0; i < b->n; i++) {
@@ -187,9 +187,9 @@ static void gather_corners(const tl_source *source, const int32_t *triangles, fa
         gather_as(source->data, 0, triangles, b);
 }
 
-/* Of three values the one at the corner with the largest angle. */
+/* Selects from three values the value at the corner with the largest angle. */
 typedef struct {
-    vm is_first, is_not_last; /* corner 0 rather than 1; one of these rather than 2 */
+    vm is_first, is_not_last; /* corner 0 rather than 1; 0 or 1 rather than 2 */
 } widest_corner;
 
 TL_INLINE vd pick_widest(widest_corner w, vd at_0, vd at_1, vd at_2)
@@ -197,9 +197,8 @@ TL_INLINE vd pick_widest(widest_corner w, vd at_0, vd at_1, vd at_2)
     return vd_select(w.is_not_last, vd_select(w.is_first, at_0, at_1), at_2);
 }
 
-/* Normals and, where wanted, angles.  Both begin at the corner with the largest angle, between the two shortest sides:
- * their product loses least for needles.  With the corners the other way round, the normal changes its sign and nothing
- * else. */
+/* Sets normals and, if wanted, angles.  Both start at the corner with the largest angle, between the two shortest
+ * sides: their product loses least for needles.  Swapping corners changes only the sign of the normal. */
 TL_INLINE void measure_block(face_block *b, int with_angles)
 {
     for (int i = 0; i < b->n; i += TL_LANES) {
@@ -237,7 +236,7 @@ TL_INLINE void measure_block(face_block *b, int with_angles)
     }
 }
 
-/* A block of neighbours.  Returns -1, or a row with an index outside the vertices. */
+/* Loads a block of consecutive triangles.  Returns -1, or a row with an index outside the vertices. */
 static int64_t load_block(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, face_block *b)
 {
     b->n = (int)(end - first < TL_FACES ? end - first : TL_FACES);
@@ -269,8 +268,8 @@ static void add_block(face_block *b, const tl_source *source, const int32_t *tri
     b->n = 0;
 }
 
-/* Goes through all triangles, and computes those that have one of the vertices: a range of vertices needs no other's
- * sums, and each sum has the order of the faces. */
+/* Reads all triangles, and computes those that have one of the vertices: so no range of vertices needs sums of another,
+ * and each sum has the order of the faces. */
 static int64_t vertex_normals(const tl_source *source, const int32_t *triangles, int64_t n_triangles, int64_t first,
                               int64_t end, double *out)
 {

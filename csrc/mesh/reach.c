@@ -1,12 +1,12 @@
 /* Reach: how far the points of triangles can lie from a surface, bounded from above, by branch and bound.
- * In: triangles and the surface.  Out: a distance that is met and one that is not passed.
+ * In: triangles and the surface.  Out: a distance that some point reaches, and a bound that no point exceeds.
  *
  * The distance from one triangle of the surface is a convex function, so over a convex piece of a triangle it is
- * largest at a corner, and the distance from the surface is not larger than that.  No point of a piece is farther from
- * the surface than its middle by more than its radius, either.  Where neither is near enough to the known
- * distance, the piece is cut along the sides of the triangle that is nearest to its middle: the part above that one
- * is judged by it, the rest by others.  Where that does not help, the piece is halved.  A bound holds wherever the cuts
- * are, and whichever triangle judges: the last ones are tried before the tree.
+ * largest at a corner, and the distance from the surface is not larger.  Also, no point of a piece is farther from the
+ * surface than its middle by more than its radius.  Where neither bound is near enough to the known distance, the piece
+ * is cut along the sides of the triangle that is nearest to its middle: that triangle bounds the part above it, other
+ * triangles bound the rest.  Where that does not help, the piece is halved.  A bound holds wherever the cuts are, and
+ * whichever triangle gives it: recent triangles are tried before the tree.
  *
  * Based on: M. Tang, M. Lee, Y. J. Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009;
  * M. Guthe, P. Borodin, R. Klein, Fast and Accurate Hausdorff Distance Calculation between Meshes, 2005 (branch and
@@ -23,8 +23,8 @@
 
 enum {
     TL_PIECE_CORNERS = 12,
-    TL_PIECES = 96, /* that wait; when there is no room a piece is taken as it is */
-    TL_RECENT = 8,  /* triangles that are remembered: blob of 10^6 and its 250,000, 6.1 s of CPU time to 4.4 */
+    TL_PIECES = 96, /* on the stack; without room a piece is bounded without a cut */
+    TL_RECENT = 8,  /* recent triangles: blob of 10^6 and its 250,000, 6.1 s of CPU time to 4.4 */
 };
 
 /* A convex piece of a triangle. */
@@ -39,7 +39,7 @@ typedef struct {
     double across[3]; /* the normal of the triangle, of any length */
     double share, least;
     double known;
-    int64_t recent[TL_RECENT]; /* triangles that have judged, the latest first: neighbours are near them, too */
+    int64_t recent[TL_RECENT]; /* triangles that gave bounds, the latest first: neighbours are near them, too */
 } reaching;
 
 static void cross_f64(const double a[3], const double b[3], double out[3])
@@ -56,8 +56,8 @@ static void add_corner(convex *p, const double at[3])
     p->n++;
 }
 
-/* Cuts a piece by the plane through `at`, into the part in the direction of `normal` and the rest.  Returns 0 and
- * cuts nothing where either would be thinner than `slack`.  There must be room for two corners more. */
+/* Cuts a piece by the plane through `at`, into the part in the direction of `normal` and the rest.  Returns 0 and cuts
+ * nothing where either part would be thinner than `slack`.  There must be room for two corners more. */
 static int cut(const convex *p, const double at[3], const double normal[3], double slack, convex *inside,
                convex *outside)
 {
@@ -89,7 +89,7 @@ static int cut(const convex *p, const double at[3], const double normal[3], doub
     return 1;
 }
 
-/* The largest squared distance of a piece's corners from a triangle, and which corner that is. */
+/* The largest squared distance of a piece's corners from a triangle; sets *farthest to that corner. */
 static double squared_from_triangle(const tl_surface *s, const convex *p, int64_t triangle, int *farthest)
 {
     double largest = 0.0, at[3];
@@ -103,7 +103,7 @@ static double squared_from_triangle(const tl_surface *s, const convex *p, int64_
     return largest;
 }
 
-/* Puts a triangle first of those that are remembered, in place of the one at [i]. */
+/* Moves a triangle to the front of the recent triangles, in place of the one at [i]. */
 TL_INLINE void remember(reaching *r, int64_t triangle, int i)
 {
     for (; i > 0; i--)
@@ -111,7 +111,7 @@ TL_INLINE void remember(reaching *r, int64_t triangle, int i)
     r->recent[0] = triangle;
 }
 
-/* The foot of a point, which is a distance that is met. */
+/* The foot of a point; its distance is reached. */
 static foot foot_of(reaching *r, const double p[3])
 {
     foot best;
@@ -133,8 +133,8 @@ static double enough_of(const reaching *r)
     return r->known + (more > r->least ? more : r->least);
 }
 
-/* The foot of the middle of a piece: on a triangle that is remembered, if the middle lies above its inside and not
- * farther than the known distance; else on the nearest. */
+/* The foot of the middle of a piece: on a recent triangle, if the middle projects inside it and is not farther than the
+ * known distance; else on the nearest triangle. */
 static foot foot_of_middle(reaching *r, const double middle[3])
 {
     const tl_surface *s = r->surface;
@@ -150,8 +150,8 @@ static foot foot_of_middle(reaching *r, const double middle[3])
     return foot_of(r, middle);
 }
 
-/* Cuts a piece along the sides of a triangle, across the triangle that it is of; pushes the parts outside.  Returns how
- * many there are. */
+/* Cuts a piece along the sides of a triangle, perpendicular to the piece's triangle; pushes the parts outside.  Returns
+ * how many. */
 static int cut_along(const reaching *r, convex *p, int64_t triangle, double slack, convex *rest)
 {
     int n = 0;
@@ -176,7 +176,8 @@ static int cut_along(const reaching *r, convex *p, int64_t triangle, double slac
     return n;
 }
 
-/* Halves a piece across its longest radius; one with many corners by a diagonal.  The second half follows the first. */
+/* Halves a piece across its longest radius; a piece with many corners by a diagonal.  The second half is stored after
+ * the first. */
 static void halve(convex *p, const double middle[3])
 {
     const convex whole = *p;
@@ -200,7 +201,7 @@ static void halve(convex *p, const double middle[3])
     cut(&whole, middle, along, 0.0, p, other);
 }
 
-/* The middle of a piece, and its squared radius round it. */
+/* Sets the middle of a piece; returns its squared radius around it. */
 static double middle_of(const convex *p, double middle[3])
 {
     double largest = 0.0;
@@ -217,7 +218,7 @@ static double middle_of(const convex *p, double middle[3])
     return largest;
 }
 
-/* A bound for a piece, by the cheapest means that is enough; else a part of it stays on top, and the rest
+/* Bounds a piece, by the cheapest means that suffices; else leaves a part of it on top of the stack, and the rest
  * below. */
 static double bound_piece(reaching *r, convex *stack, int *n)
 {
@@ -252,8 +253,7 @@ static double bound_piece(reaching *r, convex *stack, int *n)
     return 0.0;
 }
 
-/* How far triangles [first, end) can be from a surface.  Each is looked at by itself, beginning from `reach->known`, so
- * that the result does not depend on how many there are in a range. */
+/* Each triangle starts from `reach->known`, so that the result does not depend on the range. */
 static void find_reach(const tl_surface *s, const double *points, const int32_t *triangles, int64_t first, int64_t end,
                        double share, double least, tl_reach *reach)
 {
