@@ -19,7 +19,7 @@ from topleft._core.raster.composite import composite
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.peel import DepthLayers, peel
 from topleft._core.raster.points import PointFragments, points
-from topleft._core.raster.poses import FragmentsBatch
+from topleft._core.raster.poses import FragmentsBatch, rasterize_poses
 from topleft._core.raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.file_cameras import load_cameras
@@ -159,6 +159,7 @@ __all__ = [
     "polygons",
     "rasterize",
     "rasterize_mesh",
+    "rasterize_poses",
     "release_memory",
     "render",
     "render_batch",

@@ -22,7 +22,7 @@ POINTS = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.5], [0.0, 4.0, 0.0]]
 ONE = [[0, 1, 2]]
 FRAGS = tl.rasterize_mesh(CUBE, CAMERA, SIZE)
 LAYERS = tl.peel(CUBE.vertices, CUBE.triangles, SIZE, transform=CAMERA.clip_from_world(SIZE), layers=2)
-POSES = tl.rasterize([POINTS, POINTS], ONE, SIZE)
+POSES = tl.rasterize_poses([POINTS, POINTS], ONE, SIZE)
 CLOUD = tl.points(POINTS, SIZE)
 TABLE = tl.overlap([FLAT], SIZE)
 PLAN = tl.plan(POINTS, ONE, SIZE)
@@ -113,6 +113,8 @@ CALLS = {
                        "depth_test": "less", "tolerance": 0.0}),
     "rasterize": (tl.rasterize, {"vertices": POINTS, "triangles": ONE, "size": SIZE, "depth_test": "less",
                                  "background_depth": None, "out": None, **VIEW}),
+    "rasterize_poses": (tl.rasterize_poses, {"vertices": [POINTS, POINTS], "triangles": ONE, "size": SIZE,
+                                             "depth_test": "less", "background_depth": None, "out": None, **VIEW}),
     "rasterize_mesh": (tl.rasterize_mesh, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "cull": "none",
                                            "tolerance": 0.0, "threads": None, "rasterizer": None, "origin": (0, 0),
                                            "viewport": None}),

@@ -224,7 +224,7 @@ def merge(changing: Changing) -> Case:
 
 
 def rasters(changing: Changing) -> Case:
-    """`field`, `height_map`, `tiles`, and `rasterize` of a batch of poses."""
+    """`field`, `height_map`, `tiles`, and `rasterize_poses`."""
     draw, size = changing.draw, size_of(changing.draw)
     name = draw.of(["field", "height_map", "tiles", "poses"])
     view = options_of(draw, SAMPLINGS)
@@ -254,7 +254,7 @@ def rasters(changing: Changing) -> Case:
 
     def call() -> None:
         if name == "poses":
-            tl.rasterize(poses, triangles, size, **options).interpolate(vertices)
+            tl.rasterize_poses(poses, triangles, size, **options).interpolate(vertices)
         elif name == "tiles":
             raster = tl.tiles(mesh, size, **options)
             attempts(lambda: next(iter(raster)).pixels, lambda: raster[:40, :90])

@@ -368,7 +368,7 @@ def tiles_case(draw: Draw) -> Case:
 
 
 def batch_case(draw: Draw) -> Case:
-    """`rasterize` of many poses of a mesh."""
+    """`rasterize_poses`."""
     size, view = (draw.source.integer(1, 50), draw.source.integer(1, 40)), view_of(draw, SAMPLINGS)
     n, n_vertices, n_triangles = draw.of([3, 1, 0]), draw.of([6, 3, 40, 0]), draw.of([2, 1, 0, 30])
     columns = 3 if "transform" in view else draw.of([3, 2, 4])
@@ -380,10 +380,8 @@ def batch_case(draw: Draw) -> Case:
     view["depth_test"] = draw.of(["less", "greater", None])
 
     def call(*arrays: Any, **options: Any) -> Any:
-        found = tl.rasterize(*arrays, size, **options)
-        if isinstance(found, tl.FragmentsBatch):
-            return [found.triangle, found.depth, found.barycentric()]
-        return found
+        found = tl.rasterize_poses(*arrays, size, **options)
+        return [found.triangle, found.depth, found.barycentric()]
 
     return Case(f"poses {size}", call, inputs, view)
 

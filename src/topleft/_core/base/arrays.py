@@ -136,7 +136,8 @@ def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
     if array.size == 0 and array.ndim == 1:
         array = array.reshape(0, 3 if has_transform else 2)
     if array.ndim != 2 or array.shape[1] not in ((3,) if has_transform else (2, 3, 4)):
-        raise ValueError(f"vertices must have shape {wish}, got {array.shape}")
+        poses = "; rasterize_poses takes (B, V, C)" if array.ndim == 3 else ""
+        raise ValueError(f"vertices must have shape {wish}, got {array.shape}{poses}")
     if array.shape[0] > INT32_MAX:
         raise ValueError(f"vertices must have at most {INT32_MAX} rows, got {array.shape[0]}")
     if array.dtype.kind == "f":
@@ -239,11 +240,12 @@ def narrow_triangles(
     refuse_rows(run_parts(narrow, len(triangles), n_threads), given, n_vertices)
 
 
-def as_transform(values: ArrayLike, *, has_poses: bool = False) -> NDArray[Any]:
-    """Return a finite (4, 4) transform, or with `has_poses` maybe several, (B, 4, 4)."""
+def as_transform(values: ArrayLike) -> NDArray[Any]:
+    """Return a finite (4, 4) transform."""
     array = as_array("transform", values)
-    if array.shape[-2:] != (4, 4) or array.ndim > 2 + has_poses:
-        raise ValueError(f"transform must have shape (4, 4), got {array.shape}")
+    if array.shape != (4, 4):
+        poses = "; rasterize_poses takes (B, 4, 4)" if array.ndim == 3 else ""
+        raise ValueError(f"transform must have shape (4, 4), got {array.shape}{poses}")
     check_real("transform", array)
     if not np.isfinite(array).all():
         raise ValueError("transform must be finite, got NaN or infinity")

@@ -1,4 +1,4 @@
-"""Draws many poses of one mesh: a visibility buffer for each, one behind the other.
+"""Draws many poses of a mesh: a visibility buffer for each, one behind the other.
 
 Input: vertices (B, V, C) or transforms (B, 4, 4), and triangles that all poses share. Output: `FragmentsBatch`.
 """
@@ -7,22 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal, cast, overload
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._core.base.arrays import as_array, as_checked_triangles, as_out, as_triangles
+from topleft._core.base.arrays import as_array, as_checked_triangles, as_out, as_transform, as_triangles
 from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.rasterize import FragmentOptions, draw_fragments, refuse_many
+from topleft._core.raster.rasterize import draw_arrays, fragment_options
 from topleft._core.raster.view import Planned, View, ViewOptions
 from topleft.typing import DepthTestOption, EncodingOption, FilterOption, WrapOption
 
 
 class FragmentsBatch(Sequence[Fragments]):
-    """The result of `rasterize` for a batch: a visibility buffer for each of B poses, behind each other.
+    """The visibility buffers of B poses that `rasterize_poses` returns, one behind the other.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class FragmentsBatch(Sequence[Fragments]):
     >>> import topleft as tl
     >>> poses = np.array([np.eye(4), np.diag([0.5, 0.5, 1, 1])])
     >>> corners = [(-1, -1, 0), (1, -1, 0), (-1, 1, 0)]
-    >>> batch = tl.rasterize(corners, [(0, 1, 2)], (4, 4), transform=poses)
+    >>> batch = tl.rasterize_poses(corners, [(0, 1, 2)], (4, 4), transform=poses)
     >>> batch.triangle.shape, batch.mask.sum(axis=(1, 2)).tolist()
     ((2, 4, 4), [6, 1])
     """
@@ -178,76 +178,6 @@ class FragmentsBatch(Sequence[Fragments]):
         return np.stack(found) if found else empty(shape, np.float32)
 
 
-def n_poses(vertices: object, transform: object) -> int | None:
-    """How many poses vertices (B, V, C) or transforms (B, 4, 4) have; None where they have no leading axis."""
-    counts = {}
-    for name, array in (("vertices", vertices), ("transform", transform)):
-        shape = getattr(array, "shape", ())
-        if len(shape) == 3 or depth_of_lists(array) == 3:
-            counts[name] = len(cast("Sequence[Any]", array))
-    if len(set(counts.values())) > 1:
-        raise ValueError(f"vertices and transform must have one number of poses, got {counts}")
-    return next(iter(counts.values()), None)
-
-
-def depth_of_lists(values: object) -> int:
-    """How many axes nested lists have, told by their first items."""
-    if isinstance(values, list | tuple):
-        return 1 + (depth_of_lists(values[0]) if values else 0)
-    return 0
-
-
-def draw_batch(
-    n: int,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    size: object,
-    options: ViewOptions,
-    depth_test: DepthTestOption | None,
-    background_depth: float | None,
-    out: object,
-) -> FragmentsBatch:
-    """`rasterize` of n poses: each is drawn by one thread, so many side by side as there are."""
-    view = View.parse(size, options, has_poses=True)
-    refuse_many(view, "rasterize")
-    fragment_options = FragmentOptions.parse(depth_test, background_depth, out)
-    (width, height), n_samples = view.size, view.sampling.n_samples
-    shape = (n, height, width) if n_samples == 1 else (n, height, width, n_samples)
-    outs: list[NDArray[Any] | None] = []
-    for name, array, dtype in (
-        ("triangle", fragment_options.ids_out, np.int32),
-        ("depth", fragment_options.depth_out, np.float32),
-    ):
-        if array is not None:
-            outs.append(as_out(f"out {name}", array, shape, dtype))
-        else:  # the planes of samples are each pose's own
-            outs.append(empty(shape, dtype) if n_samples == 1 else None)
-    points = as_array("vertices", vertices)
-    corners = triangles if view.plan is not None else as_triangles(triangles)
-    if isinstance(corners, np.ndarray) and corners.dtype == np.int64 and view.plan is None:  # once, not for each pose
-        corners = as_checked_triangles(corners, points.shape[-2] if points.ndim > 1 else 0)
-    matrices = view.transform
-    n_threads = min(n, available_threads() if view.threads is None else view.threads)
-    one = replace(view, threads=1) if n_threads > 1 else view
-    if view.plan is not None:
-        one = replace(one, plan=PlanOfPoses(view.plan))
-
-    def draw_some(first: int, end: int) -> list[Fragments]:
-        found = []
-        for i in range(first, end):
-            own = points[i] if points.ndim == 3 else points
-            transform = matrices[i] if matrices is not None and matrices.ndim == 3 else matrices
-            pose, arrays = replace(one, transform=transform), tuple(None if to is None else to[i] for to in outs)
-            found.append(draw_fragments(FRESH, own, corners, pose, depth_test, background_depth, arrays))
-        return found
-
-    drawn = [frags for part in run_parts(draw_some, n, n_threads) for frags in part] if n else []
-    ids, depth = outs
-    if n_samples == 1 and ids is not None and depth is not None:
-        return FragmentsBatch(ids, depth, drawn)
-    return FragmentsBatch.stacked(drawn, view.size)
-
-
 class PlanOfPoses(Planned):
     """A plan that many poses use at once: it notes no times, and draws no clusters."""
 
@@ -257,3 +187,84 @@ class PlanOfPoses(Planned):
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the plan's own triangles, as `Planned` does."""
         return self._plan.triangles_of(triangles, n_vertices)
+
+
+def rasterize_poses(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: int | tuple[int, int],
+    *,
+    depth_test: DepthTestOption | None = "less",
+    background_depth: float | None = None,
+    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None = None,
+    **view: Unpack[ViewOptions],
+) -> FragmentsBatch:
+    """Return the visibility buffers of B poses of a mesh, each drawn by one thread, on all cores.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (B, V, C) or (V, C)
+        As in `rasterize`, of each pose or of all.
+    triangles, size, depth_test, background_depth, **view
+        As in `rasterize`; `transform` may be (B, 4, 4). With a `plan` of one pose triangles are not checked again.
+    out : (ndarray of int32, ndarray of float32), each of shape (B, H, W), or (B, H, W, S) for S samples, optional
+        Where ids and depth go; either may be None.
+
+    Returns
+    -------
+    FragmentsBatch
+        ``.triangle`` and ``.depth`` (B, H, W); ``[i]`` is the `Fragments` of a pose, equal to what `rasterize` returns
+        for it.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As in `rasterize`; also where neither `vertices` nor `transform` has an axis of poses, or B differs.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> corners = [[0, 0], [4, 0], [0, 4]]
+    >>> tl.rasterize_poses([corners, corners[::-1]], [[0, 1, 2]], (4, 1)).triangle
+    array([[[ 0,  0,  0, -1]],
+    <BLANKLINE>
+           [[ 0,  0,  0, -1]]], dtype=int32)
+    """
+    transform, points = view.pop("transform", None), as_array("vertices", vertices)
+    matrices = np.empty(0) if transform is None else as_array("transform", transform)
+    counts = {len(array) for array in (points, matrices) if array.ndim == 3}
+    if len(counts) != 1:
+        wish = "vertices (B, V, C), transform (B, 4, 4) or both must have one number of poses B"
+        raise ValueError(f"{wish}, got {points.shape} and {None if transform is None else matrices.shape}")
+    (n,), checked = counts, View.parse(size, view)
+    options = fragment_options(checked, depth_test, background_depth, out)
+    of_poses = list(points) if points.ndim == 3 else [points] * n
+    matrix = None if transform is None or matrices.ndim == 3 else as_transform(matrices)
+    transforms = list(map(as_transform, matrices)) if matrices.ndim == 3 else [matrix] * n
+    (width, height), n_samples = checked.size, checked.sampling.n_samples
+    shape = (n, height, width) if n_samples == 1 else (n, height, width, n_samples)
+    outs: list[NDArray[Any] | None] = []
+    for name, array, dtype in (("triangle", options.ids_out, np.int32), ("depth", options.depth_out, np.float32)):
+        if array is not None:
+            outs.append(as_out(f"out {name}", array, shape, dtype))
+        else:  # each pose has planes for its samples
+            outs.append(empty(shape, dtype) if n_samples == 1 else None)
+    indices = triangles if checked.plan is not None else as_triangles(triangles)
+    if isinstance(indices, np.ndarray) and indices.dtype == np.int64 and checked.plan is None:  # once for all poses
+        indices = as_checked_triangles(indices, points.shape[-2] if points.ndim > 1 else 0)
+    n_threads = min(n, available_threads() if checked.threads is None else checked.threads)
+    if n_threads > 1:
+        checked = replace(checked, threads=1)
+    if checked.plan is not None:
+        checked = replace(checked, plan=PlanOfPoses(checked.plan))
+
+    def draw_pose(i: int) -> Fragments:
+        ids, depth = (None if array is None else array[i] for array in outs)
+        own = options._replace(ids_out=ids, depth_out=depth)
+        return draw_arrays(FRESH, of_poses[i], indices, replace(checked, transform=transforms[i]), own)
+
+    parts = run_parts(lambda first, end: [draw_pose(i) for i in range(first, end)], n, n_threads) if n else []
+    frags, (ids, depth) = [drawn for part in parts for drawn in part], outs
+    if n_samples == 1 and ids is not None and depth is not None:
+        return FragmentsBatch(ids, depth, frags)
+    return FragmentsBatch.stacked(frags, checked.size)

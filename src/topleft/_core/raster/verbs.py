@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from threading import Lock
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -15,7 +15,6 @@ from topleft._core.base.threads import parse_threads
 from topleft._core.raster.fill import Style, draw_fill
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.lines import draw_wireframe
-from topleft._core.raster.poses import draw_batch, n_poses
 from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import AlphaOption, BlendOption, DepthTestOption, PerOption, ResolveOption
@@ -232,17 +231,16 @@ def rasterize(
     Parameters
     ----------
     vertices, triangles, size, **view
-        As in `coverage`; vertices (B, V, C), `transform` (B, 4, 4), or both, draw a batch of B poses, on all cores.
-        The depth of pixel-space vertices (V, 3) is their third column; (V, 2) vertices lie at depth 0
-        and are drawn in painter's order.
+        As in `coverage`; `rasterize_poses` takes many poses of a mesh. The depth of pixel-space vertices (V, 3) is
+        their third column; (V, 2) vertices lie at depth 0 and are drawn in painter's order.
     depth_test : "less", "greater" or None
         Which triangle is kept: the one with the smaller depth, with the larger depth, or the later one. At equal depth
         the triangle with the lower index.
     background_depth : float, optional
         Depth where nothing is; +inf, or -inf with "greater", unless given.
-    out : (ndarray of int32, ndarray of float32), each of shape (H, W), (H, W, S), (B, H, W) or (B, H, W, S), optional
-        Where ids and depth go, of S samples and B poses; either may be None. Without an array for it, the depth of
-        vertices (V, 2) is made on first access: ids alone take half the time.
+    out : (ndarray of int32, ndarray of float32), each of shape (H, W), or (H, W, S) for S samples, optional
+        Where ids and depth go; either may be None. Without an array for it, the depth of vertices (V, 2) is made on
+        first access: ids alone take half the time.
 
     Returns
     -------
@@ -250,9 +248,7 @@ def rasterize(
         ``.triangle`` (H, W) int32 with -1 for none, ``.depth`` (H, W) float32, ``.mask`` (H, W) bool,
         ``.barycentric()``, ``.interpolate(values)``. With several samples a pixel also ``.samples_triangle`` and
         ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
-        ``.sample(i)`` gives the same of another. Of a batch `FragmentsBatch`: ``.triangle`` and ``.depth`` (B, H, W),
-        ``[i]`` is the `Fragments` of a pose, equal to those of that pose drawn alone. A `plan` of one pose
-        saves the others the check of the triangles.
+        ``.sample(i)`` gives the same of another.
 
     Raises
     ------
@@ -281,10 +277,6 @@ def rasterize(
     array([[ 1. ,  0.5,  0.5, -inf],
            [ 0.5,  0.5, -inf, -inf]], dtype=float32)
     """
-    n = n_poses(vertices, view.get("transform"))
-    if n is not None:
-        batch = draw_batch(n, vertices, triangles, size, view, depth_test, background_depth, out)
-        return cast("Fragments", batch)  # the rare case: whoever passes a batch knows the result
     # fragments refer to the arrays that they were drawn from, so none of these can be reused
     return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 

@@ -161,23 +161,16 @@ class View:
         return TEST_CODES.get(self.sampling, 0)
 
     @classmethod
-    def parse(
-        cls, size: object, options: ViewOptions, *, why_snapped: str | None = None, has_poses: bool = False
-    ) -> View:
-        """Check the options of a call.
-
-        `why_snapped`: why the caller draws snapped vertices alone, if so; `has_poses`: there may be several transforms.
-        """
+    def parse(cls, size: object, options: ViewOptions, *, why_snapped: str | None = None) -> View:
+        """Check the options of a call; `why_snapped`: why the caller draws snapped vertices alone, if so."""
         checked = as_size(size)
         if options.keys() <= KEPT_OPTIONS:
             with suppress(TypeError):  # what cannot be hashed is looked at below
                 return kept_view(checked, why_snapped, **cast("dict[str, Any]", options))
-        return cls._parse(checked, options, why_snapped, has_poses=has_poses)
+        return cls._parse(checked, options, why_snapped)
 
     @classmethod
-    def _parse(
-        cls, size: tuple[int, int], options: ViewOptions, why_snapped: str | None, *, has_poses: bool = False
-    ) -> View:
+    def _parse(cls, size: tuple[int, int], options: ViewOptions, why_snapped: str | None) -> View:
         if not options.keys() <= OPTIONS:
             unknown = min(options.keys() - OPTIONS)
             raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
@@ -196,7 +189,7 @@ class View:
             size=size,
             origin=as_window(options.get("origin", (0, 0)), grid_bits),
             viewport=size if viewport is None else as_size(viewport, "viewport", smallest=1),
-            transform=None if transform is None else as_transform(transform, has_poses=has_poses),
+            transform=None if transform is None else as_transform(transform),
             subpixel_bits=bits,
             grid_bits=grid_bits,
             sampling=sampling,
