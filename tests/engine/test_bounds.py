@@ -147,7 +147,7 @@ def test_bounds_are_kept_for_large_triangles(n, reach, width, pays):
     points = np.concatenate([corners, rng.uniform(size=(n, 3, 1))], axis=-1).reshape(-1, 3)
     view = View.parse(size, {})
     snapped = snap_mesh(FreshMemory(), points, np.arange(3 * n).reshape(-1, 3), view, with_depth=True, out=None)
-    route, drawing = choices.route(view, snapped, "less", wants_depth=False)
+    route, drawing = choices.route(view, snapped.work, "less", wants_depth=False)
     assert (route, drawing.is_bounded) == (Route.DEPTH, pays)
 
 

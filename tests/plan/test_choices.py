@@ -313,7 +313,7 @@ def guess_of(vertices, size, **view):
     """What a scene in pixels seems to hold: triangles in the picture, layers, and rows."""
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     checked = View.parse(size, view)
-    return snap_mesh(KeptMemory(), vertices, triangles, checked, with_depth=False, out=None).work
+    return snap_mesh(KeptMemory(), vertices, triangles, checked, with_depth=False, out=None).work.guess
 
 
 def test_guess_counts_triangles_in_the_picture():
@@ -370,7 +370,7 @@ def test_work_grows_with_what_is_seen_and_asked():
         vertices, triangles, _ = tl.scenes.random_triangles(n, size_px)
         checked = View.parse((1920, 1080), view)
         snapped = snap_mesh(KeptMemory(), vertices, triangles, checked, with_depth=True, out=None)
-        return choices.work_ns(checked, snapped, sink)
+        return choices.work_ns(checked, snapped.work, sink)
 
     few = work(1000, 40, Sink.NEAREST)
     assert few < work(2000, 40, Sink.NEAREST) < work(2000, 80, Sink.NEAREST)

@@ -27,13 +27,13 @@ def views(*options, sizes=SIZES):
 
 
 def scenes(view):
-    """Scenes as choices see them: so many triangles, of which some are seen, in so many layers and rows each."""
+    """Work as choices meet it: so many triangles, of which some are seen, in so many layers and rows each."""
     for n, seen, layers, rows, scatter in product(
         COUNTS[::3], (1.0, 0.06), (0.01, 0.3, 2.0, 30.0), (1.0, 4.2, 4.4, 40.0), (0.0, 0.4, 1.0)
     ):
         work = (seen * n, layers, min(rows * seen * n, layers * view.size[0] * view.size[1]))
         mesh = SimpleNamespace(guess_scatter=lambda _, s=scatter: s)
-        yield SimpleNamespace(mesh=mesh, work=work, n_triangles=n, n_vertices=n // 2, has_depth=True)
+        yield SimpleNamespace(mesh=mesh, guess=work, n_triangles=n, n_vertices=n // 2, has_depth=True)
 
 
 def surveys():
@@ -90,7 +90,7 @@ def instances():
 
 
 def flat():
-    return of_scenes(lambda v, s: choices.pays_without_depth(s, v), {})
+    return of_scenes(lambda v, s: choices.pays_without_depth(v, s), {})
 
 
 def sorting():
@@ -115,7 +115,7 @@ def blending():
 
 
 def colours():
-    return of_scenes(lambda v, s: choices.is_direct(s, v, np.dtype(np.uint8), is_flat=True), {})
+    return of_scenes(lambda v, s: choices.is_direct(v, s, np.dtype(np.uint8), is_flat=True), {})
 
 
 def labels():

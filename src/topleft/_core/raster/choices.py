@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,7 +26,6 @@ from topleft.typing import DepthTestOption
 
 if TYPE_CHECKING:
     from topleft._core.raster.cluster_draw import Survey
-    from topleft._core.raster.snap import Snapped
 
 #: Sinks that give the same picture whatever the order of triangles.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
@@ -38,6 +37,35 @@ SHAPES_OF = {
 }  # fmt: skip
 
 WORK_OF = {Sink.MASK: "bits", Sink.SAMPLES: "bits", Sink.COUNT: "counts", Sink.LABEL: "labels"}
+
+
+@dataclass(slots=True)
+class Work:
+    """What a draw will meet: a snapped mesh, and guesses of the engine, which are made when a choice first asks."""
+
+    mesh: engine.SnappedMesh
+    points: NDArray[Any]
+    is_clip_space: bool
+    n_triangles: int
+    size: tuple[int, int]  # of the view, pixels
+    _guess: tuple[float, float, float] | None = None
+
+    @property
+    def guess(self) -> tuple[float, float, float]:
+        """Triangles in the picture, layers, and rows of all triangles."""
+        if self._guess is None:
+            self._guess = self.mesh.guess_seen(*self.size)
+        return self._guess
+
+    @property
+    def n_vertices(self) -> int:
+        """Vertices of the mesh, used or not."""
+        return len(self.points)
+
+    @property
+    def has_depth(self) -> bool:
+        """Whether vertices have depths; otherwise all of them lie at 0."""
+        return self.is_clip_space or self.points.shape[1] == 3
 
 
 class SampledLimits(NamedTuple):
@@ -102,13 +130,13 @@ def pays_to_share(n_items: int) -> bool:
     return n_items * costs.shared_item >= costs.thread_ns
 
 
-def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
+def threads_to_draw(view: View, work: Work, sink: Sink) -> int:
     """Return how many threads draw, in bands of rows: `threads=`, or as many as the work is worth."""
     n_threads = view.threads
     if n_threads is None:
         n_threads = available_threads()
         if n_threads > 1:
-            n_threads = min(n_threads, max(1, int(work_ns(view, snapped, sink) / cost_table().thread_ns)))
+            n_threads = min(n_threads, max(1, int(work_ns(view, work, sink) / cost_table().thread_ns)))
     return min(view.size[1], n_threads)
 
 
@@ -137,7 +165,7 @@ def is_worth_one(n_triangles: int, size: tuple[int, int]) -> bool:
     return is_short or available_threads() == 1
 
 
-def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
+def work_ns(view: View, work: Work, sink: Sink) -> float:
     """Return an estimate of how long one thread draws, from a guess of the visible area."""
     costs = cost_table()
     kind = "area" if view.sampling is Sampling.AREA else WORK_OF.get(sink, "ids")
@@ -145,9 +173,9 @@ def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
     n_pixels = view.size[0] * view.size[1]
     if n_pixels <= costs.near_pixels:
         row_ns, pixel_ns = min(row_ns, costs.near_row), min(pixel_ns, costs.near_pixel)
-    _, n_layers, n_rows = snapped.work
+    _, n_layers, n_rows = work.guess
     drawn_ns = row_ns * n_rows + n_pixels * (sample_ns * n_layers + pixel_ns)
-    return float(costs.work_triangle * snapped.n_triangles + view.sampling.n_samples * drawn_ns)
+    return float(costs.work_triangle * work.n_triangles + view.sampling.n_samples * drawn_ns)
 
 
 def can_slice(view: View) -> bool:
@@ -307,22 +335,21 @@ def first_depth(points: NDArray[Any], *, has_depth: bool) -> float:
         return float(np.float32(points[0, 2])) + 0.0  # -0 becomes 0, as it does in every depth buffer
 
 
-def pays_without_depth(snapped: Snapped, view: View) -> bool:
+def pays_without_depth(view: View, work: Work) -> bool:
     """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are."""
     costs, n_pixels = cost_table(), view.size[0] * view.size[1]
-    _, n_layers, n_rows = snapped.work
+    _, n_layers, n_rows = work.guess
     compared_ns = costs.compared_sample * n_layers * n_pixels
     if n_pixels > costs.near_pixels:
         compared_ns += costs.compared_row * n_rows
     return compared_ns > costs.flat_call + costs.flat_pixel * n_pixels
 
 
-def is_flat(snapped: Snapped, view: View) -> bool:
+def is_flat(view: View, work: Work) -> bool:
     """Tell whether all triangles lie at one depth, so that samples need not compare it, and leaving that out pays."""
-    is_clip_space = snapped.given.source.is_clip_space
-    if is_clip_space or not pays_without_depth(snapped, view):
+    if work.is_clip_space or not pays_without_depth(view, work):
         return False
-    return common_depth(snapped.given.points, has_depth=snapped.has_depth, is_clip_space=is_clip_space) is not None
+    return common_depth(work.points, has_depth=work.has_depth, is_clip_space=False) is not None
 
 
 class Drawing(NamedTuple):
@@ -335,17 +362,17 @@ class Drawing(NamedTuple):
     in_bands: bool  # triangles are sorted into bands of rows, and band after band is drawn
 
 
-def drawing(view: View, snapped: Snapped, sink: Sink) -> Drawing:
+def drawing(view: View, work: Work, sink: Sink) -> Drawing:
     """Return how a mesh is drawn."""
-    n_threads = threads_to_draw(view, snapped, sink)
-    sliced = is_sliced(view, snapped.n_triangles, n_threads, sink)
-    in_bands = pays_to_sort(view, snapped, sink) and not draws_large_shapes(snapped, view, sink, n_threads)
-    return Drawing(sink, n_threads, sliced and not in_bands, pays_to_bound(view, snapped, sink), in_bands)
+    n_threads = threads_to_draw(view, work, sink)
+    sliced = is_sliced(view, work.n_triangles, n_threads, sink)
+    in_bands = pays_to_sort(view, work, sink) and not draws_large_shapes(view, work, sink, n_threads)
+    return Drawing(sink, n_threads, sliced and not in_bands, pays_to_bound(view, work, sink), in_bands)
 
 
-def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
+def pays_to_sort(view: View, work: Work, sink: Sink) -> bool:
     """Tell whether triangles are sorted into bands of rows: few of a large picture, or each far from the one before."""
-    costs, n_pixels, n = cost_table(), view.size[0] * view.size[1], snapped.n_triangles
+    costs, n_pixels, n = cost_table(), view.size[0] * view.size[1], work.n_triangles
     has_depth = sink in (Sink.NEAREST, Sink.FARTHEST, Sink.PAINT)
     is_stored = has_depth or sink in (Sink.COUNT, Sink.LABEL)
     is_area = view.sampling is Sampling.AREA and sink is Sink.COUNT
@@ -353,7 +380,7 @@ def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
         return False
     if n == 0 or not can_slice(view):
         return False
-    n_seen, n_layers, n_rows = snapped.work
+    n_seen, n_layers, n_rows = work.guess
     if is_area:
         return costs.area_pixel * n_pixels + costs.area_row * n_rows > costs.area_triangle * n
     n_covered = n_layers * n_pixels
@@ -366,11 +393,11 @@ def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
     sorted_ns = n_seen * costs.sorted_triangle + (n - n_seen) * costs.outside_triangle
     if cleared_ns + met_ns <= sorted_ns:
         return False
-    scatter = guess_scatter(view, snapped)
+    scatter = guess_scatter(view, work)
     return cleared_ns + scatter * met_ns > sorted_ns + scatter * n_seen * costs.far_triangle
 
 
-def pays_to_sort_labels(view: View, snapped: Snapped, n_threads: int) -> bool:
+def pays_to_sort_labels(view: View, work: Work, n_threads: int) -> bool:
     """Tell whether flat colours by several samples are drawn in bands, from the last triangle to the first.
 
     Threads share the setup, a large picture is resolved in the cache, and large triangles leave out what others cover.
@@ -378,26 +405,26 @@ def pays_to_sort_labels(view: View, snapped: Snapped, n_threads: int) -> bool:
     costs, n_pixels = cost_table(), view.size[0] * view.size[1]
     if n_threads > 1 or 4 * n_pixels * view.sampling.n_samples > costs.label_planes:
         return True
-    n_seen, n_layers, _ = snapped.work
+    n_seen, n_layers, _ = work.guess
     return n_layers * n_pixels >= costs.label_pixels * n_seen
 
 
-def pays_to_bound(view: View, snapped: Snapped, sink: Sink) -> bool:
+def pays_to_bound(view: View, work: Work, sink: Sink) -> bool:
     """Tell whether to keep, beside depths, a bound of those of each 64 columns of a row: where spans are long."""
     costs, (width, height) = cost_table(), view.size
     is_kept = sink in (Sink.NEAREST, Sink.FARTHEST) and view.sampling is Sampling.CENTER and not view.is_exact
-    if not is_kept or width < costs.bound_columns or snapped.n_triangles > costs.bound_triangles:
+    if not is_kept or width < costs.bound_columns or work.n_triangles > costs.bound_triangles:
         return False
-    _, n_layers, n_rows = snapped.work
+    _, n_layers, n_rows = work.guess
     return n_layers * width * height >= costs.bound_span * max(1.0, n_rows)
 
 
-def guess_scatter(view: View, snapped: Snapped) -> float:
+def guess_scatter(view: View, work: Work) -> float:
     """Return the share of triangles that are taller than a band of rows, or lie farther from the next."""
-    return snapped.mesh.guess_scatter(max(1, int(cost_table().far_pixels) // view.size[0]))
+    return work.mesh.guess_scatter(max(1, int(cost_table().far_pixels) // view.size[0]))
 
 
-def rows_to_blend(view: View, snapped: Snapped, row_bytes: int, *, lays_ground: bool) -> int:
+def rows_to_blend(view: View, work: Work, row_bytes: int, *, lays_ground: bool) -> int:
     """Return how many rows are blended before the next: a band that stays in the cache, where all are met again.
 
     Each band looks at all triangles.
@@ -406,15 +433,15 @@ def rows_to_blend(view: View, snapped: Snapped, row_bytes: int, *, lays_ground: 
     n_rows = max(1, int(costs.blend_bytes) // row_bytes)
     if n_rows >= height:
         return height
-    _, n_layers, n_triangle_rows = snapped.work
+    _, n_layers, n_triangle_rows = work.guess
     n_covered = n_layers * width * height
     again_ns = n_triangle_rows * costs.blended_row + n_covered * costs.blended_pixel
     ground_ns = min(n_covered, width * height) * costs.blended_pixel if lays_ground else 0.0
-    looked_ns = snapped.n_triangles * costs.blended_triangle + snapped.n_vertices * costs.blended_vertex
+    looked_ns = work.n_triangles * costs.blended_triangle + work.n_vertices * costs.blended_vertex
     cost_ns = height / n_rows * looked_ns
     if view.sampling is Sampling.AREA:
         cost_ns += n_triangle_rows / n_rows * costs.blended_strip
-    return n_rows if ground_ns + again_ns * guess_scatter(view, snapped) > cost_ns else height
+    return n_rows if ground_ns + again_ns * guess_scatter(view, work) > cost_ns else height
 
 
 class Route(Enum):
@@ -426,19 +453,19 @@ class Route(Enum):
     SAMPLES = "ids and depth of each sample"
 
 
-def route(view: View, snapped: Snapped, test: DepthTestOption | None, *, wants_depth: bool) -> tuple[Route, Drawing]:
+def route(view: View, work: Work, test: DepthTestOption | None, *, wants_depth: bool) -> tuple[Route, Drawing]:
     """Return how `rasterize` draws a mesh; `wants_depth`: into an array of the caller's."""
-    has_depth = snapped.has_depth
+    has_depth = work.has_depth
     sink = fragment_sink(test, has_depth=has_depth)
     if view.sampling.n_samples > 1:
         found = Route.SAMPLES
     elif not has_depth and not wants_depth:
         found, sink = Route.LABELS, Sink.LABEL
-    elif is_flat(snapped, view):
+    elif is_flat(view, work):
         found, sink = Route.FLAT, Sink.LABEL
     else:
         found = Route.DEPTH
-    return found, drawing(view, snapped, sink)
+    return found, drawing(view, work, sink)
 
 
 class FillRoute(Enum):
@@ -453,15 +480,15 @@ class FillRoute(Enum):
 
 
 def fill_route(
-    view: View, snapped: Snapped, colors: NDArray[Any], *, is_flat: bool, is_mixed: bool, has_ground: bool
+    view: View, work: Work, colors: NDArray[Any], *, is_flat: bool, is_mixed: bool, has_ground: bool
 ) -> FillRoute:
     """Return how `fill` draws a mesh; `is_mixed`: with the colours below, `has_ground`: over one colour."""
-    if not snapped.n_triangles or 0 in view.size:
+    if not work.n_triangles or 0 in view.size:
         return FillRoute.NOTHING
     shapes = blends_large_shapes if is_mixed else fills_large_shapes
-    if has_ground and shapes(snapped, view, colors, is_flat=is_flat):
+    if has_ground and shapes(view, work, colors, is_flat=is_flat):
         return FillRoute.BLENDED_SHAPES if is_mixed else FillRoute.SHAPES
-    if is_mixed or is_direct(snapped, view, colors.dtype, is_flat=is_flat):
+    if is_mixed or is_direct(view, work, colors.dtype, is_flat=is_flat):
         return FillRoute.BLENDED
     return FillRoute.SAMPLES if view.sampling.n_samples > 1 else FillRoute.LABELS
 
@@ -492,40 +519,40 @@ def earlier_wins(test: DepthTestOption | None, *, has_depth: bool) -> bool:
     return test is not None and has_depth
 
 
-def draws_large_shapes(snapped: Snapped, view: View, sink: Sink, n_threads: int) -> bool:
+def draws_large_shapes(view: View, work: Work, sink: Sink, n_threads: int) -> bool:
     """Tell whether `draw` writes a picture row by row: so few triangles for the size of a thread's rows."""
     is_known = sink in SHAPES_OF and view.sampling is not Sampling.AREA and not view.test
     n_samples = view.sampling.n_samples if sink is Sink.SAMPLES else 1
     width, height = view.size
-    return is_known and snapped.mesh.is_large_shapes(width, height // max(1, n_threads), n_samples, SHAPES_OF[sink])
+    return is_known and work.mesh.is_large_shapes(width, height // max(1, n_threads), n_samples, SHAPES_OF[sink])
 
 
-def fills_large_shapes(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+def fills_large_shapes(view: View, work: Work, colors: NDArray[Any], *, is_flat: bool) -> bool:
     """Tell whether flat colours over a background are written row by row."""
     n_samples = view.sampling.n_samples
     is_stored = n_samples == 1 and colors.dtype == np.uint8 and colors.shape[1:] == (4,)
     most = engine.SHAPES_STORED if is_stored else engine.SHAPES_LABELLED
-    return is_flat and view.sampling is not Sampling.AREA and snapped.mesh.is_large_shapes(*view.size, n_samples, most)
+    return is_flat and view.sampling is not Sampling.AREA and work.mesh.is_large_shapes(*view.size, n_samples, most)
 
 
-def blends_large_shapes(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+def blends_large_shapes(view: View, work: Work, colors: NDArray[Any], *, is_flat: bool) -> bool:
     """Tell whether flat colours are blended over a background row by row.
 
     By area four bytes a pixel are blended where they are, which is as fast for one triangle and faster for several.
     """
     is_in_place = colors.dtype == np.uint8 and colors.shape[1:] == (4,)
     pays = is_flat and view.sampling.n_samples == 1 and not (view.sampling is Sampling.AREA and is_in_place)
-    return pays and snapped.mesh.blends_large_shapes(*view.size)
+    return pays and work.mesh.blends_large_shapes(*view.size)
 
 
-def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
+def is_direct(view: View, work: Work, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
     """Tell whether colours are best stored triangle by triangle, without labels in between.
 
     Labels cost a pass to clear and one to colour them, and less a triangle that is seen.
     """
     if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1 or view.is_exact:
         return False
-    costs, (n_seen, _, _) = cost_table(), snapped.work
+    costs, (n_seen, _, _) = cost_table(), work.guess
     return n_seen * costs.direct_triangle <= view.size[0] * view.size[1] * costs.paint
 
 

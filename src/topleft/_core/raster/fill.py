@@ -140,7 +140,7 @@ def draw_fill(
             ground = np.zeros((), palette.dtype)
         painting = Painting(memory, snapped, view, palette, canvas, transfer, is_flat, ground)
         route = choices.fill_route(
-            view, snapped, palette, is_flat=is_flat, is_mixed=blending.is_needed, has_ground=ground is not None
+            view, snapped.work, palette, is_flat=is_flat, is_mixed=blending.is_needed, has_ground=ground is not None
         )
         if ground is not None and not choices.lays_ground(route, view, palette, is_flat=is_flat):
             painting = painting.with_ground_laid()
@@ -183,7 +183,7 @@ def draw_labels(
     if ground.shape not in ((), own.shape[1:]) or not np.array_equal(ground.astype(dtype), ground):
         raise ValueError(f"background must be one {dtype}, or one for each channel, got {shown(style.background)}")
     ids: NDArray[np.int32] = memory.scratch("labels", view.size[::-1], np.int32)
-    draw(memory, snapped, view, choices.drawing(view, snapped, Sink.LABEL), ids)
+    draw(memory, snapped, view, choices.drawing(view, snapped.work, Sink.LABEL), ids)
     if 0 in view.size or not snapped.n_triangles:
         ids[...] = -1
     shape = (*ids.shape, *own.shape[1:])
@@ -228,7 +228,7 @@ def fill_large_shapes(p: Painting) -> None:
         mesh = p.snapped.mesh
         return mesh.fill_large_shapes(p.pixels, first, end - first, p.colors, p.transfer, under, positions)
 
-    if max(run_parts(fill_rows, p.view.size[1], choices.threads_to_draw(p.view, p.snapped, Sink.LABEL))) >= 0:
+    if max(run_parts(fill_rows, p.view.size[1], choices.threads_to_draw(p.view, p.snapped.work, Sink.LABEL))) >= 0:
         p.snapped.refuse()
     p.view.mark("draw")
 
@@ -236,7 +236,7 @@ def fill_large_shapes(p: Painting) -> None:
 def paint(p: Painting) -> None:
     """Draw coloured triangles: first which triangle shows in each pixel, then its colour."""
     labels = p.memory.scratch("labels", p.pixels.shape[:2], np.int32)
-    drawing = choices.drawing(p.view, p.snapped, Sink.LABEL)
+    drawing = choices.drawing(p.view, p.snapped.work, Sink.LABEL)
     draw(p.memory, p.snapped, p.view, drawing, labels)
     palette, flat, under = engine.as_bytes(p.colors), engine.as_bytes(p.pixels), p.ground_bytes
 
@@ -248,9 +248,13 @@ def paint(p: Painting) -> None:
 
 def paint_samples(p: Painting) -> None:
     """Draw coloured triangles, each pixel the mean of its samples."""
-    drawing = choices.drawing(p.view, p.snapped, Sink.LABEL)
+    drawing = choices.drawing(p.view, p.snapped.work, Sink.LABEL)
     samples = p.samples(drawing.n_threads)
-    if p.is_flat and choices.can_slice(p.view) and choices.pays_to_sort_labels(p.view, p.snapped, drawing.n_threads):
+    if (
+        p.is_flat
+        and choices.can_slice(p.view)
+        and choices.pays_to_sort_labels(p.view, p.snapped.work, drawing.n_threads)
+    ):
         if draw_means(samples, engine.Palette(p.colors, p.transfer), p.pixels, p.ground):
             p.snapped.refuse()
         p.view.mark("draw")
@@ -274,7 +278,8 @@ def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:
 
     A ground is there for uint8 with one sample a pixel, or for `is_large_shapes`.
     """
-    n_threads, n_samples = choices.threads_to_draw(p.view, p.snapped, Sink.LABEL), p.view.sampling.n_samples
+    work, n_samples = p.snapped.work, p.view.sampling.n_samples
+    n_threads = choices.threads_to_draw(p.view, work, Sink.LABEL)
     if n_samples == 1:
         pictures, meshes = p.pixels[None], [p.snapped.mesh]
     else:
@@ -283,7 +288,7 @@ def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:
         pictures[...] = p.pixels
     row_bytes = (4 if p.is_u8 else 4 * p.n_channels) * p.view.size[0]
     lays_ground = p.ground is not None
-    band_rows = 0 if is_large_shapes else choices.rows_to_blend(p.view, p.snapped, row_bytes, lays_ground=lays_ground)
+    band_rows = 0 if is_large_shapes else choices.rows_to_blend(p.view, work, row_bytes, lays_ground=lays_ground)
     for mesh, picture in zip(meshes, pictures, strict=True):
         if blend_picture(p, mesh, picture, blending, n_threads, band_rows):
             p.snapped.refuse()

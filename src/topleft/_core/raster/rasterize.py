@@ -137,7 +137,7 @@ def draw_area(
 ) -> NDArray[np.float32]:
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with Canvas.of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
-        drawing = choices.drawing(view, snapped, Sink.COUNT)
+        drawing = choices.drawing(view, snapped.work, Sink.COUNT)
         half_px = max(1, 1 << view.grid_bits >> 1) if drawing.in_bands else None
         if sum_areas(memory, snapped.mesh, canvas, drawing.n_threads, is_clamped=is_clamped, half_px=half_px):
             snapped.refuse()
@@ -162,10 +162,10 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
         return draw_share_of_masks(memory, snapped, view, out)
     if view.sampling.n_samples > 1:
         with Canvas.of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
-            draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), canvas)
+            draw(memory, snapped, view, choices.drawing(view, snapped.work, Sink.SAMPLES), canvas)
         return result
     with Canvas.of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
-        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.MASK), canvas)
+        draw(memory, snapped, view, choices.drawing(view, snapped.work, Sink.MASK), canvas)
     return result
 
 
@@ -175,9 +175,9 @@ def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: objec
     mask: NDArray[np.bool_] = memory.scratch("sample mask", shape, np.bool_)
     with Canvas.of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
         canvas[...] = 0.0
+        drawing = choices.drawing(view, snapped.work, Sink.MASK)
         for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
-            seen = replace(snapped, mesh=snapped.mesh.at_sample(*at))
-            draw(memory, seen, view, choices.drawing(view, seen, Sink.MASK), mask)
+            draw(memory, replace(snapped, mesh=snapped.mesh.at_sample(*at)), view, drawing, mask)
             np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
     return result
 
@@ -186,9 +186,9 @@ def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object
     """Return how many triangles cover each sample, (H, W, S): a plane a sample in memory."""
     n, (width, height) = view.sampling.n_samples, view.size
     planes = memory.empty("sample counts", (n, height, width), np.int32)
+    drawing = choices.drawing(view, snapped.work, Sink.COUNT)
     for plane, at in zip(planes, sample_positions(n, view.grid_bits).tolist(), strict=True):
-        seen = replace(snapped, mesh=snapped.mesh.at_sample(*at))
-        draw(memory, seen, view, choices.drawing(view, seen, Sink.COUNT), plane)
+        draw(memory, replace(snapped, mesh=snapped.mesh.at_sample(*at)), view, drawing, plane)
     counts = np.moveaxis(planes, 0, -1)
     if out is None:
         return counts
@@ -207,7 +207,7 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     if view.sampling.n_samples > 1:
         return draw_sample_counts(memory, snapped, view, out)
     with Canvas.of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
-        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.COUNT), canvas)
+        draw(memory, snapped, view, choices.drawing(view, snapped.work, Sink.COUNT), canvas)
     return result
 
 
@@ -295,7 +295,7 @@ def draw_arrays(
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     if names is not None:
         snapped = replace(snapped, mesh=snapped.mesh.named(names))
-    route, drawing = choices.route(view, snapped, options.test, wants_depth=options.depth_out is not None)
+    route, drawing = choices.route(view, snapped.work, options.test, wants_depth=options.depth_out is not None)
     return ROUTES[route](memory, snapped, view, options, drawing).drawn_from(corners)
 
 
@@ -308,8 +308,8 @@ def draw_labels(memory: Memory, snapped: Snapped, view: View, options: FragmentO
 
 def draw_flat(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
     """Draw ids of triangles that all lie at one depth, and write it where they are."""
-    earlier_wins = choices.earlier_wins(options.test, has_depth=snapped.has_depth)
-    flat_depth = choices.first_depth(snapped.given.points, has_depth=snapped.has_depth)
+    earlier_wins = choices.earlier_wins(options.test, has_depth=snapped.work.has_depth)
+    flat_depth = choices.first_depth(snapped.given.points, has_depth=snapped.work.has_depth)
     ids, depth = buffers_of(memory, view, options)
     draw(memory, snapped, view, drawing, ids.canvas, earlier_wins=earlier_wins)
 

@@ -17,6 +17,7 @@ from topleft._core.base.arrays import apart_from, as_triangles, as_vertices, che
 from topleft._core.base.memory import Memory, empty
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
+from topleft._core.raster.choices import Work
 from topleft._core.raster.view import RasterState, View
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
@@ -43,7 +44,7 @@ class MeshArrays(NamedTuple):
         check_rows(self.triangles, len(self.points), self.triangles_given)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Snapped:
     """A mesh after the snap, or without one in `mesh.exact`: ready to be drawn into any buffer of the view's size."""
 
@@ -53,16 +54,11 @@ class Snapped:
     pieces: engine.Pieces | None
     size: tuple[int, int]  # of the view, pixels
     can_slice: bool = True  # whether threads can each take some of the triangles
-    _work: tuple[float, float, float] | None = field(default=None, init=False, repr=False)
+    work: Work = field(init=False)
 
-    @property
-    def work(self) -> tuple[float, float, float]:
-        """What a draw will meet: triangles in the picture, layers, rows. The engine guesses it at the first choice."""
-        work = self._work
-        if work is None:
-            work = self.mesh.guess_seen(*self.size)
-            object.__setattr__(self, "_work", work)
-        return work
+    def __post_init__(self) -> None:
+        given = self.given
+        self.work = Work(self.mesh, given.points, given.source.is_clip_space, len(given.triangles), self.size)
 
     @property
     def n_vertices(self) -> int:
@@ -73,11 +69,6 @@ class Snapped:
     def n_triangles(self) -> int:
         """Triangles of the mesh, before any of them is cut."""
         return len(self.given.triangles)
-
-    @property
-    def has_depth(self) -> bool:
-        """Whether vertices have a depth of their own; otherwise all of them lie at 0."""
-        return self.given.source.is_clip_space or self.given.points.shape[1] == 3
 
     def refuse(self) -> NoReturn:
         """Raise an error for the first triangle with an index or a vertex that cannot be drawn, as one was not."""

@@ -311,7 +311,7 @@ def visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     snapped = snap_mesh(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
     ids: I32 = SCRATCH.scratch("labels", view.size[::-1], np.int32)
     depth = None if sink is Sink.LABEL else SCRATCH.scratch("depth of heights", ids.shape, np.float32)
-    draw(SCRATCH, snapped, view, choices.drawing(view, snapped, sink), ids, depth=depth)
+    draw(SCRATCH, snapped, view, choices.drawing(view, snapped.work, sink), ids, depth=depth)
     return ids
 
 

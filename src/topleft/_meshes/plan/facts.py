@@ -16,11 +16,11 @@ from topleft._core.base.arrays import as_array
 from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.options import Sampling, Sink
 from topleft._core.raster import choices
-from topleft._core.raster.choices import Drawing, Route
+from topleft._core.raster.choices import Drawing, FillRoute, Route
 from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
 from topleft._core.raster.clusters import Clusters
 from topleft._core.raster.sampling import area_cells, band_bytes, sample_positions, split_bytes
-from topleft._core.raster.snap import Snapped, snap_mesh
+from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.mesh import Mesh
 from topleft.typing import DepthTestOption
@@ -159,10 +159,17 @@ def find_facts(
     (points, source, indices_drawn, *_), pieces = snapped.given, snapped.pieces
     xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
-    route, drawing = None, choices.drawing(view, snapped, find_sink(verb, view))
+    route, drawing = None, choices.drawing(view, snapped.work, find_sink(verb, view))
     if verb == "rasterize":
-        route, drawing = choices.route(view, snapped, test, wants_depth=False)
-    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=source.is_clip_space)
+        route, drawing = choices.route(view, snapped.work, test, wants_depth=False)
+    filling, is_large_shapes = None, False
+    if verb == "fill":  # with RGBA, a colour of each triangle
+        rgba = np.zeros((snapped.n_triangles, 4), np.uint8)
+        filling = choices.fill_route(view, snapped.work, rgba, is_flat=True, is_mixed=False, has_ground=True)
+        is_large_shapes = filling is FillRoute.SHAPES
+    elif view.sampling.n_samples == 1 or drawing.sink is Sink.SAMPLES:
+        is_large_shapes = choices.draws_large_shapes(view, snapped.work, drawing.sink, drawing.n_threads)
+    common = choices.common_depth(points, has_depth=snapped.work.has_depth, is_clip_space=source.is_clip_space)
     samples = sample_positions(view.sampling.n_samples, view.grid_bits) if drawing.sink is Sink.SAMPLES else None
     census = [(0, 0.0, 0.0)] * len(CLASSES)
     if 0 not in view.size and snapped.n_triangles:
@@ -189,23 +196,15 @@ def find_facts(
         n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]
         n_pieces=len(pieces) if pieces else 0,
         common_depth=common,
-        is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
-        is_large_shapes=writes_rows(snapped, view, verb, drawing),
-        work_ms=choices.work_ns(view, snapped, drawing.sink) / 1e6,
+        is_direct=filling is FillRoute.BLENDED,
+        is_large_shapes=is_large_shapes,
+        work_ms=choices.work_ns(view, snapped.work, drawing.sink) / 1e6,
         census=tuple(census),
         decided=decided,
     )
     checked = np.array(indices_drawn, np.int32)
     checked.flags.writeable = False
     return facts, checked
-
-
-def writes_rows(snapped: Snapped, view: View, verb: str, drawing: Drawing) -> bool:
-    """Tell whether a picture is written row by row; colours are taken for RGBA, one a triangle."""
-    if verb == "fill":
-        return choices.fills_large_shapes(snapped, view, np.zeros((snapped.n_triangles, 4), np.uint8), is_flat=True)
-    is_one = view.sampling.n_samples == 1 or drawing.sink is Sink.SAMPLES
-    return is_one and choices.draws_large_shapes(snapped, view, drawing.sink, drawing.n_threads)
 
 
 def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Decided:
