@@ -137,16 +137,16 @@ class Fragments:
     13.75
     """
 
-    #: Fragments of each sample when there are several.
-    _samples: tuple[Fragments, ...] = ()
-    #: Their ids and depths, until the planes are read.
+    #: Ids and depth of several samples as drawn, (S, H, W).
+    _planes: tuple[NDArray[Any], NDArray[np.float32]] | None = None
+    #: What stands for the planes until they are read.
     _split: SplitSamples | None = None
+    #: The mesh as each of several samples sees it.
+    _meshes: Sequence[engine.SnappedMesh | PartOfMesh] = ()
     #: The mesh that it was drawn from; None where that is not kept.
     corners: GivenCorners | None = None
     #: The subject that attributes belong to: "Mesh", "Scene" (one for each instance) or "Points".
     _subject_kind = "Mesh"
-    #: Ids and depth of these, (S, H, W).
-    _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
 
     def __init__(
         self,
@@ -165,32 +165,22 @@ class Fragments:
     def drawn_from(self, corners: GivenCorners) -> Self:
         """Keep the mesh that it was drawn from, for derivatives and distances; returns itself."""
         self.corners = corners
-        for sample in self._samples:
-            sample.corners = corners
         return self
-
-    def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
-        """Return the fragments of each of several samples, and their planes (S, H, W), drawn now if they were not."""
-        if self._split is not None:
-            self._set_planes(*self._split.planes(), self._split.drawn.meshes)
-            self._split = None
-        return self._samples, self._planes
-
-    def _set_planes(
-        self, ids: NDArray[np.int32], depth: NDArray[np.float32], meshes: Sequence[engine.SnappedMesh | PartOfMesh]
-    ) -> None:
-        """Take ids and depth of several samples, (S, H, W), and the mesh as each sample sees it."""
-        numbers = self._n_vertices, self._n_triangles
-        self._samples = tuple(Fragments(*planes, *numbers) for planes in zip(ids, depth, meshes, strict=True))
-        self._planes = ids, depth
-        self.id, self._depth = ids[0], depth[0]
-        if self.corners is not None:
-            self.drawn_from(self.corners)
 
     @property
     def drawn_planes(self) -> tuple[NDArray[Any], NDArray[np.float32]]:
         """Ids and depth of all samples as they were drawn, (S, H, W); drawn now, if they were not."""
-        return self._sampled()[1] or (self.id[None], self.depth[None])
+        if self._split is not None:
+            self._planes, self._meshes = self._split.planes(), self._split.drawn.meshes
+            self._split = None
+        return self._planes or (self.id[None], self.depth[None])
+
+    def _of_sample(self, k: int, ids: NDArray[Any], depth: NDArray[np.float32]) -> Fragments:
+        """Return the fragments of ids and depth (H, W) as drawn, seen from sample k."""
+        mesh = self._meshes[k] if self._meshes else self._snapped_or_maker
+        frags = Fragments(ids, depth, mesh, self._n_vertices, self._n_triangles)
+        frags.corners = self.corners
+        return frags
 
     def _whole(self, ids: NDArray[Any]) -> NDArray[Any]:
         """Return the ids of drawn triangles as `.id` has them: the same, unless a lens cuts triangles into parts."""
@@ -210,9 +200,9 @@ class Fragments:
 
     def _seen(self) -> SeenSamples:
         """Return the ids and depths of the samples, as drawn."""
-        if self._split is not None:
-            found = self._split
-            return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.drawn.positions))
+        split = self._split
+        if split is not None:
+            return SeenSamples.of(split.ids[None], split.depth[None], split.split, len(split.drawn.positions))
         return SeenSamples.of(*self.drawn_planes)
 
     def __repr__(self) -> str:
@@ -237,23 +227,19 @@ class Fragments:
         return self._depth
 
     @property
-    def samples_triangle(self) -> NDArray[np.int32]:
-        """Indices of triangles by sample, int32 (H, W, S)."""
-        if self._split is not None:
-            return np.moveaxis(self._split.sample_ids, 0, -1)
-        _, planes = self._sampled()
-        return self.id[..., None] if planes is None else np.moveaxis(planes[0], 0, -1)
-
-    @property
     def samples_id(self) -> NDArray[Any]:
         """The ids of `id` at each sample, (H, W, S)."""
-        return self.samples_triangle
+        return np.moveaxis(self._whole(self.drawn_planes[0] if self._split is None else self._split.sample_ids), 0, -1)
+
+    @property
+    def samples_triangle(self) -> NDArray[np.int32]:
+        """Indices of triangles by sample, int32 (H, W, S)."""
+        return self.samples_id
 
     @property
     def samples_depth(self) -> NDArray[np.float32]:
         """Depth by sample, float32 (H, W, S)."""
-        _, planes = self._sampled()
-        return self.depth[..., None] if planes is None else np.moveaxis(planes[1], 0, -1)
+        return np.moveaxis(self.drawn_planes[1], 0, -1)
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -271,7 +257,7 @@ class Fragments:
     ) -> Fragments:
         """Return the fragments of several samples: planes (S, H, W), and the mesh as each sample sees it."""
         frags = cls(triangle[0], depth[0], meshes[0], n_vertices, n_triangles)
-        frags._set_planes(triangle, depth, meshes)
+        frags._planes, frags._meshes = (triangle, depth), meshes
         return frags
 
     @classmethod
@@ -367,10 +353,11 @@ class Fragments:
             raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
         return found, slopes
 
-    def _at_sample(self, i: int) -> Fragments:
+    def _at_sample(self, i: object) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
-        samples = self._sampled()[0] or (self,)
-        return samples[as_sample(i, len(samples))]
+        ids, depth = self.drawn_planes
+        k = as_sample(i, len(ids))
+        return self if len(ids) == 1 else self._of_sample(k, ids[k], depth[k])
 
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
         """Return the distance of each visible pixel along the view ("metric z"), in units of the world.
@@ -580,13 +567,12 @@ class Fragments:
         return Backward.of(self).smooth_vjp(picture, grad, edges)
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
-        """Return the same, with background in all pixels but these."""
-        rows, cols = as_places(rows, cols, self.triangle.shape)
-        triangle = np.full_like(self.triangle, -1)
-        triangle[rows, cols] = self.triangle[rows, cols]
-        found = Fragments(triangle, self.depth, self._snapped_or_maker, self._n_vertices, self._n_triangles)
-        found.corners = self.corners
-        return found
+        """Return the fragments with background in all pixels but these."""
+        rows, cols = as_places(rows, cols, self.id.shape)
+        drawn = self._seen().ids[0]
+        ids = np.full_like(drawn, -1)
+        ids[rows, cols] = drawn[rows, cols]
+        return self._of_sample(0, ids, self.depth)
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel.

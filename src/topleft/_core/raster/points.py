@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import as_array, as_count, as_number, as_places, as_point_size, as_real, as_vertices
+from topleft._core.base.arrays import as_array, as_count, as_number, as_point_size, as_real, as_vertices
 from topleft._core.base.memory import FRESH, Memory, check_fits
 from topleft._core.base.options import Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
@@ -70,8 +70,6 @@ class PointFragments(Fragments):
         self.id, self._depth = ids[0], depth[0]
         self._n_vertices = self._n_triangles = n_points
         self._planes = ids, depth
-        if len(ids) > 1:
-            self._samples = tuple(PointFragments(ids[k : k + 1], depth[k : k + 1], n_points) for k in range(len(ids)))
 
     def __repr__(self) -> str:
         height, width = self.id.shape
@@ -82,12 +80,8 @@ class PointFragments(Fragments):
         """Index of the point that shows in the pixel, int32 (H, W), -1 where there is none."""
         return self.id
 
-    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> PointFragments:
-        """Return the same, with background in all pixels but these."""
-        rows, cols = as_places(rows, cols, self.id.shape)
-        ids = np.full((1, *self.id.shape), -1, np.int32)
-        ids[0, rows, cols] = self.id[rows, cols]
-        return PointFragments(ids, self.depth[None], self._n_vertices)
+    def _of_sample(self, k: int, ids: NDArray[Any], depth: NDArray[np.float32]) -> PointFragments:  # noqa: ARG002
+        return PointFragments(ids[None], depth[None], self._n_vertices)
 
     def barycentric(self) -> NDArray[np.float32]:
         """Raise a `ValueError`: a point has no corners."""

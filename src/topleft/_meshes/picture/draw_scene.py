@@ -25,7 +25,6 @@ from topleft._core.raster.rasterize import FragmentOptions, draw_fragments
 from topleft._core.raster.sampling import SamplePass, draw_sorted, draw_split
 from topleft._core.raster.snap import refuse_changed
 from topleft._core.raster.static_mesh import draw_static
-from topleft._meshes.picture.fragments import SceneFragments
 from topleft._meshes.picture.placed import Placed
 from topleft._meshes.scene.scene import Scene, unchecked_scene
 from topleft.typing import DepthTestOption
@@ -73,7 +72,7 @@ def draw_ids(
             drawn = draw_static(memory, view.static, view, depth_test, background_depth, out)
         else:
             drawn = draw_fragments(memory, mesh.vertices, mesh.triangles, view, depth_test, background_depth, out)
-        return drawn if placed.is_plain_mesh else fragments_of(placed, drawn)
+        return drawn if placed.is_plain_mesh else placed.kind_of_fragments.of(drawn, placed)
     options = FragmentOptions.parse(depth_test, background_depth, None)
     sink = choices.fragment_sink(options.test, has_depth=True)
     (width, height), positions = placed.view.size, placed.positions
@@ -93,13 +92,6 @@ def draw_ids(
         frags = placed.fragments(ids, depth, positions)
     if background_depth is not None:
         depth[frags.drawn_planes[0] < 0] = background_depth
-    return frags
-
-
-def fragments_of(placed: Placed, drawn: Fragments) -> SceneFragments:
-    """Return the fragments of a scene from those of its triangles as one mesh."""
-    frags = placed.fragments(drawn.id[None], drawn.depth[None], placed.positions)
-    frags._whole_scene = drawn
     return frags
 
 
@@ -131,7 +123,7 @@ def draw_joined(placed: Placed, sink: Sink, background: float) -> Fragments | No
     if split is None:
         refuse_changed()
     n_vertices, n_triangles = int(placed.scene.first_vertices[-1]), placed.scene.n_triangles
-    return fragments_of(placed, Fragments.of_split(split, n_vertices, n_triangles))
+    return placed.kind_of_fragments.of(Fragments.of_split(split, n_vertices, n_triangles), placed)
 
 
 def draw_scene(placed: Placed, targets: Sequence[SampleTarget], *, is_first: bool = True) -> None:

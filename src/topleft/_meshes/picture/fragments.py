@@ -6,7 +6,7 @@ rectangles of pixels with the fragments and the mesh as they were drawn.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, cast
@@ -18,7 +18,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_aligned, as_array, as_values, set_aligned, shown
 from topleft._core.base.memory import empty
-from topleft._core.raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
+from topleft._core.raster.fragments import Fragments, Viewer, view_of
 from topleft._core.raster.peel import DepthLayers
 from topleft._core.raster.sampling import split_ranges
 from topleft._meshes.model.mesh import Mesh
@@ -166,33 +166,28 @@ class SceneFragments(InstanceIds, Fragments):
 
     _subject_kind = "Scene"
 
-    #: The fragments of all instances as one mesh, at the first sample; None where they are not kept.
-    _whole_scene: Fragments | None = None
+    #: The fragments of the only instance, as an array draws it; None of several.
+    _one: Fragments | None = None
 
     def __init__(
         self, ids: Ids, depth: NDArray[np.float32], placed: Placed, positions: Sequence[tuple[int, int]]
     ) -> None:
         """Take drawn planes (S, H, W), and where their samples lie."""
-        self._given = ids, depth
+        self._planes = ids, depth
         self.placed = placed
         self.positions = positions
         self.id, self._depth = placed.whole_ids(ids[0]), depth[0]
 
-    @property
-    def drawn_planes(self) -> tuple[Ids, NDArray[np.float32]]:
-        """The drawn planes (S, H, W); drawn now, if they were not."""
-        return self._given if self._whole_scene is None else (self._whole_scene._sampled()[1] or self._given)
+    @classmethod
+    def of(cls, drawn: Fragments, placed: Placed) -> Self:
+        """Return the fragments of a scene from those of all its triangles as one mesh."""
+        frags = cls(drawn.id[None], drawn.depth[None], placed, placed.positions)
+        frags._split, frags._planes = drawn._split, drawn._planes or frags._planes
+        frags._one = drawn if len(placed.first_ids) == 2 else None
+        return frags
 
-    @property
-    def _one(self) -> Fragments | None:
-        """The fragments of the only instance, if there is one."""
-        return self._whole_scene if len(self.placed.first_ids) == 2 else None
-
-    @cached_property
-    def _planes(self) -> Any:  # type: ignore[override]
-        """The same in terms of the whole scene."""
-        ids, depth = self.drawn_planes
-        return self.placed.whole_ids(ids), depth
+    def _of_sample(self, k: int, ids: Ids, depth: NDArray[np.float32]) -> Self:
+        return type(self)(ids[None], depth[None], self.placed, self.positions[k : k + 1])
 
     def __repr__(self) -> str:
         height, width = self.id.shape
@@ -200,9 +195,9 @@ class SceneFragments(InstanceIds, Fragments):
 
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes the parts itself: they refer to memory of this one."""
-        own = vars(self) | {"_given": self.drawn_planes}
+        state = vars(self) | {"_planes": self.drawn_planes}
         return {
-            name: value for name, value in own.items() if name not in ("parts", "_whole_scene", "_snapped_instances")
+            name: state[name] for name in state.keys() - {"parts", "_one", "_split", "_meshes", "_snapped_instances"}
         }
 
     __setstate__ = set_aligned
@@ -224,11 +219,6 @@ class SceneFragments(InstanceIds, Fragments):
         """Index of the instance that shows, int32, -1 where there is none."""
         return super().instance if self._one is not None else self._found[0]
 
-    @property
-    def samples_id(self) -> Ids:
-        """The `id` of each sample, (H, W, S)."""
-        return np.moveaxis(self._planes[0], 0, -1)
-
     @cached_property
     def samples_instance(self) -> NDArray[np.int32]:
         """Index of the instance that each sample sees, int32 (H, W, S)."""
@@ -241,9 +231,6 @@ class SceneFragments(InstanceIds, Fragments):
 
     def _whole(self, ids: Ids) -> Ids:
         return self.placed.whole_ids(ids)
-
-    def _seen(self) -> SeenSamples:
-        return SeenSamples.of(*self._given) if self._whole_scene is None else self._whole_scene._seen()
 
     def _counts(self) -> list[tuple[int, int]]:
         return counts_of(self.whole)
@@ -280,45 +267,23 @@ class SceneFragments(InstanceIds, Fragments):
         snapped = self.placed.snap_parts(shown, part)
         return tuple((i, mesh.at_sample(*sample), firsts[i]) for i, mesh in zip(shown.tolist(), snapped, strict=True))
 
-    def _at_sample(self, i: int) -> Self:
-        """Return ids, depth and attributes at one sample of each pixel."""
-        i = as_sample(i, len(self.positions))
-        ids, depth = self.drawn_planes
-        return type(self)(ids[i : i + 1], depth[i : i + 1], self.placed, self.positions[i : i + 1])
-
-    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Self:
-        """Return the fragments with nothing in other pixels than these."""
-        ids = np.full((1, *self.id.shape), -1, self.id.dtype)
-        ids[0, rows, cols] = self.drawn_planes[0][0, rows, cols]
-        return type(self)(ids, self.depth[None], self.placed, self.positions[:1])
-
     @cached_property
     def parts(self) -> tuple[VisiblePart, ...]:
         """The visible parts of the instances that show, in their order."""
-        return tuple(self._make_parts())
-
-    def _make_parts(self) -> Iterator[VisiblePart]:
-        bent = self.placed.bent
-        if self._one is not None and self.placed.scene.n_triangles:
-            yield VisiblePart(0, WHOLE, self._one, self.whole[0], None if bent is None else bent[0])
-            return
-        _, boxes = self._found
-        shown, ids = np.flatnonzero(boxes[:, 2] > 0), self.drawn_planes[0][0]
-
-        def place(i: int) -> tuple[slice, slice]:
-            left, top, right, bottom = boxes[i].tolist()
-            return slice(top, bottom), slice(left, right)
-
-        def part(i: int) -> NDArray[np.int32]:
-            return local_part(ids[place(i)], *self.placed.first_ids[i : i + 2].tolist())
-
-        for i, snapped in zip(shown.tolist(), self.placed.snap_parts(shown, part), strict=True):
-            box, own = place(i), part(i)
-            scene = snapped.at_sample(*self.positions[0]).moved(box[1].start, box[0].start)
-            mesh = self.placed.scene[i].mesh
-            frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
-            frags.corners = self.placed.corners(i)
-            yield VisiblePart(i, box, frags, self.whole[i], None if bent is None else bent[i])
+        placed, bent = self.placed, self.placed.bent
+        if self._one is not None and placed.scene.n_triangles:
+            return (VisiblePart(0, WHOLE, self._one, self.whole[0], None if bent is None else bent[0]),)
+        boxes, ids, parts = self._found[1].tolist(), self._seen().ids[0], []
+        for i, snapped, first in self._snapped_instances:
+            (left, top, right, bottom), mesh = boxes[i], placed.scene[i].mesh
+            if right > left:  # otherwise other samples alone see it
+                box = slice(top, bottom), slice(left, right)
+                local = local_part(ids[box], first, first + len(mesh.triangles))
+                numbers = len(mesh.vertices), len(mesh.triangles)
+                frags = Fragments(local, self.depth[box], snapped.moved(left, top), *numbers)
+                frags.corners = placed.corners(i)
+                parts.append(VisiblePart(i, box, frags, self.whole[i], None if bent is None else bent[i]))
+        return tuple(parts)
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel; see `Fragments`."""

@@ -162,7 +162,12 @@ class Placed:
 
     def fragments(self, ids: Ids, depth: NDArray[np.float32], positions: Sequence[tuple[int, int]]) -> SceneFragments:
         """Return drawn planes (S, H, W) as fragments of the scene, or of its only mesh."""
-        return (MeshFragments if self.is_mesh else SceneFragments)(ids, depth, self, positions)
+        return self.kind_of_fragments(ids, depth, self, positions)
+
+    @property
+    def kind_of_fragments(self) -> type[SceneFragments]:
+        """Of a scene, or of its only mesh."""
+        return MeshFragments if self.is_mesh else SceneFragments
 
     @cached_property
     def positions(self) -> list[tuple[int, int]]:
