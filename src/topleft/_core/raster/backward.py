@@ -99,7 +99,7 @@ class Backward:
     def interpolate(
         self, values: NDArray[Any], grad: ArrayLike, grad_derivatives: ArrayLike | None
     ) -> tuple[Floats, Floats]:
-        """Return the gradients of values and vertices from those of an attribute and of its derivatives."""
+        """Return the gradients of values and vertices from the gradients of an attribute and of its derivatives."""
         n = values.shape[-1] if values.ndim > 1 else 1
         attr = np.ascontiguousarray(values, np.float64).reshape(1, -1, n)
         tri = np.arange(len(attr[0]), dtype=np.int32).reshape(-1, 3) if values.ndim == 3 else self.grid.tri

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Sinks that give the same picture whatever the order of triangles.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
 
-#: Sinks that draw a few large triangles row by row, and how few those are.
+#: Sinks that draw a few large triangles row by row, and the largest number of triangles.
 SHAPES_OF = {
     Sink.MASK: engine.SHAPES_OF_BITS, Sink.SAMPLES: engine.SHAPES_OF_BITS, Sink.COUNT: engine.SHAPES_STORED,
     Sink.LABEL: engine.SHAPES_STORED,
@@ -304,13 +304,13 @@ def pays_to_share_instances(n_triangles: int, n_rows: float) -> bool:
 
 
 def pays_to_snap_all(n_vertices: int, n_pixels: int) -> bool:
-    """Tell whether all vertices of a mesh in clusters are snapped for attributes, not only those that show."""
+    """Tell whether all vertices of a mesh in clusters are snapped for attributes, not only visible vertices."""
     costs = cost_table()
     return n_vertices * costs.transform <= n_pixels * costs.seen_pixel
 
 
 def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:
-    """Return the depth of every vertex if they all have the same.
+    """Return the depth of every vertex if all depths are equal.
 
     The plane through three equal depths is that depth to the bit. The first, the middle and the last vertex settle it
     for most scenes; the others are looked at only when those agree. Clip space is never looked at: its depth is not
@@ -357,7 +357,7 @@ class Drawing(NamedTuple):
 
     sink: Sink
     n_threads: int
-    is_sliced: bool  # each thread takes a slice of the triangles; otherwise all of them, in its own rows
+    is_sliced: bool  # each thread takes a slice of the triangles; otherwise all of them, in a part of the rows
     is_bounded: bool  # large triangles skip parts of the picture that hide them
     in_bands: bool  # triangles are sorted into bands of rows, and band after band is drawn
 
@@ -410,7 +410,7 @@ def pays_to_sort_labels(view: View, work: Work, n_threads: int) -> bool:
 
 
 def pays_to_bound(view: View, work: Work, sink: Sink) -> bool:
-    """Tell whether to keep, beside depths, a bound of those of each 64 columns of a row: where spans are long."""
+    """Tell whether to keep, beside depths, a bound of the depths of each 64 columns of a row: where spans are long."""
     costs, (width, height) = cost_table(), view.size
     is_kept = sink in (Sink.NEAREST, Sink.FARTHEST) and view.sampling is Sampling.CENTER and not view.is_exact
     if not is_kept or width < costs.bound_columns or work.n_triangles > costs.bound_triangles:

@@ -1,4 +1,4 @@
-"""The classics behind the public verbs: checks, one kernel call, the same buffers.
+"""The classics behind the public verbs: checks, one kernel call, the buffers that all methods fill.
 
 In: arguments of `coverage`, `overdraw` or `fill`, with a ``method=`` of `CLASSICS`.  Out: their results.  Vertices are
 pixels; there is no transform, clipping, culling or depth.  A count is the number of times that a pixel was drawn, so a
@@ -143,7 +143,7 @@ def as_scene(
         raise ValueError(f"method {method.name!r} takes vertices in pixels, (V, 2) or (V, 3), got shape {points.shape}")
     points = np.array(points, np.float64, order="C")  # a copy: nobody else changes it after the check
     corners = as_checked_triangles(triangles, len(points))
-    # Without sub-pixel bits a kernel takes one, so that a pixel centre is an integer.
+    # Without sub-pixel bits a kernel takes one bit, so that a pixel centre is an integer.
     limit = method.limit / 2 ** max(1, view.subpixel_bits) if method.has_subpixel_bits else method.limit
     with np.errstate(invalid="ignore"):
         is_bad = ~(np.abs(points[:, :2]) < limit).all(axis=1)

@@ -160,7 +160,7 @@ class ClusteredMesh(BoxView):
         return others[:n_others].copy(), n_drawn
 
     def count_drawn(self, sink: Sink) -> int:
-        """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
+        """Return how many clusters one thread draws: the clusters that are neither left out nor hidden."""
         width, height = self._view.size
         ids: NDArray[np.int32] = np.empty((height, width), np.int32)
         target = engine.Target(sink, ids, np.empty((height, width), np.float32), None)
@@ -182,7 +182,7 @@ class ClusteredMesh(BoxView):
     def parts_of_samples(
         self, ids: NDArray[np.int32], samples: Sequence[tuple[int, int]]
     ) -> list[Callable[..., engine.SnappedMesh]]:
-        """Return a maker of the mesh as each sample sees it; those that (S, H, W) ids show are snapped once.
+        """Return a maker of the mesh as each sample sees it; triangles that (S, H, W) ids show are snapped once.
 
         Where other triangles are needed, too, all are snapped.
         """

@@ -50,7 +50,7 @@ class Clusters:
     triangles : ndarray of int32, shape (T, 3)
         Its triangles, their indices checked.
     own_points : ndarray, shape (N, 3)
-        The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
+        The vertices cluster by cluster, vertices on borders several times, and some rows that may be read past the end.
     n_bytes : int
         How much memory the copy takes.
     n_drawn : int, optional
@@ -121,7 +121,7 @@ class SortedClusters(NamedTuple):
     records: NDArray[np.uint8]
     """`tl_cluster` of ``csrc/clusters.h``, one after the other."""
     vertices: NDArray[np.int32]
-    """(N,) the vertices of the mesh cluster by cluster, those on borders several times."""
+    """(N,) the vertices of the mesh cluster by cluster, vertices on borders several times."""
     corners: NDArray[np.uint8]
     """(T, 3) the corners of the triangles among the vertices of their cluster."""
     order: NDArray[np.int32]

@@ -32,7 +32,7 @@ BLEND_CODES = {mode: code for code, mode in enumerate(get_args(BlendOption))}  #
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """The options of `fill` besides those that all verbs share, not yet checked."""
+    """The options of `fill` that other verbs do not have, not yet checked."""
 
     per: PerOption
     background: ArrayLike | None
@@ -274,7 +274,7 @@ ROUTES = {FillRoute.SHAPES: fill_large_shapes, FillRoute.SAMPLES: paint_samples,
 
 
 def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:
-    """Blend coloured triangles; with several samples a pixel each is a picture of its own.
+    """Blend coloured triangles; with several samples a pixel each sample is a picture.
 
     A ground is there for uint8 with one sample a pixel, or for `is_large_shapes`.
     """

@@ -80,7 +80,7 @@ class SeenSamples(NamedTuple):
 
     @classmethod
     def of(cls, ids: NDArray[Any], depth: NDArray[Any], split: engine.Split | None = None, n: int = 0) -> Self:
-        """Take planes; those that kernels cannot read are copied."""
+        """Take planes; planes that kernels cannot read are copied."""
         return cls(as_read(ids, ids.dtype), as_read(depth, np.float32), split, n or len(ids))
 
     def split_pixels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[Any], NDArray[np.float32]]:
@@ -183,7 +183,7 @@ class Fragments:
         return frags
 
     def _whole(self, ids: NDArray[Any]) -> NDArray[Any]:
-        """Return the ids of drawn triangles as `.id` has them: the same, unless a lens cuts triangles into parts."""
+        """Return the ids of drawn triangles as `.id` has them: equal, unless a lens cuts triangles into parts."""
         return ids
 
     def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:

@@ -1,6 +1,6 @@
 """Merges visibility buffers: several processes draw a share of the triangles each, for the whole picture.
 
-Input: ids and depth of each share. Output: those of all triangles, to the bit, whatever the shares were.
+Input: ids and depth of each share. Output: ids and depth of all triangles, to the bit, whatever the shares were.
 
 Based on: S. Molnar, M. Cox, D. Ellsworth, H. Fuchs, A Sorting Classification of Parallel Rendering, 1994 (sort-last).
 """
@@ -151,7 +151,7 @@ def _as_buffer(buffer: Any, i: int) -> tuple[I32, F32]:
 
 
 def _planes_of(frags: Fragments) -> tuple[Any, Any]:
-    """Ids and depth, (H, W) or (H, W, S); ids of a scene are those of all its triangles."""
+    """Ids and depth, (H, W) or (H, W, S); ids of a scene count all its triangles."""
     samples = frags.samples_id
     return (samples, frags.samples_depth) if np.shape(samples)[-1:] != (1,) else (frags.id, frags.depth)
 

@@ -87,7 +87,7 @@ class DepthLayers:
         return (self.planes[0] >= 0).sum(0, dtype=np.int32)
 
     def layer(self, k: int) -> Fragments:
-        """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
+        """Return layer k, 0 the nearest, as a visibility buffer, which computes attributes."""
         return self.rows(k, 0, self.planes[0].shape[1])
 
     def rows(self, k: int, top: int, n_rows: int) -> Fragments:

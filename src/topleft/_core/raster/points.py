@@ -52,7 +52,7 @@ class PointFragments(Fragments):
     _subject_kind = "Points"
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], n_points: int) -> None:
-        """Take planes (S, H, W), one a sample.
+        """Take planes (S, H, W), a plane for each sample.
 
         Raises
         ------
@@ -239,7 +239,7 @@ def rows_of(
 
 
 def snap_points(memory: Memory, array: NDArray[Any], view: View) -> NDArray[np.uint8]:
-    """The records of all points; those that cannot be drawn are marked."""
+    """The records of all points; points that cannot be drawn are marked."""
     source, n = source_of(array, view), len(array)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
     records, _, n_bad, _ = snap(
@@ -255,7 +255,7 @@ def snap_points(memory: Memory, array: NDArray[Any], view: View) -> NDArray[np.u
 
 
 def sizes_in_fx(sizes_px: float | NDArray[np.float64], bits: int) -> tuple[int, NDArray[np.int32] | None]:
-    """Sizes in whole sub-pixels: one, or one each."""
+    """Sizes in whole sub-pixels: one size, or the size of each point."""
     fx = np.minimum(np.rint(np.asarray(sizes_px) * 2.0**bits), float(min(MOST_POINT_PX << bits, (1 << 30) - 1)))
     if fx.ndim == 0:
         return int(fx), None

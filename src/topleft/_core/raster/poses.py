@@ -113,7 +113,7 @@ class FragmentsBatch(Sequence[Fragments]):
         texture, **options
             As `Fragments.sample` takes them.
         uv : array_like
-            Those of all, (V, 2), say; or with a leading axis of B, (B, V, 2).
+            Of all poses, (V, 2), say; or of each, (B, V, 2).
 
         Raises
         ------
@@ -143,7 +143,7 @@ class FragmentsBatch(Sequence[Fragments]):
         Parameters
         ----------
         values : array_like of real numbers
-            Those of all, as `Fragments.interpolate` takes them, (V, K), say; or with a leading axis of B, (B, V, K).
+            Of all poses, as `Fragments.interpolate` takes them, (V, K), say; or of each, (B, V, K).
         background : float
             Value where there is no triangle.
         derivatives : bool
@@ -166,7 +166,7 @@ class FragmentsBatch(Sequence[Fragments]):
         )
 
     def _each(self, values: ArrayLike) -> Sequence[NDArray[Any]]:
-        """Return the values of each pose: its own, or those of all."""
+        """Return the values of each pose: a part of (B, ...), or the values of all poses."""
         array = as_array("values", values)
         has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
         if has_own and len(array) != len(self):

@@ -74,7 +74,7 @@ def draw(
 
 
 def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height: int, n_parts: int) -> list[int]:
-    """Draw as `draw` does: each thread a slice of the triangles into its rows, then those that others list for it."""
+    """Draw as `draw` does: each thread a slice of the triangles into its rows, then what others list for it."""
     mesh, n = snapped.mesh, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
     starts = [n * i // n_parts for i in range(n_parts + 1)]
@@ -96,7 +96,7 @@ def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height:
 
 
 class Canvas(NamedTuple):
-    """An array to return, and a contiguous aligned one to draw into: the same wherever that one is.
+    """An array to return, and the contiguous aligned array that is drawn into: the returned array where that is both.
 
     As a context it gives both, and at its end both are the same picture.
     """
@@ -231,7 +231,7 @@ def draw_all_samples(
 
 
 class FragmentOptions(NamedTuple):
-    """The options of `rasterize` beside those of all verbs."""
+    """The options of `rasterize` that other verbs do not have."""
 
     test: DepthTestOption | None
     background: float  # depth where nothing is
@@ -331,7 +331,7 @@ def draw_depth(memory: Memory, snapped: Snapped, view: View, options: FragmentOp
 
 
 def draw_samples(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
-    """Draw ids and depth of every sample: those of the first, and of pixels that show several; or a plane a sample."""
+    """Draw ids and depth of the first sample and of pixels that show several triangles; or of every sample."""
     (width, height), n = view.size, view.sampling.n_samples
     own = SamplePass(memory, snapped.mesh, sample_positions(n, view.grid_bits), drawing.n_threads)
     check_fits((n, height, width), np.int32, np.float32)

@@ -305,7 +305,7 @@ def snap(
 def without_sides(
     made: Callable[[NDArray[np.int32], RasterState], engine.SnappedMesh], triangles: NDArray[np.int32], view: View
 ) -> engine.SnappedMesh:
-    """Return a mesh of the triangles, after those that show the side that is not drawn are collapsed."""
+    """Return a mesh of the triangles, after triangles that show the side that is not drawn are collapsed."""
     if view.single_sided is not None and len(triangles):
         is_single, cull = view.single_sided
         seen = made(triangles, view.raster_state._replace(cull=cull))

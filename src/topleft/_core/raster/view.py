@@ -31,7 +31,7 @@ class Planned(Protocol):
     """The part of `topleft.Plan` that verbs use."""
 
     def fitted(self, view: View) -> View:
-        """Return the view with its choices, or raise an error where the plan is for another one."""
+        """Return the view with its choices, or raise an error where the plan is for another view."""
         return replace(view, plan=self)
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
@@ -85,7 +85,7 @@ class ViewOptions(WindowOptions, total=False):
 
 OPTIONS = frozenset(ViewOptions.__annotations__)
 KEPT_OPTIONS = frozenset({"clip_depth", "cull", "far_clip", "near_clip", "sampling", "subpixel_bits", "threads"})
-"""Those that, unlike arrays and pairs, are equal only where they mean the same, types compared."""
+"""Options that, unlike arrays and pairs, are equal only where their meaning is, types compared."""
 
 
 class RasterState(NamedTuple):
@@ -119,7 +119,7 @@ class View:
     classic: Method | None = None
     plan: Planned | None = None
     static: Static | None = None
-    """The mesh that the arrays are of, if they are those of one."""
+    """The mesh that has the arrays, if a mesh does."""
     single_sided: tuple[NDArray[np.uint8], int] | None = None
     """1 for each triangle with a side that is not drawn, and the `tl_cull` that names that side."""
     sides_by_material: bool = True

@@ -74,9 +74,9 @@ class BentMesh:
     """Triangles that a camera without lens draws as the lens would show the mesh."""
 
     points_eye: F64
-    """(V', 3), for `Camera.clip_from_eye`: first the vertices of the mesh that are used, then those of parts."""
+    """(V', 3), for `Camera.clip_from_eye`: first the vertices of the mesh that are used, then vertices of parts."""
     triangles: I32  # (T', 3): rows of `points_eye`; triangles that the lens cannot see are left out
-    parts: SubdividedTriangles | None  # None: the triangles are those of the mesh
+    parts: SubdividedTriangles | None  # None: the triangles of the mesh
 
     __setstate__ = set_aligned
 
@@ -150,7 +150,7 @@ class BentMesh:
         sign = {"none": 0, "back": 1, "front": -1}[parse(CullOption, "cull", cull)]
         is_drawn = np.ones(self.triangles.shape, bool)
         places: npt.NDArray[np.signedinteger[Any]] = self.triangles
-        if self.parts is not None:  # parts have points of their own
+        if self.parts is not None:  # parts have other points than the mesh
             is_drawn[self.parts.rows] = self.parts.is_outline
             _, same = np.unique(self.points_eye, axis=0, return_inverse=True)
             first = np.empty(len(same), np.intp)

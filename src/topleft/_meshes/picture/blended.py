@@ -45,7 +45,7 @@ COLORED = Material(alpha_mode="blend")
 
 
 def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
-    """The blended triangles (T,), by the materials of the mesh or this one; None if there are none."""
+    """The blended triangles (T,), by the materials of the mesh or this material; None if there are none."""
     given = mesh.materials if material is None else (material,)
     materials = given or (COLORED,)
     are_blended = [one.alpha_mode == "blend" and has_opacity(one, mesh) for one in materials]
@@ -85,7 +85,7 @@ def blended_masks(scene: Scene, options: ShadingOptions) -> list[Mask | None] | 
 def lay_blended(
     picture: U8, solid: Fragments, placed: Placed, masks: Sequence[Mask | None], options: ShadingOptions
 ) -> None:
-    """Lay the visible blended triangles over the picture of the opaque ones; masks are those of drawn triangles."""
+    """Lay the visible blended triangles over the picture of opaque triangles; masks are of drawn triangles."""
     if 0 not in placed.view.size:
         TransparentPass(placed, masks, options).lay_over(picture, solid)
 
@@ -107,12 +107,12 @@ class TransparentPass:
 
     @cached_property
     def snapped(self) -> list[engine.SnappedMesh]:
-        """The same, ready to be peeled."""
+        """The blended triangles, snapped, to be peeled."""
         return [self.blended.snap(i) for i, mask in enumerate(self.masks) if mask is not None]
 
     @cached_property
     def lit(self) -> Lit:
-        """The same, ready to be shaded."""
+        """The blended triangles, with the light that shades them."""
         some = [i for i, mask in enumerate(self.masks) if mask is not None]
         bent, first_ids = self.placed.bent, self.placed.first_ids
         shown = []

@@ -112,7 +112,7 @@ def draw_groups(placed: Placed, targets: Sequence[SampleTarget], ids: NDArray[np
 
 
 def draw_joined(placed: Placed, sink: Sink, background: float) -> Fragments | None:
-    """Draw several samples as those of one mesh; None where that takes planes: of clusters, or of many meshes."""
+    """Draw several samples of all instances as one mesh; None where that takes planes: clusters, or many meshes."""
     view = placed.view.but(is_split=True)
     is_clustered = len(placed.in_parts) > 0 or in_clusters(placed, sink)
     if is_clustered or len(placed.joined) != 1 or not choices.can_split(view, placed.scene.n_triangles):
@@ -190,7 +190,7 @@ def draw_part(placed: Placed, targets: Sequence[SampleTarget], *, is_first: bool
 
 
 def draw_instances(placed: Placed, targets: Sequence[SampleTarget], *, is_first: bool) -> None:
-    """Draw whole instances; where order does not matter those whose boxes may show, nearest first."""
+    """Draw whole instances; where order does not matter instances whose boxes may show, nearest first."""
     sink, order = Sink(targets[0].target.sink), np.arange(len(placed.scene))
     may_leave_out = choices.can_cluster(placed.view, sink)
     may_hide = may_leave_out and sink in (Sink.NEAREST, Sink.FARTHEST)
@@ -259,9 +259,9 @@ def find_shown(
     *,
     is_drawn: bool,
 ) -> NDArray[np.intp]:
-    """Return those of some instances whose boxes may show in a sample in some rows, or in all.
+    """Return which of some instances have boxes that may show in a sample in some rows, or in all.
 
-    If `is_drawn`, before the targets' depths; otherwise at least the first one, which clears the targets.
+    If `is_drawn`, before the targets' depths; otherwise at least the first instance, which clears the targets.
     """
     may_show: NDArray[np.uint8] = np.zeros(len(some), np.uint8)
     for target, at in targets:
@@ -340,7 +340,7 @@ def draw_clusters(
 ) -> bool:
     """Draw a sample in clusters, in memory of each thread; returns as `draw_clustered` does.
 
-    In rounds, each of which leaves out instances that lie outside, between samples, or behind those of earlier ones.
+    In rounds, each of which leaves out instances that lie outside, between samples, or behind earlier rounds.
     """
     keeps_order = Sink(target.target.sink) in (Sink.NEAREST, Sink.FARTHEST)
     order = find_shown(placed, order, [target], is_drawn=keeps_order and not is_first)
@@ -358,7 +358,7 @@ def draw_clusters(
 def draw_round(
     placed: Placed, some: NDArray[np.intp], target: SampleTarget, memories: Sequence[Memory], **ends: bool
 ) -> bool:
-    """Draw a sample of some instances, each thread those in its rows; returns as `draw_clustered` does."""
+    """Draw a sample of some instances, each thread the instances in its rows; returns as `draw_clustered` does."""
     tops = split_rows(placed, some, len(memories))
 
     def own(first: int, end: int) -> list[int]:

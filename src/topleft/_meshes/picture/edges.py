@@ -1,4 +1,4 @@
-"""Draws the edges of triangles over a picture, those that its visibility buffer does not hide.
+"""Draws the edges of triangles over a picture, where its visibility buffer does not hide them.
 
 Input: a picture (H, W, 4) uint8, `Fragments`, the `Mesh` or `Scene` and the `Camera` they were made with.
 """
@@ -60,7 +60,7 @@ def draw_edges(
     cull: CullOption,
     threads: int | None,
 ) -> None:
-    """Draw the edges of triangles over the picture (H, W, 4), those that are not behind a depth (H, W)."""
+    """Draw the edges of triangles over the picture (H, W, 4), where they are not behind a depth (H, W)."""
     height, width = depth.shape
     size = width, height
     transform = camera.clip_from_world(size) if camera.lens is None else camera.clip_from_eye(size)

@@ -40,7 +40,7 @@ WHOLE = slice(None), slice(None)
 class VisiblePart:
     """The visible part of one instance: its index, the rectangle of pixels round it, and the fragments there.
 
-    `frags` count the triangles that were drawn: of a lens those of `bent`, else those of the mesh.
+    `frags` count the triangles that were drawn: of `bent` through a lens, else of the mesh.
     """
 
     i: int
@@ -180,7 +180,7 @@ class SceneFragments(InstanceIds, Fragments):
 
     @classmethod
     def of(cls, drawn: Fragments, placed: Placed) -> Self:
-        """Return the fragments of a scene from those of all its triangles as one mesh."""
+        """Return the fragments of a scene from the fragments of all its triangles as one mesh."""
         frags = cls(drawn.id[None], drawn.depth[None], placed, placed.positions)
         frags._split, frags._planes = drawn._split, drawn._planes or frags._planes
         frags._one = drawn if len(placed.first_ids) == 2 else None
@@ -248,7 +248,7 @@ class SceneFragments(InstanceIds, Fragments):
         seen, first_ids = self._seen(), self.placed.first_ids
         ids = seen.ids
         width, height = ids.shape[:0:-1]
-        if len(first_ids) == 2:  # there is one, wherever it shows
+        if len(first_ids) == 2:  # the only instance may be anywhere
             boxes = np.array([[0, 0, width, height]], np.int32)
         else:
             boxes = np.tile(np.array([width, height, 0, 0], np.int32), (len(first_ids) - 1, 1))
@@ -372,7 +372,7 @@ class SceneDepthLayers(InstanceIds, DepthLayers):
 
     @property
     def n_vertices(self) -> None:
-        """None: vertices are those of several meshes."""
+        """None: several meshes have vertices."""
         return
 
     @property
@@ -381,7 +381,7 @@ class SceneDepthLayers(InstanceIds, DepthLayers):
         return np.moveaxis(self.planes[0], 0, -1)
 
     def layer(self, k: int) -> SceneFragments:
-        """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
+        """Return layer k, 0 the nearest, as a visibility buffer, which computes attributes."""
         k = range(len(self))[k]
         ids, depth = self.planes
         return SceneFragments(ids[k : k + 1], depth[k : k + 1], self.placed, [(0, 0)])
@@ -396,7 +396,7 @@ def instance_of_ids(ids: Ids, first_ids: NDArray[np.int64]) -> NDArray[np.int32]
 
 
 def find_instances(ids: Ids, first_ids: NDArray[np.int64], boxes: NDArray[np.int32] | None) -> NDArray[np.int32]:
-    """Return the same of contiguous ids (H, W), and widen the boxes of those that show."""
+    """Return the instance of each of contiguous ids (H, W), and widen the boxes of visible instances."""
     found = empty(ids.shape, np.int32)
     if ids.dtype == np.int32:
         engine.find_instances(cast("NDArray[np.int32]", ids), first_ids, found, boxes)
@@ -411,7 +411,7 @@ def find_instances(ids: Ids, first_ids: NDArray[np.int64], boxes: NDArray[np.int
 
 
 def local_part(ids: Ids, first: int, end: int) -> NDArray[np.int32]:
-    """Return ids less the first of those in [first, end), which int32 counts; -1 for others."""
+    """Return ids in [first, end) less `first`, which int32 counts; -1 for others."""
     own: NDArray[Any] = ids - ids.dtype.type(first)
     own[own.view(np.dtype(f"u{own.itemsize}")) >= end - first] = -1
     return own.astype(np.int32, copy=False)

@@ -70,7 +70,7 @@ def evaluate(
 
 
 def points_of(part: VisiblePart) -> F64:
-    """Where the pixels that are seen lie on the mesh, in its own space: (P, 3) float64."""
+    """Where visible pixels lie on the mesh, in object space: (P, 3) float64."""
     ids, rows = part.frags._seen().ids[0], np.eye(4)[None, :3]
     points: F64 = evaluate([part.shown], ids, PointKind.ROWS, rows, np.nan, dtype=np.float64)[part.seen]
     return points
@@ -95,7 +95,7 @@ class GBuffer:
         return draw_visible(self.shot, self.rasterizer, self.look.get("material"), **self.options)
 
     def sampled(self, sampling: str) -> Fragments:
-        """Return the same with several samples a pixel."""
+        """Return the visibility buffer with several samples a pixel, without the holes of materials."""
         return draw_visible(self.shot, material=self.look.get("material"), sampling=sampling, **self.options)
 
     @cached_property

@@ -48,7 +48,7 @@ class Cut:
 
     @property
     def triangles(self) -> I32:
-        """Those with holes."""
+        """The triangles with holes."""
         return np.flatnonzero(self.is_cut).astype(np.int32)
 
     def of_parts(self, source: I32) -> Cut:
@@ -66,12 +66,12 @@ class MaskedInstance(NamedTuple):
 
 
 def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
-    """The materials with holes of a mesh, or this one, and their triangles, kept; None if there are none."""
+    """The materials with holes of a mesh, or this material, and their triangles, kept; None if there are none."""
     return mesh.cache.cuts.find(material, lambda: find_cut(mesh, material))
 
 
 def find_cut(mesh: Mesh, material: Material | None) -> Cut | None:
-    """Find the materials with holes of a mesh, or this one, and their triangles; None if there are none."""
+    """Find the materials with holes of a mesh, or this material, and their triangles; None if there are none."""
     materials = mesh.materials if material is None else (material,)
     holes = [has_holes(one, mesh) for one in materials]
     if not any(holes):
@@ -82,7 +82,7 @@ def find_cut(mesh: Mesh, material: Material | None) -> Cut | None:
 
 
 def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
-    """The materials with holes, or this one, of the mesh of each instance."""
+    """The materials with holes, or this material, of the mesh of each instance."""
 
     def make() -> list[Cut | None]:
         return [cut_of(one.mesh, one.material if material is None else material) for one in scene]
@@ -93,7 +93,7 @@ def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
 def draw_visible(
     shot: Shot, rasterizer: Rasterizer | None = None, material: Material | None = None, **options: Any
 ) -> Fragments:
-    """The visibility buffer without the holes of materials (or this one); options as those of a `View`."""
+    """The visibility buffer without the holes of materials, or of this material; options as for a `View`."""
     with shot.memory(rasterizer) as memory:
         return draw_solid(memory, Placed.parse(shot, options, material), cuts_of(shot.scene, material))
 
@@ -132,7 +132,7 @@ def holed_instances(
 
 
 def solid_scene(scene: Scene, holed: Sequence[MaskedInstance], masks: Sequence[Mask | None] | None = None) -> Scene:
-    """The scene without the triangles that have holes, nor those of masks; ids stay."""
+    """The scene without triangles that have holes or that masks name; ids stay."""
     gone: list[Mask | None] = [None] * len(scene) if masks is None else list(masks)
     for i, _, _, cut in holed:
         gone[i] = cut.is_cut if (mask := gone[i]) is None else mask | cut.is_cut

@@ -57,7 +57,7 @@ class CameraRays:
 
 
 class ShadingMesh:
-    """A mesh as the shading kernels read it; `positions` (V, 3) are those of the mesh, or stretched.
+    """A mesh as the shading kernels read it; `positions` (V, 3) are the vertices of the mesh, or stretched.
 
     `center`: (3,) float64, the middle of the box round the vertices in use: the origin of the space that light is
     computed in, so that float32 is fine enough. `normals`: (N, 4) float32, unit normals of the vertices, then of
@@ -68,7 +68,7 @@ class ShadingMesh:
     def __init__(self, mesh: Mesh, stretch: F64 | None = None) -> None:
         """`stretch`: an affine matrix (4, 4) that acts on the mesh first."""
         corners = None if mesh.is_faceted else mesh.corner_normals()
-        if mesh.is_faceted:  # nobody reads normals of vertices where every face has its own
+        if mesh.is_faceted:  # no kernel reads normals of vertices where every face has a normal
             self.normals = np.ones((len(mesh.vertices), 4), np.float32)
         else:
             normals = mesh.vertex_normals() if corners is None else corners.rows

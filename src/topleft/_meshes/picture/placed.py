@@ -143,7 +143,7 @@ class Placed:
 
     @property
     def is_plain_mesh(self) -> bool:
-        """Whether the fragments of the only instance are those of the subject: a mesh without a lens."""
+        """Whether the fragments of the only instance are the fragments of the subject: a mesh without a lens."""
         return self.is_mesh and self.bent is None
 
     @property
@@ -189,11 +189,11 @@ class Placed:
         return wholes[ids]  # part -1, none, is the last
 
     def snap(self, i: int) -> engine.SnappedMesh:
-        """Return an instance, snapped; in shared buffers it draws its own range of ids. Small scenes are kept."""
+        """Return an instance, snapped; it draws the ids of its range. Small scenes are kept."""
         return self.snap_all(np.array([i]))[0]
 
     def snap_all(self, some: NDArray[np.intp]) -> list[engine.SnappedMesh]:
-        """Return some instances in the same way."""
+        """Return some instances, snapped, as `snap` does."""
         snapped = [mesh or self._snap_alone(i) for i, mesh in zip(some.tolist(), self._snap(some), strict=True)]
         if self._n_kept < VERTICES_AT_ONCE:
             self._kept.update(zip(some.tolist(), snapped, strict=True))
@@ -201,7 +201,7 @@ class Placed:
         return snapped
 
     def _snap(self, some: NDArray[np.intp]) -> list[engine.SnappedMesh | None]:
-        """Return some instances, all in one call; None for those that are to be snapped alone."""
+        """Return some instances, all in one call; None for an instance that is to be snapped alone."""
         numbers = some.tolist()
         if self._all is not None:
             return [self._kept.get(i) or self._all.mesh(i) for i in numbers]
@@ -211,7 +211,7 @@ class Placed:
         return [None] * len(some) if placed is None else [placed.mesh(k) for k in range(len(some))]
 
     def _project(self, some: NDArray[np.intp]) -> engine.PlacedMeshes | None:
-        """Return some instances, but for those to be snapped alone; None: that is all of them."""
+        """Return some instances without those that are snapped alone; None: all are."""
         view, n = self.view, len(some)
         firsts = np.concatenate([[0], np.cumsum(self._vertex_counts[some])])
         n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
@@ -281,7 +281,7 @@ class Placed:
 
     @cached_property
     def sides(self) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-        """The `tl_cull` of each instance, and which have triangles with two sides beside others with one."""
+        """The `tl_cull` of each instance, and which have triangles with two sides beside triangles with one side."""
         view, key = self.view, (self.view.cull, self.view.sides_by_material)
         kept = self.whole.cache.sides if self.material is None else {}
         found = kept.get(key)

@@ -62,7 +62,7 @@ class PictureOptions:
     def of(cls, shot: Shot, view: dict[str, Any], look: dict[str, Any]) -> PictureOptions:
         """Return the checked options of a shot, kept with its subject unless a value may change.
 
-        Those of a mesh in parts of several levels are not kept: other choices of parts share its cache.
+        Options of a mesh in parts of several levels are not kept: other choices of parts share its cache.
         """
         subject = shot.scene[0].mesh if shot.is_mesh else shot.scene
         if shot.is_mesh and shot.scene[0].mesh.is_in_parts:

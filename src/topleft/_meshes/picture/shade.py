@@ -43,7 +43,7 @@ MIN_PX_PER_THREAD = 1 << 14
 
 SHOW_CODES = {"normals": 1, "matcap": 2}  # tl_show in csrc/shading.h; light: 0
 NUMBERS = frozenset({"ids", "depth"})
-"""Those that colour numbers of the buffer, without light."""
+"""Modes that colour numbers of the buffer, without light."""
 
 PLAIN = Surface((Material(),), is_by_triangle=False)
 """Fills the place of the materials in pictures of normals, which read none."""
@@ -156,7 +156,7 @@ def inputs_of(
 
 
 class Lit:
-    """Instances that are ready to be shaded: at least those that show, in the order of their ids."""
+    """Instances that are ready to be shaded: at least all visible instances, in the order of their ids."""
 
     def __init__(
         self, shown: Sequence[ShownInstance], camera: Camera, size: tuple[int, int], options: ShadingOptions

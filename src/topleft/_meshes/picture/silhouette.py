@@ -108,7 +108,7 @@ def silhouette(
 
 
 def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
-    """The mask of a shot; options as those of `coverage`, without `transform`."""
+    """The mask of a shot; options as for `coverage`, without `transform`."""
     placed = Placed.parse(shot, options, with_depth=False)
     view = placed.view
     if len(placed.scene) == 1:

@@ -141,7 +141,7 @@ def peel_shot(
     material: Material | None = None,
     **options: Any,
 ) -> DepthLayers:
-    """The nearest layers of a shot; options as those of `peel`, without `transform`."""
+    """The nearest layers of a shot; options as for `peel`, without `transform`."""
     shot.scene.check_counted("a scene that is peeled")
     placed = Placed.parse(shot, options, material)
     if shot.is_mesh:

@@ -92,7 +92,7 @@ def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
 def as_polygons(subject: MeshLike) -> Polygons:
     """The points and triangles of a subject that `as_mesh` takes; points stay flat where they are.
 
-    A `TypeError` if it is none of those, a `ValueError` if it has no faces that are surfaces.
+    A `TypeError` if it is none of these, a `ValueError` if it has no faces that are surfaces.
     """
     if _is_scene(subject) or isinstance(subject, str | os.PathLike):
         subject = as_mesh(subject)

@@ -39,7 +39,7 @@ EYE = np.eye(4)
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """A mesh and where it stands; the arrays are those of the mesh, never copied.
+    """A mesh and where it stands; the arrays of the mesh are never copied.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ class Scene:
 
     @cached_property  # type: ignore[no-redef]
     def instances(self) -> tuple[Instance, ...]:
-        """The instances; those of a scene that was made like another are made when all are needed."""
+        """The instances; a scene that was made like another makes them when all are needed."""
         return tuple(map(self._made, range(len(self))))
 
     def _made(self, i: int) -> Instance:
@@ -341,7 +341,7 @@ class Scene:
 
     @cached_property
     def has_no_materials(self) -> bool:
-        """Whether no instance has a material of its own."""
+        """Whether no instance has a material beside its mesh."""
         return all(one.material is None for one in self.instances)
 
     @cached_property
@@ -418,7 +418,7 @@ class Scene:
         return self._but(meshes={id(mesh): (mesh, at) for mesh, at in places if len(at)}, **known)
 
     def _but(self, **values: object) -> Scene:
-        """Return a scene like this one, of which these values are known, others than those of its instances."""
+        """Return a scene like this scene, with these values in place of the values of its instances."""
         scene = object.__new__(Scene)
         vars(scene).update(values, _like=vars(self).get("_like", self))
         return scene
