@@ -5,6 +5,7 @@ Each verb checks its arguments, snaps the mesh (read, transform, snap, clip), ch
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
@@ -158,27 +159,32 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     snapped = snap_to_cover(memory, vertices, triangles, view, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
-    if view.sampling.n_samples > 1 and view.is_exact:
-        return draw_share_of_masks(memory, snapped, view, out)
-    if view.sampling.n_samples > 1:
-        with Canvas.of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
-            draw(memory, snapped, view, choices.drawing(view, snapped.work, Sink.SAMPLES), canvas)
-        return result
-    with Canvas.of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
-        draw(memory, snapped, view, choices.drawing(view, snapped.work, Sink.MASK), canvas)
-    return result
+
+    def draw_mask(sink: Sink, pixels: NDArray[Any], at: tuple[int, int]) -> None:
+        seen = replace(snapped, mesh=snapped.mesh.at_sample(*at)) if any(at) else snapped
+        draw(memory, seen, view, choices.drawing(view, snapped.work, sink), pixels)
+
+    return draw_cover(memory, view, out, draw_mask)
 
 
-def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.float32]:
-    """Return the share of samples that triangles cover, from a mask of each sample."""
+def draw_cover(
+    memory: Memory, view: View, out: object, draw_mask: Callable[[Sink, NDArray[Any], tuple[int, int]], None]
+) -> NDArray[Any]:
+    """Return where triangles are, or the share of samples that they cover.
+
+    `draw_mask` draws them into pixels, as a sample sees them that lies so far from the centre, in sub-pixels.
+    """
     n, shape = view.sampling.n_samples, view.size[::-1]
-    mask: NDArray[np.bool_] = memory.scratch("sample mask", shape, np.bool_)
-    with Canvas.of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
-        canvas[...] = 0.0
-        drawing = choices.drawing(view, snapped.work, Sink.MASK)
-        for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
-            draw(memory, replace(snapped, mesh=snapped.mesh.at_sample(*at)), view, drawing, mask)
-            np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
+    name, dtype = ("coverage share", np.float32) if n > 1 else ("coverage", np.bool_)
+    with Canvas.of(memory, name, out, shape, dtype) as (result, canvas):
+        if n == 1 or not view.is_exact:
+            draw_mask(Sink.SAMPLES if n > 1 else Sink.MASK, canvas, (0, 0))
+        else:  # which the kernel of several samples does not draw
+            canvas[...] = 0.0
+            mask: NDArray[np.bool_] = memory.scratch("sample mask", shape, np.bool_)
+            for x, y in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
+                draw_mask(Sink.MASK, mask, (x, y))
+                np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
     return result
 
 

@@ -5,6 +5,7 @@ Input: `Mesh` or `Scene`, `Camera`. Output: a mask (H, W), bool or float32.
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any, Unpack
 
 import numpy as np
@@ -15,10 +16,10 @@ from topleft._core import engine
 from topleft._core.base.array_types import MeshLike
 from topleft._core.base.arrays import as_out
 from topleft._core.base.defaults import DEFAULT_SIZE
-from topleft._core.base.memory import FRESH, SCRATCH, empty
+from topleft._core.base.memory import SCRATCH, empty
 from topleft._core.base.options import Sampling, Sink
 from topleft._core.base.threads import count_threads
-from topleft._core.raster.rasterize import Canvas, draw_coverage
+from topleft._core.raster.rasterize import Canvas, draw_cover, draw_coverage
 from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.view import View, WindowOptions
 from topleft._meshes.camera.camera import CameraLike
@@ -115,43 +116,27 @@ def cover_shot(shot: Shot, out: object, **options: Any) -> NDArray[Any]:
         mesh = placed.scene[0].mesh
         return draw_coverage(SCRATCH, mesh.vertices, mesh.triangles, placed.view_of(0), out)
     view.refuse_classic("a scene")
-    width, height = view.size
-    n = view.sampling.n_samples
-    is_share = n > 1 or view.sampling is Sampling.AREA
-    with Canvas.of(FRESH, "coverage", out, (height, width), np.float32 if is_share else np.bool_) as (result, canvas):
-        if not (width and height):
-            pass
-        elif view.sampling is Sampling.AREA:
+    if view.sampling is Sampling.AREA:
+        with Canvas.of(SCRATCH, "coverage area", out, view.size[::-1], np.float32) as (result, canvas):
             add_areas(placed, view, canvas)
-        elif n > 1 and view.is_exact:
-            add_masks(placed, view, canvas)
-        else:
-            samples = sample_positions(n, view.grid_bits) if n > 1 else None
-            shape = engine.Target.covered_shape(height, width, n)
-            sink = Sink.SAMPLES if n > 1 else Sink.MASK
-            target = engine.Target(sink, canvas, None, SCRATCH.scratch("covered", shape, np.uint64), samples)
-            draw_scene(placed, [SampleTarget(target, (0, 0))])
-    return result
+        return result
 
+    def draw_mask(sink: Sink, pixels: NDArray[Any], at: tuple[int, int]) -> None:
+        n, (width, height) = view.sampling.n_samples if sink is Sink.SAMPLES else 1, view.size
+        covered = SCRATCH.scratch("covered", engine.Target.covered_shape(height, width, n), np.uint64)
+        samples = sample_positions(n, view.grid_bits) if n > 1 else None
+        if pixels.size:
+            draw_scene(placed, [SampleTarget(engine.Target(sink, pixels, None, covered, samples), at)])
 
-def add_masks(placed: Placed, view: View, canvas: NDArray[np.float32]) -> None:
-    """Write the share of samples that the instances cover, from a mask of each sample."""
-    n, (width, height) = view.sampling.n_samples, view.size
-    mask: NDArray[np.bool_] = SCRATCH.scratch("sample mask", (height, width), np.bool_)
-    covered = SCRATCH.scratch("covered", engine.Target.covered_shape(height, width, 1), np.uint64)
-    canvas[...] = 0
-    for x, y in sample_positions(n, view.grid_bits).tolist():
-        draw_scene(placed, [SampleTarget(engine.Target(Sink.MASK, mask, None, covered), (x, y))])
-        np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
+    return draw_cover(SCRATCH, view, out, draw_mask)
 
 
 def add_areas(placed: Placed, view: View, canvas: NDArray[np.float32]) -> None:
     """Write the sum of the areas that the instances cover, at most 1."""
     canvas[...] = 0
-    own = empty(canvas.shape, np.float32)
-    for chunk in placed.chunks():
-        for mesh in chunk:
-            n_threads = count_threads(view.threads, mesh.n_triangles)
-            sum_areas(SCRATCH, mesh, own, n_threads, is_clamped=True)
-            canvas += own
+    areas = empty(canvas.shape, np.float32)
+    for mesh in chain.from_iterable(placed.chunks() if canvas.size else ()):
+        n_threads = count_threads(view.threads, mesh.n_triangles)
+        sum_areas(SCRATCH, mesh, areas, n_threads, is_clamped=True)
+        canvas += areas
     np.minimum(canvas, 1, out=canvas)
