@@ -69,7 +69,7 @@ class GivenCorners(NamedTuple):
         return steps
 
 
-class SeenSamples(NamedTuple):
+class SampleBuffers(NamedTuple):
     """The ids and depths of the samples of a picture, as kernels read them."""
 
     ids: NDArray[Any]
@@ -186,7 +186,8 @@ class Fragments:
         """Return the ids of drawn triangles as `.id` has them: equal, unless a lens cuts triangles into parts."""
         return ids
 
-    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
+    @property
+    def _visible_meshes(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
         """Return each visible mesh as the first sample sees it: its index, the mesh, the id of its triangle 0."""
         return [(0, self._snapped, 0)]
 
@@ -198,12 +199,12 @@ class Fragments:
         """Return mesh `i` as it was drawn: itself, unless a lens cuts it."""
         return mesh
 
-    def _seen(self) -> SeenSamples:
+    def _buffers(self) -> SampleBuffers:
         """Return the ids and depths of the samples, as drawn."""
         split = self._split
         if split is not None:
-            return SeenSamples.of(split.ids[None], split.depth[None], split.split, len(split.drawn.positions))
-        return SeenSamples.of(*self.drawn_planes)
+            return SampleBuffers.of(split.ids[None], split.depth[None], split.split, len(split.drawn.positions))
+        return SampleBuffers.of(*self.drawn_planes)
 
     def __repr__(self) -> str:
         height, width = self.triangle.shape
@@ -569,7 +570,7 @@ class Fragments:
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return the fragments with background in all pixels but these."""
         rows, cols = as_places(rows, cols, self.id.shape)
-        drawn = self._seen().ids[0]
+        drawn = self._buffers().ids[0]
         ids = np.full_like(drawn, -1)
         ids[rows, cols] = drawn[rows, cols]
         return self._of_sample(0, ids, self.depth)

@@ -23,7 +23,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32, U8
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
-from topleft._core.raster.fragments import Fragments, SeenSamples
+from topleft._core.raster.fragments import Fragments, SampleBuffers
 from topleft._core.raster.peel import peel_meshes
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh, has_opacity, is_laid
@@ -114,7 +114,7 @@ class TransparentPass:
     def lit(self) -> Lit:
         """The blended triangles, with the light that shades them."""
         some = [i for i, mask in enumerate(self.masks) if mask is not None]
-        bent, first_ids = self.placed.bent, self.placed.first_ids
+        bent, first_ids = self.placed.bent, self.placed.scene.first_ids
         shown = []
         for i, one in zip(some, self.snapped, strict=True):
             mesh = self.scene[i].mesh if bent is None else bent[i].mesh_of(self.scene[i].mesh)
@@ -136,7 +136,7 @@ class TransparentPass:
             under = picture
             if len(positions) > 1:
                 sample = frags.sample(k).only(*at)
-                under = opaque.picture(sample._seen(), np.array(positions[k], np.int32))
+                under = opaque.picture(sample._buffers(), np.array(positions[k], np.int32))
             self.composite(*planes, positions[k], under[at], numbers, light, alpha)
         color = light / np.maximum(alpha, np.float32(1e-20))[:, None]
         steps = np.rint(np.minimum(color, 1) * LINEAR_ONE).astype(np.int64)
@@ -175,7 +175,7 @@ class TransparentPass:
             if not (ids[k] >= 0).any():
                 break
             seen = ids[k] >= 0
-            layer = SeenSamples.of(ids[k : k + 1], depth[k : k + 1])
+            layer = SampleBuffers.of(ids[k : k + 1], depth[k : k + 1])
             own, pixels = self.lit.picture(layer, np.array(at_sample, np.int32))[seen], numbers[seen]
             share = through[pixels] * (own[:, 3] / np.float32(255))
             light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]

@@ -104,7 +104,7 @@ def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: S
     if options.mode in ("ids", "depth"):
         return shade_numbers(frags, camera, options)
     return shade_each(
-        frags._seen(), options.background, lambda ids, depth: colors_of(ids, depth, cloud, camera, options)
+        frags._buffers(), options.background, lambda ids, depth: colors_of(ids, depth, cloud, camera, options)
     )
 
 

@@ -106,7 +106,7 @@ def draw_groups(placed: Placed, targets: Sequence[SampleTarget], ids: NDArray[np
         group = part_of(placed, scene, scene.first_ids[:-1] + 1, pays_in_clusters=True)
         draw_scene(group, targets, is_first=i == 0)
         is_new = ids > 0
-        np.add(ids, placed.first_ids[i] - 1, out=counted, where=is_new, dtype=np.int64)
+        np.add(ids, placed.scene.first_ids[i] - 1, out=counted, where=is_new, dtype=np.int64)
         ids[is_new] = 0
     return counted
 

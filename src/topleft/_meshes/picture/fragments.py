@@ -67,7 +67,7 @@ class VisiblePart:
     @cached_property
     def shown(self) -> ShownInstance:
         """The mesh as it was drawn, for kernels."""
-        ((_, snapped, first),) = self.frags._drawn()
+        ((_, snapped, first),) = self.frags._visible_meshes
         mesh = self.mesh if self.bent is None else self.bent.mesh_of(self.mesh)
         return ShownInstance(snapped, mesh, self.place, first, i=self.i)
 
@@ -98,7 +98,7 @@ def parts_of(frags: Fragments, scene: Scene) -> Sequence[VisiblePart]:
 def shown_of(frags: Fragments, scene: Scene) -> Sequence[ShownInstance]:
     """The instances that some sample sees, as they are shaded, of the scene that was drawn."""
     found = []
-    for i, snapped, first in frags._drawn():
+    for i, snapped, first in frags._visible_meshes:
         one = scene[i]
         found.append(ShownInstance(snapped, frags._parts_of(i, one.mesh), one.transform, first, one.material, i))
     return found
@@ -127,12 +127,12 @@ class InstanceIds:
     @cached_property
     def instance(self) -> NDArray[np.int32]:
         """Index of the instance that shows, int32, -1 where there is none."""
-        return instance_of_ids(self.id, self.placed.whole_first_ids)
+        return instance_of_ids(self.id, self.placed.whole.first_ids)
 
     @cached_property
     def triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh, int32, -1 where there is none."""
-        return local_ids(self.id, self.instance, self.placed.whole_first_ids)
+        return local_ids(self.id, self.instance, self.placed.whole.first_ids)
 
 
 class SceneFragments(InstanceIds, Fragments):
@@ -183,7 +183,7 @@ class SceneFragments(InstanceIds, Fragments):
         """Return the fragments of a scene from the fragments of all its triangles as one mesh."""
         frags = cls(drawn.id[None], drawn.depth[None], placed, placed.positions)
         frags._split, frags._planes = drawn._split, drawn._planes or frags._planes
-        frags._one = drawn if len(placed.first_ids) == 2 else None
+        frags._one = drawn if len(placed.scene.first_ids) == 2 else None
         return frags
 
     def _of_sample(self, k: int, ids: Ids, depth: NDArray[np.float32]) -> Self:
@@ -196,9 +196,7 @@ class SceneFragments(InstanceIds, Fragments):
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes the parts itself: they refer to memory of this one."""
         state = vars(self) | {"_planes": self.drawn_planes}
-        return {
-            name: state[name] for name in state.keys() - {"parts", "_one", "_split", "_meshes", "_snapped_instances"}
-        }
+        return {name: state[name] for name in state.keys() - {"parts", "_one", "_split", "_meshes", "_visible_meshes"}}
 
     __setstate__ = set_aligned
 
@@ -211,8 +209,8 @@ class SceneFragments(InstanceIds, Fragments):
     def _found(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Which instance shows (H, W), and the boxes of pixels round each (N, 4): left, top, right, bottom."""
         ids: Ids = np.ascontiguousarray(as_aligned(self.id))
-        boxes = np.tile(np.array([*ids.shape[::-1], 0, 0], np.int32), (len(self.placed.whole_first_ids) - 1, 1))
-        return find_instances(ids, self.placed.whole_first_ids, boxes), boxes
+        boxes = np.tile(np.array([*ids.shape[::-1], 0, 0], np.int32), (len(self.placed.whole.first_ids) - 1, 1))
+        return find_instances(ids, self.placed.whole.first_ids, boxes), boxes
 
     @cached_property
     def instance(self) -> NDArray[np.int32]:
@@ -222,12 +220,12 @@ class SceneFragments(InstanceIds, Fragments):
     @cached_property
     def samples_instance(self) -> NDArray[np.int32]:
         """Index of the instance that each sample sees, int32 (H, W, S)."""
-        return instance_of_ids(self.samples_id, self.placed.whole_first_ids)
+        return instance_of_ids(self.samples_id, self.placed.whole.first_ids)
 
     @cached_property
     def samples_triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
-        return local_ids(self.samples_id, self.samples_instance, self.placed.whole_first_ids)
+        return local_ids(self.samples_id, self.samples_instance, self.placed.whole.first_ids)
 
     def _whole(self, ids: Ids) -> Ids:
         return self.placed.whole_ids(ids)
@@ -238,14 +236,11 @@ class SceneFragments(InstanceIds, Fragments):
     def _parts_of(self, i: int, mesh: Mesh) -> Mesh:
         return mesh if self.placed.bent is None else self.placed.bent[i].mesh_of(mesh)
 
-    def _drawn(self) -> Sequence[tuple[int, engine.SnappedMesh, int]]:
-        return self._snapped_instances
-
     @cached_property
-    def _snapped_instances(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
+    def _visible_meshes(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
         if self._one is not None:
-            return tuple(self._one._drawn())
-        seen, first_ids = self._seen(), self.placed.first_ids
+            return tuple(self._one._visible_meshes)
+        seen, first_ids = self._buffers(), self.placed.scene.first_ids
         ids = seen.ids
         width, height = ids.shape[:0:-1]
         if len(first_ids) == 2:  # the only instance may be anywhere
@@ -273,8 +268,8 @@ class SceneFragments(InstanceIds, Fragments):
         placed, bent = self.placed, self.placed.bent
         if self._one is not None and placed.scene.n_triangles:
             return (VisiblePart(0, WHOLE, self._one, self.whole[0], None if bent is None else bent[0]),)
-        boxes, ids, parts = self._found[1].tolist(), self._seen().ids[0], []
-        for i, snapped, first in self._snapped_instances:
+        boxes, ids, parts = self._found[1].tolist(), self._buffers().ids[0], []
+        for i, snapped, first in self._visible_meshes:
             (left, top, right, bottom), mesh = boxes[i], placed.scene[i].mesh
             if right > left:  # otherwise other samples alone see it
                 box = slice(top, bottom), slice(left, right)
@@ -368,7 +363,7 @@ class SceneDepthLayers(InstanceIds, DepthLayers):
     @property
     def n_triangles(self) -> int:
         """Triangles of all instances together."""
-        return int(self.placed.whole_first_ids[-1])
+        return int(self.placed.whole.first_ids[-1])
 
     @property
     def n_vertices(self) -> None:

@@ -71,7 +71,7 @@ def evaluate(
 
 def points_of(part: VisiblePart) -> F64:
     """Where visible pixels lie on the mesh, in object space: (P, 3) float64."""
-    ids, rows = part.frags._seen().ids[0], np.eye(4)[None, :3]
+    ids, rows = part.frags._buffers().ids[0], np.eye(4)[None, :3]
     points: F64 = evaluate([part.shown], ids, PointKind.ROWS, rows, np.nan, dtype=np.float64)[part.seen]
     return points
 
@@ -118,7 +118,7 @@ class GBuffer:
         self, kind: PointKind, rows_of: Callable[[ShownInstance], F64], channels: tuple[int, ...], background: float
     ) -> npt.NDArray[np.float32]:
         """The values of visible points of meshes by rows (R, 4), in the space of each."""
-        ids, threads = self.frags._seen().ids[0], self.options.get("threads")
+        ids, threads = self.frags._buffers().ids[0], self.options.get("threads")
 
         def make(shown: Sequence[ShownInstance], ids: npt.NDArray[np.int32]) -> npt.NDArray[np.float32]:
             if not shown:
@@ -128,7 +128,7 @@ class GBuffer:
 
         if ids.dtype == np.int32:
             return make(shown_of(self.frags, self.shot.scene), ids)
-        return self.join(channels, background, lambda part: make([part.shown], part.frags._seen().ids[0]))
+        return self.join(channels, background, lambda part: make([part.shown], part.frags._buffers().ids[0]))
 
     def tell(
         self, kind: PointKind, rows_of: Callable[[F64], F64], channels: tuple[int, ...], background: float

@@ -118,7 +118,7 @@ def normals_of(gbuffer: GBuffer, turn: F64) -> npt.NDArray[np.float32]:
     frags, cloud = gbuffer.frags, gbuffer.shot.cloud
     if cloud is not None:
         return frags.interpolate(normals_at(cloud, gbuffer.shot.camera, turn), background=0.0)
-    seen, shown = frags._seen(), shown_of(frags, gbuffer.shot.scene)
+    seen, shown = frags._buffers(), shown_of(frags, gbuffer.shot.scene)
     return shade_normals(shown, seen.ids[0], gbuffer.shot.camera, turn, threads=gbuffer.options.get("threads"))
 
 

@@ -146,16 +146,6 @@ class Placed:
         """Whether the fragments of the only instance are the fragments of the subject: a mesh without a lens."""
         return self.is_mesh and self.bent is None
 
-    @property
-    def first_ids(self) -> NDArray[np.int64]:
-        """Where the ids of each instance of the drawn scene begin."""
-        return self.scene.first_ids
-
-    @property
-    def whole_first_ids(self) -> NDArray[np.int64]:
-        """Where the ids of each instance begin."""
-        return self.whole.first_ids
-
     def with_scene(self, scene: Scene) -> Placed:
         """Return another scene before the camera, made for this picture alone: no mesh of it is drawn in clusters."""
         return replace(self, scene=scene, may_cluster=False)
@@ -184,7 +174,7 @@ class Placed:
         """Return ids in terms of the whole scene: as they are without a lens."""
         if self.bent is None or all(one.parts is None for one in self.bent):
             return ids
-        firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
+        firsts = zip(self.bent, self.whole.first_ids[:-1].tolist(), strict=True)
         wholes = np.concatenate([*(one.source + first for one, first in firsts), [-1]]).astype(np.int32)
         return wholes[ids]  # part -1, none, is the last
 
@@ -271,7 +261,7 @@ class Placed:
         if self.given_numbers is not None:
             return self.given_numbers
         has_ids = self.with_depth and self.scene.n_triangles <= INT32_MAX
-        return self.first_ids[:-1] if has_ids else np.zeros(len(self.scene), np.int64)
+        return self.scene.first_ids[:-1] if has_ids else np.zeros(len(self.scene), np.int64)
 
     @cached_property
     def in_parts(self) -> NDArray[np.intp]:

@@ -117,7 +117,7 @@ def shade_by(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOpt
     """The picture of a visibility buffer by checked options."""
     if options.mode in NUMBERS:
         return shade_numbers(frags, camera, options)
-    return shade_instances(shown_of(frags, scene), frags._seen(), camera, options)
+    return shade_instances(shown_of(frags, scene), frags._buffers(), camera, options)
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene | Points) -> None:

@@ -26,7 +26,7 @@ from topleft._core.base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_
 from topleft._core.base.memory import empty
 from topleft._core.base.options import parse
 from topleft._core.base.threads import count_threads, parse_threads, run_parts, threads_for
-from topleft._core.raster.fragments import Fragments, SeenSamples
+from topleft._core.raster.fragments import Fragments, SampleBuffers
 from topleft._core.raster.sampling import sample_positions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.environment import Environment
@@ -175,7 +175,7 @@ class Lit:
             inputs.set_picture(*show, has_opacity=options.shows_opacity)
             self.scene = scene_of_tables(shown, inputs.tables)
 
-    def picture(self, seen: SeenSamples, at: I32 | None = None) -> U8:
+    def picture(self, seen: SampleBuffers, at: I32 | None = None) -> U8:
         """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
 
         `at`: where the one sample that sees them lies, sub-pixels from the centre, unless the meshes are seen from it.
@@ -199,7 +199,7 @@ class Lit:
         return picture
 
 
-def shade_instances(shown: Sequence[ShownInstance], seen: SeenSamples, camera: Camera, options: ShadingOptions) -> U8:
+def shade_instances(shown: Sequence[ShownInstance], seen: SampleBuffers, camera: Camera, options: ShadingOptions) -> U8:
     """The picture (H, W, 4) uint8 of instances, as `Lit` has it."""
     height, width = seen.ids.shape[1:]
     if seen.ids.dtype == np.int32:
@@ -211,11 +211,11 @@ def shade_instances(shown: Sequence[ShownInstance], seen: SeenSamples, camera: C
     for first, end in ((0, height // 2), (height // 2, height)):
         ids, depth = (np.ascontiguousarray(planes[:, first:end]) for planes in (seen.ids, seen.depth))
         moved = [one._replace(snapped=one.snapped.moved(0, first)) for one in shown]
-        halves.append(shade_instances(moved, SeenSamples.of(ids, depth), camera, options))
+        halves.append(shade_instances(moved, SampleBuffers.of(ids, depth), camera, options))
     return np.concatenate(halves)
 
 
-def rename(shown: Sequence[ShownInstance], seen: SeenSamples) -> tuple[list[ShownInstance], SeenSamples] | None:
+def rename(shown: Sequence[ShownInstance], seen: SampleBuffers) -> tuple[list[ShownInstance], SampleBuffers] | None:
     """Number the triangles of the instances that are seen in int32; None where it does not hold them.
 
     A row of pixels is not halved.
@@ -257,14 +257,14 @@ def surface_of(shown: ShownInstance, options: ShadingOptions) -> Surface:
 
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
     """Colour each triangle by its id, or by its distance: the picture (H, W, 4) uint8."""
-    seen = frags._seen()
+    seen = frags._buffers()
     if options.mode == "ids":
         return shade_each(seen, options.background, lambda ids, _: id_colors(frags._whole(ids)))
     ends = options.depth_range or distances(seen, camera)
     return shade_each(seen, options.background, lambda _, depth: greys_of(depth, camera, ends))
 
 
-def shade_each(seen: SeenSamples, background: Color, colors_of: Callable[[I32, F32], U8]) -> U8:
+def shade_each(seen: SampleBuffers, background: Color, colors_of: Callable[[I32, F32], U8]) -> U8:
     """The picture (H, W, 4) uint8 of colours (P, 3) that ids and depths have.
 
     A triangle has one colour in a pixel, that at the first of the samples that see it. Their light is averaged, alpha
@@ -314,7 +314,7 @@ def eye_distance(depth: F32, camera: Camera) -> F64:
     return (ndc * d - b) / (ndc * c - a)
 
 
-def distances(seen: SeenSamples, camera: Camera) -> tuple[float, float]:
+def distances(seen: SampleBuffers, camera: Camera) -> tuple[float, float]:
     """The least and the greatest distance of visible samples along the view."""
     depth = seen.depth[0][seen.ids[0] >= 0]
     if seen.n_samples > 1:
