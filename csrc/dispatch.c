@@ -73,10 +73,10 @@ static const tl_isa_unit UNITS[TL_N_ISA] = {
  * for Windows does not link. */
 typedef struct {
     unsigned ecx_1, ebx_7, ecx_extended; /* registers of cpuid */
-    unsigned saved;                      /* which vectors a thread keeps while others run, of xgetbv */
+    unsigned saved;                      /* which vectors the system saves for a thread, of xgetbv */
 } cpu_words;
 
-#ifdef __APPLE__ /* its system tells of longer ones once they are used, and saves them from then on */
+#ifdef __APPLE__ /* macOS reports longer vectors only once they are used, and saves them from then on */
 enum { SAVES_AVX2 = 0x06, SAVES_AVX512 = 0x06 };
 #else /* 128 and 256 bits; masks, 512 bits, 32 vectors */
 enum { SAVES_AVX2 = 0x06, SAVES_AVX512 = 0xe6 };
@@ -95,7 +95,7 @@ static cpu_words ask_cpu(void)
 
 static int has(unsigned word, unsigned bits) { return (word & bits) == bits; }
 
-/* Each probe tests for all extensions that its unit is compiled with in setup.py. */
+/* Each probe tests all extensions that setup.py compiles its unit with. */
 static int cpu_has_simd128(void) { return has(ask_cpu().ecx_1, bit_SSSE3 | bit_SSE4_1 | bit_POPCNT); }
 
 static int cpu_has_avx2(void)

@@ -4,34 +4,33 @@
 
 #include <stdint.h>
 
-/* A transformed vertex: x, y, depth, and its place: x and y as int32, rounded to 2^-18 px and clamped to
- * 2^12 px. */
+/* A transformed vertex: x, y, depth, and its place: x and y as int32, rounded to 2^-18 px and clamped to 2^12 px. */
 #define TL_PLACED 4
 #define TL_PLACE_BITS 18
 #define TL_PLACE_LIMIT_PX 4096
 
-/* How many decisions were made by each means. */
+/* How many decisions were made by each method. */
 typedef struct tl_exact_counts {
-    int64_t n_triangles;  /* that were drawn, of each pass */
-    int64_t n_on_grid;    /* with all vertices on 2^-8 px, where others of their vector were in doubt */
-    int64_t n_refined;    /* samples and row ends that lie too near an edge for float lanes */
+    int64_t n_triangles;  /* drawn triangles, counted in each pass */
+    int64_t n_on_grid;    /* with all vertices on 2^-8 px, tested because their vector was in doubt */
+    int64_t n_refined;    /* samples and row ends too near an edge for float lanes */
     int64_t n_turns;      /* triangles: the sign of the area was refined */
-    int64_t n_expansions; /* signs that only sums of many numbers told */
-    int64_t n_integers;   /* signs that only integers of 2176 bits told */
+    int64_t n_expansions; /* signs that only sums of many numbers decided */
+    int64_t n_integers;   /* signs that only integers of 2176 bits decided */
 } tl_exact_counts;
 
-/* A mesh with the float64 vertices that stand here.  A vertex that cannot be drawn has x NaN.  Drawn are
- * the triangles of the mesh, collapsed to a point where a clip plane cuts them, and then all pieces. */
+/* A mesh with these float64 vertices.  A vertex that cannot be drawn has x NaN.  `triangles` are those of the mesh,
+ * collapsed to a point where a clip plane cuts them, and then all pieces. */
 typedef struct tl_exact_points {
     const double
-        *points; /* (n_points, stride): x and y in pixels, and depth when stride > 2; behind them those of pieces */
+        *points; /* (n_points, stride): x and y in pixels, and depth when stride > 2; then the vertices of pieces */
     int stride;  /* 2, 3 or TL_PLACED */
     int64_t n_points;
     const int32_t *triangles; /* (n_triangles, 3) */
     int64_t n_triangles;
-    const int32_t *names;           /* (n_triangles,) which triangle of the mesh each is of; NULL: its index */
+    const int32_t *names;           /* (n_triangles,) the triangle of the mesh of each; NULL: its index */
     const struct tl_pieces *pieces; /* or NULL */
-    double band;                    /* 1; tests pass less to prove that narrower bands draw wrong pixels */
+    double band;                    /* 1; tests pass less, and must get wrong pixels */
 } tl_exact_points;
 
 #endif

@@ -1,6 +1,6 @@
-/* The kernel table of one instruction set, its units compiled together, with nothing visible but the table.
- * isa_*.c name the set (TL_ISA_NAME) and the table (TL_KERNELS) and include this file.  `setup.py` compiles each unit
- * by itself instead, side by side and only if its files change. */
+/* The kernel table of one instruction set, with its units compiled together and only the table visible.
+ * isa_*.c define the name of the set (TL_ISA_NAME) and of the table (TL_KERNELS) and include this file.  `setup.py`
+ * compiles each unit by itself instead, in parallel and only if its files change. */
 #include "topleft.h"
 
 #include "unit_raster.c"
@@ -10,7 +10,7 @@
 #include "unit_polygons.c"
 #include "unit_grad.c"
 
-#ifndef TL_KERNELS /* read by itself, as an editor does */
+#ifndef TL_KERNELS /* for editors, which read this file alone */
 #define TL_ISA_NAME "none"
 #define TL_KERNELS tl_kernels_none
 #endif

@@ -1,10 +1,10 @@
-/* The contract of windows of huge rasters: which triangles each of them needs, and visibility buffers put together. */
+/* The contract of windows of huge rasters: which triangles each window needs, and merged visibility buffers. */
 #ifndef TOPLEFT_TILES_H
 #define TOPLEFT_TILES_H
 
 #include <stdint.h>
 
-/* A raster cut into windows, all of one size but the last of a row or a column. */
+/* A raster cut into windows of one size; the last row and column may be smaller. */
 typedef struct {
     int64_t width_px, height_px;               /* of the raster, below 2^31 */
     int64_t window_width_px, window_height_px; /* at least 1 */
@@ -21,10 +21,10 @@ typedef struct {
     int32_t left, right, top, bottom;
 } tl_window_box;
 
-/* Windows of a span that its triangle is written to one by one. */
+/* The most windows of a span whose triangle is written to each window. */
 #define TL_SHORT_SPAN 2
 
-/* Vertices and triangles where they lie: rows of numbers of any kind, to be copied. */
+/* Vertices and triangles in place: rows of numbers of any type, to be copied. */
 typedef struct {
     const char *points;
     int64_t point_stride; /* bytes from row to row */
@@ -35,7 +35,7 @@ typedef struct {
     int is_wide;
 } tl_corners;
 
-/* Which of two triangles shows: the one of smaller or of larger depth, at equal depth the lower index; or the larger
+/* Which of two triangles shows: that of smaller or of larger depth, at equal depth the lower index; or the larger
  * index. */
 typedef enum { TL_MERGE_LESS = 0, TL_MERGE_GREATER = 1, TL_MERGE_LATER = 2 } tl_merge_rule;
 
@@ -45,7 +45,7 @@ typedef struct {
     float *depth;
     const int32_t *other_ids;
     const float *other_depth;
-    int32_t first_id; /* is added to the other ids */
+    int32_t first_id; /* added to other_ids */
     tl_merge_rule rule;
 } tl_merge;
 

@@ -15,13 +15,13 @@
 #include "nearest.h"
 #include "tiles.h"
 
-/* Where there is no number. The sign is clear; that of Microsoft's NAN depends on the compiler. */
+/* The value for no data.  Its sign bit is 0; that of Microsoft's NAN depends on the compiler. */
 #define TL_NAN __builtin_nan("")
 
 /* ---- vertices ------------------------------------------------------------------------------------------ */
 
-/* A snapped vertex, 16 bytes: one vector load.  x_fx = TL_SPECIAL marks a vertex that the 64-bit path cannot
- * take; y_fx then holds the reason, a tl_special. */
+/* A snapped vertex, 16 bytes: one vector load.  x_fx = TL_SPECIAL marks a vertex that does not fit 64-bit code; y_fx
+ * then holds the reason, a tl_special. */
 typedef struct {
     int32_t x_fx, y_fx; /* |.| < 2^30 */
     double z;           /* depth; 0 when the mesh has none */
@@ -31,7 +31,7 @@ typedef struct {
 
 typedef enum {
     TL_BAD = 0,     /* not finite, or |x_fx| >= 2^62, or a depth outside float32 */
-    TL_WIDE = 1,    /* 2^30 <= |x_fx| < 2^62: the coordinates stand in the table of wide vertices */
+    TL_WIDE = 1,    /* 2^30 <= |x_fx| < 2^62: the coordinates are in the table of wide vertices */
     TL_CLIPPED = 2, /* outside a clip plane: triangles that use it are drawn as pieces */
 } tl_special;
 
@@ -47,7 +47,7 @@ typedef struct {
     tl_scalar scalar;
     int n_components; /* 2 or 3: pixels (and depth), 3: object space when there is a matrix, 4: clip space */
     int64_t n;
-    const void *matrix; /* (4, 4) row-major clip from object, of the same scalar type, or NULL */
+    const void *matrix; /* (4, 4) row-major clip from object, of the type `scalar`, or NULL */
     int is_affine;      /* the last row of the matrix is 0 0 0 1: every w is 1, and dividing by it changes no bit */
 } tl_source;
 
@@ -55,24 +55,24 @@ typedef struct {
     const tl_vertex *vertices;
     const tl_wide *wide;     /* a row per vertex, or NULL when no vertex is wide */
     const double *inv_w;     /* 1/w per vertex, or NULL: see `source` */
-    const tl_source *source; /* where w comes from when inv_w is NULL; NULL as well: all equal (pixel space) */
+    const tl_source *source; /* the source of w when inv_w is NULL; if NULL, too, w is constant (pixel space) */
     int64_t n_vertices;
-    /* the sample from the pixel's centre, which vertices are seen from: |.| <= half a pixel */
+    /* the sample from the pixel's centre, to which vertices are relative: |.| <= half a pixel */
     int32_t sample_x_fx, sample_y_fx;
     const struct tl_exact_points *exact; /* vertices that are not snapped, instead of `vertices` and `wide`; or NULL */
 } tl_vertex_set;
 
-/* How many vertices of each special kind a vertex stage has seen, used by a triangle or not. */
+/* How many vertices of each special kind a vertex stage has stored, used by a triangle or not. */
 typedef struct {
     int64_t n_bad, n_wide, n_clipped;
 } tl_vertex_counts;
 
-/* Where projected vertices go: records, with a table of wide ones or NULL; or, not snapped, points (n, TL_PLACED). */
+/* The output of projection: records, with a table of wide vertices or NULL; or, not snapped, points (n, TL_PLACED). */
 typedef struct {
     tl_vertex *records;
     tl_wide *wide;
     double *points;
-    /* rows of four numbers, one a vertex, that go to seen_rows with 1/w in place of the fourth; or NULL */
+    /* rows of four numbers, one a vertex, copied to seen_rows with 1/w as the fourth; or NULL */
     const float *rows;
     float *seen_rows;
 } tl_projected;
@@ -87,12 +87,11 @@ typedef struct {
     int near_clip, far_clip;
 } tl_view;
 
-/* Triangles that a clip plane has cut: fans of triangles over their own vertices, in order of
- * their source triangle. */
+/* The pieces of clipped triangles: fans of triangles over new vertices, in the order of their source triangles. */
 typedef struct tl_pieces {
     tl_vertex *vertices; /* (n_vertices,) */
     tl_wide *wide;       /* (n_vertices,) */
-    double *points;      /* instead of both where vertices are not snapped: (n_vertices, 3); or NULL */
+    double *points;      /* instead of `vertices` and `wide` where vertices are not snapped: (n_vertices, 3); or NULL */
     double *inv_w;       /* (n_vertices,) */
     double *weights;     /* (n_vertices, 3): barycentrics in the source triangle */
     int32_t *triangles;  /* (n_pieces, 3) into `vertices` */
@@ -103,13 +102,13 @@ typedef struct tl_pieces {
 /* ---- drawing ------------------------------------------------------------------------------------------- */
 
 /* When a triangle covers a pixel: when it holds the sample, when it meets the pixel's square in positive area, or when
- * it holds the whole square.  The last two have no depth and no order: they draw masks and counts. */
+ * it holds the whole square.  OUTER and INNER have no depth and no order: they draw masks and counts. */
 typedef enum { TL_TEST_SAMPLE = 0, TL_TEST_OUTER = 1, TL_TEST_INNER = 2 } tl_test;
 
-/* How drawing is given up: polled now and then. */
+/* Polled now and then to cancel a call. */
 typedef struct tl_pause {
-    int64_t left_px;                /* about how many pixels are drawn before the next poll */
-    int (*poll)(struct tl_pause *); /* sets left_px anew; unless it returns 0 the picture is given up */
+    int64_t left_px;                /* about how many pixels are left to draw before the next poll */
+    int (*poll)(struct tl_pause *); /* resets left_px; unless it returns 0 the call is cancelled */
 } tl_pause;
 
 /* The part of the picture that a buffer shows, in whole pixels. */
@@ -121,22 +120,22 @@ typedef struct {
     tl_pause *pause; /* or NULL: the picture is drawn to its end */
 } tl_window;
 
-/* Counts work that takes as long as so many pixels of a large triangle, up to 2^62; not below the next question, where
- * the sum could overflow. */
+/* Counts work that takes as long as n_px pixels of a large triangle, n_px <= 2^62; not below 0, where the sum could
+ * overflow. */
 static inline void tl_count_work(const tl_window *window, int64_t n_px)
 {
     if (window->pause && window->pause->left_px >= 0)
         window->pause->left_px -= n_px;
 }
 
-/* Whether to give up the picture: kernels return soon, leave buffers as they were found where they say so, and
- * all else that they return means nothing. */
+/* Whether to cancel the call: kernels then return soon, restore scratch buffers where they say so, and their other
+ * results are undefined. */
 static inline int tl_is_given_up(const tl_window *window)
 {
     return window->pause && window->pause->left_px < 0 && window->pause->poll(window->pause);
 }
 
-/* The work of setup and cull of a triangle, and of shading a pixel. */
+/* The work of setup and cull of a triangle, and of shading a pixel, in pixels. */
 #define TL_SETUP_PX 32
 #define TL_SHADE_PX 32
 
@@ -148,14 +147,14 @@ typedef enum {
     TL_SINK_MASK = 0,     /* uint8 = 1; a bit in `covered` until the last pass */
     TL_SINK_COUNT = 1,    /* int32 += 1 */
     TL_SINK_LABEL = 2,    /* int32 = id, painter's order: the later triangle wins */
-    TL_SINK_PAINT = 3,    /* the same, and float = depth */
-    TL_SINK_NEAREST = 4,  /* id and depth where depth < that of the pixel; at equal depth the lower id */
-    TL_SINK_FARTHEST = 5, /* id and depth where depth > that of the pixel; at equal depth the lower id */
+    TL_SINK_PAINT = 3,    /* as LABEL, and float = depth */
+    TL_SINK_NEAREST = 4,  /* id and depth where the depth is less; at equal depth the lower id */
+    TL_SINK_FARTHEST = 5, /* id and depth where the depth is greater; at equal depth the lower id */
     TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
     TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
     TL_SINK_PEEL = 8,     /* ids and depths of the nearest layers, sorted: `peeled` */
     TL_SINK_SPANS = 9,    /* nothing is drawn: spans are listed; not for draw */
-    TL_SINK_CENSUS = 16,  /* nothing is drawn: triangles are counted by how they would be; not for draw */
+    TL_SINK_CENSUS = 16,  /* nothing is drawn: triangles are counted by class; not for draw */
 } tl_sink;
 
 /* Which code draws a triangle, or why none does.  A triangle that a clip plane cuts is counted by its pieces. */
@@ -177,14 +176,15 @@ typedef enum {
 } tl_class;
 
 typedef struct {
-    tl_sink sink;                 /* for which triangles are counted */
+    tl_sink sink;                 /* the sink that triangles are counted for */
     int64_t n[TL_N_CLASSES];      /* triangles, or pieces */
-    double boxes[TL_N_CLASSES];   /* samples in the boxes that they can cover of the window */
-    double covered[TL_N_CLASSES]; /* about how many of them are covered: the lesser of area and box, added up */
+    double boxes[TL_N_CLASSES];   /* samples of the window in their boxes */
+    double covered[TL_N_CLASSES]; /* about how many of these are covered: the sum of the lesser of area and box */
 } tl_census;
 
-/* The crossings of columns: a bit a step of each sample, in rows of the target.  A depth z flips bit ceil(z - 0.5), the
- * first step with its middle behind the surface, n_steps where there is none; or sets bit floor(z), if it is a step. */
+/* The crossings of columns: a bit a step for each sample, in rows of the target.  A depth z flips bit ceil(z - 0.5),
+ * the first step whose middle is behind the surface, or n_steps; with is_set it sets bit floor(z), if that is a
+ * step. */
 typedef struct {
     uint64_t *bits; /* n_words of 64 a sample, more bits than n_steps */
     int64_t n_words;
@@ -192,8 +192,8 @@ typedef struct {
     int is_set;
 } tl_crossings;
 
-/* The layers of pixels: of every covered sample of a pixel the n_layers that come first by depth, then id.  Planes, the
- * first one first; id -1 and the depth that every other comes before where there are fewer. */
+/* The layers of pixels: of all covered samples of a pixel the n_layers that come first by depth, then id.  Planes, the
+ * first layer first; missing layers have id -1 and the depth that every other depth comes before. */
 #define TL_MAX_LAYERS 16
 typedef struct {
     int n_layers;    /* 1 to TL_MAX_LAYERS */
@@ -201,27 +201,27 @@ typedef struct {
     int32_t *ids;    /* the window's first pixel in the first plane, with the rows of the target */
     float *depth;
     int64_t plane_px;              /* from plane to plane */
-    const tl_crossings *crossings; /* instead of the others, which then mean nothing; or NULL */
+    const tl_crossings *crossings; /* instead of ids and depth, which are then not read; or NULL */
 } tl_peeled;
 
 typedef struct {
     tl_sink sink;
     void *pixels; /* mask, counts or ids; rows of stride_px pixels.  BLEND: the blend_state of mix.h */
-    float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
+    float *depth; /* PAINT, NEAREST, FARTHEST; rows of stride_px */
     int64_t stride_px;
     int64_t n_samples; /* from the first sample to the last, set by draw */
-    /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels.  LABEL: the
-     * same, or NULL; where it is given, triangles come from the last to the first. */
+    /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels.  LABEL:
+     * tl_covered_words, or NULL; if not NULL, triangles are drawn from the last to the first. */
     uint64_t *covered;
     /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
     int sample_bits;
     const int32_t *samples_fx; /* (2^sample_bits, 2): x, y of each from the pixel's centre */
-    int sample;                /* the one that is being drawn; draw knows */
+    int sample;                /* the sample that is drawn; set by draw */
     int32_t flip;              /* LABEL: ids are xored with it: 0, or TL_FLIP: the earlier triangle wins */
     tl_census *census;         /* CENSUS */
     const tl_peeled *peeled;   /* PEEL; the window has less than 2^31 pixels */
     /* NEAREST, FARTHEST: a bound behind all depths of a segment of a row, tl_segments(stride_px) numbers a row, set by
-     * draw, so that large triangles and clusters that lie behind are left out; or NULL */
+     * draw, so that hidden triangles and clusters are skipped; or NULL */
     float *bounds;
 } tl_target;
 
@@ -235,8 +235,8 @@ static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGM
 #define TL_SHAPE_SLOTS 128
 #define TL_SHAPE_SPANS 4096
 
-#define TL_BLENDED_ROWS 32   /* of colours that are blended, a band */
-#define TL_BLENDED_RUNS 128  /* of a row of these */
+#define TL_BLENDED_ROWS 32   /* rows that are blended at a time */
+#define TL_BLENDED_RUNS 128  /* runs of such a row */
 #define TL_SHAPES_BLENDED 16 /* triangles */
 
 /* The largest number of triangles drawn row by row, by what the other path would be: bits; every triangle stored over a
@@ -255,17 +255,17 @@ static inline int tl_shapes_are_blended(int64_t n, int64_t width, int64_t height
     return n <= TL_SHAPES_BLENDED && width >= 64 && width < (1 << 25) && n << 18 <= width * height;
 }
 
-/* Bits of a label where those of a pixel's samples stand in one word.  No label has all of them set. */
+/* Bits of a label where the labels of a pixel's samples share one word.  No label has all of them set. */
 static inline int tl_shape_label_bits(int sample_bits) { return sample_bits ? 64 >> sample_bits : 63; }
 
-/* A bit a sample, and a word behind the end. */
+/* A bit a sample, and a word after the end. */
 static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 64 + 2; }
 
 /* A mesh after the snap, which kernels draw. */
 typedef struct {
     tl_vertex_set mesh;
-    /* (n_triangles, 3), maybe the caller's memory: draw checks the indices; later reads go through
-     * vertex/corners.h, in case they have changed */
+    /* (n_triangles, 3), maybe the caller's memory: draw checks the indices; later reads use vertex/corners.h, because
+     * they may have changed */
     const int32_t *triangles;
     int64_t n_triangles;
     const tl_pieces *pieces; /* of triangles with TL_CLIPPED vertices, or NULL */
@@ -276,32 +276,33 @@ typedef struct {
     const int32_t *names;
 } tl_snapped;
 
-/* The part of a mesh that one pass draws.  Several passes may share a mesh: each takes some of the triangles, draws
- * them in its own window and lists those that reach outside of it for the passes that own the rest of the picture. */
+/* The part of a mesh that one pass draws.  Several passes may share a mesh: each processes some of the triangles, draws
+ * them in its window and lists those that reach beyond it, for the passes that draw the rest of the picture. */
 typedef struct {
     const int32_t *ids; /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
     int64_t first, end;
-    /* or NULL; then `snapped` has no vertices and no triangles, and `outside` gets those with a TL_SPECIAL corner */
+    /* or NULL; then `snapped` has no vertices and no triangles, and `outside` gets triangles with a TL_SPECIAL
+     * corner */
     struct tl_cluster_pass *clusters;
-    /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
+    /* out, or NULL: triangles that reach into `picture` beyond the window; end - first + 16 numbers */
     int32_t *outside;
     int64_t n_outside;
-    const tl_window *picture;       /* that all the passes draw; read when there is `outside` */
-    int is_first, is_last;          /* of the passes over the window: the first clears it */
-    struct tl_exact_counts *counts; /* out: added up, of a mesh without snapped vertices; or NULL */
+    const tl_window *picture;       /* the whole of all passes; read if `outside` is not NULL */
+    int is_first, is_last;          /* among the passes over the window: the first clears it */
+    struct tl_exact_counts *counts; /* out, or NULL: counts are added, for a mesh without snapped vertices */
 } tl_slice;
 
 /* The triangles that reach into a window, and the first and last band of rows of each. */
 typedef struct {
     int64_t n;
     int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
-    int32_t *first_col, *end_col;          /* the same, the columns that each may reach; or NULL */
+    int32_t *first_col, *end_col;          /* and the columns that each may reach; or NULL */
 } tl_bins;
 
 #define TL_MAX_SAMPLES 16 /* of a pixel */
 
-/* Pixels that show several triangles, row by row from left to right: those of row y are [rows[2 y], rows[2 y +
- * 1]) of the columns, and of the ids and depths of each sample but the first, which lie `room` numbers apart. */
+/* Split pixels, which show several triangles, row by row from left to right: row y has [rows[2 y], rows[2 y + 1]) of
+ * the columns, and of the ids and depths of each sample but the first, which are `room` numbers apart. */
 typedef struct {
     int64_t *rows;
     int32_t *columns, *ids;
@@ -309,9 +310,8 @@ typedef struct {
     int64_t room;
 } tl_split;
 
-/* The ids and depths that 2^sample_bits samples see in the rows [row0, row0 + n_rows) of a picture: the first sample in
- * all columns, and the others, `plane` pixels apart, in the columns [col0, col0 + n_cols): outside of them none sees
- * anything. */
+/* The ids and depths of 2^sample_bits samples in the rows [row0, row0 + n_rows) of a picture: the first sample in all
+ * columns, other samples, `plane` pixels apart, in the columns [col0, col0 + n_cols): elsewhere they are background. */
 typedef struct {
     const int32_t *first_ids, *ids;
     const float *depth;
@@ -327,17 +327,17 @@ typedef struct {
     int32_t blank;
 } tl_laid_rows;
 
-/* How the samples' colours are averaged: uint8 values become light and back in 65537 steps; alpha, behind the first
- * n_channels, does not.  With straight alpha colours count as much as they are opaque. */
+/* How the samples' colours are averaged: uint8 values are decoded to light and back in 65537 steps, except alpha, after
+ * the first n_channels.  With straight alpha colours are weighted by it. */
 typedef struct {
     const int32_t *decode; /* (256,), 0 to 65536; NULL: the values as they are */
     const uint8_t *encode; /* (65537,) */
     int n_channels;        /* of colour */
-    int is_straight;       /* channel n_channels is alpha, and colours have not been multiplied by it */
+    int is_straight;       /* channel n_channels is alpha, and colours are not multiplied by it */
 } tl_transfer;
 
-/* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32
- * that are all TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They are left as they were found. */
+/* The target of exact areas.  `cells` is scratch: tl_area_stride(width) numbers a row, int32 that are all
+ * TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They end with these values. */
 typedef struct {
     float *pixels; /* rows of stride_px pixels */
     int64_t stride_px;
@@ -347,9 +347,9 @@ typedef struct {
 } tl_area;
 
 #define TL_CELL_CLEAR (1 << 30)
-#define TL_AREA_OVERFLOW -2 /* of draw_area: the sums need wide cells */
+#define TL_AREA_OVERFLOW -2 /* of draw_area: the sums need int64 cells */
 
-/* Cells a row: 16 before the first pixel, at least 16 behind the last, whole cache lines. */
+/* Cells a row: 16 before the first pixel, at least 16 after the last, whole cache lines. */
 static inline int64_t tl_area_stride(int64_t width) { return (width + 47) / 16 * 16; }
 
 /* How a triangle's colour changes a pixel. */
@@ -362,22 +362,22 @@ typedef enum {
     TL_BLEND_MIN = 5,
 } tl_blend;
 
-/* Pixels that colours are blended into, one triangle after the other. */
+/* The target of blended colours, one triangle after the other. */
 typedef struct {
     void *pixels; /* rows of stride_px pixels of n_channels uint8 or float32 */
     int64_t stride_px;
     const void *colors; /* (n_triangles, n_channels), or (n_vertices, n_channels) unless is_flat */
     int n_channels, is_u8, is_flat;
     tl_blend blend;
-    int is_premultiplied; /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
+    int is_premultiplied; /* colours are multiplied by alpha; otherwise the last of 2 or 4 channels is alpha */
     const uint8_t
-        *ground; /* uint8 or is_large_shapes: the colour that all pixels get first, or NULL: they stay as they are */
+        *ground; /* uint8 or is_large_shapes: the initial colour of all pixels, or NULL: they keep their colours */
     int is_large_shapes; /* flat triangles over a ground, at most TL_SHAPES_BLENDED, are drawn row by row */
-    int is_area;         /* the share of the pixel that the triangle covers counts, not its centre */
-    int64_t band_rows;   /* drawn at once, > 0: with fewer all triangles are set up more often */
+    int is_area;         /* colours are weighted by the covered area of the pixel; otherwise its centre decides */
+    int64_t band_rows;   /* rows of a band, > 0: with fewer rows all triangles are set up more often */
     int32_t
         *packed; /* uint8 with other than 4 channels: room for the window; is_large_shapes: for TL_BLENDED_ROWS rows */
-    int32_t *cells; /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
+    int32_t *cells; /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR before and after */
 } tl_canvas;
 
 /* Cells for small triangles, or for strips of the width of a window. */
@@ -389,18 +389,18 @@ static inline int64_t tl_blend_cells(int64_t width)
     return atlas > strip ? atlas : strip;
 }
 
-/* The layers that are seen through each other, and their colours: straight, alpha last. */
+/* The layers to composite, and their colours: straight alpha, last. */
 typedef struct {
-    const int32_t *ids;  /* planes, of the first pixel on; -1, or an id of no triangle, ends the layers of a pixel */
-    int64_t n_triangles; /* that were peeled */
+    const int32_t *ids;  /* planes, from the first pixel on; -1, or an id of no triangle, ends the layers of a pixel */
+    int64_t n_triangles; /* number of triangles that were peeled */
     int64_t plane_px;
     int n_layers;
     int n_channels; /* 2 or 4 */
-    int is_u8;      /* colours are 0 to 255, and pixels uint8; otherwise 0 to 1 and float32 */
-    /* colours are of the triangles, uint8 or float32; otherwise float32 planes (n_layers, n, n_channels) */
+    int is_u8;      /* colours are 0 to 255, and pixels uint8; otherwise colours are 0 to 1 and float32 */
+    /* colours of the triangles, uint8 or float32; otherwise float32 planes (n_layers, n, n_channels) */
     int is_flat;
     const void *colors;
-    const float *background; /* (n_channels,), of the same range, behind all layers; or NULL */
+    const float *background; /* (n_channels,), in the range of the colours, behind all layers; or NULL */
 } tl_composite;
 
 /* ---- lines --------------------------------------------------------------------------------------------- */
@@ -422,9 +422,9 @@ typedef struct {
 typedef struct {
     int is_smooth;      /* float32 coverage; otherwise uint8, 1 where a line is */
     void *pixels;       /* rows of stride_px */
-    const float *depth; /* hides lines; the same stride, or NULL */
-    double depth_bias;  /* how far behind it a line still shows */
-    int is_farthest;    /* the larger depth is the nearer one */
+    const float *depth; /* hides lines; rows of stride_px, or NULL */
+    double depth_bias;  /* how far behind `depth` a line is still visible */
+    int is_farthest;    /* larger depths are nearer */
     int64_t stride_px;
 } tl_line_target;
 
@@ -432,9 +432,9 @@ typedef struct {
 
 /* Points as discs or squares. */
 typedef struct {
-    const tl_vertex *vertices; /* TL_SPECIAL ones are not drawn */
+    const tl_vertex *vertices; /* TL_SPECIAL vertices are not drawn */
     int64_t n;
-    /* sub-pixels: the diameter of the disc, the side of the square, below 2^30; of all, unless sizes_fx has each */
+    /* sub-pixels: the diameter of the disc, the side of the square, below 2^30; of all points if sizes_fx is NULL */
     int64_t size_fx;
     const int32_t *sizes_fx;
     int is_disc;
@@ -443,24 +443,24 @@ typedef struct {
 
 /* ---- creases ------------------------------------------------------------------------------------------- */
 
-/* Sides at a vertex that more triangles share join nothing: comparisons are bounded. */
+/* Sides at a vertex that more triangles share join no corners: this bounds comparisons. */
 #define TL_MOST_AT_SIDE 32
 
 /* The triangles round vertices. */
 typedef struct {
     const int32_t *triangles; /* (n_triangles, 3) */
-    const int32_t *starts;    /* (n_vertices + 1,): where the corners of each vertex begin, and their end */
+    const int32_t *starts;    /* (n_vertices + 1,): where the corners of each vertex begin, and the end of the last */
     const int32_t *corners;   /* (3 n_triangles,): 3 * triangle + corner, vertex by vertex */
     const double *normals;    /* (n_triangles, 3), unit, 0 without an area */
     const double *angles;     /* (n_triangles, 3) */
     double least_cosine;      /* of the angle between triangles that are not creased */
 } tl_fans;
 
-/* Where normals of creased vertices go. */
+/* The output of creased normals. */
 typedef struct {
-    const int32_t *starts;        /* (n_vertices + 1,): the rows of each vertex's groups, none if there is but one */
+    const int32_t *starts;        /* (n_vertices + 1,): the rows of each vertex's groups; no rows for a single group */
     const int32_t *groups;        /* (3 n_triangles,): the group of each corner at its vertex, -1 without an area */
-    const int32_t *own_triangles; /* (n_triangles, 3): the rows of corners that are in no row of a group */
+    const int32_t *own_triangles; /* (n_triangles, 3): the rows of corners without a group */
     int64_t first_row;            /* the number of row 0 of the groups in row_of_corner */
     double *of_vertices;          /* (n_vertices, 3) */
     double *of_groups;            /* (rows, 3) */
@@ -474,7 +474,7 @@ typedef struct {
     const double *values;     /* (n_points,) */
     const int32_t *triangles; /* (n_triangles, 3) */
     int64_t n_points, n_triangles;
-    /* (1 + n_triangles, TL_PLANE_DOUBLES) of list_planes, or NULL: fill_planes then computes them as it goes */
+    /* (1 + n_triangles, TL_PLANE_DOUBLES) of list_planes, or NULL: `fill_planes` then computes them on the fly */
     double *planes;
 } tl_valued;
 
@@ -485,8 +485,9 @@ typedef struct {
 /* The kinds of value of the point of a pixel. */
 typedef enum {
     TL_POINT_ROWS_OF = 0, /* n_rows numbers, 1 or 3 */
-    TL_POINT_LENGTH = 1,  /* the length of three */
-    /* the way in pixels, x and y, from where three numbers x, y, w lie to where three others do; NaN unless w > 0 */
+    TL_POINT_LENGTH = 1,  /* the length of three numbers */
+    /* the motion in pixels, x and y, from the projection of three numbers x, y, w to that of three others; NaN unless w
+     * > 0 */
     TL_POINT_FLOW = 2,
 } tl_point_kind;
 
@@ -499,7 +500,7 @@ typedef struct {
 } tl_point_mesh;
 
 typedef struct {
-    const tl_point_mesh *meshes; /* of each instance of the picture */
+    const tl_point_mesh *meshes; /* one for each instance of the picture */
     tl_point_kind kind;
     int n_rows;
     double half_width_px, half_height_px; /* FLOW: half of the whole picture */
@@ -507,18 +508,18 @@ typedef struct {
     int is_f64_out;
 } tl_points;
 
-/* Values of vertices, or of corners, to find slopes of, and the triangles that show. */
+/* Values of vertices, or of corners, whose derivatives are wanted, and the visible triangles. */
 typedef struct {
-    const int32_t *slot; /* of each triangle its place among those that show */
-    const double *steps; /* of each corner the slopes of its weight over w along x and y, and its w: (n, 3, 3) */
-    const int32_t *rows; /* of each corner its row of `values`: (n, 3) */
+    const int32_t *slot; /* of each triangle: its index among the visible triangles */
+    const double *steps; /* of each corner: the derivatives of its weight over w along x and y, and its w: (n, 3, 3) */
+    const int32_t *rows; /* of each corner: its row of `values`: (n, 3) */
     const float *values; /* (rows, n_values) */
     int64_t n_values;
 } tl_sloped;
 
 /* ---- run lengths --------------------------------------------------------------------------------------- */
 
-#define TL_RLE_LINE 64 /* bytes of a row that are looked at together */
+#define TL_RLE_LINE 64 /* bytes of a row that are compared together */
 
 /* A window of a picture, to list its runs of equal pixels down the columns. */
 typedef struct {
@@ -538,12 +539,12 @@ typedef struct {
     int64_t start, end, key;
 } tl_run;
 
-/* Run lengths of n objects: how many pixels are not in the object, how many are, and so on. */
+/* Run lengths of n objects: how many pixels are outside of the object, then how many inside, alternating. */
 typedef struct {
     int64_t n, n_pixels;   /* objects; pixels of the picture */
-    const int64_t *starts; /* where the counts of each begin; room for two a run, and one */
+    const int64_t *starts; /* where the counts of each object begin; room for two a run, and one */
     int64_t *n_counts;
-    int64_t *ends; /* of the last run of each */
+    int64_t *ends; /* of the last run of each object */
     int64_t *counts;
 } tl_rles;
 
@@ -555,7 +556,7 @@ typedef struct {
     int pixel_bytes;         /* 1 to 4 */
 } tl_png_rows;
 
-/* Bytes of n_rows in the file, at most: codes of 12 bits; tables, and what is written past the end. */
+/* The most bytes of n_rows in the file: codes of 12 bits; tables, and what is written past the end. */
 static inline int64_t tl_png_room(int64_t n_rows, int64_t n_bytes) { return n_rows * (1 + n_bytes) * 3 / 2 + 256; }
 
 #include "clusters.h"

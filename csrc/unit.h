@@ -1,6 +1,6 @@
-/* The end of each unit.  The build compiles it with TL_UNIT and TL_ISA, its name and that of the set: it then
- * defines one function, which puts the unit's kernels into a table, and no other symbol: no code of a wider set answers
- * for the baseline.  Without them it is a part of kernels.c. */
+/* The end of each unit.  The build compiles it with TL_UNIT and TL_ISA, the names of the unit and of the set: it then
+ * defines one function, which stores the unit's kernels in a table, and no other symbol, so that no code of a wider set
+ * can replace the baseline's.  Without them it is a part of kernels.c. */
 #include "topleft.h"
 
 #ifdef TL_UNIT
@@ -8,7 +8,7 @@
 #define TL_JOINED(a, b, c) TL_JOIN(a, b, c)
 #define TL_KERNELS_OF TL_JOINED(TL_UNIT_, TL_UNIT, )
 
-/* Sinks of hooks.h for which no kernel of this unit draws. */
+/* Stubs for the sinks of hooks.h that no kernel of this unit draws with. */
 #if defined(TL_HOOKS_H) && !defined(TL_MIX_SHAPES_C)
 static void mix_run(struct blend_state *b, int64_t at, int64_t n) { (void)b, (void)at, (void)n, __builtin_trap(); }
 #endif
