@@ -1,7 +1,5 @@
 """The examples run as a user runs them, and the pictures of docs/guide/examples.md are theirs; the notebooks run."""
 
-from __future__ import annotations
-
 import ast
 import json
 import re

@@ -39,8 +39,18 @@ def test_metadata_python_floor_is_3_11():
     assert ["3.10" in floor, "3.11" in floor, "3.13" in floor] == [False, True, True]
 
 
-def test_metadata_runtime_dependencies_are_numpy_and_pillow_alone():
-    assert requirements_of("") == {"numpy", "pillow"}
+@pytest.mark.parametrize(
+    ("extra", "packages"),
+    [
+        ("", {"numpy", "pillow"}),
+        ("render", {"trimesh", "tqdm"}),
+        ("torch", {"torch"}),
+        ("explore", {"anywidget", "starlette", "uvicorn", "websockets"}),
+        ("simplify", {"fast-simplification"}),
+    ],
+)
+def test_metadata_extra_adds_its_packages_alone(extra, packages):
+    assert requirements_of(extra) == packages
 
 
 def test_metadata_runtime_dependencies_state_a_floor():
@@ -49,39 +59,8 @@ def test_metadata_runtime_dependencies_state_a_floor():
 
 
 def test_metadata_extras_are_the_documented_ones():
-    found = set(metadata.metadata("topleft").get_all("Provides-Extra"))
-    assert found == {
-        "dask",
-        "explore",
-        "formats",
-        "jax",
-        "peers",
-        "render",
-        "simplify",
-        "tiles",
-        "torch",
-        "test",
-        "bench",
-        "docs",
-        "dev",
-        "all",
-    }
-
-
-def test_metadata_render_extra_is_trimesh_and_tqdm():
-    assert requirements_of("render") == {"trimesh", "tqdm"}
-
-
-def test_metadata_torch_extra_is_torch():
-    assert requirements_of("torch") == {"torch"}
-
-
-def test_metadata_explore_extra_is_a_server_and_a_widget():
-    assert requirements_of("explore") == {"anywidget", "starlette", "uvicorn", "websockets"}
-
-
-def test_metadata_simplify_extra_is_fast_simplification():
-    assert requirements_of("simplify") == {"fast-simplification"}
+    documented = ["all", "bench", "dask", "dev", "docs", "explore", "formats", "jax", "peers", "render", "simplify"]
+    assert sorted(metadata.metadata("topleft").get_all("Provides-Extra")) == [*documented, "test", "tiles", "torch"]
 
 
 def test_metadata_version_is_that_of_the_binary():
@@ -158,9 +137,7 @@ def test_bindings_of_a_header_that_they_cannot_read_is_an_error(text, tmp_path, 
         bindings.contract()
 
 
-def test_classics_use_no_engine_and_are_loaded_when_asked_for():
-    code = f"import topleft, sys; print('topleft.{UNITS[1]}' in sys.modules)"
-    assert run_python(code).stdout.split() == ["False"]
+def test_classics_use_no_engine():
     folder = Path(str(resources.files("topleft.methods") / "__init__.py")).parent
     sources = [path for path in folder.rglob("*") if path.name.endswith((".py", ".pyx", ".pxi"))]
     lines = [line for path in sources for line in path.read_text(encoding="utf-8").splitlines()]
@@ -188,20 +165,11 @@ def test_build_info_names_the_compiler():
     assert tl.build_info()["compiler"].split()[0] in {"gcc", "clang"}
 
 
-def test_isa_default_is_the_widest_available():
-    done = run_python("import topleft as tl; print(tl.build_info()['isa'])")
-    assert done.stdout.split() == [tl.build_info()["isa_available"][-1]], done.stderr
-
-
-@pytest.mark.parametrize("isa", tl.build_info()["isa_available"])
-def test_isa_override_is_used(isa):
-    done = run_python("import topleft as tl; print(tl.build_info()['isa'])", TOPLEFT_ISA=isa)
-    assert done.stdout.split() == [isa], done.stderr
-
-
-def test_isa_override_empty_is_no_override():
-    done = run_python("import topleft as tl; print(tl.build_info()['isa'])", TOPLEFT_ISA="")
-    assert done.stdout.split() == [tl.build_info()["isa_available"][-1]], done.stderr
+@pytest.mark.parametrize("isa", [None, "", *tl.build_info()["isa_available"]])
+def test_isa_is_the_one_asked_for_or_the_widest_available(isa):
+    asked = {} if isa is None else {"TOPLEFT_ISA": isa}
+    done = run_python("import topleft as tl; print(tl.build_info()['isa'])", **asked)
+    assert done.stdout.split() == [isa or tl.build_info()["isa_available"][-1]], done.stderr
 
 
 def test_isa_override_unknown_name_lists_the_choices():
@@ -232,12 +200,6 @@ def test_use_isa_unknown_name_is_an_error_and_changes_nothing():
     with pytest.raises(ValueError, match="instruction set must be one of scalar"):
         engine.use_isa("sse9")
     assert engine.isa_in_use() == before
-
-
-def test_import_of_topleft_loads_no_optional_dependency():
-    optional = {"trimesh", "tqdm", "scipy", "matplotlib", "fast_simplification"}
-    done = run_python(f"import topleft, sys; print(*sorted({optional} & set(sys.modules)))")
-    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
 
 
 def test_version_stands_in_pyproject_and_everything_else_agrees():

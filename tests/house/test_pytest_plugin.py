@@ -1,5 +1,6 @@
 """`topleft.pytest_plugin`: pictures that are kept, those that are missing, and those that differ."""
 
+import os
 import re
 import subprocess
 import sys
@@ -79,10 +80,12 @@ def test_plugin_compares_and_updates_in_a_project(tmp_path):
         "import topleft as tl\n\n\ndef test_cube(assert_picture):\n"
         '    assert_picture(tl.Mesh(*tl.scenes.cube()), "cube", size=(20, 16))\n'
     )
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    runs = [
-        subprocess.run([*command, *more], cwd=tmp_path, check=False).returncode
-        for more in ([], ["--update-pictures"], [])
-    ]
-    assert runs == [1, 0, 0]
+    code = """import pytest
+command = ["-q", "-p", "no:cacheprovider"]
+print("ended:", *(int(pytest.main([*command, *more])) for more in ([], ["--update-pictures"], [])))"""
+    environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True, env=environment
+    )
+    assert ended.stdout.splitlines()[-1] == "ended: 1 0 0"
     assert (np.asarray(Image.open(tmp_path / "pictures" / "cube.png")) == PICTURE).all()

@@ -45,11 +45,6 @@ def test_results_show_what_came_of_their_jobs():
     assert layers.picture is layers.layers["color"]
 
 
-def test_plan_is_one_line():
-    line = repr(tl.plan([[0, 0], [9, 0], [0, 9]], [[0, 1, 2]], (9, 9)))
-    assert line == "<Plan: rasterize 9x9, 1 triangles, 1 thread>"
-
-
 def test_scene_is_a_table_in_a_notebook():
     table = SCENE._repr_html_()
     assert table.count("<tr>") == 3

@@ -187,12 +187,7 @@ def errors_of_pyright(folder):
 
 
 @pytest.mark.parametrize("checker", ["mypy", "pyright"])
-def test_programs_of_the_pages_have_types(checker, request):
+def test_programs_of_the_pages_have_types_and_misspelt_words_are_found(checker, request):
     errors = request.getfixturevalue(f"errors_of_{checker}")
     assert [error for error in errors if error[0] != "misspelt"] == []
-
-
-@pytest.mark.parametrize("checker", ["mypy", "pyright"])
-def test_misspelt_words_of_options_are_found(checker, request):
-    errors = request.getfixturevalue(f"errors_of_{checker}")
     assert sorted({line for name, line, _ in errors if name == "misspelt"}) == list(misspelt()[1])
