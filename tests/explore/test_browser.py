@@ -2,25 +2,23 @@
 
 import json
 import re
-import shutil
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from node_page import NODE, NodePage
+from node_page import CHROMIUM, NODE, NodePage
 
-playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
+pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
 
-import topleft as tl  # noqa: E402
-from topleft._apps.explore.content import content_of  # noqa: E402
-from topleft._apps.explore.content import scene as scene_of  # noqa: E402
-from topleft._apps.explore.handlers import answer  # noqa: E402
-from topleft._apps.explore.messages import split  # noqa: E402
-from topleft._apps.explore.notebook import markup  # noqa: E402
-from topleft._apps.explore.session import Session  # noqa: E402
+import topleft as tl
+from topleft._apps.explore.content import content_of
+from topleft._apps.explore.content import scene as scene_of
+from topleft._apps.explore.handlers import answer
+from topleft._apps.explore.messages import split
+from topleft._apps.explore.notebook import markup
+from topleft._apps.explore.session import Session
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium"),
     pytest.mark.skipif(NODE is None, reason="node is not installed"),
@@ -39,14 +37,6 @@ PIXELS = """(key) => {
   const {data, width, height} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
   return [height, width, [...data]];
 }"""
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

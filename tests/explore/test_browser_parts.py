@@ -1,25 +1,21 @@
 """Steps, Mesh and Race in a browser: what is on the screen is what the library draws, by mouse, touch and keys."""
 
-from __future__ import annotations
-
 import io
 import json
-import shutil
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from node_page import NODE, NodePage
+from node_page import CHROMIUM
 from PIL import Image
 
-playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
+pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
 
-import topleft as tl  # noqa: E402
-from topleft._apps.explore.mesh_view import HANDLERS, MeshView  # noqa: E402
-from topleft._apps.explore.session import Content, Session  # noqa: E402
+import topleft as tl
+from topleft._apps.explore.mesh_view import HANDLERS, MeshView
+from topleft._apps.explore.session import Content, Session
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium")
 
 PART = "document.querySelector('.explorer').app.parts"
@@ -32,14 +28,6 @@ PIXELS = """(where) => {
   const {data, width, height} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
   return [height, width, btoa([...data].map((byte) => String.fromCharCode(byte)).join(""))];
 }"""
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -75,15 +63,6 @@ def steps_page(chromium, explorer):
     with opened(chromium, explorer, "#steps=" + json.dumps({"scene": "two-triangles", "method": "edge"})) as page:
         page.wait_for_function(f"() => {PART}.steps.state().step === 0")
         yield page
-
-
-@pytest.fixture(scope="module")
-def node_page():
-    if NODE is None:
-        pytest.skip("node is not installed")
-    found = NodePage()
-    yield found
-    found.close()
 
 
 def canvas_of(page, where):

@@ -1,9 +1,6 @@
 """Edits of triangles on the page: edits.js by node, its states drawn by the page."""
 
 import pytest
-from node_page import NODE, NodePage
-
-pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
 SQUARE = {"vertices": [[1.5, 1.5], [9.5, 1.5], [1.5, 9.5], [9.5, 9.5]], "triangles": [[0, 1, 2], [1, 3, 2]]}
 SQUARE |= {"size": [11, 12], "origin": [0, 0]}
@@ -12,13 +9,6 @@ EDITS = {
     "add": (SQUARE, "add", 0), "split": (SQUARE, "split", 0), "flip": (SQUARE, "flip", 1),
     "remove": (SQUARE, "remove", 1), "add to nothing": (NOTHING, "add", 0), "remove nothing": (NOTHING, "remove", 0),
 }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def page():
-    found = NodePage()
-    yield found
-    found.close()
 
 
 @pytest.fixture(scope="module")

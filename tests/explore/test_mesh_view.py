@@ -1,7 +1,5 @@
 """Views of a mesh: pixels are those of `render` and `rasterize`, files draw the same, what is broken is refused."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

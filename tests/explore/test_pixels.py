@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from node_page import NODE, NodePage
+from node_page import NODE
 
 import topleft as tl
 from topleft._apps.explore.content import SCENES, content_of_name, scene
@@ -29,15 +29,6 @@ DEEP = SQUARE | {
     "triangles": [[0, 3, 2], [1, 3, 4]],
 }
 LOOKS = ["owners", "overdraw", "wireframe"]
-
-
-@pytest.fixture(scope="module")
-def page():
-    if NODE is None:
-        pytest.skip("node is not installed")
-    found = NodePage()
-    yield found
-    found.close()
 
 
 @pytest.fixture

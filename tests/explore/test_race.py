@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from node_page import NODE, NodePage
 
 from topleft._apps.explore.race import HANDLERS, entries, lists, value_at
 from topleft._apps.explore.session import Content, Session
@@ -14,15 +13,6 @@ from topleft.scene_families import FAMILIES, Axis
 
 RECORD = Path(__file__).parents[2] / "benchmarks" / "records" / "atlas.json"
 COLORS = {"another triangle shows": (204, 121, 167), "a gap": (213, 94, 0), "drawn more than once": (20, 130, 210)}
-
-
-@pytest.fixture(scope="module")
-def page():
-    if NODE is None:
-        pytest.skip("node is not installed")
-    found = NodePage()
-    yield found
-    found.close()
 
 
 @pytest.fixture

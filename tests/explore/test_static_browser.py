@@ -3,11 +3,10 @@
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
-from shutil import which
 from typing import get_args
 
 import pytest
+from node_page import CHROMIUM, PAGE
 
 playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install '.[explore]'")
@@ -17,8 +16,6 @@ from topleft._apps.explore.session import Content  # noqa: E402
 from topleft._apps.explore.static import SETS, write_static  # noqa: E402
 from topleft.typing import SamplingOption  # noqa: E402
 
-CHROMIUM = next(filter(None, map(which, ("chromium", "chromium-browser", "google-chrome"))), None)
-PAGE = files("topleft._apps.explore").joinpath("page")
 HAS_KERNELS = all(PAGE.joinpath(f"topleft-{name}.wasm").is_file() for name in SETS)
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium"),

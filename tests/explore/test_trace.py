@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from node_page import NODE, NodePage
 
 import topleft as tl
 from topleft.methods import CLASSICS, METHODS, find_method, reference
-
-pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
 TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
 SIZE = (21, 19)
@@ -45,13 +42,6 @@ class Trace:
         """The numbers of a step, lists as they are."""
         values = {name: [*map(float, text.split(", "))] for name, text, _ in self.steps[i][7]}
         return {name: numbers[0] if len(numbers) == 1 else numbers for name, numbers in values.items()}
-
-
-@pytest.fixture(scope="module")
-def page():
-    found = NodePage()
-    yield found
-    found.close()
 
 
 @pytest.fixture(scope="module")

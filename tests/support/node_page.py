@@ -14,6 +14,7 @@ from topleft._apps.explore.messages import split
 from topleft._apps.explore.session import Content, Session
 
 NODE = shutil.which("node")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 PAGE = files("topleft._apps.explore").joinpath("page")
 
 
