@@ -1,7 +1,5 @@
 """Many pictures: the same ones whoever draws them, in bounded memory, and errors with their jobs."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 import pickle

@@ -1,7 +1,5 @@
 """Batches that write files: whole ones only, and those that are there are left out on request."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from batch_jobs import BOX, EXECUTORS, SIZE, orbit, pictures

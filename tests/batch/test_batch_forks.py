@@ -1,7 +1,5 @@
 """Batches and fork: parent and child both get all pictures."""
 
-from __future__ import annotations
-
 import os
 import time
 

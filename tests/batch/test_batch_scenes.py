@@ -1,7 +1,5 @@
 """What batches draw: meshes that are read once, scenes, meshes of other libraries, through lenses, as glass."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

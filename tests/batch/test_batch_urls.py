@@ -1,7 +1,5 @@
 """Batches that write to URLs: files whole or not there, those that are there left out on request."""
 
-from __future__ import annotations
-
 import io
 import pickle
 import subprocess

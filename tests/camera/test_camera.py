@@ -1,7 +1,5 @@
 """Cameras: where points land in the picture, against arithmetic written out here."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lenses: where points are seen, against the formulas of OpenCV written out here in plain Python."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

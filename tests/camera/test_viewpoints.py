@@ -1,7 +1,5 @@
 """Many cameras round one subject."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The command line: real files in, pictures out, one clear line and the right exit status when it cannot be."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The command line and batches: what meshes lack of their files is told once, and cameras of files are used."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from concurrent.futures import ProcessPoolExecutor

@@ -1,7 +1,5 @@
 """What `topleft render` may be told about the look of a mesh: texture, matcap, glass."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from first_pictures import camera_of, first_picture

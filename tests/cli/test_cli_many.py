@@ -1,7 +1,5 @@
 """The command line for many pictures: layers, job files, workers, sheets, animations, and going on after a break."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

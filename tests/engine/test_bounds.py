@@ -86,17 +86,6 @@ def test_picture_has_the_same_bits(isa, seed, force):
 
 
 @ON_EACH_ISA
-def test_all_instruction_sets_agree_with_the_scalar_one(isa, force):
-    rng = np.random.default_rng(9)
-    for size in SIZES:
-        mesh = scene(rng, 30, size)
-        with on("scalar"):
-            expected = draw(*mesh, size, bounded=False, force=force)
-        with on(isa):
-            assert_same_fragments(draw(*mesh, size, bounded=True, force=force), expected)
-
-
-@ON_EACH_ISA
 def test_shares_of_triangles_keep_the_bounds_of_their_rows(isa, force):
     force(is_sliced=True)
     size, rng = (600, 80), np.random.default_rng(3)

@@ -408,14 +408,6 @@ def test_engine_both_turns_equal_exact_picture(cull, isa):
     check_all(isa, cases(both_turns, cull))
 
 
-@ON_EACH_ISA
-def test_engine_culled_sides_are_all(isa):
-    scene = mixed(np.random.default_rng(3), 5000, (90, 60))
-    with on(isa):
-        back, front, whole = (tl.overdraw(*scene.arrays, cull=cull) for cull in ("back", "front", "none"))
-    assert_same(back + front, whole)
-
-
 # ---- windows --------------------------------------------------------------------------------------------------------
 
 

@@ -1,7 +1,5 @@
 """Fields and heights on grids, against planes written out here and evaluated pixel by pixel."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from types import SimpleNamespace
 

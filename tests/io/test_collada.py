@@ -1,7 +1,5 @@
 """COLLADA: triangles of all kinds of lists, the transforms of nodes, materials, and what is left out and told."""
 
-from __future__ import annotations
-
 import warnings
 import zipfile
 

@@ -1,7 +1,5 @@
 """Files: small meshes written here and read back, broken ones refused."""
 
-from __future__ import annotations
-
 import sys
 import zipfile
 
@@ -11,9 +9,7 @@ import pytest
 import topleft as tl
 from topleft import scenes
 from topleft._meshes.io import load as files
-from topleft._meshes.io.images import save_image
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.model.normals import face_normals
 from topleft.errors import MeshError, MeshWarning, MissingPackageError
 
 trimesh = pytest.importorskip("trimesh")
@@ -40,19 +36,7 @@ def exported(kind, mesh=None):
     return (mesh or trimesh.Trimesh(vertices, triangles, process=False)).export(file_type=kind)
 
 
-def area(mesh):
-    a, b, c = (mesh.vertices[mesh.triangles[:, corner]] for corner in range(3))
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-
-
 # Meshes in
-
-
-def test_load_obj_quads_and_polygons_become_triangles(write):
-    mesh = files.load(write("a.obj", SQUARE + "v .5 2 0\nf 1 2 3 4\nf 1 2 3 5 4\n"))
-    assert mesh.triangles.shape == (2 + 3, 3)
-    assert area(mesh) == pytest.approx(1 + 1.5)
-    assert (face_normals(mesh.vertices, mesh.triangles) == [0, 0, 1]).all()
 
 
 def test_load_obj_groups_are_one_mesh_in_the_order_of_the_file(write):
@@ -72,38 +56,6 @@ def test_load_obj_texture_seam_doubles_vertices_but_not_normals(write):
     assert (mesh.vertex_normals() == [0, 0, 1]).all()
     whole = files.load(write("b.obj", SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"))
     assert len(whole.vertices) == 4
-
-
-MTL = "newmtl red\nKd 1 0 0\nKs .5 .5 .5\nNs 20\nnewmtl picture\nKd 0 0 0\nmap_Kd a.png\n"
-
-
-def test_load_obj_materials_come_with_their_triangles(write, tmp_path):
-    save_image(tmp_path / "a.png", np.full((1, 2, 3), (0, 0, 255), np.uint8))
-    write("a.mtl", MTL)
-    faces = "usemtl picture\nf 1/1 2/2 3/3\nusemtl red\nf 1/1 3/3 4/4\n"
-    mesh = files.load(write("a.obj", "mtllib a.mtl\n" + SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n" + faces))
-    assert mesh.material_of_triangle.tolist() == [0, 1]
-    picture, red = mesh.materials
-    assert picture.texture.image.tolist() == [[[0, 0, 255, 255]] * 2]
-    assert (red.color, red.texture, red.shininess) == ((255, 0, 0), None, 20)
-    assert red.specular == pytest.approx(0.5, abs=0.01)  # trimesh keeps bytes
-
-
-def test_load_gltf_base_color_is_light_and_its_cutout_is_kept(tmp_path):
-    trimesh = pytest.importorskip("trimesh")
-    shape = trimesh.creation.box()
-    shape.visual = trimesh.visual.TextureVisuals(
-        uv=np.zeros((8, 2)),
-        material=trimesh.visual.material.PBRMaterial(
-            baseColorFactor=[0.5, 0.0, 1.0, 1.0], roughnessFactor=0.5, alphaMode="MASK", alphaCutoff=0.25
-        ),
-    )
-    shape.export(tmp_path / "a.glb")
-    (material,) = files.load(tmp_path / "a.glb").materials
-    assert material.color[0] == pytest.approx(188, abs=1)  # half the light, in bytes
-    assert material.color[1:] == (0, 255)
-    assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.25)
-    assert (material.metallic, material.roughness) == (1, 0.5)
 
 
 def test_as_mesh_of_trimesh_with_a_cutoff_above_one_shows_nothing():
@@ -129,11 +81,6 @@ def test_load_obj_relative_indices_count_from_their_line(write):
     text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 6\n"
     mesh = files.load(write("a.obj", text))
     assert mesh.vertices[mesh.triangles][:, 0].tolist() == [[0, 0, 0], [5, 0, 0]]
-
-
-def test_load_obj_vertex_colors_are_kept(write):
-    text = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n"
-    assert files.load(write("a.obj", text)).colors.tolist() == [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]]
 
 
 def test_load_obj_in_another_encoding_is_read(write):
@@ -172,22 +119,6 @@ def test_load_ply_face_colors_stay_sharp_and_shading_smooth(write):
     assert (mesh.colors[mesh.triangles] == colors[:, None]).all()
     expected = Mesh(vertices, triangles).vertex_normals()[triangles]
     assert mesh.vertex_normals()[mesh.triangles] == pytest.approx(expected, abs=1e-6)
-
-
-def test_load_glb_nodes_are_placed_and_mirrors_keep_the_outside(write):
-    vertices, triangles = scenes.shape("icosphere", subdivisions=1)
-    ball = trimesh.Trimesh(vertices, triangles, process=False)
-    scene = trimesh.Scene()
-    scene.add_geometry(ball, transform=np.diag([2.0, 1, 1, 1]))
-    shift = np.eye(4)
-    shift[:3, 3] = 10, 0, 0
-    scene.add_geometry(ball, transform=shift @ np.diag([-1.0, 1, 1, 1]))
-    mesh = files.load(write("a.glb", scene.export(file_type="glb")))
-    assert mesh.triangles.shape == (160, 3)
-    assert mesh.bounds == pytest.approx(np.array([[-2, -1, -1], [11, 1, 1]]), abs=0.1)
-    a, b, c = (mesh.vertices[mesh.triangles[:, corner]] for corner in range(3))
-    ball_volume = (a * np.cross(b, c)).sum() / 6
-    assert ball_volume == pytest.approx(3 * ball.volume, rel=1e-5)
 
 
 def test_load_scaled_node_normals_stay_at_right_angles(write):

@@ -1,7 +1,5 @@
 """glTF: each feature in the smallest file that has it."""
 
-from __future__ import annotations
-
 import base64
 import json
 import warnings

@@ -1,7 +1,5 @@
 """Animations of glTF: where nodes, skins and morph targets are at a time."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

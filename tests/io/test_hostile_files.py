@@ -1,7 +1,5 @@
 """Files that nobody meant: mutated, truncated, pointing elsewhere. Each ends in a mesh or in one line of MeshError."""
 
-from __future__ import annotations
-
 import bz2
 import contextlib
 import gzip

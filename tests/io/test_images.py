@@ -1,7 +1,5 @@
 """Images: pictures and buffers that are whole in their file or not there."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

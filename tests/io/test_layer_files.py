@@ -1,7 +1,5 @@
 """Layers in files: what a file holds is what its notes say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from comparing import assert_same

@@ -1,7 +1,5 @@
 """OBJ and MTL: what the file says, and nothing that it does not say."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """OFF: each form of it in the smallest file that has it."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """PLY: text and binary, polygons and strips, what corners and faces say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """PNG files: what Pillow decodes is what was encoded, and each chunk is as the standard says."""
 
-from __future__ import annotations
-
 import io
 import struct
 import zlib

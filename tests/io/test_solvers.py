@@ -1,7 +1,5 @@
 """VTK and formats of solvers: what meshio reads of them is drawn, or told."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

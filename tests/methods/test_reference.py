@@ -1,7 +1,5 @@
 """The exact reference against tiny pictures that are written out: one rule a test, worked by hand."""
 
-import doctest
-import sys
 from fractions import Fraction
 
 import numpy as np
@@ -23,11 +21,6 @@ def test_reference_module_imports_nothing_of_ours():
         name for name in vars(ref) if getattr(vars(ref)[name], "__module__", "") == ref.__name__
     ]
     assert "engine" not in vars(ref)
-
-
-def test_reference_docstring_examples_hold():
-    result = doctest.testmod(sys.modules[ref.__name__])
-    assert (result.failed, result.attempted > 0) == (0, True)
 
 
 # ---- snap -----------------------------------------------------------------------------------------------------------

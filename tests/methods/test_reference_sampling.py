@@ -1,7 +1,5 @@
 """The exact references of samples and conservative coverage: tiny pictures, and the definitions put another way."""
 
-import doctest
-import sys
 from fractions import Fraction
 
 import numpy as np
@@ -22,11 +20,6 @@ def scenes(bits, seed=3):
     for make in (few_bits, on_centres, slivers):
         scene = make(rng, 6)
         yield *scene.arrays, scene.view | {"subpixel_bits": bits, "origin": (2, 3)}
-
-
-def test_docstring_examples_hold():
-    result = doctest.testmod(sys.modules[sampling.__name__])
-    assert (result.failed, result.attempted) == (0, 4)
 
 
 # ---- several samples a pixel ----------------------------------------------------------------------------------------

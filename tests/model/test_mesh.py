@@ -1,7 +1,5 @@
 """Mesh: what it accepts, its normals, and vertices that are the same place."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, on

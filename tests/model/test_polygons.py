@@ -1,7 +1,5 @@
 """Polygons: their triangles cover what they cover."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, on

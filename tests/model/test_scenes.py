@@ -1,7 +1,5 @@
 """Scenes: deterministic to the bit, and built-in shapes that are closed and face outward."""
 
-from __future__ import annotations
-
 import hashlib
 from collections import Counter
 

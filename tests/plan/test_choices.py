@@ -1,4 +1,4 @@
-"""Each choice is enough: thousands of random scenes, drawn with the choice forced on and off, have the same bits."""
+"""Each choice is enough: hundreds of random scenes, drawn with the choice forced on and off, have the same bits."""
 
 from dataclasses import fields
 
@@ -46,7 +46,7 @@ def both_ways(draw, **forced):
 def test_flat_depth_left_out_gives_the_same_bits(depth_test):
     rng = np.random.default_rng(1)
     n_flat = 0
-    for _ in range(2000):
+    for _ in range(700):
         vertices, triangles = random_triangles(rng, int(rng.integers(2, 4)))
         if vertices.shape[1] == 3:
             vertices[:, 2] = rng.choice([0.0, -0.0, 0.5, -3.7, 1e-300, -1e-300, 1e-42, 3e38])
@@ -64,7 +64,7 @@ def test_flat_depth_left_out_gives_the_same_bits(depth_test):
         assert (bits_of(never) == bits_of(always)).all()
         assert (never.barycentric() == always.barycentric()).all()
         n_flat += never.mask.any()
-    assert n_flat > 1500
+    assert n_flat > 500
 
 
 def random_affine(rng):
@@ -79,7 +79,7 @@ def random_affine(rng):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_divide_left_out_gives_the_same_bits(dtype):
     rng = np.random.default_rng(2)
-    for _ in range(2500):
+    for _ in range(800):
         n = int(rng.integers(1, 40))
         vertices = rng.uniform(-1.2, 1.2, (3 * n, 3)) * rng.choice([1.0, 1.0, 1e6], (3 * n, 1))
         vertices[rng.integers(0, 3 * n)] *= rng.choice([1.0, 1e30])
@@ -131,7 +131,7 @@ def test_shares_and_bands_give_the_same_bits():
     def forced(view, n_triangles, n_parts, sink):
         return n_parts > 1 and choices.can_slice(view)
 
-    for _ in range(1500):
+    for _ in range(500):
         vertices, triangles = random_triangles(rng, 3)
         one = bits_of(tl.rasterize(vertices, triangles, SIZE, threads=1))
         threads = int(rng.integers(2, 5))
@@ -155,29 +155,6 @@ def test_threads_over_arrays_give_the_same_bits():
 
         chosen, forced = both_ways(draw, pays_to_share=True)
         assert (chosen == forced).all()
-
-
-def test_whole_pixels_need_no_sub_pixel_bits():
-    rng = np.random.default_rng(5)
-    for _ in range(1500):
-        vertices, triangles = random_triangles(rng, 3)
-        vertices[:, :2] = np.rint(vertices[:, :2])
-        pictures = [bits_of(tl.rasterize(vertices, triangles, SIZE, subpixel_bits=bits)) for bits in (0, 8, 16)]
-        assert (pictures[0] == pictures[1]).all()
-        assert (pictures[0] == pictures[2]).all()
-
-
-def test_more_bits_and_other_methods_give_the_same_bits():
-    rng = np.random.default_rng(6)
-    away = 2**24  # pixels: beyond 2**30 sub-pixels, where 128 bits are taken
-    for _ in range(1500):
-        vertices, triangles = random_triangles(rng, 3)
-        vertices[:, :2] = np.rint(vertices[:, :2] * 256) / 256
-        narrow = bits_of(tl.rasterize(vertices, triangles, SIZE))
-        wide = bits_of(tl.rasterize(vertices + [away, -away, 0], triangles, SIZE, origin=(away, -away)))
-        assert (narrow == wide).all()
-        for method in ("edge", "scanline"):
-            assert (narrow == bits_of(tl.rasterize(vertices, triangles, SIZE, method=method))).all()
 
 
 @pytest.mark.parametrize(
@@ -240,7 +217,7 @@ def random_clip_space(rng):
 def test_samples_in_bands_and_whole_give_the_same_bits(force, n_components):
     rng = np.random.default_rng(7)
     force(plane_bytes=8 * SIZE[0] * 4)  # bands of four rows
-    for _ in range(700):
+    for _ in range(300):
         vertices, triangles = random_clip_space(rng) if n_components == 4 else random_triangles(rng, 3)
         options = {"sampling": "msaa4", "cull": str(rng.choice(["none", "back", "front"])), "threads": 1}
 
@@ -254,7 +231,7 @@ def test_samples_in_bands_and_whole_give_the_same_bits(force, n_components):
 
 def test_search_for_cut_triangles_gives_the_same_bits():
     rng = np.random.default_rng(8)
-    for _ in range(700):
+    for _ in range(300):
         vertices, triangles = random_clip_space(rng)
         if rng.integers(2):
             vertices[:, 3] = 2.0  # none is cut
@@ -268,7 +245,7 @@ def test_search_for_cut_triangles_gives_the_same_bits():
 
 def test_colours_with_labels_and_without_are_the_same():
     rng = np.random.default_rng(9)
-    for _ in range(700):
+    for _ in range(300):
         vertices, triangles = random_triangles(rng)
         colors = rng.integers(0, 256, (len(triangles), int(rng.integers(1, 5))), np.uint8)
 

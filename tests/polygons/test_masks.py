@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, kept, on
-from hypothesis import given
+from hypothesis import given, settings
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
@@ -39,6 +39,7 @@ def test_mask_of_wild_rings_equals_reference(isa, rule, seed):
 
 
 @ON_EACH_RULE
+@settings(max_examples=120)
 @given(wild_seeds)
 def test_squares_of_wild_rings_equal_reference(rule, seed):
     polygon = wild_polygon(np.random.default_rng(seed))

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, kept, on
-from hypothesis import given
+from hypothesis import given, settings
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
@@ -35,6 +35,7 @@ def dense(table):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("rule", ["evenodd", "nonzero"])
+@settings(max_examples=120)
 @given(wild_seeds)
 def test_areas_of_wild_rings_are_within_bound(isa, rule, seed):
     polygon = wild_polygon(np.random.default_rng(seed))

@@ -27,6 +27,7 @@ import topleft as tl
 
 PIXEL = pytest.mark.parametrize("make", PIXEL_SCENES.values(), ids=PIXEL_SCENES)
 CLIP = pytest.mark.parametrize("make", CLIP_SCENES.values(), ids=CLIP_SCENES)
+EITHER = pytest.mark.parametrize("make", (PIXEL_SCENES | CLIP_SCENES).values(), ids=PIXEL_SCENES | CLIP_SCENES)
 DEPTH_TEST = pytest.mark.parametrize("depth_test", ["less", "greater", None])
 
 
@@ -40,27 +41,15 @@ def scenes(make, n):
 # ---- coverage and overdraw ------------------------------------------------------------------------------------------
 
 
-@PIXEL
-def test_overdraw_adversarial_pixels_equals_reference(make):
+@EITHER
+def test_overdraw_adversarial_scene_equals_reference(make):
     for scene, _ in scenes(make, 15):
         comparing.check_overdraw(scene)
 
 
-@CLIP
-def test_overdraw_adversarial_clip_space_equals_reference(make):
-    for scene, _ in scenes(make, 15):
-        comparing.check_overdraw(scene)
-
-
-@settings(max_examples=400)
-@given(pixel_scenes())
-def test_overdraw_any_pixels_equals_reference(scene):
-    comparing.check_overdraw(scene)
-
-
-@settings(max_examples=400)
-@given(clip_scenes())
-def test_overdraw_any_clip_space_equals_reference(scene):
+@settings(max_examples=800)
+@given(pixel_scenes() | clip_scenes())
+def test_overdraw_any_scene_equals_reference(scene):
     comparing.check_overdraw(scene)
 
 
@@ -165,11 +154,10 @@ def test_rasterize_flat_depths_with_ties_equal_reference(make, depth_test):
         comparing.check_ids(with_depth(scene, rng, flat=True), depth_test)
 
 
-@DEPTH_TEST
 @PIXEL
-def test_rasterize_sloping_depths_within_bound(make, depth_test):
+def test_rasterize_sloping_depths_within_bound(make):
     for scene, rng in scenes(make, 3):
-        comparing.check_fragments(with_depth(scene, rng), depth_test)
+        comparing.check_fragments(with_depth(scene, rng))
 
 
 def far_slivers(rng, n=30, side=20):
@@ -183,27 +171,20 @@ def far_slivers(rng, n=30, side=20):
     return soup(np.concatenate(corners) / 256, (side, side))
 
 
-@DEPTH_TEST
-def test_rasterize_far_slivers_within_bound(depth_test):
+def test_rasterize_far_slivers_within_bound():
     for scene, rng in scenes(far_slivers, 4):
-        comparing.check_fragments(with_depth(scene, rng), depth_test)
+        comparing.check_fragments(with_depth(scene, rng))
 
 
-@DEPTH_TEST
 @CLIP
-def test_rasterize_clip_space_depths_within_bound(make, depth_test):
+def test_rasterize_clip_space_depths_within_bound(make):
     for scene, _ in scenes(make, 5):
-        comparing.check_fragments(scene, depth_test)
+        comparing.check_fragments(scene)
 
 
-@given(pixel_scenes(n_components=3), st.sampled_from(["less", "greater", None]))
-def test_rasterize_any_pixels_within_bound(scene, depth_test):
-    comparing.check_fragments(scene, depth_test)
-
-
-@given(clip_scenes(), st.sampled_from(["less", "greater", None]))
-def test_rasterize_any_clip_space_within_bound(scene, depth_test):
-    comparing.check_fragments(scene, depth_test)
+@given(pixel_scenes(n_components=3) | clip_scenes())
+def test_rasterize_any_scene_within_bound(scene):
+    comparing.check_fragments(scene)
 
 
 @pytest.mark.parametrize("depth_test", ["less", "greater"])
@@ -223,26 +204,15 @@ def test_rasterize_each_triangle_alone_explains_the_whole(depth_test):
 # ---- attributes -----------------------------------------------------------------------------------------------------
 
 
-@PIXEL
-def test_interpolate_pixels_within_bound(make):
-    for scene, rng in scenes(make, 3):
+@EITHER
+def test_interpolate_within_bound(make):
+    for scene, rng in scenes(make, 4):
         comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
 
 
-@CLIP
-def test_interpolate_clip_space_within_bound(make):
-    for scene, rng in scenes(make, 5):
-        comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
-
-
-@given(pixel_scenes(), st.integers(0, 2**32 - 1))
-def test_interpolate_any_pixels_within_bound(scene, seed):
-    values = np.random.default_rng(seed).uniform(-1, 1, (len(scene.vertices), 1)).astype(np.float32)
-    comparing.check_attributes(scene, values)
-
-
-@given(clip_scenes(), st.integers(0, 2**32 - 1))
-def test_interpolate_any_clip_space_within_bound(scene, seed):
+@settings(max_examples=600)
+@given(pixel_scenes() | clip_scenes(), st.integers(0, 2**32 - 1))
+def test_interpolate_any_scene_within_bound(scene, seed):
     values = np.random.default_rng(seed).uniform(-1, 1, (len(scene.vertices), 1)).astype(np.float32)
     comparing.check_attributes(scene, values)
 
@@ -250,7 +220,7 @@ def test_interpolate_any_clip_space_within_bound(scene, seed):
 # ---- fill -----------------------------------------------------------------------------------------------------------
 
 
-@PIXEL
+@EITHER
 def test_fill_flat_equals_reference(make):
     for scene, rng in scenes(make, 4):
         colors = rng.integers(0, 256, (len(scene.triangles), rng.integers(1, 5)), np.uint8)
@@ -291,29 +261,16 @@ def test_fill_any_gouraud_uint8_equals_reference(scene, seed, n_channels):
     comparing.check_fill_uint8(scene, colors, "vertex")
 
 
-@PIXEL
+@EITHER
 def test_fill_gouraud_float32_within_bound(make):
-    for scene, rng in scenes(make, 3):
-        comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 3)).astype(np.float32))
-
-
-@CLIP
-def test_fill_flat_clip_space_equals_reference(make):
     for scene, rng in scenes(make, 4):
-        colors = rng.integers(0, 256, (len(scene.triangles), 3), np.uint8)
-        comparing.check_fill_uint8(scene, colors, "triangle")
+        comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 3)).astype(np.float32))
 
 
 @CLIP
 def test_fill_gouraud_uint8_clip_space_but_for_ties_equals_reference(make):
     for scene, rng in scenes(make, 5):
         comparing.check_fill_uint8_cut(scene, rng.integers(0, 256, (len(scene.vertices), 3), np.uint8))
-
-
-@CLIP
-def test_fill_gouraud_float32_clip_space_within_bound(make):
-    for scene, rng in scenes(make, 5):
-        comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 2)).astype(np.float32))
 
 
 def test_fill_float32_flat_colours_are_copied():

@@ -41,14 +41,6 @@ def test_frame_without_pixels_gives_empty_pictures_of_that_shape(size):
     assert tl.fill(SQUARE, HALVES, np.zeros((2, 3)), size).shape == (*shape, 3)
 
 
-def test_results_have_the_stated_dtypes():
-    frags = tl.rasterize(SQUARE, HALVES, SIZE)
-    found = [frags.triangle, frags.depth, frags.mask, frags.barycentric(), frags.interpolate(np.zeros(4))]
-    assert [a.dtype for a in found] == [np.int32, np.float32, bool, np.float32, np.float32]
-    assert tl.coverage(SQUARE, HALVES, SIZE).dtype == bool
-    assert tl.overdraw(SQUARE, HALVES, SIZE).dtype == np.int32
-
-
 @pytest.mark.parametrize("layout", ["C", "F", "strided", "reversed"])
 def test_out_of_any_layout_is_filled_and_returned(layout):
     store = np.ones((8, 8), bool, order="F" if layout == "F" else "C")
@@ -114,15 +106,6 @@ def test_overdraw_out_is_cleared_first():
     np.testing.assert_array_equal(tl.overdraw(SQUARE, LEFT * 2, SIZE, out=out), 2 * LEFT_MASK)
 
 
-def test_rasterize_out_gets_ids_and_depth():
-    ids, depth = np.empty((4, 4), np.int32), np.empty((4, 8), np.float32)[:, ::2]
-    frags = tl.rasterize(SQUARE, LEFT, SIZE, out=(ids, depth))
-    assert frags.triangle is ids
-    assert frags.depth is depth
-    np.testing.assert_array_equal(ids, np.where(LEFT_MASK, 0, -1))
-    np.testing.assert_array_equal(depth, np.where(LEFT_MASK, 0, np.inf))
-
-
 @pytest.mark.parametrize("n_channels", [None, 1, 2, 3, 4])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_flat_fill_draws_over_out_and_shows_it_elsewhere(n_channels, dtype):
@@ -134,18 +117,6 @@ def test_flat_fill_draws_over_out_and_shows_it_elsewhere(n_channels, dtype):
     assert (out[~LEFT_MASK] == 7).all()
 
 
-def test_fill_draws_over_out_that_is_not_contiguous():
-    out = np.full((4, 8, 2), 7, np.uint8)[:, ::2]
-    tl.fill(SQUARE, LEFT, [[1, 2]], SIZE, out=out)
-    np.testing.assert_array_equal(out[..., 1], np.where(LEFT_MASK, 2, 7))
-
-
-def test_fill_background_fills_the_picture_first():
-    out = np.full((4, 4, 3), 7, np.uint8)
-    tl.fill(SQUARE, LEFT, [[1, 2, 3]], SIZE, background=[4, 5, 6], out=out)
-    np.testing.assert_array_equal(out[..., 2], np.where(LEFT_MASK, 3, 6))
-
-
 @pytest.mark.parametrize(
     ("dtype", "expected"), [(np.float64, np.float32), (np.float16, np.float32), (np.int64, np.uint8)]
 )
@@ -155,30 +126,11 @@ def test_fill_colors_of_other_dtypes_become_float32_or_uint8(dtype, expected):
     assert picture[3, 0].tolist() == [4, 5, 6]
 
 
-def test_fill_is_in_painters_order():
-    picture = tl.fill(SQUARE, [[0, 1, 3], [0, 3, 1]], [1, 2], SIZE)
-    np.testing.assert_array_equal(picture, 2 * LEFT_MASK)
-
-
 @pytest.mark.parametrize(("depth_test", "empty"), [("less", np.inf), ("greater", -np.inf), (None, np.inf)])
 def test_background_depth_stands_where_nothing_is(depth_test, empty):
     assert tl.rasterize(SQUARE, LEFT, SIZE, depth_test=depth_test).depth[3, 3] == empty
     frags = tl.rasterize(SQUARE, LEFT, SIZE, depth_test=depth_test, background_depth=5)
     np.testing.assert_array_equal(frags.depth, np.where(LEFT_MASK, 0, 5))
-
-
-def test_equal_depth_keeps_the_lower_index_and_painters_order_the_later():
-    vertices = np.column_stack([SQUARE, [0.25] * 4])
-    both = [[0, 1, 3], [0, 3, 1]]
-    assert tl.rasterize(vertices, both, SIZE).triangle[0, 0] == 0
-    assert tl.rasterize(vertices, both, SIZE, depth_test="greater").triangle[0, 0] == 0
-    assert tl.rasterize(vertices, both, SIZE, depth_test=None).triangle[0, 0] == 1
-    assert tl.rasterize(SQUARE, both, SIZE).triangle[0, 0] == 1  # (V, 2) has no depth
-
-
-def test_negative_zero_depth_comes_out_as_zero():
-    vertices = np.column_stack([SQUARE, [-0.0] * 4])
-    assert not np.signbit(tl.rasterize(vertices, HALVES, SIZE).depth).any()
 
 
 def test_rasterizer_gives_the_same_and_reuses_its_memory():
@@ -240,15 +192,6 @@ def test_attributes_survive_a_change_of_the_inputs():
     np.testing.assert_array_equal(frags.barycentric(), expected)
 
 
-def test_attributes_of_triangles_that_were_overwritten_are_empty_not_a_crash():
-    triangles = HALVES.astype(np.int32)
-    frags = tl.rasterize(SQUARE, triangles, SIZE)
-    triangles[:] = 2**30
-    frags.triangle[0, 0] = 2**30
-    assert (frags.barycentric() == 0).all()
-    assert (frags.interpolate(np.ones(4), background=-1) == -1).all()
-
-
 def test_attributes_of_one_id_and_one_index_too_many_are_empty():
     triangles = HALVES.astype(np.int32)
     frags = tl.rasterize(SQUARE, triangles[:1], SIZE)
@@ -258,50 +201,9 @@ def test_attributes_of_one_id_and_one_index_too_many_are_empty():
     assert (frags.barycentric() == 0).all()
 
 
-def test_interpolate_per_vertex_and_per_corner_agree():
-    frags = tl.rasterize(SQUARE, HALVES, SIZE)
-    values = np.arange(8.0).reshape(4, 2)
-    np.testing.assert_array_equal(frags.interpolate(values), frags.interpolate(values[HALVES]))
-    np.testing.assert_array_equal(frags.interpolate(values[:, 1]), frags.interpolate(values)[..., 1])
-
-
-@pytest.mark.parametrize("n_threads", [1, 2, 3, 8])
-def test_number_of_threads_changes_no_bit(n_threads):
-    rng = np.random.default_rng(7)
-    vertices = rng.uniform(-20, 120, (3000, 3))
-    triangles = np.arange(3000).reshape(-1, 3)
-    one = tl.rasterize(vertices, triangles, (101, 67), threads=1)
-    many = tl.rasterize(vertices, triangles, (101, 67), threads=n_threads)
-    np.testing.assert_array_equal(many.triangle, one.triangle)
-    np.testing.assert_array_equal(many.depth, one.depth)
-
-
 def test_environment_sets_the_number_of_threads(monkeypatch):
     monkeypatch.setenv("TOPLEFT_NUM_THREADS", "5")
     assert threads.available_threads() == 5
-
-
-def test_threads_survive_a_fork():
-    import multiprocessing
-
-    assert tl.coverage(SQUARE, HALVES, SIZE, threads=2).all()
-    with multiprocessing.get_context("fork").Pool(1) as pool:
-        mask = pool.apply(tl.coverage, (SQUARE, HALVES, SIZE), {"threads": 2})
-    assert mask.all()
-
-
-def test_dlpack_object_is_taken_without_array_interface():
-    class Tensor:
-        def __init__(self, array):
-            self.array = array
-
-        def __dlpack__(self, **kwargs):
-            return self.array.__dlpack__(**kwargs)
-
-        def __dlpack_device__(self):
-            return self.array.__dlpack_device__()
-
-    np.testing.assert_array_equal(tl.coverage(Tensor(SQUARE), Tensor(np.array(LEFT)), SIZE), LEFT_MASK)
 
 
 def test_float16_vertices_are_transformed_in_float64():

@@ -1,6 +1,5 @@
 """Compositing of layers: "over" from front to back, exact but for one rounding, whatever the order of triangles."""
 
-import doctest
 from fractions import Fraction
 
 import numpy as np
@@ -175,14 +174,6 @@ def test_composite_bad_types_are_refused():
         tl.composite(layers.triangle, np.zeros((1, 4)))
     with pytest.raises(TypeError, match="colors must be uint8 or float32, got dtype complex128"):
         tl.composite(layers, np.zeros((1, 4), complex))
-
-
-def test_composite_examples_hold():
-    finder = doctest.DocTestFinder()
-    runner = doctest.DocTestRunner()
-    for found in finder.find(tl.composite, "composite", module=False, globs={}):
-        assert runner.run(found).failed == 0
-    assert runner.tries > 0
 
 
 @pytest.mark.parametrize("wrong", [10**8, 2**31 - 1, -(2**31)])

@@ -1,7 +1,5 @@
 """Pictures of few triangles, whose colours are stored one after the other, and what lies under them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -35,16 +33,6 @@ def test_fill_of_few_triangles_one_number_a_pixel():
     vertices, triangles, colors = few_triangles(5, 1)
     picture = tl.fill(vertices, triangles, colors[:, 0], SIZE, background=7)
     assert (picture == tl.fill(vertices, triangles, colors, SIZE, background=7)[..., 0]).all()
-
-
-@pytest.mark.parametrize("options", [{"blend": "over", "sampling": "area"}, {"blend": "multiply"}])
-@pytest.mark.parametrize("n", [3, 70])
-def test_fill_blends_over_the_background_as_over_a_picture(n, options):
-    vertices, triangles, colors = few_triangles(n, 4)
-    out = np.full((*SIZE[::-1], 4), 200, np.uint8)
-    tl.fill(vertices, triangles, colors, SIZE, per="triangle", out=out, **options)
-    picture = tl.fill(vertices, triangles, colors, SIZE, per="triangle", background=200, **options)
-    assert (picture == out).all()
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -101,13 +89,6 @@ def test_rasterize_flat_vertices_depth_is_made_when_asked_for():
     assert frags.depth.dtype == np.float32
     assert (frags.depth == depth).all()
     assert set(np.unique(depth)) == {0, np.inf}
-
-
-@pytest.mark.parametrize(("options", "ground"), [({"depth_test": "greater"}, -np.inf), ({"background_depth": 7}, 7.0)])
-def test_rasterize_flat_vertices_background_depth(options, ground):
-    frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (3, 2), **options)
-    assert frags.depth.tolist() == [[0, 0, 0], [0, 0, ground]]
-    assert (frags.samples_depth[..., 0] == frags.depth).all()
 
 
 def test_rasterize_out_may_be_ids_alone():

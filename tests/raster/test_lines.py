@@ -1,8 +1,5 @@
 """Wireframes: tiny pictures written out, the exact reference on every instruction set, and what hides lines."""
 
-import doctest
-import sys
-
 import numpy as np
 import pytest
 from comparing import assert_exact, assert_same
@@ -28,11 +25,6 @@ def rows(picture):
 def segment(a, b, size, **options):
     """One line: a triangle whose third corner is its first."""
     return tl.wireframe([a, b], [[0, 1, 0]], size, **options)
-
-
-def test_reference_docstring_examples_hold():
-    result = doctest.testmod(sys.modules[ref.__name__])
-    assert (result.failed, result.attempted) == (0, 2)
 
 
 # ---- pixels ---------------------------------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """Depth peeling: every triangle that covers a centre, sorted, and nothing else."""
 
-import doctest
-
 import numpy as np
 import pytest
 from comparing import assert_exact, assert_same
@@ -166,7 +164,3 @@ def test_peel_other_samplings_are_refused(sampling):
 def test_peel_index_outside_the_vertices_is_refused(method):
     with pytest.raises(IndexError, match="triangles"):
         tl.peel([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2], [0, 1, 3]], (4, 4), method=method)
-
-
-def test_peel_examples_hold():
-    assert doctest.testmod(peel_module).failed == doctest.testmod(ref).failed == 0

@@ -1,7 +1,5 @@
 """Pictures through a lens, against meshes cut so finely that every edge is straight anyway."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

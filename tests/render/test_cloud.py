@@ -1,7 +1,5 @@
 """Clouds of points through the verbs of meshes: pictures, buffers, layers, batches."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 

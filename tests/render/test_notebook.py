@@ -1,7 +1,5 @@
 """What results show of themselves in a notebook."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rendering: what is seen has the right colour, and no picture depends on which way a face is turned."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.edges import EDGE_COLOR, depth_behind
 from topleft._meshes.picture.render import rasterize_mesh, render
-from topleft._meshes.picture.scene_shade import shade
 from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance
 
 SIZE = (64, 48)
@@ -46,19 +43,9 @@ def test_render_background_is_white_unless_given():
     assert render(CUBE, size=SIZE, background=(1, 2, 3))[0, 0].tolist() == [1, 2, 3, 255]
 
 
-def test_render_default_picture_is_640_by_480():
-    assert render(CUBE).shape == (480, 640, 4)
-
-
 @pytest.mark.parametrize("size", [(0, 5), (5, 0)])
 def test_render_empty_picture_has_its_shape(size):
     assert render(CUBE, size=size).shape == (size[1], size[0], 4)
-
-
-def test_render_leaves_the_mesh_alone():
-    vertices = CUBE.vertices.copy()
-    render(CUBE, size=SIZE)
-    assert np.array_equal(CUBE.vertices, vertices)
 
 
 @pytest.mark.parametrize("shading", ["smooth", "flat", "depth", "normals"])
@@ -166,13 +153,6 @@ def test_render_cull_leaves_sides_out(cull, is_seen):
     assert rasterize_mesh(square(), facing(), SIZE, cull=cull).mask.any() == is_seen
 
 
-def test_visibility_window_is_the_crop():
-    camera = Camera.framing(SPHERE, aspect=64 / 48)
-    whole = rasterize_mesh(SPHERE, camera, SIZE)
-    window = rasterize_mesh(SPHERE, camera, (20, 10), origin=(30, 15), viewport=SIZE)
-    assert np.array_equal(window.triangle, whole.triangle[15:25, 30:50])
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -194,21 +174,6 @@ def test_render_nothing_to_frame_is_refused():
 
 def test_render_nothing_with_a_camera_is_the_background():
     assert (render(Mesh(np.empty((0, 3)), []), facing(), SIZE) == 255).all()
-
-
-@pytest.mark.parametrize("name", ["torus-knot", "blob", "torus"])
-def test_shade_closed_shape_shows_no_background_inside(name):
-    # A pixel of background with the mesh on all four sides would be a crack.
-    mesh = Mesh(*scenes.shape(name))
-    mask = rasterize_mesh(mesh, size=(500, 500)).mask
-    alone = ~mask[1:-1, 1:-1] & mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
-    assert not alone.any()
-
-
-def test_shade_takes_fragments_of_rasterize():
-    camera = facing(2)
-    frags = rasterize_mesh(square(), camera, (8, 8))
-    assert np.array_equal(shade(frags, square(), camera), render(square(), camera, (8, 8)))
 
 
 # Edges

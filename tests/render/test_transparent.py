@@ -1,6 +1,5 @@
 """Transparent meshes and scenes: the layers of all instances, shaded and composited."""
 
-import doctest
 import tracemalloc
 
 import numpy as np
@@ -122,7 +121,3 @@ def test_transparent_bad_options_are_refused():
             tl.visible_layers(subject, CAMERA, (4, 4), layers=99)
         with pytest.raises(ValueError, match="sampling 'msaa4' gives no sorted layers"):
             tl.visible_layers(subject, CAMERA, (4, 4), sampling="msaa4")
-
-
-def test_transparent_examples_hold():
-    assert doctest.testmod(transparent).failed == 0

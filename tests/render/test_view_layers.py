@@ -1,7 +1,5 @@
 """Layers of a view, each against a formula of its own in float64: rays and planes, projections, weighted sums."""
 
-import doctest
-
 import numpy as np
 import pytest
 from comparing import assert_same
@@ -9,7 +7,6 @@ from layer_views import CAMERAS, CUBE, FLOAT32, ON_EACH_CAMERA, SIZE, SNAP_PX, S
 
 import topleft as tl
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.picture import view_layers
 from topleft._meshes.picture.gbuffer import GBuffer
 from topleft._meshes.picture.layers import LAYERS
 from topleft._meshes.picture.shot import Shot
@@ -298,7 +295,3 @@ def test_unknown_option_is_refused():
         render_layers(CUBE, colour=1)
     with pytest.raises(TypeError, match="option 'shading' is for layer 'color', which is not among depth"):
         render_layers(CUBE, layers="depth", shading="flat", sampling="center")
-
-
-def test_examples_hold():
-    assert doctest.testmod(view_layers).failed == 0

@@ -1,7 +1,5 @@
 """Pictures that are drawn in bands of rows: the same as drawn at once, from triangles as they come."""
 
-from __future__ import annotations
-
 from contextlib import contextmanager
 
 import numpy as np

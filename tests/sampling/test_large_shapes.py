@@ -1,7 +1,5 @@
 """Pictures of a few large triangles, which are written row by row: the same as with so many that they are not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,9 +1,5 @@
 """Meshes of other libraries and arrays of other kinds, as they are."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -46,16 +42,6 @@ class Tensor:
 
     def __dlpack_device__(self):
         return self.array.__dlpack_device__()
-
-
-class Wrapped:
-    """An array that only speaks `__array__`."""
-
-    def __init__(self, values):
-        self.array = np.array(values)
-
-    def __array__(self, dtype=None, copy=None):
-        return self.array if dtype is None else self.array.astype(dtype)
 
 
 def test_as_mesh_gives_a_mesh_back():
@@ -194,25 +180,6 @@ def test_as_mesh_of_something_else_is_refused(subject):
         as_mesh(subject)
 
 
-@pytest.mark.parametrize("kind", [Tensor, Wrapped])
-def test_verbs_take_tensors(kind):
-    vertices, triangles, colors = [[0.0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [[9.0], [8.0], [7.0]]
-    given = kind(vertices), kind(triangles)
-    assert np.array_equal(tl.coverage(*given, (4, 4)), tl.coverage(vertices, triangles, (4, 4)))
-    assert np.array_equal(tl.overdraw(*given, (4, 4)), tl.overdraw(vertices, triangles, (4, 4)))
-    assert np.array_equal(tl.wireframe(*given, (4, 4)), tl.wireframe(vertices, triangles, (4, 4)))
-    found = tl.fill(*given, kind(colors), (4, 4))
-    assert np.array_equal(found, tl.fill(vertices, triangles, colors, (4, 4)))
-    frags = tl.rasterize(*given, (4, 4), transform=None)
-    assert np.array_equal(frags.interpolate(kind(colors)), frags.interpolate(colors))
-    assert as_mesh((kind([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), kind(triangles))).triangles.tolist() == triangles
-
-
 def test_mesh_of_a_tensor_shares_its_memory():
     tensor = Tensor(VERTICES)
     assert np.shares_memory(as_mesh((tensor, Tensor(TRIANGLES))).vertices, tensor.array)
-
-
-def test_import_topleft_imports_no_other_mesh_library():
-    code = "import sys, topleft; print([m for m in ('trimesh', 'meshio', 'pyvista', 'matplotlib') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout == "[]\n"

@@ -1,7 +1,5 @@
 """Rendering with several samples a pixel: smooth outlines, and each triangle shaded once in a pixel."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Time against error: the exact pictures that errors are counted with, tiny runs of the commands, the page."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -117,11 +115,6 @@ def test_accuracy_command_writes_what_report_prints(tmp_path, capsys):
     assert "`lerp_scanline`" in printed
     assert cli.main(["report", str(target)]) == 0
     assert capsys.readouterr().out == printed
-
-
-def test_accuracy_command_unknown_method_is_refused(capsys):
-    assert cli.main(["accuracy", "--method", "nothing"]) == 2
-    assert "method must be one of" in capsys.readouterr().err
 
 
 def test_charts_command_draws_svg(tiny, tmp_path, capsys):

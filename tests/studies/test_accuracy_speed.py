@@ -1,14 +1,11 @@
 """The rest of the accuracy record: peers and pure twins in turns, depth, sizes, threads, tutorials; no time matters."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from benchmarks import cli
 from benchmarks.accuracy import pure, speed_tables
 from benchmarks.accuracy import study as accuracy
 from benchmarks.accuracy.depth import BITS, FORMATS, RATIOS, clip_scene, covered, make_sheets
@@ -167,8 +164,3 @@ def test_accuracy_part_of_another_machine_is_refused():
     record = accuracy.run_accuracy(replace(LITTLE, parts=["sizes"]))
     with pytest.raises(ValueError, match=r"the record must be of the same isa to add to it, '.*', got 'mmx'"):
         accuracy.run_accuracy(replace(LITTLE, parts=["sizes"]), record | {"isa": "mmx"})
-
-
-def test_accuracy_unknown_part_is_refused(capsys):
-    assert cli.main(["accuracy", "--part", "nothing"]) == 2
-    assert "parts must be some of small, " in capsys.readouterr().err

@@ -1,7 +1,5 @@
 """The benchmark of choices at a tiny size: ways are forced, draw the same bits, and are put into tables and a chart."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

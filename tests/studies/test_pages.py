@@ -1,7 +1,5 @@
 """Pages of the documentation hold the figures of the records that are kept, and what does not fit is refused."""
 
-from __future__ import annotations
-
 import json
 import re
 

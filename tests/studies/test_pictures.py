@@ -1,7 +1,5 @@
 """Pictures beside OpenGL: what is counted, the record and its page, and topleft against the pictures that are kept."""
 
-from __future__ import annotations
-
 import json
 import sys
 
@@ -116,11 +114,6 @@ def test_sheet_is_read_back(tmp_path):
 
 
 # ---- the command ----------------------------------------------------------------------------------------------------
-
-
-def test_pictures_command_unknown_scene_is_refused(capsys):
-    assert cli.main(["pictures", "--scene", "nothing"]) == 2
-    assert "--scene must be some of headlight" in capsys.readouterr().err
 
 
 def test_pictures_command_without_moderngl_is_refused(capsys, monkeypatch):

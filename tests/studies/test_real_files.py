@@ -1,7 +1,5 @@
 """Files of others, drawn: what comes of each; all from files made here."""
 
-from __future__ import annotations
-
 import json
 import os
 import time

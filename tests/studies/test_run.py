@@ -1,7 +1,5 @@
 """The benchmark suite: it runs, says what it left out, and tells a wrong picture from a right one. Nothing is timed."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -77,10 +75,24 @@ def test_run_command_writes_the_record(tmp_path, capsys):
     assert capsys.readouterr().out == printed
 
 
-@pytest.mark.parametrize("words", [["--scene", "nothing"], ["--peer", "nobody"], ["--isa", "mmx"]])
-def test_run_command_unknown_name_is_refused(words, capsys):
-    assert cli.main(["run", *words]) == 2
-    assert words[1] in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["run", "--scene", "nothing"], "nothing"),
+        (["run", "--peer", "nobody"], "nobody"),
+        (["run", "--isa", "mmx"], "mmx"),
+        (["accuracy", "--method", "nothing"], "method must be one of"),
+        (["accuracy", "--part", "nothing"], "parts must be some of small, "),
+        (["atlas", "--family", "nothing"], "--family must be some of far"),
+        (["atlas", "--method", "nothing"], "--method must be some of auto"),
+        (["batch", "--peer", "cube"], "--peer must be some of llvmpipe, riley, deodr, vtk, got cube"),
+        (["pictures", "--scene", "nothing"], "--scene must be some of headlight"),
+        (["static", "--scene", "cube", "--scale", "0.02"], "no scene begins with cube"),
+    ],
+)
+def test_command_with_an_unknown_name_is_refused(command, said, capsys):
+    assert cli.main(command) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_peer_that_is_not_installed_gives_its_name(monkeypatch):

@@ -1,7 +1,5 @@
 """The picture of one scene in every sampling."""
 
-from __future__ import annotations
-
 import pytest
 from benchmarks import cli
 from PIL import Image

@@ -1,7 +1,5 @@
 """Anti-aliased pictures in the benchmark suite: their error, their tables, and the page that shows them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.harness.errors import area_error, draw_exact

@@ -1,7 +1,5 @@
 """What the tests of batches share: a small mesh, views of it, and what they must look like."""
 
-from __future__ import annotations
-
 import topleft as tl
 from topleft import scenes
 

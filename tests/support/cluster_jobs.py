@@ -1,7 +1,5 @@
 """What workers of a test's cluster do: cameras that wait, kill their process, or hang."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from strategies import Scene
@@ -83,28 +84,42 @@ def check_ids(scene: Scene, depth_test):
         assert_exact(tl.rasterize(*scene.arrays, depth_test=depth_test, method=method, **scene.view).triangle, expected)
 
 
-def check_fragments(scene: Scene, depth_test):
+class Candidate(NamedTuple):
+    """A triangle at a sample: its exact depth, how far float64 may be off, and half a unit of float32 twice more."""
+
+    depth: Fraction
+    slack: Fraction
+    allowed: Fraction
+
+    @classmethod
+    def of(cls, fragment):
+        depth, slack = fragment.depth(), depth_slack(fragment)
+        return cls(depth, slack, slack + 2 * half_ulp(depth))
+
+
+def check_fragments(scene: Scene):
     """The triangle seen covers the sample, its depth is right, and no other is nearer by more than the bounds."""
     candidates = defaultdict(dict)
     for fragment in ref.fragments(*scene.arrays, **scene.view):
-        candidates[fragment.row, fragment.column].setdefault(fragment.piece.triangle, fragment)
-    frags = tl.rasterize(*scene.arrays, depth_test=depth_test, **scene.view)
-    covered = np.zeros(frags.triangle.shape, bool)
-    towards_eye = {"less": -1, "greater": 1, None: 0}[depth_test]
-    for pixel, by_id in candidates.items():
-        covered[pixel] = True
-        seen = by_id[int(frags.triangle[pixel])]
-        assert_within(frags.depth[pixel], seen.depth(), depth_slack(seen))
-        for other in by_id.values():
-            allowed = depth_slack(seen) + depth_slack(other) + 2 * half_ulp(seen.depth()) + 2 * half_ulp(other.depth())
-            assert towards_eye * (other.depth() - seen.depth()) <= allowed
-    assert_exact(frags.mask, covered)
-    assert (frags.triangle[~covered] == -1).all()
-    assert (frags.depth[~covered] == (-np.inf if depth_test == "greater" else np.inf)).all()
-    for method in METHODS:
-        other = tl.rasterize(*scene.arrays, depth_test=depth_test, method=method, **scene.view)
-        assert_same(other.triangle, frags.triangle)
-        assert_same(other.depth, frags.depth)
+        by_id = candidates[fragment.row, fragment.column]
+        if fragment.piece.triangle not in by_id:
+            by_id[fragment.piece.triangle] = Candidate.of(fragment)
+    for depth_test, towards_eye in (("less", -1), ("greater", 1), (None, 0)):
+        frags = tl.rasterize(*scene.arrays, depth_test=depth_test, **scene.view)
+        covered = np.zeros(frags.triangle.shape, bool)
+        for pixel, by_id in candidates.items():
+            covered[pixel] = True
+            seen = by_id[int(frags.triangle[pixel])]
+            assert_within(frags.depth[pixel], seen.depth, seen.slack)
+            for other in by_id.values():
+                assert towards_eye * (other.depth - seen.depth) <= seen.allowed + other.allowed
+        assert_exact(frags.mask, covered)
+        assert (frags.triangle[~covered] == -1).all()
+        assert (frags.depth[~covered] == (-np.inf if depth_test == "greater" else np.inf)).all()
+        for method in METHODS:
+            other = tl.rasterize(*scene.arrays, depth_test=depth_test, method=method, **scene.view)
+            assert_same(other.triangle, frags.triangle)
+            assert_same(other.depth, frags.depth)
 
 
 def depth_slack(fragment):

@@ -3,8 +3,6 @@
 A worker that has lost its scheduler waits for another one at that address, as one does that a service keeps alive.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import sys

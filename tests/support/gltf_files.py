@@ -1,7 +1,5 @@
 """Small glTF files, written from arrays."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

@@ -1,7 +1,5 @@
 """What the tests of layers and of lenses look at, and from where."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -14,8 +14,6 @@ Based on: R. DeMillo, R. Lipton, F. Sayward, Hints on Test Data Selection, 1978;
 Testing Using Program Schemata, 1992 (all mutants in one build).
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import copy

@@ -2,8 +2,6 @@
 
 import math
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -607,8 +605,3 @@ def test_peeler_has_at_most_16_layers():
         peeler.rasterize_next_layer()
     with raises(ValueError, "a DepthPeeler has at most 16 layers"):
         peeler.rasterize_next_layer()
-
-
-def test_import_of_topleft_leaves_torch_for_later():
-    code = "import sys, topleft; print('torch' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"

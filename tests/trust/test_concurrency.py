@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 import threading
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -101,18 +101,6 @@ def test_a_texture_first_sampled_by_several_threads_at_once_gives_one_picture():
             assert_same(picture, expected)
 
 
-def test_rasterizers_of_many_threads_keep_apart():
-    scenes = [tl.scenes.blob(500 + 100 * i) for i in range(12)]
-    flat = [(vertices[:, :2] * 25 + 30, triangles) for vertices, triangles in scenes]
-    expected = [tl.overdraw(*scene, SIZE) for scene in flat]
-
-    def draw(i):
-        rasterizer = tl.Rasterizer(SIZE, threads=1 + i % 3)
-        return all(np.array_equal(rasterizer.overdraw(*flat[k % 12]), expected[k % 12]) for k in range(i, i + 40))
-
-    assert at_once(12, draw) == [True] * 12
-
-
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of fork beside threads, which is what is tested
 @pytest.mark.parametrize("how", multiprocessing.get_all_start_methods())
 def test_a_child_of_a_process_that_has_drawn_draws(how):
@@ -140,14 +128,6 @@ def test_a_child_of_a_process_that_has_drawn_draws(how):
     run = [sys.executable, "-c", script]
     ended = subprocess.run(run, capture_output=True, text=True, timeout=120, env=environment())
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "True\n", "")
-
-
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_a_pool_of_processes_begun_after_the_parent_has_drawn_draws():
-    expected = render_in_child()
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork")) as pool:
-        assert set(pool.map(render_in_child, range(6))) == {expected}
-    assert render_in_child() == expected
 
 
 @pytest.mark.parametrize("end", ["", "sys.exit(0)", "raise SystemExit(0)"])

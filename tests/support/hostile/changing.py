@@ -5,8 +5,6 @@ an array and a call that takes minutes will not. Each case is printed before it 
 change. All that follows from `--seed N --cases 1`, but not what meets when.
 """
 
-from __future__ import annotations
-
 import argparse
 import faulthandler
 import sys

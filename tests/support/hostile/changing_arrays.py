@@ -5,8 +5,6 @@ without a sanitizer. The other process is a fork, which has no lock of the inter
 with the call, also where that is killed.
 """
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 import os

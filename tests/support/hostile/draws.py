@@ -4,8 +4,6 @@ A case is drawn from a `Source`: hypothesis (`tests/trust/test_fuzz.py`), a rand
 that coverage guides (`fuzz.py`). The cases are in `fuzzing.py` and `fuzzing_grids.py`.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

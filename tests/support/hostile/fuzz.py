@@ -7,8 +7,6 @@ status 1; `--seed N --cases 1` draws that one again. With `--guided` coverage of
 fuzz` builds for that, with clang, and starts it with the corpus of this folder.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

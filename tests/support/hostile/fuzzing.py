@@ -6,8 +6,6 @@ the call is refused in one line of a documented type, before `out` has changed; 
 inputs are what they were, and plain copies of the same arrays, drawn by another number of threads, give the same bits.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from itertools import pairwise

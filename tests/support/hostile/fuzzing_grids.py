@@ -3,8 +3,6 @@
 What must hold of them stands in `fuzzing.py`.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ Every file is read by a process of its own. Prints the CPU seconds and the memor
 takes more than 5 s or 1 GB, or ends otherwise than in a mesh, in words or in a missing package.
 """
 
-from __future__ import annotations
-
 import argparse
 import bz2
 import functools

@@ -3,8 +3,6 @@
 `TOPLEFT_MUTATIONS` is the number of mutated files of each format that the tests read: N_MUTATIONS unless set.
 """
 
-from __future__ import annotations
-
 import json
 import os
 

@@ -4,8 +4,6 @@
 the same with fewer.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import sys
