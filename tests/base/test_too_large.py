@@ -47,12 +47,6 @@ def test_ids_and_depth_that_do_not_fit_together_are_refused_with_their_bytes(mon
         draw()
 
 
-@pytest.mark.parametrize("verb", [tl.coverage, tl.overdraw, tl.rasterize, tl.wireframe, tl.peel])
-def test_a_picture_that_no_memory_holds_is_a_memory_error_with_its_bytes(verb):
-    with pytest.raises(MemoryError, match=r"no memory for .*[0-9,]{20,} bytes"):
-        verb(*SCENE, (2**31 - 1, 2**31 - 1))
-
-
 def test_a_plan_of_exact_vertices_that_no_memory_holds_is_a_memory_error_with_its_bytes():
     with pytest.raises(MemoryError, match=r"no memory for .*[0-9,]{20,} bytes"):
         tl.plan(*SCENE, (2**31 - 1, 2**31 - 1), subpixel_bits="exact")

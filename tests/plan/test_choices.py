@@ -125,25 +125,6 @@ def test_divide_stays_unless_every_w_is_one(row):
     assert not choices.is_affine(matrix)
 
 
-def test_shares_and_bands_give_the_same_bits():
-    rng = np.random.default_rng(3)
-
-    def forced(view, n_triangles, n_parts, sink):
-        return n_parts > 1 and choices.can_slice(view)
-
-    for _ in range(500):
-        vertices, triangles = random_triangles(rng, 3)
-        one = bits_of(tl.rasterize(vertices, triangles, SIZE, threads=1))
-        threads = int(rng.integers(2, 5))
-
-        def draw(arrays=(vertices, triangles), threads=threads):
-            return bits_of(tl.rasterize(*arrays, SIZE, threads=threads))
-
-        chosen, shared = both_ways(draw, is_sliced=forced)
-        assert (chosen == one).all()
-        assert (shared == one).all()
-
-
 def test_threads_over_arrays_give_the_same_bits():
     rng = np.random.default_rng(4)
     for _ in range(500):

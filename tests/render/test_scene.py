@@ -111,17 +111,6 @@ def test_scene_mirrored_instance_keeps_its_outside():
     assert_same(got, tl.render(turned, CAMERA, SIZE, cull="back", edges=True))
 
 
-@pytest.mark.parametrize("shading", ["smooth", "flat", "ids", "depth", "normals"])
-@pytest.mark.parametrize("sampling", ["center", "msaa4"])
-def test_scene_of_one_is_rendered_like_its_mesh(shading, sampling):
-    options = {"shading": shading, "sampling": sampling, "background": (1, 2, 3, 0), "edges": shading == "flat"}
-    got, expected = tl.render(tl.Scene([SPHERE]), size=SIZE, **options), tl.render(SPHERE, size=SIZE, **options)
-    if sampling == "center":
-        assert_same(got, expected)
-    else:  # the samples of a scene are rounded to eight bits before their mean, those of a mesh after it
-        assert np.abs(got.astype(int) - expected).max() <= 1
-
-
 def test_scene_picture_shows_each_instance_as_if_alone():
     aside = np.eye(4)
     aside[0, 3] = 3.5

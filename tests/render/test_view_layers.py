@@ -203,13 +203,6 @@ def test_color_is_the_picture_of_render():
     )
 
 
-def test_mesh_and_scene_of_one_have_the_same_layers():
-    camera, names = CAMERAS["perspective"], [name for name in LAYERS if name != "uv"]
-    a, b = (look(camera, *names, subject=s, camera_to=CAMERAS["off-centre"]) for s in (CUBE, tl.Scene([CUBE])))
-    for name in names:
-        assert_same(np.nan_to_num(a[name]), np.nan_to_num(b[name]))
-
-
 def test_uv_and_attributes_are_interpolated():
     rng = np.random.default_rng(2)
     mesh = tl.Mesh(CUBE.vertices, CUBE.triangles)
