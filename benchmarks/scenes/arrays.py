@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -68,21 +67,6 @@ def terrain_arrays(n: int, height: float = 0.12) -> Arrays:
     x, z = np.meshgrid(*[np.linspace(-1, 1, side)] * 2)
     points = np.stack([x, heights - heights.min(), z], axis=-1).reshape(-1, 3)
     return points.astype(np.float32), grid_triangles(side, side)
-
-
-def write_ply(path: Path, vertices: NDArray[Any], triangles: NDArray[Any], **attributes: NDArray[Any]) -> None:
-    """Write a binary PLY file of float32 vertices; attributes: columns of float32 or bytes by their names."""
-    columns = dict(zip("xyz", vertices.T.astype("<f4"), strict=True)) | attributes
-    points = np.zeros(len(vertices), [(name, column.dtype) for name, column in columns.items()])
-    for name, column in columns.items():
-        points[name] = column
-    faces = np.zeros(len(triangles), [("n", "u1"), ("corners", "<i4", 3)])
-    faces["n"], faces["corners"] = 3, triangles
-    kinds = {"u1": "uchar", "f4": "float"}
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
-    lines += [f"property {kinds[column.dtype.str[1:]]} {name}" for name, column in columns.items()]
-    lines += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header\n"]
-    path.write_bytes("\n".join(lines).encode() + points.tobytes() + faces.tobytes())
 
 
 def rounded(arrays: Arrays) -> Arrays:

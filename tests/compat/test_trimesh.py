@@ -17,7 +17,6 @@ from topleft.compat._arrays import dots_along
 SIZE = (64, 48)
 QUAD = [[0, 1, 2], [0, 2, 3]]
 WALL = np.array([[-9.0, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]])
-GREY = [102, 102, 102, 255]
 
 
 class Camera:

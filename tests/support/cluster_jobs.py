@@ -32,18 +32,3 @@ def wait_a_little(mesh, size):
     """A camera that takes its time."""
     time.sleep(0.05)
     return tl.Camera.framing(mesh, aspect=size[0] / size[1])
-
-
-class CountedMesh(tl.Mesh):
-    """A mesh that writes a line each time that a process receives it."""
-
-    def __reduce__(self):
-        fields = {name: getattr(self, name) for name in ("vertices", "triangles")}
-        return received, (fields, str(self.log))
-
-
-def received(fields, log):
-    """Make a mesh of what was sent."""
-    with open(log, "a") as file:
-        file.write(f"{os.getpid()}\n")
-    return tl.Mesh(**fields)
