@@ -9,9 +9,10 @@ have them.
 from __future__ import annotations
 
 import io
+import struct
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +32,9 @@ DTYPES = {
 }  # fmt: skip
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 MAX_HEADER_BYTES = 1 << 20
+STRUCT_CODES = {
+    "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d",
+}  # fmt: skip
 
 
 @dataclass
@@ -41,6 +45,18 @@ class _Property:
     dtype: np.dtype[Any]
     count_dtype: np.dtype[Any] | None = None
 
+    def none(self) -> Array | _List:
+        """The values of no rows."""
+        return np.zeros(0, self.dtype) if self.count_dtype is None else _List(np.zeros(0), np.zeros(0, np.int64))
+
+    def stored(self, order: str) -> _Property:
+        """The property with the dtypes of the body, which are float64 in a text."""
+
+        def of(dtype: np.dtype[Any]) -> np.dtype[Any]:
+            return dtype.newbyteorder("<" if order == "<" else ">") if order else np.dtype(np.float64)
+
+        return _Property(self.name, of(self.dtype), None if self.count_dtype is None else of(self.count_dtype))
+
 
 @dataclass
 class _Element:
@@ -50,7 +66,21 @@ class _Element:
 
     @property
     def has_lists(self) -> bool:
-        return any(own.count_dtype is not None for own in self.properties)
+        return any(prop.count_dtype is not None for prop in self.properties)
+
+    def stored(self, order: str) -> _Element:
+        """The element with the dtypes of the body."""
+        return _Element(self.name, self.n, [prop.stored(order) for prop in self.properties])
+
+    def layout(self, lengths: list[int]) -> np.dtype[Any]:
+        """A row whose lists have these lengths: property i is the field "i", the length of its list the field "ni"."""
+        fields: list[Any] = []
+        for i, (prop, k) in enumerate(zip(self.properties, lengths, strict=True)):
+            if prop.count_dtype is None:
+                fields.append((f"{i}", prop.dtype))
+            else:
+                fields += [(f"n{i}", prop.count_dtype), (f"{i}", prop.dtype, (k,))]
+        return np.dtype(fields)
 
 
 @dataclass(frozen=True)
@@ -94,23 +124,23 @@ def read_ply(source: InputFile) -> list[Mesh]:
 def _found(content: bytes, order: str, elements: list[_Element], start: int, source: InputFile) -> dict[str, Rows]:
     """The elements by name."""
     if order:
-        body = _Bytes(content, start, "<" if order == "<" else ">")
-        return {element.name: body.rows(element) for element in elements}
-    numbers = _Numbers(content[start:])
+        body = _Body(np.frombuffer(content, np.uint8), start)
+        return {element.name: body.rows(element.stored(order)) for element in elements}
+    body = _Body(numbers_of_text(content[start:]))
     error: MeshError | None = None
     found: dict[str, Rows] = {}
     try:
-        found = {element.name: numbers.rows(element) for element in elements}
+        found = {element.name: _rows_of_text(body, element) for element in elements}
     except MeshError as raised:
         error = raised
-    if error is None and not numbers.n_left:
+    if error is None and not body.n_left:
         return found
     lines = [line for line in content[start:].splitlines() if line.strip()]
     if len(lines) == sum(element.n for element in elements):  # each row has its line: longer than the header says
         ends = np.cumsum([element.n for element in elements]).tolist()
         for element, end in zip(elements, ends, strict=True):
             rows = [_row(line, element) for line in lines[end - element.n : end]]
-            found[element.name] = _Numbers(b" ".join(rows)).rows(element)
+            found[element.name] = _rows_of_text(_Body(numbers_of_text(b" ".join(rows))), element)
         source.notes.add("rows with more numbers than the header says, which are not read")
     elif error is not None:
         raise error
@@ -137,22 +167,15 @@ def mapped_elements(path: Path) -> tuple[dict[str, Array], Array, dict[str, Arra
     with open(path, "rb") as file:
         order, elements, _, at = _header(file.read(MAX_HEADER_BYTES))
     n_bytes, found = path.stat().st_size, {}
-    byte_order: Literal["<", ">"] = "<" if order == "<" else ">"
     for element in elements if order else []:
-        fields: list[Any] = []
-        for i, own in enumerate(element.properties):
-            if own.count_dtype is not None:
-                fields.append((f"n{i}", own.count_dtype.newbyteorder(byte_order)))
-            k = 1 if own.count_dtype is None else 3
-            fields.append((f"{i}", own.dtype.newbyteorder(byte_order), *((k,) if k > 1 else ())))
         if element.has_lists and element.name != "face":
             return None
-        dtype = np.dtype(fields)
+        dtype = element.stored(order).layout([3] * len(element.properties))
         if at + dtype.itemsize * element.n > n_bytes:
             if element.has_lists:
                 return None
             raise MeshError(f"it ends within its {element.n} rows of {element.name}")
-        rows = np.memmap(path, dtype, "r", at, (element.n,)) if element.n and fields else np.empty(0, dtype)
+        rows = np.memmap(path, dtype, "r", at, (element.n,)) if element.n and dtype.names else np.empty(0, dtype)
         at += dtype.itemsize * element.n
         found[element.name] = {own.name: (rows, i) for i, own in enumerate(element.properties)}
         if element.name == "face":
@@ -207,60 +230,16 @@ def _header(content: bytes) -> tuple[str, list[_Element], list[str], int]:
     raise MeshError("its header does not end")
 
 
-class _Numbers:
-    """A body of text."""
-
-    def __init__(self, content: bytes) -> None:
-        self._values = numbers_of_text(content)
-        self._at = 0
-
-    @property
-    def n_left(self) -> int:
-        """How many numbers nobody has read."""
-        return len(self._values) - self._at
-
-    def rows(self, element: _Element) -> Rows:
-        """The next element."""
-        n, width = element.n, len(element.properties)
-        left = len(self._values) - self._at
-        if n * width > left:
-            raise MeshError(f"it ends within its {n} rows of {element.name}")
-        if not element.has_lists:
-            block = self._values[self._at : self._at + n * width].reshape(n, width)
-            self._at += n * width
-            return {own.name: _cast(block[:, i], own.dtype) for i, own in enumerate(element.properties)}
-        starts: list[list[int]] = [[] for _ in element.properties]
-        lengths: list[list[int]] = [[] for _ in element.properties]
-        values, end = self._values, len(self._values)
-        if width == 1 and n:  # every list is as long as the first?
-            k = _length(values[self._at])
-            block = values[self._at : self._at + n * (k + 1)]
-            if len(block) == n * (k + 1) and (block[:: k + 1] == k).all():
-                self._at += n * (k + 1)
-                lists = _listed(block.reshape(n, k + 1)[:, 1:].ravel(), element.properties[0].dtype)
-                return {element.properties[0].name: _List(lists, np.full(n, k))}
-        at = self._at
-        for _ in range(n):
-            for i, own in enumerate(element.properties):
-                k = 1
-                if own.count_dtype is not None:
-                    if at >= end:
-                        raise MeshError(f"it ends within its {n} rows of {element.name}")
-                    k = _length(values[at])
-                    at += 1
-                starts[i].append(at)
-                lengths[i].append(k)
-                at += k
-        if at > end:
-            raise MeshError(f"it ends within its {n} rows of {element.name}")
-        self._at = at
-        made: Rows = {}
-        for i, own in enumerate(element.properties):
-            first, many = np.array(starts[i], np.int64), np.array(lengths[i], np.int64)
-            picked = values[_ranges(first, many)]
-            is_list = own.count_dtype is not None
-            made[own.name] = _List(_listed(picked, own.dtype), many) if is_list else _cast(picked, own.dtype)
-        return made
+def _rows_of_text(body: _Body, element: _Element) -> Rows:
+    """The next element of a text, with the dtypes that the header declares."""
+    rows = body.rows(element.stored(""))
+    for prop in element.properties:
+        values = rows[prop.name]
+        if isinstance(values, _List):
+            rows[prop.name] = replace(values, values=_listed(values.values, prop.dtype))
+        else:
+            rows[prop.name] = _cast(values, prop.dtype)
+    return rows
 
 
 def _cast(values: Array, dtype: np.dtype[Any]) -> Array:
@@ -290,103 +269,94 @@ def _ranges(starts: I64, lengths: I64) -> I64:
     )
 
 
-class _Bytes:
-    """A body of binary numbers."""
+class _Body:
+    """What follows a header: bytes, or the numbers of a text, which are read as float64 whatever they stand for."""
 
-    def __init__(self, content: bytes, start: int, order: Literal["<", ">"]) -> None:
-        self._bytes = np.frombuffer(content, np.uint8)
-        self._at = start
-        self._order: Literal["<", ">"] = order
+    def __init__(self, items: Array, at: int = 0) -> None:
+        self._items, self._at = items, at
+        self._bytes = items.view(np.uint8).data
+
+    @property
+    def n_left(self) -> int:
+        """How many items nobody has read."""
+        return len(self._items) - self._at
 
     def rows(self, element: _Element) -> Rows:
-        """The next element."""
-        if not element.has_lists:
-            return self._plain(element)
-        if element.n == 0:
-            return {own.name: _List(np.zeros(0), np.zeros(0, np.int64)) for own in element.properties}
-        made = self._of_one_length(element)
-        return self._walked(element) if made is None else made
-
-    def _plain(self, element: _Element) -> Rows:
-        dtype = np.dtype([(f"{i}", own.dtype.newbyteorder(self._order)) for i, own in enumerate(element.properties)])
-        block = self._block(dtype, element)
-        self._at += dtype.itemsize * element.n
-        return {own.name: block[f"{i}"] for i, own in enumerate(element.properties)}
-
-    def _block(self, dtype: np.dtype[Any], element: _Element) -> Array:
-        if dtype.itemsize * element.n > len(self._bytes) - self._at:
-            raise MeshError(f"it ends within its {element.n} rows of {element.name}")
-        return np.frombuffer(self._bytes.data, dtype, element.n, self._at)
+        """The next element, with the dtypes of the body."""
+        if not element.n:
+            return {prop.name: prop.none() for prop in element.properties}
+        least = sum((prop.count_dtype or prop.dtype).itemsize for prop in element.properties)
+        if element.n * least > self._n_bytes_left:
+            raise _short(element)
+        found = self._of_one_length(element)
+        return self._of_any_length(element) if found is None else found
 
     def _of_one_length(self, element: _Element) -> Rows | None:
         """The rows if all lists of a property are as long as in the first row."""
-        fields: list[Any] = []
-        at = self._at
-        for i, own in enumerate(element.properties):
-            dtype, k = own.dtype.newbyteorder(self._order), 1
-            if own.count_dtype is not None:
-                count = own.count_dtype.newbyteorder(self._order)
-                k = self._count(at, count, element)
-                fields.append((f"n{i}", count))
-                at += count.itemsize
-            if k * dtype.itemsize > len(self._bytes) - at:
-                raise MeshError(f"it ends within its {element.n} rows of {element.name}")
-            fields.append((f"{i}", dtype, (k,)))
-            at += k * dtype.itemsize
-        dtype = np.dtype(fields)
-        if dtype.itemsize * element.n > len(self._bytes) - self._at:
+        _, lengths, _ = self._walked(element, 1)
+        n, layout = element.n, element.layout([k for (k,) in lengths])
+        if n * layout.itemsize > self._n_bytes_left:
             return None
-        block = self._block(dtype, element)
+        block = np.ndarray((n,), layout, self._bytes, self._at * self._items.itemsize)
         made: Rows = {}
-        for i, own in enumerate(element.properties):
-            values = block[f"{i}"]
-            if own.count_dtype is None:
-                made[own.name] = values[:, 0]
-                continue
-            if not (block[f"n{i}"] == values.shape[1]).all():
-                return None
-            made[own.name] = _List(values.ravel(), np.full(element.n, values.shape[1]))
-        self._at += dtype.itemsize * element.n
+        for i, (prop, (k,)) in enumerate(zip(element.properties, lengths, strict=True)):
+            made[prop.name] = block[f"{i}"]
+            if prop.count_dtype is not None:
+                if not (block[f"n{i}"] == k).all():
+                    return None
+                made[prop.name] = _List(made[prop.name].ravel(), np.full(n, k))
+        self._at += n * layout.itemsize // self._items.itemsize
         return made
 
-    def _count(self, at: int, dtype: np.dtype[Any], element: _Element) -> int:
-        if at + dtype.itemsize > len(self._bytes):
-            raise MeshError(f"it ends within its {element.n} rows of {element.name}")
-        return _length(float(np.frombuffer(self._bytes.data, dtype, 1, at)[0]))
+    def _of_any_length(self, element: _Element) -> Rows:
+        starts, lengths, self._at = self._walked(element, element.n)
+        made: Rows = {}
+        for prop, first, many in zip(element.properties, starts, lengths, strict=True):
+            k, size = np.array(many, np.int64), prop.dtype.itemsize // self._items.itemsize
+            values = self._items[_ranges(np.array(first, np.int64), k * size)].view(prop.dtype)
+            made[prop.name] = values if prop.count_dtype is None else _List(values, k)
+        return made
 
-    def _walked(self, element: _Element) -> Rows:
-        """The rows one by one: where a list begins is known from the lengths of those before."""
-        n, content, order = element.n, self._bytes.tobytes(), "big" if self._order == ">" else "little"
-        least = sum((own.count_dtype or own.dtype).itemsize for own in element.properties)
-        if n * least > len(content) - self._at:
-            raise MeshError(f"it ends within its {n} rows of {element.name}")
+    def _walked(self, element: _Element, n: int) -> tuple[list[list[int]], list[list[int]], int]:
+        """Where the values of each property begin in the next n rows, how many each has, and where the rows end.
+
+        Row by row: where a list begins is known from the lengths of those before.
+        """
         starts: list[list[int]] = [[] for _ in element.properties]
         lengths: list[list[int]] = [[] for _ in element.properties]
-        shapes = [(i, own.dtype.itemsize, own.count_dtype) for i, own in enumerate(element.properties)]
-        at, end = self._at, len(content)
+        item, content, at, end = self._items.itemsize, self._bytes, self._at, len(self._items)
+        shapes = []
+        for prop, first, many in zip(element.properties, starts, lengths, strict=True):
+            count = None if prop.count_dtype is None else _reader(prop.count_dtype)
+            shapes.append((prop.dtype.itemsize // item, count, first, many))
         for _ in range(n):
-            for i, size, count in shapes:
+            for size, count, first, many in shapes:
                 k = 1
                 if count is not None:
-                    if count.kind == "f":
-                        k = self._count(at, count.newbyteorder(self._order), element)
-                    else:
-                        k = int.from_bytes(content[at : at + count.itemsize], order, signed=count.kind == "i")  # type: ignore[arg-type]
-                    at += count.itemsize
-                starts[i].append(at)
-                lengths[i].append(k)
+                    after = at + count.size // item
+                    if after > end:
+                        raise _short(element)
+                    k = _length(count.unpack_from(content, at * item)[0])
+                    at = after
+                first.append(at)
+                many.append(k)
                 at += k * size
-                if k < 0 or at > end:
-                    raise MeshError(f"it ends within its {n} rows of {element.name}")
-        self._at = at
-        made: Rows = {}
-        for i, own in enumerate(element.properties):
-            first, many = np.array(starts[i], np.int64), np.array(lengths[i], np.int64)
-            dtype = own.dtype.newbyteorder(self._order)
-            at_bytes = _ranges(first, many * dtype.itemsize)
-            values = self._bytes[at_bytes].view(dtype)
-            made[own.name] = values if own.count_dtype is None else _List(values, many)
-        return made
+            if at > end:
+                raise _short(element)
+        return starts, lengths, at
+
+    @property
+    def _n_bytes_left(self) -> int:
+        return self.n_left * self._items.itemsize
+
+
+def _reader(dtype: np.dtype[Any]) -> struct.Struct:
+    """What reads a number of a dtype from bytes."""
+    return struct.Struct(("<" if dtype.str[0] == "|" else dtype.str[0]) + STRUCT_CODES[dtype.str[1:]])
+
+
+def _short(element: _Element) -> MeshError:
+    return MeshError(f"it ends within its {element.n} rows of {element.name}")
 
 
 def _corners(found: dict[str, Rows], source: InputFile) -> tuple[I64, I64, Rows]:
