@@ -14,16 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import I64
-from topleft._core.base.arrays import apart_from, as_aligned, as_array, check_real
+from topleft._core.base.arrays import apart_from, as_aligned, as_array, check_real, set_aligned
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RingSet:
     """Polygon i has the rings `[polygons[i], polygons[i + 1])`, ring k the points `[rings[k], rings[k + 1])`."""
 
     points: npt.NDArray[Any]  # (N, 2), contiguous float32, float64 or int64
     rings: I64
     polygons: I64
+
+    __setstate__ = set_aligned
 
     def __len__(self) -> int:
         return len(self.polygons) - 1

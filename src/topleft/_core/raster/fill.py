@@ -132,7 +132,7 @@ def draw_fill(
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, style.per, style.background, out)
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
-    is_flat = colors_are_flat(len(palette), snapped, style.per)
+    is_flat = colors_are_flat(len(palette), snapped.n_triangles, snapped.n_vertices, style.per)
     shape = (*view.size[::-1], *palette.shape[1:])
     ground = as_background(style.background, palette)
     with Canvas.of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
@@ -196,11 +196,10 @@ def draw_labels(
     return result
 
 
-def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
+def colors_are_flat(n_colors: int, n_triangles: int, n_vertices: int, per: str) -> bool:
     """Tell whether a row of colours belongs to a triangle; otherwise it belongs to a vertex."""
     choice = parse(PerOption, "per", per)
-    n_triangles = snapped.n_triangles
-    fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
+    fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == n_vertices
     if choice == "auto" and fits_triangles and fits_vertices and n_colors:
         raise ValueError(
             f"colors has {n_colors} rows, and there are as many triangles as vertices: "
@@ -212,8 +211,8 @@ def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
         return False
     wish = {
         "triangle": f"{n_triangles} rows, one per triangle",
-        "vertex": f"{snapped.n_vertices} rows, one per vertex",
-        "auto": f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
+        "vertex": f"{n_vertices} rows, one per vertex",
+        "auto": f"{n_triangles} rows, one per triangle, or {n_vertices}, one per vertex",
     }[choice]
     raise ValueError(f"colors must have {wish}, got {n_colors}")
 

@@ -130,16 +130,11 @@ def field(
     is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(PerOption, "per", per))
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     grid = grid_of(size, pixel_size, extent, y, partial(extent_of, points, triangles))
-    points_px = grid.to_pixels(points)
     size = _window_of(grid, origin) if window is None else window
     view = View.parse(size, {"subpixel_bits": subpixel_bits, "threads": threads, "origin": origin})
-    nodata = grid.nodata if nodata is None else nodata
-    dtype = dtype_of_field(array.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
-    empty = nodata_of(nodata, dtype)
-    own = array if not is_of_faces or polygons.faces is None else array[polygons.faces]
-    with Canvas.of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
-        draw_field(canvas, points_px, triangles, own, view, empty, is_of_faces=is_of_faces)
-    return result
+    if is_of_faces and polygons.faces is not None:
+        array = array[polygons.faces]
+    return draw_field(points, triangles, array, grid, view, nodata, out, is_of_faces=is_of_faces)
 
 
 def height_map(
@@ -205,11 +200,8 @@ def height_map(
     size, pixel_size = (spacing, None) if isinstance(spacing, Grid) else (None, spacing)
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     grid = grid_of(size, pixel_size, extent, y, partial(extent_of, points, triangles))
-    points_px, heights = grid.to_pixels(points), points[:, 2].astype(np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
-    with Canvas.of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
-        draw_heights(canvas, points_px, triangles, heights, view, range_of(heights, triangles), surface, grid.nodata)
-    return result
+    return draw_heights(points, triangles, grid, view, surface, range_of(points[:, 2], triangles), out)
 
 
 def _window_of(grid: Grid, origin: tuple[int, int]) -> tuple[int, int]:
@@ -265,9 +257,9 @@ def is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: Pe
     raise ValueError(f"values must have shape {wish}, got {values.shape}")
 
 
-def range_of(heights: F64, triangles: I32) -> tuple[float, float]:
+def range_of(heights: npt.NDArray[Any], triangles: I32) -> tuple[float, float]:
     """The lowest and the highest height that triangles use."""
-    used: F64 = heights[triangles]
+    used = heights[triangles]
     with np.errstate(invalid="ignore"):
         return (float(used.min()), float(used.max())) if used.size else (0.0, 0.0)
 
@@ -281,29 +273,37 @@ def depth_of(heights: F64, low: float, high: float) -> F64:
 
 
 def draw_field(
-    canvas: npt.NDArray[Any], points_px: F64, triangles: I32, values: npt.NDArray[Any], view: View,
-    empty: npt.NDArray[Any], *, is_of_faces: bool,
-) -> None:  # fmt: skip
-    """Draw values of triangles, or of vertices, and `empty` where nothing is."""
-    ids = visible(points_px, triangles, view, Sink.LABEL)
-    if is_of_faces:
-        np.take(np.append(values.astype(canvas.dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
-        return
-    fill_planes(ids, points_px, triangles, values.astype(np.float64, copy=False), view, canvas)
-    if not np.isnan(empty):  # which planes leave
-        canvas[ids < 0] = empty
+    points: npt.NDArray[Any], triangles: I32, values: npt.NDArray[Any], grid: Grid, view: View, nodata: float | None,
+    out: object, *, is_of_faces: bool,
+) -> npt.NDArray[Any]:  # fmt: skip
+    """`field` with checked arguments: values of vertices, or a value of each triangle."""
+    nodata = grid.nodata if nodata is None else nodata
+    dtype = dtype_of_field(values.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
+    empty, points_px = nodata_of(nodata, dtype), grid.to_pixels(points)
+    with Canvas.of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
+        ids = visible(points_px, triangles, view, Sink.LABEL)
+        if is_of_faces:
+            np.take(np.append(values.astype(dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
+        else:
+            fill_planes(ids, points_px, triangles, values.astype(np.float64, copy=False), view, canvas)
+            if not np.isnan(empty):  # which planes leave
+                canvas[ids < 0] = empty
+    return result
 
 
 def draw_heights(
-    canvas: F64, points_px: F64, triangles: I32, heights: F64, view: View, ends: tuple[float, float],
-    surface: SurfaceOption, nodata: float | None,
-) -> None:  # fmt: skip
-    """Draw the upper or lower surface, heights between two ends."""
+    points: npt.NDArray[Any], triangles: I32, grid: Grid, view: View, surface: SurfaceOption, ends: tuple[float, float],
+    out: object,
+) -> F64:  # fmt: skip
+    """`height_map` with checked arguments, of heights between two ends."""
     sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
-    ids = visible(np.column_stack([points_px, depth_of(heights, *ends)]), triangles, view, sink)
-    fill_planes(ids, points_px, triangles, heights, view, canvas)
-    if nodata is not None:
-        canvas[ids < 0] = nodata
+    points_px, heights = grid.to_pixels(points), np.ascontiguousarray(points[:, 2], np.float64)
+    with Canvas.of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
+        ids = visible(np.column_stack([points_px, depth_of(heights, *ends)]), triangles, view, sink)
+        fill_planes(ids, points_px, triangles, heights, view, canvas)
+        if grid.nodata is not None:
+            canvas[ids < 0] = grid.nodata
+    return result
 
 
 def visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:

@@ -7,20 +7,18 @@ in the place of triangles; each window is the crop of the picture that `polygons
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import I32, Array
-from topleft._core.base.arrays import set_aligned
 from topleft._core.base.grid import Extent, Grid
 from topleft._core.base.memory import FRESH, Memory
-from topleft._core.base.options import Sampling, parse_sampling
+from topleft._core.base.options import parse_sampling
 from topleft._core.polygons.polygons import as_paint, in_crs_of, polygons
 from topleft._core.polygons.rings import RingSet
-from topleft._meshes.windows.drawing import Painter, Size
+from topleft._meshes.windows.drawing import Crop, Kind, Painter, Payload, Values
 from topleft._meshes.windows.spans import Tiling
 
 MOST_SPANS = 1 << 28
@@ -68,8 +66,8 @@ class Areas:
             box[is_full, 2:] = np.maximum.reduceat(rings.points, firsts[:-1][is_full])
         return box
 
-    def of(self, which: I32) -> RingSet:
-        """Some of the polygons."""
+    def corners(self, which: I32, memory: Memory = FRESH) -> RingSet:  # noqa: ARG002
+        """The rings of some of the polygons."""
         rings, polygon_offsets = self.rings.rings, self.rings.polygons
         own_rings, n_rings = _ranges(polygon_offsets[which], polygon_offsets[which + 1])
         own_points, n_points = _ranges(rings[own_rings], rings[own_rings + 1])
@@ -137,64 +135,31 @@ class AreaIndex:
         return self._polygons[self._starts[i] : self._starts[i + 1]]
 
 
-@dataclass(frozen=True)
-class AreaPayload:
-    """The content of a window: its polygons, ascending, their points and offsets, and their values."""
-
-    triangles: I32
-    points: Array
-    rings: npt.NDArray[np.int64]
-    polygons: npt.NDArray[np.int64]
-    values: Array | None = None
-
-    __setstate__ = set_aligned
+def values_of(values: Any, areas: Areas, options: dict[str, Any]) -> Values:
+    """Check the values of polygons; without values these are their numbers."""
+    sampling = parse_sampling(options.get("sampling", "center"))
+    paint = as_paint("index" if values is None else values, options.get("background"), areas.n, sampling)
+    return Values(paint.table, is_flat=True)
 
 
-class AreaPainter(Painter):
-    """`polygons`: masks, labels or values."""
+def draw_polygons(painter: Painter, payload: Payload, crop: Crop) -> Array:
+    """Draw a window of `polygons`."""
+    style = dict(painter.style)
+    if payload.values is not None:
+        style["values"] = payload.values
+        if style.get("background") is None:
+            nodata = None if painter.grid is None else painter.grid.nodata
+            style["background"] = -1 if painter.kind.name == "labels" else nodata
+    return polygons(payload.corners, crop.size, out=crop.out, **style, **painter.view_at(crop))
 
-    own = ("assume_valid", "background", "max_crossings", "rule", "sampling")
 
-    @classmethod
-    def of_kind(cls, kind: str, grid: Grid | None, areas: Areas, values: Any, options: dict[str, Any]) -> AreaPainter:
-        """Return the painter of windows of polygons."""
-        known = (*cls.own, "subpixel_bits")
-        unknown = sorted(options.keys() - set(known))
-        if unknown:
-            raise TypeError(f"polygons have no option {unknown[0]!r}; their options are {', '.join(known)}")
-        if kind not in ("labels", "coverage", "fill"):
-            raise ValueError(f"kind must be 'labels', 'coverage' or 'fill' for polygons, got {kind!r}")
-        if (kind == "fill") != (values is not None):
-            raise ValueError(f"values are for the kind 'fill', which needs them, got {kind!r}")
-        view = {name: options[name] for name in ("subpixel_bits",) if name in options}
-        painter = cls(grid, options, view, 2)
-        how = parse_sampling(options.get("sampling", "center"))
-        if kind == "coverage":
-            is_share = how is Sampling.AREA or how.n_samples > 1
-            painter.dtype, painter.empty = (np.dtype(np.float32), 0.0) if is_share else (np.dtype(bool), False)
-            painter.values = None
-        else:
-            said = options.get("background")
-            if said is None and kind == "fill" and grid is not None:
-                said = grid.nodata
-            paint = as_paint("index" if kind == "labels" else values, said, areas.n, how)
-            painter.values, painter.empty = paint.table, paint.background
-            painter.dtype, painter.channels = paint.table.dtype, paint.table.shape[1:]
-            painter.nodata = float(paint.background) if not painter.channels else None
-        return painter
+OPTIONS = ("assume_valid", "background", "max_crossings", "rule", "sampling")
 
-    values: Array | None
+VIEW = ("subpixel_bits",)
 
-    def gather(self, triangles: Any, which: I32, memory: Memory = FRESH) -> Any:  # noqa: ARG002
-        """Take the polygons of a window out of all of them."""
-        rings = triangles.of(which)
-        values = None if self.values is None else self.values[which]
-        return AreaPayload(which, rings.points, rings.rings, rings.polygons, values)
-
-    def draw(self, payload: Any, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
-        """Return the pixels of a window."""
-        style = {name: value for name, value in self.options.items() if name != "background"}
-        if payload.values is not None:
-            style |= {"values": payload.values, "background": self.empty}
-        rings = RingSet(payload.points, payload.rings, payload.polygons)
-        return polygons(rings, size, origin=origin, threads=threads, out=out, **style)
+KINDS = {
+    "coverage": Kind("coverage", draw_polygons, OPTIONS, view=VIEW),
+    "labels": Kind("labels", draw_polygons, OPTIONS, values_of, view=VIEW, has_nodata=True),
+    "fill": Kind("fill", draw_polygons, OPTIONS, values_of, needs="numbers or colours", view=VIEW, has_nodata=True),
+}
+"""The kinds of rasters of polygons."""

@@ -98,7 +98,7 @@ class IndexedTriangles:
         flat = rows.ravel()
         if len(self.columns) == 1:
             return points[flat].reshape(len(rows), 3, self.n_components)
-        return np.stack([column[flat] for column in self.columns], axis=-1).reshape(len(rows), 3, -1)
+        return np.stack([column[flat] for column in self.columns], axis=-1).reshape(len(rows), 3, self.n_components)
 
     def _bad_index(self, which: slice | I32, bad: int) -> IndexError:
         number = (which.start or 0) + bad if isinstance(which, slice) else int(which[bad])

@@ -11,7 +11,7 @@ from topleft._core.base.array_types import I32, Array
 from topleft._core.base.arrays import as_aligned
 from topleft._meshes.windows.ahead import kept_memory
 from topleft._meshes.windows.blocks import Triangles
-from topleft._meshes.windows.drawing import Painter, Payload
+from topleft._meshes.windows.drawing import Crop, Painter, Payload
 
 
 @dataclass(frozen=True)
@@ -20,12 +20,11 @@ class SentJob:
 
     painter: Painter
     payload: Payload
-    origin: tuple[int, int]
-    size: tuple[int, int]
+    crop: Crop
 
     def __call__(self) -> Array:
         """Draw it."""
-        return self.painter.window(self.payload, self.origin, self.size, 1, None)
+        return self.painter.window(self.payload, self.crop)
 
 
 @dataclass(frozen=True)
@@ -35,11 +34,10 @@ class MappedJob:
     triangles: Triangles
     painter: Painter
     which: I32
-    origin: tuple[int, int]
-    size: tuple[int, int]
+    crop: Crop
 
     def __call__(self) -> Array:
         """Draw it."""
         which = as_aligned(self.which)  # bytes that were received lie anywhere
         payload = self.painter.gather(self.triangles, which, kept_memory())
-        return self.painter.window(payload, self.origin, self.size, 1, None)
+        return self.painter.window(payload, self.crop)

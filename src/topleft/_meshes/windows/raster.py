@@ -23,10 +23,11 @@ from topleft._core.base.grid import Extent, ExtentLike, Grid
 from topleft._core.base.options import check_choice
 from topleft._core.base.threads import available_threads, parse_threads
 from topleft._meshes.field.field import grid_of
+from topleft._meshes.windows import areas, drawing
 from topleft._meshes.windows.ahead import in_order, kept_memory
-from topleft._meshes.windows.areas import AreaIndex, AreaPainter, Areas, are_polygons, areas_of, extent_of_polygons
+from topleft._meshes.windows.areas import AreaIndex, Areas, are_polygons, areas_of, extent_of_polygons
 from topleft._meshes.windows.blocks import BLOCK, Triangles, fingerprint_of, mapped_npy, triangles_of
-from topleft._meshes.windows.drawing import KINDS, ON_GRIDS, Painter, painter_of, without_values
+from topleft._meshes.windows.drawing import ON_GRIDS, Crop, painter_of, without_values
 from topleft._meshes.windows.jobs import MappedJob, SentJob
 from topleft._meshes.windows.spans import SPAN_BYTES, Tiling, WindowIndex
 from topleft.typing import RasterKindOption, YOption
@@ -102,7 +103,7 @@ class WindowedRaster:
         options: dict[str, Any],
     ) -> None:
         self._folder = None if folder is None else os.fspath(as_path("folder", folder))
-        check_choice("kind", kind, tuple(KINDS))
+        check_choice("kind", kind, tuple(drawing.KINDS))
         is_of_areas = are_polygons(mesh)
         self.triangles: Any = mesh if is_of_areas else triangles_of(mesh, self._folder)
         grid: Grid | None = None
@@ -116,12 +117,12 @@ class WindowedRaster:
         self.window_size = min(w, max(self.size[0], 1)), min(h, max(self.size[1], 1))
         if isinstance(values, str | os.PathLike):
             values = values_of(values, self.triangles)
-        self.painter: Painter
+        kinds = areas.KINDS if is_of_areas else drawing.KINDS
+        if kind not in kinds:
+            raise ValueError(f"kind must be 'labels', 'coverage' or 'fill' for polygons, got {kind!r}")
         if is_of_areas:
             self.triangles = areas_of(mesh, grid, options.pop("crs", None))
-            self.painter = AreaPainter.of_kind(kind, grid, self.triangles, values, options)
-        else:
-            self.painter = painter_of(kind, grid, self.triangles, values, options)
+        self.painter = painter_of(kinds[kind], grid, self.triangles, values, options)
         bits = 0 if self.painter.is_exact else self.painter.view.get("subpixel_bits", 8)
         self.threads, self._memory = parse_threads(threads), as_count("memory", memory)
         self.tiling = Tiling(*self.size, *self.window_size, bits)
@@ -168,8 +169,8 @@ class WindowedRaster:
     def range_of_values(self) -> tuple[float, float]:
         """The lowest and the highest depth, height or value of the mesh; makes the index."""
         self.index  # noqa: B018  (which looks at depths and heights)
-        if hasattr(self.painter, "find_range"):
-            self.painter.find_range()
+        if self.kind == "field" and self.painter.values is not None:
+            return self.painter.values.range()
         return self.painter.low, self.painter.high
 
     @property
@@ -204,10 +205,9 @@ class WindowedRaster:
         """Whether the mesh lies in files that other processes can map."""
         if self.is_of_polygons:
             return False
-        values = getattr(self.painter, "values", None)
         state = getattr(self.triangles, "__getstate__")()  # noqa: B009
         arrays = [state.get("_rows"), state.get("triangles"), *state.get("columns", ())]
-        return values is None and not any(isinstance(array, np.ndarray) for array in arrays)
+        return self.painter.values is None and not any(isinstance(array, np.ndarray) for array in arrays)
 
     @property
     def fingerprint(self) -> str:
@@ -215,7 +215,8 @@ class WindowedRaster:
         if self._fingerprint is None:
             painter = self.painter
             words = (1, self.kind, self.size, self.window_size, self.grid, sorted(painter.options.items(), key=str))
-            arrays = {"values": getattr(painter, "values", None), "faces": self.triangles.faces}
+            values = None if painter.values is None else painter.values.array
+            arrays = {"values": values, "faces": self.triangles.faces}
             self._fingerprint = fingerprint_of(self.triangles, arrays, words)
         return self._fingerprint
 
@@ -227,17 +228,16 @@ class WindowedRaster:
 
     def draw_window(self, row: int, column: int, *, threads: int | None = None, out: Array | None = None) -> Array:
         """Return the pixels of a window, in a fresh array or in `out`."""
-        origin, size = self.place(row, column)
-        payload = self.painter.gather(self.triangles, self.index.of_window(row, column), kept_memory())
-        return self.painter.window(payload, origin, size, self.threads if threads is None else threads, out)
+        crop = Crop(*self.place(row, column), self.threads if threads is None else threads, out)
+        return self._draw(self.index.of_window(row, column), crop)
 
     def job(self, row: int, column: int) -> Callable[[], Array]:
         """Return a job that draws a window in another process: it carries the window's triangles, or where they are."""
-        origin, size = self.place(row, column)
+        crop = Crop(*self.place(row, column))
         which = self.index.of_window(row, column)
         if self.is_mapped:
-            return MappedJob(self.triangles, self.painter, which, origin, size)
-        return SentJob(without_values(self.painter), self.painter.gather(self.triangles, which), origin, size)
+            return MappedJob(self.triangles, self.painter, which, crop)
+        return SentJob(without_values(self.painter), self.painter.gather(self.triangles, which), crop)
 
     def __iter__(self) -> Iterator[Window]:
         """Give all windows, row by row, each with an array of its own."""
@@ -275,9 +275,10 @@ class WindowedRaster:
                 f"the part must lie in the raster of {self.size[0]} x {self.size[1]} pixels, got {width} x {height} "
                 f"from ({x}, {y}) on"
             )
-        which = self._triangles_in(x, y, width, height)
-        payload = self.painter.gather(self.triangles, which, kept_memory())
-        return self.painter.window(payload, (x, y), (width, height), self.threads, None)
+        return self._draw(self._triangles_in(x, y, width, height), Crop((x, y), (width, height), self.threads))
+
+    def _draw(self, which: npt.NDArray[np.int32], crop: Crop) -> Array:
+        return self.painter.window(self.painter.gather(self.triangles, which, kept_memory()), crop)
 
     def _triangles_in(self, x: int, y: int, width: int, height: int) -> npt.NDArray[np.int32]:
         if not (width and height):
