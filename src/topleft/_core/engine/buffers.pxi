@@ -36,7 +36,7 @@ cdef object as_float32(const double[:, ::1] matrix):
 
 
 cdef inline tl_projected points_to(double *points) noexcept nogil:
-    """Where points go that are not snapped."""
+    """The output of vertices that are not snapped."""
     cdef tl_projected out
     memset(&out, 0, sizeof(out))
     out.points = points
@@ -44,7 +44,7 @@ cdef inline tl_projected points_to(double *points) noexcept nogil:
 
 
 cdef tl_projected projected_to(vertices: Array):
-    """Records, or points (V, PLACED) float64, as kernels take them."""
+    """Return `tl_projected` of records, or of points (V, PLACED) float64."""
     cdef tl_projected out = points_to(NULL)
     cdef const uint8_t[::1] raw = as_bytes(vertices)
     if vertices.dtype == np.float64:
@@ -55,7 +55,7 @@ cdef tl_projected projected_to(vertices: Array):
 
 
 cdef class Source:
-    """The caller's (V, C) vertices, contiguous float32, float64 or int64, and the matrix that takes them to clip space."""
+    """The caller's (V, C) vertices, contiguous float32, float64 or int64, and their matrix to clip space."""
 
     cdef tl_source source
     cdef object arrays
@@ -149,7 +149,7 @@ cdef class Target:
 
     def __init__(self, int sink, pixels: Array, depth: F32 | None, covered: U64 | None, samples: I32 | None = None,
                  bint earlier_wins=False, bounds: F32 | None = None):
-        """`bounds`: `bounds_shape` float32, with which large triangles and clusters that lie behind are left out."""
+        """`bounds`: `bounds_shape` float32: large triangles and clusters that lie behind them are skipped."""
         self.sink, self.flip, self.bounds = sink, TL_FLIP if earlier_wins else 0, bounds
         self.height, self.width = pixels.shape
         self.n_bytes = pixels.nbytes + (0 if depth is None else depth.nbytes)
@@ -159,7 +159,7 @@ cdef class Target:
 
     @staticmethod
     def covered_shape(int64_t height, int64_t width, int64_t n_samples=1) -> tuple[int, int]:
-        """Return the shape of the uint64 scratch that a mask needs: any rows of it are enough for as many of the mask."""
+        """Return the shape of the uint64 scratch of a mask: n rows of it suffice for any n rows of the mask."""
         return height, tl_covered_words(width * n_samples)
 
     @staticmethod
@@ -168,7 +168,7 @@ cdef class Target:
         return height, tl_segments(width)
 
     def keep_bounds(self, float[:, ::1] bounds):
-        """Have it keep bounds of depth, `bounds_shape` float32, from when it is next cleared."""
+        """Keep bounds of depth in `bounds_shape` float32, from the next clear on."""
         self.bounds = bounds
 
     cdef tl_target rows(self, int64_t first_row) noexcept:
@@ -211,7 +211,7 @@ def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_
 
 def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, int64_t n_rows, bint earlier_wins,
                    float depth, float background):
-    """Write one depth for all triangles in rows of a picture; labels, as drawn to a `Target`, become ids."""
+    """Write an equal depth for all triangles in rows of a picture; labels, as drawn to a `Target`, become ids."""
     cdef int64_t n = n_rows * ids.shape[1]
     if n:
         with nogil:
@@ -220,11 +220,11 @@ def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, in
 
 def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles) -> int:
     """The kernel `first_bad`."""
-    cdef int64_t n = triangles.shape[0], n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex), found = -1
+    cdef int64_t n = triangles.shape[0], n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex), bad = -1
     if n and n_vertices:
         with nogil:
-            found = K.first_bad(<const tl_vertex *>&records[0], n_vertices, &triangles[0, 0], n)
-    return found
+            bad = K.first_bad(<const tl_vertex *>&records[0], n_vertices, &triangles[0, 0], n)
+    return bad
 
 
 cdef class Pieces:
@@ -237,7 +237,7 @@ cdef class Pieces:
                  const int32_t[::1] ids=None):
         """`vertices`: records, or points (V, PLACED) that are not snapped.
 
-        `ids`: the triangles that may be cut, ascending; unless given, all of them.
+        `ids`: the triangles that may be cut, ascending; None: all triangles.
         """
         cdef tl_pieces *p = &self.pieces
         cdef tl_projected projected = projected_to(vertices)

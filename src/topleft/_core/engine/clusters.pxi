@@ -1,4 +1,4 @@
-# Meshes that are sorted into clusters, and passes that draw the clusters in view.
+# Meshes sorted into clusters, and passes that draw the visible clusters.
 
 CLUSTER = TL_CLUSTER
 CLUSTER_GROUP = TL_CLUSTER_GROUP
@@ -20,7 +20,7 @@ def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, int64_t
 
 def list_cut(const int32_t[::1] ids, const int32_t[:, ::1] corners, const uint8_t[::1] records,
              int32_t[::1] cut) -> int:
-    """List those of some triangles that a clip plane may cut, maybe more than once; returns how many."""
+    """List the triangles of `ids` that a clip plane may cut, maybe more than once; returns how many."""
     cdef const tl_vertex *vertices = <const tl_vertex *>data(records)
     cdef const tl_vertex *v
     cdef int64_t i, k, n_cut = 0, n = ids.shape[0]
@@ -42,7 +42,7 @@ def order_triangles(Source source, const int32_t[:, ::1] triangles, const double
                     uint64_t[:, ::1] room, int32_t[::1] order):
     """Write the order of triangles along a curve that keeps neighbours together; `box`: low and high of the vertices.
 
-    `keys` and `order` have a number a triangle, `room` has two rows of them.
+    `keys` (T,), `order` (T,); `room` (2, T).
     """
     cdef int64_t n = triangles.shape[0]
     if n:
@@ -55,7 +55,7 @@ def cut_clusters(const int32_t[:, ::1] triangles, const int32_t[::1] order, int3
                  int32_t[::1] vertices, uint8_t[:, ::1] corners) -> tuple[int, int]:
     """The kernel `cut_clusters`.
 
-    Returns the numbers of clusters and of their vertices; `clusters` has room for one a triangle, `vertices` for three.
+    Returns the numbers of clusters and of their vertices; `clusters` has room for T clusters, `vertices` for 3 T numbers.
     """
     cdef int64_t n = triangles.shape[0], n_clusters = 0, n_used = 0
     if n:
@@ -78,7 +78,7 @@ cdef inline double minor(const double *a, const double *b, const double *c, int 
 
 
 cdef class ClusterView:
-    """Rows of a picture's window, as far as clusters are concerned."""
+    """Rows of a picture's window, for tests of clusters: `tl_cluster_view`."""
 
     cdef tl_cluster_view view
 
@@ -149,7 +149,7 @@ cdef class Clustered:
         return self.mesh.n_clusters
 
     def survey(self, ClusterView view, int64_t step, int64_t[::1] n_of):
-        """Count one cluster of each `step`: those outside, turned away and culled, showing their backs, and the others."""
+        """Count every `step`-th cluster in `n_of`, by its `tl_visibility`."""
         if n_of.shape[0] != TL_N_VISIBILITIES:
             raise ValueError("n_of must have a number for each `tl_visibility`")
         with nogil:
@@ -160,9 +160,9 @@ cdef class Clustered:
              bint is_last) -> tuple[int, int, int]:
         """Draw the clusters that rows of a picture show.
 
-        `mesh`: viewport, culling, id of triangle 0; its own triangles are not read. `room`: three numbers a cluster, and one.
-        `others`, a number for each triangle, gets those that a clip plane may cut, or that 64 bits cannot hold. Returns how
-        many of these there are, how many clusters the window may show, and how many of them were not hidden.
+        `mesh`: viewport, culling, id of triangle 0; its triangles are not read. `room`: (3 N + 1,) for N clusters.
+        `others` (T,): receives the triangles that a clip plane may cut, or that 64 bits cannot hold. Returns how many
+        triangles that are, how many clusters the window may show, and how many of these clusters were not hidden.
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = mesh.window(first_row, n_rows, target.width)

@@ -1,5 +1,5 @@
-# The most pixels that a visible point moves by when it moves by one unit: levels of detail are chosen by it. The
-# rules stand at the head of _meshes/lod/detail.py.
+# The most pixels that a visible point moves by when it moves by a unit of the mesh: it decides the level of detail.
+# _meshes/lod/detail.py states the rules.
 
 cdef int EXTENT = 10  # numbers of a row: lowest and highest x, y, z; centre and radius of the sphere round it
 
@@ -26,7 +26,7 @@ cdef double least_in_box(const double *row, const double *low, const double *hig
 
 
 cdef double least_on(const double *row, const double *low, const double *high, const double *extents, int n) noexcept nogil:
-    """A bound from below on an affine function on n surfaces: by their box, or by their spheres."""
+    """A lower bound of an affine function on n surfaces: by their box, or by their spheres."""
     cdef double length = sqrt(dot3(row, row)), sphere = INFINITY
     cdef int i
     for i in range(n):
@@ -42,7 +42,7 @@ cdef double stretch(const double *a, const double *b) noexcept nogil:
 
 cdef double pixels_a_unit(const double *m, double width, double height, const double *window, const double *extents,
                           int n) noexcept nogil:
-    """NaN where nothing is known. Never less for more surfaces. `window`: lower and upper x, and y."""
+    """The bound of `pixels_per_unit`, NaN where there is none. Never less for more surfaces."""
     cdef double low[3]
     cdef double high[3]
     cdef double row[4]
@@ -73,7 +73,7 @@ cdef double pixels_a_unit(const double *m, double width, double height, const do
             return NAN
     for axis in range(2):
         ends[axis][0], ends[axis][1] = window[2 * axis], window[2 * axis + 1]
-    if least_in_box(of_w, low, high) > 0.0:  # then the box shows nowhere but between its corners
+    if least_in_box(of_w, low, high) > 0.0:  # then the box is drawn within the hull of its corners
         for axis in range(2):
             places[axis][0], places[axis][1] = INFINITY, -INFINITY
         for i in range(8):
@@ -101,21 +101,21 @@ cdef double pixels_a_unit(const double *m, double width, double height, const do
 
 def pixels_per_unit(const double[:, ::1] matrix, size: tuple[int, int], const double[::1] window,
                     const double[:, ::1] extents) -> float | None:
-    """Return how many pixels a point that shows moves at most where it moves by one unit, on surfaces of these extents (N, 10).
+    """Return the most pixels that a visible point moves by when it moves by a unit, on surfaces of these extents (N, 10).
 
-    None where nothing is known of that. `matrix`: clip from object; `window`: lower and upper x, and y, in normalised
-    device coordinates.
+    None where there is no bound. `matrix`: clip from object; `window`: lower and upper x, and y, in normalised device
+    coordinates.
     """
-    cdef double found = pixels_a_unit(&matrix[0, 0], size[0], size[1], &window[0], &extents[0, 0], extents.shape[0])
-    return None if isnan(found) else found
+    cdef double scale = pixels_a_unit(&matrix[0, 0], size[0], size[1], &window[0], &extents[0, 0], extents.shape[0])
+    return None if isnan(scale) else scale
 
 
 def coarsest_levels(const double[:, :, ::1] matrices, size: tuple[int, int], const double[::1] window,
                     const double[:, ::1] extents, const double[::1] bounds, double tolerance, int64_t[::1] levels,
                     double[::1] scales):
-    """Write the last level that is sure to be within a tolerance, 0 for none but the first, under each matrix (N, 4, 4).
+    """Write the coarsest level that is surely within a tolerance, under each matrix (N, 4, 4); level 0 is the mesh.
 
-    `extents`, `bounds`: of the levels, the first that of the mesh itself; `scales`: pixels a unit for that level.
+    `extents`, `bounds`: of the levels; `scales`: pixels per unit of the chosen level.
     """
     cdef double width = size[0], height = size[1], least, scale
     cdef double both[20]
@@ -128,7 +128,7 @@ def coarsest_levels(const double[:, :, ::1] matrices, size: tuple[int, int], con
             continue
         memcpy(both, &extents[0, 0], sizeof(double) * EXTENT)
         for k in range(extents.shape[0] - 1, 0, -1):
-            if bounds[k] * least <= tolerance:  # it is no less where the level reaches beyond the mesh
+            if bounds[k] * least <= tolerance:  # the scale is no less where the level reaches beyond the mesh
                 memcpy(both + EXTENT, &extents[k, 0], sizeof(double) * EXTENT)
                 scale = pixels_a_unit(&matrices[i, 0, 0], width, height, &window[0], both, 2)
                 if not isnan(scale) and bounds[k] * scale <= tolerance:
@@ -139,12 +139,12 @@ def coarsest_levels(const double[:, :, ::1] matrices, size: tuple[int, int], con
 cdef int64_t choose_under(const double *m, double width, double height, const double *window, const double *extents,
                           const double *bounds, const int64_t *counts, int64_t level, int64_t first, int64_t part,
                           double tolerance, int32_t *chosen, int64_t n, double *off) noexcept nogil:
-    """Add the parts that stand for a part to n chosen ones; returns how many there are. `first`: the first row of its level."""
+    """Append a part, or the finer parts that replace it, to n chosen parts; returns how many. `first`: row 0 of its level."""
     cdef int64_t row = first + part, n_children, k
     cdef double scale = 0.0
     if level > 0:
         scale = pixels_a_unit(m, width, height, window, extents + EXTENT * row, 1)
-    if level == 0 or bounds[row] * scale <= tolerance:  # not where nothing is known of it
+    if level == 0 or bounds[row] * scale <= tolerance:  # false where the scale is NaN
         chosen[n] = <int32_t>row
         off[0] = larger(off[0], bounds[row] * scale)
         return n + 1
@@ -158,10 +158,10 @@ cdef int64_t choose_under(const double *m, double width, double height, const do
 def choose_parts(const double[:, ::1] matrix, size: tuple[int, int], const double[::1] window,
                  const double[:, ::1] extents, const double[::1] bounds, const int64_t[::1] counts, double tolerance,
                  int32_t[::1] chosen) -> tuple[int, float]:
-    """Write the rows of the coarsest parts that are sure to be within a tolerance, or else those of the mesh itself.
+    """Write the rows of the coarsest parts that are surely within a tolerance, of the mesh where no coarser part is.
 
-    `extents` (N, 10), `bounds`: of the parts, those of the mesh itself first, then level by level; `counts`: how many
-    parts a level has. Returns how many are chosen, and the most pixels that they are off.
+    `extents` (N, 10), `bounds`: of the parts, first of the mesh, then level by level; `counts`: how many parts a level
+    has. Returns how many parts are chosen, and a bound of their error in pixels.
     """
     cdef double width = size[0], height = size[1], off = 0.0
     cdef int64_t top = counts.shape[0] - 1, first = bounds.shape[0] - counts[counts.shape[0] - 1], part, n = 0

@@ -2,21 +2,21 @@
 
 
 cdef tuple[Array, Array, Array] joined(Pieces pieces, points: Array, triangles: Array):
-    """Return points, triangles and names of a mesh, its cut triangles collapsed to one point, and of the pieces."""
+    """Return points, triangles and names of a mesh and its pieces; cut triangles are collapsed to a point."""
     cdef int64_t n = points.shape[0], n_pieces = len(pieces)
     is_cut = np.isnan(points[:, 0])[triangles].any(axis=1)
     collapsed = np.where(is_cut[:, None], np.int32(n), triangles)
-    own, _, _, _, corners, owners = pieces.arrays if n_pieces else (np.empty((0, 3)), *[np.empty((0, 3), np.int32)] * 5)
-    own = own[: pieces.pieces.n_vertices]
-    places = np.rint(np.clip(own[:, :2], -TL_PLACE_LIMIT_PX, TL_PLACE_LIMIT_PX) * (1 << TL_PLACE_BITS))
+    clipped, _, _, _, corners, owners = pieces.arrays if n_pieces else (np.empty((0, 3)), *[np.empty((0, 3), np.int32)] * 5)
+    clipped = clipped[: pieces.pieces.n_vertices]
+    places = np.rint(np.clip(clipped[:, :2], -TL_PLACE_LIMIT_PX, TL_PLACE_LIMIT_PX) * (1 << TL_PLACE_BITS))
     placed = np.ascontiguousarray(places.astype(np.int32)).view(np.float64)
-    all_points = np.concatenate([points, np.zeros((1, TL_PLACED)), np.hstack([own, placed])])
+    all_points = np.concatenate([points, np.zeros((1, TL_PLACED)), np.hstack([clipped, placed])])
     names = np.concatenate([np.arange(len(triangles), dtype=np.int32), owners.reshape(-1)[:n_pieces]])
     return all_points, np.concatenate([collapsed, corners[:n_pieces] + np.int32(n + 1)]), names
 
 
 cdef class UnsnappedPoints:
-    """Vertices in pixels as they are, the triangles that are drawn of them, and how many samples were decided how."""
+    """Vertices in pixels, not snapped, and their triangles; counts how samples were decided."""
 
     cdef tl_exact_points points
     cdef tl_exact_counts counted
@@ -44,7 +44,7 @@ cdef class UnsnappedPoints:
 
     @property
     def counts(self) -> tuple[int, int, int, int, int, int]:
-        """`tl_exact_counts` of all that has been drawn, in its order."""
+        """The fields of `tl_exact_counts`, in order, summed over all draws."""
         cdef tl_exact_counts *c = &self.counted
         return c.n_triangles, c.n_on_grid, c.n_refined, c.n_turns, c.n_expansions, c.n_integers
 

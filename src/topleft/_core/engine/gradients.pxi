@@ -11,7 +11,7 @@ FACE_ROWS = TL_FACE_ROWS
 
 
 cdef const void *first_of(array: object):
-    """Return where the numbers of a contiguous array begin, NULL for None; the caller holds the array."""
+    """Return the address of a contiguous array, NULL for None; the caller holds the array."""
     cdef Py_buffer held
     if array is None:
         return NULL
@@ -22,7 +22,7 @@ cdef const void *first_of(array: object):
 
 
 cdef tl_grad_texture looked_up(levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...]):
-    """Return a texture and where it is looked at, as `GradientView.texels` is given them."""
+    """Return a texture and its coordinates; the parameters are those of `GradientView.texels`."""
     cdef tl_grad_texture t
     cdef int64_t n_texels = 0
     cdef int k
@@ -92,7 +92,7 @@ cdef class GradientView:
                GradientSums sums or None, int64_t first, int64_t end) -> int:
         """Write rows of attributes (V, K); with sums, of their gradients. Returns as `points_vjp` does.
 
-        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None for absent ones.
+        `arrays`: rast, rast_db, out, out_da, and with sums g_rast, g_rast_db; None where an array is absent.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_values v
@@ -115,8 +115,8 @@ cdef class GradientView:
                int64_t end):
         """Write rows of a texture, levels (., H, W, C).
 
-        `codes`: of the filter and of the texture beyond its edges, as in ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out;
-        None for absent ones.
+        `codes`: `tl_texel_filter` and `tl_texel_edge` of ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out; None where an
+        array is absent.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_texture t = looked_up(levels, codes, arrays)
@@ -125,10 +125,10 @@ cdef class GradientView:
 
     def texels_vjp(self, levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...],
                    GradientSums sums or None, int64_t first, int64_t end):
-        """Write rows of the gradients of where a texture is looked at, and sum up those of its texels.
+        """Backward of `texels`: write rows of the gradients of coordinates, accumulate the gradients of texels in `sums`.
 
-        `arrays`: those of `texels`, `out` a gradient, and g_uv, g_uv_da, g_bias; without g_uv, or without sums, those
-        gradients are left out. `sums` have a multiple of four columns, of which the first C count.
+        `arrays`: as for `texels`, `out` a gradient, and g_uv, g_uv_da, g_bias. Without g_uv the gradients of coordinates
+        are skipped, without sums the gradients of texels. `sums` have a multiple of four columns, the first C are used.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_texture t = looked_up(levels, codes, arrays)
@@ -139,7 +139,7 @@ cdef class GradientView:
             K.grad_texels_vjp(&view, &t, of_texels)
 
     def outline(self, mesh: tuple[Array, Array, Array], int32_t[::1] sides, bint has_sides, int64_t part, int64_t n_parts):
-        """Write a part of the places of vertices (V, 2), pixels, and of sides (T); then, with all sides, of outlines (T).
+        """Write a part of the positions of vertices (V, 2), pixels, and of sides (T); with all sides, of outlines (T).
 
         `mesh`: across, places, outline, as `edges` takes them.
         """
@@ -157,7 +157,7 @@ cdef class GradientView:
 
     def edges(self, mesh: tuple[Array, Array, Array], int32_t[:, ::1] scratch, int rule,
               arrays: tuple[Array | None, ...], GradientSums sums or None, int64_t first, int64_t end):
-        """Write rows of a picture with smooth silhouettes; with sums, of the gradients of its colours.
+        """Write rows of a picture with smooth silhouettes; with sums, the gradients of its colours.
 
         `mesh`: across, places, outline. `scratch`: (3, W + IDS_ROOM). `arrays`: rast, color, out; with sums rast,
         color, gradients of out, gradients of color.
@@ -186,17 +186,17 @@ cdef class GradientView:
                 sums: tuple[GradientSums, GradientSums], int64_t first, int64_t end) -> tuple[float, int]:
         """Write rows of a picture of `attr` (V, K) float32, or add their gradients to sums.
 
-        `ids`: row 0 is on top. `mesh` and `scratch[0]` are those of `edges`, the former None for what was seen before;
-        `codes`: the rule and the weight of squares.
-        `pixels`, one of them: the picture; its gradients; another one, whose squared differences count. `seen` and the
-        rest of `scratch` are those of ``tl_grad_picture``. `sums`: by triangle, HEAD_OF_FACE columns and SUMS_OF_FACE
-        for each three attributes; by vertex, four columns and those of attributes. Returns the sum of squares, and how
-        many faces are seen.
+        `ids`: row 0 is on top. `mesh` and `scratch[0]`: as for `edges`; the arrays of `mesh` are None where `seen` is
+        filled. `codes`: the rule and the weight of squares.
+        `pixels`: the picture, its gradients, or a target whose squared differences count; two of the three are None.
+        `seen` and the rest of `scratch`: fields of ``tl_grad_picture``. `sums`: by triangle, HEAD_OF_FACE columns and
+        SUMS_OF_FACE for each three attributes; by vertex, four columns and a column for each attribute. Returns the sum
+        of squares, and how many faces are visible.
         """
         cdef tl_grad_view view = self.rows(first, end)
         cdef tl_grad_picture l
         cdef GradientSums faces = sums[0], vertices = sums[1]
-        cdef double found
+        cdef double squares
         memset(&l, 0, sizeof(l))
         if first >= end or view.width == 0 or attr.shape[1] == 0:
             return 0.0, 0
@@ -215,18 +215,18 @@ cdef class GradientView:
         l.rast = <float *>first_of(scratch[3])
         l.faces, l.vertices = &faces.sums, &vertices.sums
         with nogil:
-            found = K.grad_picture(&view, &l)
-        return found, l.n_faces
+            squares = K.grad_picture(&view, &l)
+        return squares, l.n_faces
 
 
 cdef class GradientSums:
-    """Sums of rows of a tensor, of those that a band touches."""
+    """Sums for the rows of a tensor that a band touches."""
 
     cdef tl_grad_sums sums
     cdef object arrays
 
     def __init__(self, int32_t[::1] slot_of, int32_t[::1] rows, double[:, ::1] sums):
-        """`slot_of`: -1 for each row of the tensor; room for the rows that a band may touch, and for their sums."""
+        """`slot_of`: -1 for each row of the tensor; `rows`, `sums`: room for the rows that a band may touch."""
         self.arrays = (slot_of, rows, sums)
         self.sums.slot_of = &slot_of[0] if slot_of.shape[0] else NULL
         self.sums.rows = &rows[0] if rows.shape[0] else NULL
@@ -234,7 +234,7 @@ cdef class GradientSums:
         self.sums.n, self.sums.n_columns = 0, sums.shape[1]
 
     def add_to(self, outs: tuple[Array, ...]):
-        """Add the sums to the rows (N, K) that they belong to, K columns to each of `outs`, and forget them."""
+        """Add the sums to the rows of `outs`, arrays (N, K) that share the columns of the sums, and clear the sums."""
         cdef int64_t i, c, n_rows, n_columns, at, first = 0, n_sums = self.sums.n_columns
         cdef void *rows
         cdef const double *sums
@@ -244,7 +244,7 @@ cdef class GradientSums:
             rows, is_f64 = <void *>first_of(out), out.dtype == np.float64
             with nogil:
                 for i in range(self.sums.n):
-                    if self.sums.rows[i] >= n_rows:  # they are the others'
+                    if self.sums.rows[i] >= n_rows:  # a row of the longer arrays of `outs`
                         continue
                     at, sums = self.sums.rows[i] * n_columns, self.sums.sums + i * n_sums + first
                     for c in range(n_columns):
@@ -258,7 +258,7 @@ cdef class GradientSums:
 
 def area_vjp(const double[:, ::1] points_px, const int32_t[:, ::1] triangles, const double[:, ::1] values or None,
              const double[:, :, ::1] grad, double[:, ::1] out):
-    """Add the gradients of points to `out` (V, 2) from those (H, W, C) of areas times the values (T, C), or 1."""
+    """Backward of areas times values (T, C), or 1: add the gradients of points to `out` (V, 2); `grad`: (H, W, C)."""
     cdef tl_grad_area p
     if not triangles.shape[0] or not grad.shape[0] or not grad.shape[1] or not grad.shape[2]:
         return

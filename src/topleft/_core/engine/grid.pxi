@@ -1,14 +1,14 @@
-# Meshes onto voxels (columns of crossings, bytes and shares, the voxels that triangles meet) and onto texels.
+# Rasterizes meshes into voxels (columns of crossings, bytes and shares, the voxels that triangles meet) and texels.
 
 
 def column_words(int64_t n_steps) -> int:
-    """Return how many uint64 a column of so many steps takes in `draw_crossings`."""
+    """Return how many uint64 a column of n_steps takes in `draw_crossings`."""
     return n_steps // 64 + 1
 
 
 def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, bint is_set, int64_t first,
                    int64_t end) -> int:
-    """Note the crossings of rows [first, end) of columns (H, W, column_words): `tl_crossings`.
+    """Store the crossings of rows [first, end) of columns (H, W, column_words): `tl_crossings`.
 
     Returns as `SnappedMesh.draw` does.
     """
@@ -62,11 +62,11 @@ def count_columns(const uint64_t[:, :, ::1] bits, int sample_bits, float[:, :, :
 
 def scatter_columns(const uint64_t[:, :, ::1] bits, uint8_t[::1] out, strides: tuple[int, int, int]):
     """The kernel `scatter_columns`."""
-    cdef int64_t own[3]
-    own[0], own[1], own[2] = strides
+    cdef int64_t axis_strides[3]
+    axis_strides[0], axis_strides[1], axis_strides[2] = strides
     if bits.shape[0] and bits.shape[1]:
         with nogil:
-            K.scatter_columns(&bits[0, 0, 0], bits.shape[0], bits.shape[1], bits.shape[2], own, &out[0])
+            K.scatter_columns(&bits[0, 0, 0], bits.shape[0], bits.shape[1], bits.shape[2], axis_strides, &out[0])
 
 
 def touch_voxels(const double[:, ::1] points, const int32_t[:, ::1] triangles, int64_t first, int64_t end,
@@ -158,7 +158,7 @@ VIEW_BLOCK = TL_VIEW_BLOCK
 def view_heights(const double[:, ::1] heights, const double[:, ::1] blocks, const double[::1] eye, const double[::1] columns, const double[::1] rows,
                  const double[::1] cell, double curvature, double most_squared, int64_t first, int64_t end,
                  double[:, ::1] out):
-    """Write how high above the ground of rows [first, end) something is seen from (column, row, height).
+    """Write the least height above the ground that is visible from `eye`, (column, row, height), in rows [first, end).
 
     `blocks`: the greatest height of VIEW_BLOCK + 1 cells along both axes. `columns`, `rows`: 1 / (k - eye) of each k.
     """

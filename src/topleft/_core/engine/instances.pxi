@@ -1,8 +1,8 @@
-# Instances of meshes behind the vertex stage: many in one call.
+# Projects and snaps the instances of meshes, many in a call.
 
 
 cdef class MeshList:
-    """Vertices (V, 3), float32 or float64, and checked triangles of a scene's meshes, to be placed again and again."""
+    """Vertices (V, 3), float32 or float64, and checked triangles of the meshes of a scene."""
 
     cdef object arrays
     cdef uint8_t[::1] source_room, mesh_room
@@ -28,11 +28,11 @@ cdef class MeshList:
 
 
 cdef class PlacedMeshes:
-    """Instances of some meshes of a list, by their numbers: `project` makes them ready to be drawn.
+    """Instances of the meshes `some` of a list: `project` makes them ready to be drawn.
 
     `matrices`: clip from object of each. `culls`, `numbers`: the `tl_cull` of each, and the id of its triangle 0.
-    `is_apart`: 1 where one is left out. `how`: that of a view. `room`: records of all vertices, uint8, or points
-    (V, PLACED) float64, which are not snapped; from vertex firsts[i] on for instance i.
+    `is_apart`: 1 where an instance is skipped. `how`: as for `SnappedMesh`. `room`: records of all vertices, uint8, or
+    points (V, PLACED) float64, which are not snapped; from vertex firsts[i] on for instance i.
     """
 
     cdef object arrays, room
@@ -69,14 +69,14 @@ cdef class PlacedMeshes:
                 self.meshes[i].mesh.vertices = <const tl_vertex *>self.place(i)
 
     cdef uint8_t *place(self, int64_t i) noexcept nogil:
-        """Where the vertices of an instance begin."""
+        """The address of an instance's first vertex."""
         cdef int64_t n_bytes = TL_PLACED * sizeof(double) if self.is_exact else sizeof(tl_vertex)
         return &self.raw[0] + self.firsts[i] * n_bytes
 
     def project(self, int64_t first, int64_t end):
-        """Project instances [first, end) and leave out those that need a closer look.
+        """Project instances [first, end) and skip each that must be drawn alone.
 
-        That is one with a vertex that is bad, wide or clipped, without triangles, or with a matrix beyond float32.
+        That is an instance with a vertex that is bad, wide or clipped, without triangles, or with a matrix beyond float32.
         """
         if self.firsts[end] - self.firsts[first] < HELD_VERTICES:
             self.project_all(first, end)
@@ -101,56 +101,56 @@ cdef class PlacedMeshes:
             self.is_apart[i] = counts.n_bad + counts.n_wide + counts.n_clipped > 0
 
     def count_left_out(self) -> int:
-        """Return how many triangles the instances have that were left out."""
+        """Return how many triangles the skipped instances have."""
         cdef int64_t i, n = 0
         for i in range(self.is_apart.shape[0]):
             n += self.meshes[i].n_triangles if self.is_apart[i] else 0
         return n
 
     def mesh(self, int64_t i) -> SnappedMesh | None:
-        """Return an instance ready to be drawn; None if it was left out."""
+        """Return an instance ready to be drawn; None if it was skipped."""
         if self.is_apart[i]:
             return None
-        cdef SnappedMesh made = self.like(i)
+        cdef SnappedMesh instance = self.like(i)
         if self.is_exact:
-            self.set_points(made, <double *>self.place(i), made.snapped.mesh.n_vertices)
-        return made
+            self.set_points(instance, <double *>self.place(i), instance.snapped.mesh.n_vertices)
+        return instance
 
     def joined(self, int64_t first, const int32_t[:, ::1] triangles) -> SnappedMesh:
-        """Return some of the instances as one mesh, for drawing alone, culled and numbered as instance `first` is.
+        """Return instances joined to a mesh that can only be drawn, culled and numbered as instance `first` is.
 
-        `triangles`: of theirs, by vertices of the whole room.
+        `triangles`: of these instances, indices of the vertices in `room`.
         """
-        cdef SnappedMesh made = self.like(first)
+        cdef SnappedMesh instance = self.like(first)
         cdef int64_t n_vertices = self.firsts[self.is_apart.shape[0]]
-        made.arrays = self.room, triangles
-        made.snapped.mesh.source, made.snapped.mesh.n_vertices = NULL, n_vertices
-        made.snapped.triangles, made.snapped.n_triangles = &triangles[0, 0], triangles.shape[0]
+        instance.arrays = self.room, triangles
+        instance.snapped.mesh.source, instance.snapped.mesh.n_vertices = NULL, n_vertices
+        instance.snapped.triangles, instance.snapped.n_triangles = &triangles[0, 0], triangles.shape[0]
         if self.is_exact:
-            self.set_points(made, <double *>&self.raw[0], n_vertices)
+            self.set_points(instance, <double *>&self.raw[0], n_vertices)
         else:
-            made.snapped.mesh.vertices = <const tl_vertex *>&self.raw[0]
-        return made
+            instance.snapped.mesh.vertices = <const tl_vertex *>&self.raw[0]
+        return instance
 
     cdef SnappedMesh like(self, int64_t i):
-        cdef SnappedMesh made = SnappedMesh.__new__(SnappedMesh)
-        made.snapped, made.arrays, made.viewport, made.is_used = self.meshes[i], self.arrays, self.viewport, None
-        made.x_px, made.y_px, made.subpixel_bits, made.test = self.x_px, self.y_px, self.subpixel_bits, <tl_test>self.test
-        return made
+        cdef SnappedMesh instance = SnappedMesh.__new__(SnappedMesh)
+        instance.snapped, instance.arrays, instance.viewport, instance.is_used = self.meshes[i], self.arrays, self.viewport, None
+        instance.x_px, instance.y_px, instance.subpixel_bits, instance.test = self.x_px, self.y_px, self.subpixel_bits, <tl_test>self.test
+        return instance
 
     cdef void set_points(self, SnappedMesh mesh, const double *points, int64_t n):
-        """Give a mesh n points (PLACED,) that are not snapped, of triangles that no plane cuts."""
-        cdef UnsnappedPoints made = UnsnappedPoints.__new__(UnsnappedPoints)
-        memset(&made.counted, 0, sizeof(made.counted))
-        memset(&made.points, 0, sizeof(made.points))
-        made.arrays, made.n_vertices, made.points.band = mesh.arrays, n, 1.0
-        made.points.points, made.points.n_points, made.points.stride = points, n, TL_PLACED
-        made.points.triangles, made.points.n_triangles = mesh.snapped.triangles, mesh.snapped.n_triangles
-        mesh.exact, mesh.snapped.mesh.exact = made, &made.points
+        """Set n points (PLACED,) of a mesh that are not snapped, of triangles that no plane cuts."""
+        cdef UnsnappedPoints exact = UnsnappedPoints.__new__(UnsnappedPoints)
+        memset(&exact.counted, 0, sizeof(exact.counted))
+        memset(&exact.points, 0, sizeof(exact.points))
+        exact.arrays, exact.n_vertices, exact.points.band = mesh.arrays, n, 1.0
+        exact.points.points, exact.points.n_points, exact.points.stride = points, n, TL_PLACED
+        exact.points.triangles, exact.points.n_triangles = mesh.snapped.triangles, mesh.snapped.n_triangles
+        mesh.exact, mesh.snapped.mesh.exact = exact, &exact.points
 
 
 cdef bint set_matrix(tl_source *source, const double *matrix, float *rounded) noexcept:
-    """Give a mesh its matrix, in its own type, or NULL if that cannot hold it; return whether every w is 1."""
+    """Set the matrix of a mesh in the type of its vertices, NULL beyond float32; return whether every w is 1."""
     cdef int k
     source.matrix = matrix
     if source.scalar == TL_F32:

@@ -1,4 +1,4 @@
-"""Choose the kernels once, at import: the widest that this machine can run, or those that ``TOPLEFT_ISA`` names."""
+"""Choose the kernels at import: of the widest instruction set that runs here, or of the set in ``TOPLEFT_ISA``."""
 
 import os
 from typing import Any
@@ -11,7 +11,7 @@ NAMES = ("scalar", "simd128", "avx2", "avx512")
 def select() -> str:
     """Return the instruction set in use: ``TOPLEFT_ISA`` if it is set, else the widest that was built and can run here.
 
-    A `ValueError` when ``TOPLEFT_ISA`` names one that does not exist, was not built, or cannot run here.
+    A `ValueError` when ``TOPLEFT_ISA`` names a set that does not exist, was not built, or cannot run here.
     """
     available = kernels.isa_available()
     name = os.environ.get("TOPLEFT_ISA", "").strip().lower()
@@ -35,8 +35,8 @@ def build_info() -> dict[str, Any]:
     -------
     dict
         ``version``; ``compiler``; ``flags``, the compiler flags of each kernel unit; ``isa_built``, the instruction
-        sets in the binary; ``isa_available``, those of them that this machine can run; ``isa``, the one in use. Every
-        instruction set gives the same bits.
+        sets in the binary; ``isa_available``, the sets that this machine can run; ``isa``, the set in use. All
+        instruction sets compute equal bits.
 
     Examples
     --------

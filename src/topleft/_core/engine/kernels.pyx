@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 # cython: freethreading_compatible=True
 # cython: auto_pickle=False, emit_code_comments=False, annotation_typing=False
-"""Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index.
+"""Each function takes memoryviews, calls a kernel and returns its status. Callers check every shape, dtype and index.
 
 `csrc/kernels.h` describes the kernels: a docstring names its kernel, and adds what an array of NumPy has beyond it.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 include "contract.pxi"  # the declarations of csrc's headers: packaging/bindings.py makes it
 
-# The kernels of each instruction set that was in use, and of that which is. Scalar until `isa.py` has chosen: never NULL.
+# The kernels of each instruction set that was used, and of the set in use. Scalar until `isa.py` has chosen: never NULL.
 cdef tl_kernels tables[TL_N_ISA]
 cdef const tl_kernels *K = &tables[TL_ISA_SCALAR]
 cdef str isa_name = "scalar"
@@ -23,7 +23,7 @@ tl_set_kernels(b"scalar", &tables[TL_ISA_SCALAR])
 
 
 def use_isa(name: str) -> None:
-    """Let all further calls run on the kernels of one available instruction set."""
+    """Run all further calls on the kernels of an available instruction set."""
     global K, isa_name
     if name not in isa_available():
         raise ValueError(f"instruction set must be one of {', '.join(isa_available())}, got {name!r}")
@@ -48,7 +48,7 @@ def isa_available() -> list[str]:
 
 
 def compiler_info() -> dict[str, object]:
-    """Return how this binary was made: version, compiler, flags of each unit."""
+    """Return how this binary was built: version, compiler, flags of each unit."""
     return {
         "version": tl_version().decode(),
         "compiler": tl_compiler().decode().strip(),
@@ -58,15 +58,15 @@ def compiler_info() -> dict[str, object]:
 cdef enum:
     LABEL = 2  # TL_SINK_LABEL
 
-# Less work than this keeps the GIL: a thread that let go of it waits for those that take it, 50 us and more each time.
-# Not so parts of a work, which threads do side by side.
+# Less work than this keeps the GIL: to release and retake it costs 50 us and more while other threads run Python.
+# Kernels that threads run in parallel on parts of a picture always release it.
 cdef enum:
     HELD_VERTICES = 1 << 15
-    HELD_PX = 1 << 14  # that are shaded
+    HELD_PX = 1 << 14  # shaded pixels
     HELD_DRAWN_PX = 1 << 24  # if each triangle covered the whole window
 
 VERTEX_BYTES = sizeof(tl_vertex)
-PLACED = TL_PLACED  # numbers of a vertex behind a transform that is not snapped
+PLACED = TL_PLACED  # numbers of a transformed vertex that is not snapped
 CELL_CLEAR = TL_CELL_CLEAR
 AREA_OVERFLOW = TL_AREA_OVERFLOW
 BLENDED_ROWS = TL_BLENDED_ROWS

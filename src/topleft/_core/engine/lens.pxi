@@ -1,4 +1,4 @@
-# Meshes behind a lens: vertices as it shows them, and triangles in parts with straight sides in its picture.
+# Meshes behind a lens: distorts vertices, and splits triangles into parts with straight sides in the picture.
 
 
 cdef class LensTable:
@@ -20,7 +20,7 @@ cdef class LensTable:
         self.lens.p[0], self.lens.p[1] = p
 
     def go_on_from(self, double limit, double cosine, double sine, double slope):
-        """Let the picture go on outwards evenly from an angle on."""
+        """Extend the lens linearly beyond an angle."""
         self.lens.limit, self.lens.limit_cosine, self.lens.limit_sine, self.lens.slope = limit, cosine, sine, slope
 
     def set_frame(self, double least_cosine, double cap_cosine, double cap_sine):
@@ -64,23 +64,23 @@ cdef class LensTable:
 
     def count_parts(self, const double[:, ::1] points, const float[:, ::1] records, const int32_t[:, ::1] triangles,
                     const int32_t[::1] ids, double near, int64_t most) -> tuple[int, int]:
-        """Return how many parts listed triangles have, up to `most` and a few, and how many points of their own."""
+        """Return how many parts listed triangles have, up to `most` and a few, and how many points the parts add."""
         cdef tl_bent_parts parts
         memset(&parts, 0, sizeof(parts))
         self.split(points, records, triangles, ids, near, most, &parts)
         return parts.n_parts, parts.n_points
 
     def write_parts(self, const double[:, ::1] points, const float[:, ::1] records, const int32_t[:, ::1] triangles,
-                    const int32_t[::1] ids, double near, int32_t[:, ::1] own, int32_t[::1] source,
-                    double[:, :, ::1] weights, uint8_t[:, ::1] is_outline, double[:, ::1] own_points):
-        """Write the parts that `count_parts` has counted; the first of their points is the vertex behind the last."""
+                    const int32_t[::1] ids, double near, int32_t[:, ::1] part_corners, int32_t[::1] source,
+                    double[:, :, ::1] weights, uint8_t[:, ::1] is_outline, double[:, ::1] part_points):
+        """Write the parts that `count_parts` has counted; their points are numbered from the number of vertices on."""
         cdef tl_bent_parts parts
         memset(&parts, 0, sizeof(parts))
-        if own.shape[0]:
-            parts.triangles, parts.source, parts.weights = &own[0, 0], &source[0], &weights[0, 0, 0]
+        if part_corners.shape[0]:
+            parts.triangles, parts.source, parts.weights = &part_corners[0, 0], &source[0], &weights[0, 0, 0]
             parts.is_outline, parts.first_point = &is_outline[0, 0], <int32_t>points.shape[0]
-            parts.points = &own_points[0, 0] if own_points.shape[0] else NULL
-            self.split(points, records, triangles, ids, near, own.shape[0], &parts)
+            parts.points = &part_points[0, 0] if part_points.shape[0] else NULL
+            self.split(points, records, triangles, ids, near, part_corners.shape[0], &parts)
 
     cdef void split(self, const double[:, ::1] points, const float[:, ::1] records, const int32_t[:, ::1] triangles,
                     const int32_t[::1] ids, double near, int64_t most, tl_bent_parts *parts):

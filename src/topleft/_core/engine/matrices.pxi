@@ -1,5 +1,5 @@
-# Small matrices, sines and roots, the same on every machine: sums in one order, no fused multiply-add, no library with
-# a last bit that depends on the processor.
+# Small matrices, sines and roots, bit for bit equal on every machine: sums in a fixed order, no fused multiply-add, no
+# library whose last bit depends on the processor.
 
 from libc.math cimport fabs, floor, fmod, frexp, ldexp, rint
 
@@ -47,7 +47,7 @@ def product(a: ArrayLike, b: ArrayLike) -> F64:
 
 
 cdef int invert(double[8] *rows, Py_ssize_t n) except -1:
-    """Turn the rows of a matrix (n, n), n at most 4, into those of its inverse, n numbers further on in each row."""
+    """Write the inverse of a matrix (n, n), n at most 4, into columns n to 2 n of `rows`; overwrites the matrix."""
     cdef Py_ssize_t i, j, k, best
     cdef double factor, pivot
     for i in range(n):
@@ -77,14 +77,14 @@ cdef int invert(double[8] *rows, Py_ssize_t n) except -1:
 
 def inverse(a: Array) -> F64:
     """Return the inverse of a float64 matrix (n, n), n at most 4; a LinAlgError if it is singular."""
-    cdef const double[:, :] given = as_numbers(a, 2)
-    cdef Py_ssize_t n = given.shape[0], i, j
+    cdef const double[:, :] matrix = as_numbers(a, 2)
+    cdef Py_ssize_t n = matrix.shape[0], i, j
     cdef double[4][8] rows
-    if given.shape[1] != n or n > 4:
+    if matrix.shape[1] != n or n > 4:
         raise ValueError(f"a matrix must be square, of 4 rows at most, got shape {np.shape(a)}")
     for i in range(n):
         for j in range(n):
-            rows[i][j] = given[i, j]
+            rows[i][j] = matrix[i, j]
     invert(rows, n)
     result = np.empty((n, n))
     cdef double[:, ::1] out = result
@@ -95,7 +95,7 @@ def inverse(a: Array) -> F64:
 
 
 cdef double determinant_of(const double[:, :] m) noexcept:
-    """That of the first three rows and columns."""
+    """The determinant of the first three rows and columns."""
     return (
         m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
         - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
@@ -112,7 +112,7 @@ def determinant(a: ArrayLike) -> float:
 
 
 cdef int handedness(const double[:, :] m) noexcept:
-    """1 of a matrix (4, 4) that is surely a pose, -1 of one that mirrors; 0 where the caller looks closer.
+    """1 of a matrix (4, 4) that is surely a pose, -1 of a pose that mirrors; 0 where the caller must test exactly.
 
     A pose is finite, ends in 0 0 0 1 and is regular: the least singular value of three rows is at least 2 |det| / |m|^2,
     in Frobenius' norm, and 1e-9 |m| is enough.
@@ -140,18 +140,18 @@ def are_mirrored(const double[:, :, :] poses) -> U8 | None:
     """Return 1 for each of poses (N, 4, 4) that mirrors; None unless all are surely poses."""
     cdef Py_ssize_t k
     cdef int hand
-    found = np.empty(poses.shape[0], np.uint8)
-    cdef uint8_t[::1] out = found
+    mirrors = np.empty(poses.shape[0], np.uint8)
+    cdef uint8_t[::1] out = mirrors
     for k in range(poses.shape[0]):
         hand = handedness(poses[k])
         if not hand:
             return None
         out[k] = hand < 0
-    return found
+    return mirrors
 
 
 cdef struct Rays:
-    # How a camera sees a space: rows of eye, four of rays, three to eye space, origin.
+    # A camera in a space: rows of the eye, four of rays, three of the matrix to eye space, the origin.
     bint has_perspective
     double[9][3] rows
     double scale
@@ -160,7 +160,7 @@ cdef struct Rays:
 @cython.cdivision(True)  # IEEE: no number where there is none
 cdef int find_rays(const double[:, ::1] clip_from_eye, const double[:, ::1] view, const double *center, double width, double height,
                    Rays *out) except -1:
-    """Find how a camera sees a space with its origin at `center`; `view`: (4, 4), to eye space."""
+    """Compute the `Rays` of a camera in a space with its origin at `center`; `view`: (4, 4), to eye space."""
     cdef double[4][4] clip
     cdef double[3] offset
     cdef double[4][8] rows
@@ -173,15 +173,15 @@ cdef int find_rays(const double[:, ::1] clip_from_eye, const double[:, ::1] view
                 total = total + clip_from_eye[i, k] * view[k, j]
             clip[i][j] = total
     out.has_perspective = clip[3][0] != 0.0 or clip[3][1] != 0.0 or clip[3][2] != 0.0
-    cdef int[3] own = [0, 1, 3 if out.has_perspective else 2]
+    cdef int[3] clip_rows = [0, 1, 3 if out.has_perspective else 2]
     for i in range(3):
         for j in range(3):
-            rows[i][j] = clip[own[i]][j]
+            rows[i][j] = clip[clip_rows[i]][j]
     invert(rows, 3)
     for i in range(3):
         total = 0.0
         for k in range(3):
-            total = total + rows[i][3 + k] * clip[own[k]][3]
+            total = total + rows[i][3 + k] * clip[clip_rows[k]][3]
         offset[i] = total
     # the corner, one column, one row and the whole depth, of clip space
     cdef double[4][3] ends = [[-1.0, 1.0, 1.0 if out.has_perspective else -1.0], [2.0 / width, 0.0, 0.0], [0.0, -2.0 / height, 0.0], [0.0, 0.0, 2.0]]
@@ -212,7 +212,7 @@ cdef int find_rays(const double[:, ::1] clip_from_eye, const double[:, ::1] view
 
 def camera_rays(const double[:, ::1] clip_from_eye, const double[:, ::1] view, const double[::1] center, double width,
                 double height) -> tuple[bool, F64, float]:
-    """Return how a camera sees a space with its origin at `center`, as `CameraRays` of _meshes/picture/look.py holds it.
+    """Return the fields of `CameraRays`, _meshes/picture/look.py, of a camera in a space with its origin at `center`.
 
     `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale.
     """
@@ -225,7 +225,7 @@ def camera_rays(const double[:, ::1] clip_from_eye, const double[:, ::1] view, c
 
 
 def stretches(const double[:, :, ::1] views) -> list[tuple[bool, F64 | None]]:
-    """Return whether each matrix (N, 4, 4) mirrors, and the stretch (4, 4) of those that are no rotation times a scale.
+    """Return whether each matrix (N, 4, 4) mirrors, and its stretch (4, 4) unless it is a rotation times a scale.
 
     The matrix times the inverse of the stretch is a rotation, and a translation.
     """
@@ -236,12 +236,12 @@ def stretches(const double[:, :, ::1] views) -> list[tuple[bool, F64 | None]]:
     cdef Py_ssize_t n
     cdef int i, j
     cdef bint is_fine
-    cdef list found = []
+    cdef list results = []
     for n in range(views.shape[0]):
         view = views[n]
         turn = determinant_of(view)
         if turn > 0.0 and keeps_angles(view):
-            found.append((False, None))
+            results.append((False, None))
             continue
         for i in range(3):
             for j in range(i, 3):
@@ -249,21 +249,21 @@ def stretches(const double[:, :, ::1] views) -> list[tuple[bool, F64 | None]]:
         for i in range(3):
             for j in range(2, i - 1, -1):  # the diagonal last
                 g[i][j] = rounded_beside(g[i][j], g[i][i] if i == j else sqrt(g[i][i] * g[j][j]))
-        made = np.eye(4)
-        stretch = made
+        factor = np.eye(4)
+        stretch = factor
         root_of(g, stretch)
         if turn < 0.0:
             for j in range(3):
                 stretch[0, j] = -stretch[0, j]
         is_fine = stretch[1, 1] > 0.0 and stretch[2, 2] > 0.0  # nor NaN
         if is_fine:
-            turned = product(view, inverse(made))
+            turned = product(view, inverse(factor))
             is_fine = keeps_angles(turned)
         for i in range(3 if not is_fine else 0):
             for j in range(3):
                 stretch[i, j] = view[i, j]
-        found.append((not turn > 0.0, made))
-    return found
+        results.append((not turn > 0.0, factor))
+    return results
 
 
 cdef bint keeps_angles(const double[:, ::1] view) noexcept:
@@ -290,7 +290,7 @@ cdef double rounded_beside(double number, double unit) noexcept:
 
 @cython.cdivision(True)  # IEEE: no number where there is none
 cdef void root_of(double[3] *g, double[:, ::1] out) noexcept:
-    """Write the upper triangular matrix that gives g if it is multiplied by its transpose from the left (Cholesky)."""
+    """Write the upper triangular matrix r with r^T r = g (Cholesky)."""
     cdef double a = sqrt(g[0][0])
     cdef double b = g[0][1] / a, c = g[0][2] / a
     cdef double d = sqrt(g[1][1] - b * b)
@@ -301,7 +301,7 @@ cdef void root_of(double[3] *g, double[:, ::1] out) noexcept:
 
 
 def row_products(a: ArrayLike, b: ArrayLike) -> F64:
-    """Return the products (N,) of rows of float64 arrays (N, 3) with a row, or each with the same row of the other."""
+    """Return the dot products (N,) of the rows of a float64 array (N, 3) with a vector, or with the rows of another."""
     cdef const double[:, :] left = as_numbers(a, 2)
     cdef const double[:, :] right = np.broadcast_to(as_numbers(b, np.ndim(b)), np.shape(a))
     cdef Py_ssize_t i, n = left.shape[0]
@@ -317,16 +317,16 @@ def row_products(a: ArrayLike, b: ArrayLike) -> F64:
 
 def length(vector: ArrayLike) -> float:
     """Return the root of the sum of the squares of a vector of float64."""
-    cdef const double[:] given = as_numbers(vector, 1)
+    cdef const double[:] numbers = as_numbers(vector, 1)
     cdef double total = 0.0
     cdef Py_ssize_t i
-    for i in range(given.shape[0]):
-        total = total + given[i] * given[i]
+    for i in range(numbers.shape[0]):
+        total = total + numbers[i] * numbers[i]
     return sqrt(total)
 
 
 def cosine_and_sine(double degrees) -> tuple[float, float]:
-    """Return the cosine and the sine of an angle in degrees; of whole quarters 0, 1 and -1 as they are."""
+    """Return the cosine and the sine of an angle in degrees; exact 0, 1 and -1 at multiples of 90."""
     cdef double turns = fmod(degrees, 360.0)
     cdef int quarter = <int>rint(turns / 90.0)
     cdef double x = (turns - 90.0 * quarter) * RADIANS_A_DEGREE, square = x * x
@@ -356,7 +356,7 @@ def cosine_and_sine(double degrees) -> tuple[float, float]:
 
 
 def log2(double a) -> float:
-    """Return the binary logarithm of a positive float64, within two of its last bits, or of those of 1."""
+    """Return the binary logarithm of a positive float64, within two units in the last place of it or of 1."""
     cdef int exponent, k
     cdef double m = frexp(a, &exponent), total = 0.0, t
     if m < 0.7071067811865476:
@@ -368,7 +368,7 @@ def log2(double a) -> float:
 
 
 def cube_root(double a) -> float:
-    """Return the cube root of a finite float64, within two of its last bits."""
+    """Return the cube root of a finite float64, within two units in the last place."""
     cdef int exponent, thirds, k
     cdef double m = frexp(fabs(a), &exponent), root = 1.0
     if a == 0.0:
@@ -382,7 +382,7 @@ def cube_root(double a) -> float:
 
 
 cdef double arc_tangent(double t) noexcept nogil:
-    """Of 0 to 1, in radians."""
+    """The arc tangent of 0 to 1, in radians."""
     cdef double square, total = 0.0
     cdef int k
     for k in range(2):  # of a quarter of the angle, 0.2 at most
@@ -394,24 +394,24 @@ cdef double arc_tangent(double t) noexcept nogil:
 
 
 def arc_sine(double sine) -> float:
-    """Return the angle in degrees, -90 to 90, of a sine of -1 to 1, within four of its last bits."""
+    """Return the angle in degrees, -90 to 90, of a sine of -1 to 1, within four units in the last place."""
     cdef double half = arc_tangent(fabs(sine) / (1.0 + sqrt((1.0 - sine) * (1.0 + sine))))
     cdef double angle = min(90.0, 2.0 * half / RADIANS_A_DEGREE)
     return -angle if sine < 0.0 else angle
 
 
-@cython.cdivision(True)  # 0 over 0 is no number, and is not read
+@cython.cdivision(True)  # 0 over 0 is NaN, and is not read
 def off_axis(points: ArrayLike) -> tuple[F64, F64]:
-    """Return the distances (N,) of points (N, 3) from the z axis, and their angles from where it points, in radians."""
-    cdef const double[:, :] given = as_numbers(points, 2)
-    cdef Py_ssize_t i, n = given.shape[0]
+    """Return the distances (N,) of points (N, 3) from the z axis, and their angles to the z axis, in radians."""
+    cdef const double[:, :] xyz = as_numbers(points, 2)
+    cdef Py_ssize_t i, n = xyz.shape[0]
     cdef double x, y, z, most, far
     distances, angles = np.empty(n), np.empty(n)
     cdef double[::1] off = distances
     cdef double[::1] angle = angles
     with nogil:
         for i in range(n):
-            x, y, z = given[i, 0], given[i, 1], given[i, 2]
+            x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             most = max(fabs(x), fabs(y))
             if most > 0.0 or most != most:
                 x, y = x / most, y / most

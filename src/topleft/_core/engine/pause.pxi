@@ -1,21 +1,21 @@
-# Ctrl-C while a kernel draws, and how a thread stops the others that draw for it. Included by kernels.pyx.
+# Polls for Ctrl-C while a kernel draws, and cancels the threads that draw parts of a picture. Included by kernels.pyx.
 
 cdef extern from *:
     """
     #include "topleft.h"
 
-    /* How a thread finds out that it is to stop. */
+    /* The state of a thread from which `poll` decides whether its kernel stops. */
     typedef struct {
-        tl_pause pause; /* the first: a pointer to it is one to all */
-        const int32_t *stop; /* a flag of the thread that it draws for, or NULL */
+        tl_pause pause; /* first: `poll` casts a pointer to it to tl_thread_pause */
+        const int32_t *stop; /* the flag of `Stop`, NULL in a thread that no `Stop` runs */
         int64_t polled_ns;
         int is_given_up;
     } tl_thread_pause;
 
-    static tl_thread_pause *own_pause(void)
+    static tl_thread_pause *state_of_thread(void)
     {
-        static _Thread_local tl_thread_pause own;
-        return &own;
+        static _Thread_local tl_thread_pause state;
+        return &state;
     }
 
     static int flag_is_set(const int32_t *stop) { return __atomic_load_n(stop, __ATOMIC_RELAXED); }
@@ -39,7 +39,7 @@ cdef extern from *:
         const int32_t *stop
         int64_t polled_ns
         int is_given_up
-    tl_thread_pause *own_pause() noexcept nogil
+    tl_thread_pause *state_of_thread() noexcept nogil
     bint flag_is_set(const int32_t *stop) noexcept nogil
     void set_flag(int32_t *stop) noexcept nogil
     int64_t clock_ns() noexcept nogil
@@ -68,45 +68,45 @@ cdef class Stop:
 
     def run(self, work: Callable[[], object]):
         """Call `work` in a thread that can be cancelled, which raises KeyboardInterrupt."""
-        cdef tl_thread_pause *own = own_pause()
-        cdef const int32_t *before = own.stop
-        own.stop = &self.is_set
+        cdef tl_thread_pause *state = state_of_thread()
+        cdef const int32_t *before = state.stop
+        state.stop = &self.is_set
         try:
             work()
         finally:
-            own.stop = before
+            state.stop = before
 
 
 def handle_signals_in(unsigned long thread, threads: object) -> None:
-    """Name the main thread, and where each has `kept` its scratch, which a signal handler that draws must not touch."""
+    """Set the main thread, and the thread-local object whose `kept` is the scratch that signal handlers must not use."""
     global main_thread, scratch
     main_thread, scratch = thread, threads
 
 
 cdef tl_pause *pause_of_thread() noexcept nogil:
-    cdef tl_thread_pause *own = own_pause()
-    if own.pause.poll == NULL:
-        own.pause.poll = poll
-    return &own.pause
+    cdef tl_thread_pause *state = state_of_thread()
+    if state.pause.poll == NULL:
+        state.pause.poll = poll
+    return &state.pause
 
 
 cdef int poll(tl_pause *pause) noexcept nogil:
-    """Tell whether to give up: a signal handler has raised, or the flag is set."""
-    cdef tl_thread_pause *own = <tl_thread_pause *>pause
+    """Return whether to give up: a signal handler has raised, or the flag is set."""
+    cdef tl_thread_pause *state = <tl_thread_pause *>pause
     cdef int64_t now
     pause.left_px = POLL_AFTER_PX
-    if own.is_given_up:
+    if state.is_given_up:
         pause.left_px = 0
-    elif own.stop != NULL:
-        own.is_given_up = flag_is_set(own.stop)
+    elif state.stop != NULL:
+        state.is_given_up = flag_is_set(state.stop)
     elif PyThread_get_thread_ident() == main_thread:
         now = clock_ns()
-        if now - own.polled_ns >= SIGNALS_AFTER_NS:
-            own.polled_ns = now
-            own.is_given_up = check_signals()
-    if own.is_given_up:
-        pause.left_px = 0  # the next poll says so at once
-    return own.is_given_up
+        if now - state.polled_ns >= SIGNALS_AFTER_NS:
+            state.polled_ns = now
+            state.is_given_up = check_signals()
+    if state.is_given_up:
+        pause.left_px = 0  # poll again at the next chance
+    return state.is_given_up
 
 
 cdef int check_signals() noexcept with gil:
@@ -114,7 +114,7 @@ cdef int check_signals() noexcept with gil:
     global pending_error
     kept = None
     try:
-        kept, scratch.kept = getattr(scratch, "kept", None), None  # no Python code, or the handlers would run before
+        kept, scratch.kept = getattr(scratch, "kept", None), None  # not in a Python function, which would run handlers
         PyErr_CheckSignals()
     except BaseException as error:
         pending_error = error
@@ -124,13 +124,13 @@ cdef int check_signals() noexcept with gil:
 
 
 cdef int raise_if_given_up() except -1:
-    """Raise the error for which a kernel of this thread has given up, if one has."""
+    """Raise the error for which a kernel of this thread has given up, if any."""
     global pending_error
-    cdef tl_thread_pause *own = own_pause()
-    if not own.is_given_up:
+    cdef tl_thread_pause *state = state_of_thread()
+    if not state.is_given_up:
         return 0
-    own.is_given_up, own.pause.left_px = 0, POLL_AFTER_PX
-    if own.stop != NULL:
+    state.is_given_up, state.pause.left_px = 0, POLL_AFTER_PX
+    if state.stop != NULL:
         raise KeyboardInterrupt
     error, pending_error = pending_error, None  # only the main thread checks signals
     raise error

@@ -1,4 +1,4 @@
-# Writes pixels that are not found by drawing triangles: means of samples, colours of layers, points, planes, lines, clouds.
+# Computes pixels from ids and samples, and draws lines and clouds: means, layers, slopes, texels, points, planes, PNG rows.
 
 
 cdef class Transfer:
@@ -17,7 +17,7 @@ cdef class Transfer:
 
 
 cdef class Palette:
-    """The colours of triangles, (T[, C]) uint8 or float32, and how those of samples become one."""
+    """The colours of triangles, (T[, C]) uint8 or float32, and the transfer that averages the samples of a pixel."""
 
     cdef const uint8_t[::1] colors
     cdef int n_channels
@@ -33,9 +33,9 @@ cdef class Palette:
         self.colors = as_bytes(colors)
 
     cdef void mean(self, const int32_t *labels, int sample_bits, int64_t stride, int64_t n, uint8_t *pixels, int64_t first) noexcept nogil:
-        """Write the means of n pixels from the first on: planes of labels lie `stride` apart."""
-        cdef const tl_transfer *own = NULL if self.transfer is None else &self.transfer.transfer
-        K.mean_flat(labels, sample_bits, stride, n, data(self.colors), self.n_channels, self.is_u8, own,
+        """Write the means of n pixels from pixel `first` on; `stride`: labels from plane to plane."""
+        cdef const tl_transfer *c_transfer = NULL if self.transfer is None else &self.transfer.transfer
+        K.mean_flat(labels, sample_bits, stride, n, data(self.colors), self.n_channels, self.is_u8, c_transfer,
                     &pixels[first * self.n_channels * (1 if self.is_u8 else 4)])
 
     def mean_flat(self, const int32_t[:, :, ::1] labels, pixels: Array, int64_t first_row, int64_t n_rows):
@@ -50,10 +50,10 @@ cdef class Palette:
 
 def fill_bands(meshes: Sequence[SnappedMesh], int32_t[:, ::1] labels, uint64_t[::1] covered, Palette palette,
                pixels: Array, ground: Array | None, Bins bins, int64_t first_band, int64_t end_band):
-    """Write the mean colours of samples over bands of (H, W[, C]) pixels: `meshes` is the mesh as each of them sees it.
+    """Write the mean colours of samples over bands of (H, W[, C]) pixels; `meshes`: the mesh, moved to each sample.
 
-    `labels`: memory for those of a band, (S, rows * W); `covered`: a bit for each pixel of it. `ground`: a row (W[, C]) that all
-    rows get first, or None.
+    `labels`: scratch for a band, (S, rows * W); `covered`: a bit for each pixel of a band. `ground`: a row (W[, C]) that
+    is copied to all rows first, or None.
     """
     cdef tl_snapped seen[16]
     cdef SnappedMesh mesh
@@ -106,11 +106,11 @@ def mean_colors(painted: Array, pixels: Array, int64_t first_row, int64_t n_rows
     cdef int is_u8 = painted.dtype == np.uint8
     cdef int64_t height = painted.shape[1], width = painted.shape[2], first
     cdef int sample_bits = int(painted.shape[0]).bit_length() - 1
-    cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+    cdef const tl_transfer *c_transfer = NULL if transfer is None else &transfer.transfer
     first = first_row * width * n_channels * (1 if is_u8 else 4)
     if n_rows and width:
         with nogil:
-            K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, own, &flat[first])
+            K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, c_transfer, &flat[first])
 
 
 def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_row, int64_t n_rows,
@@ -118,7 +118,7 @@ def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_r
               uint8_t[::1] pixels):
     """Composite layers, planes (K, H, W), into rows [first_row, first_row + n_rows) of a picture.
 
-    `colors`: of the triangles, or of the layers of these rows, (K, n_rows, W, n_channels) float32. `background` may be None.
+    `colors`: of the triangles, or of the layers of the rows, (K, n_rows, W, n_channels) float32. `background` may be None.
     """
     cdef tl_composite layers
     cdef int64_t width = ids.shape[2], n = n_rows * width
@@ -136,7 +136,7 @@ def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_r
 def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32_t[::1] slot,
                 const double[:, :, ::1] steps, const int32_t[:, ::1] rows, const float[:, ::1] values,
                 float[:, :, ::1] out):
-    """The kernel `fill_slopes`. `steps` (M, 3, 3) and `rows` (M, 3) are those of `tl_sloped`."""
+    """The kernel `fill_slopes`. `steps` (M, 3, 3) and `rows` (M, 3) are fields of `tl_sloped`."""
     cdef tl_sloped sloped
     cdef int64_t n = ids.shape[0]
     if n == 0 or values.shape[1] == 0:
@@ -155,19 +155,19 @@ def fill_texels(const float[:, ::1] texels, const int64_t[:, ::1] rows, codes: t
                 float[:, ::1] out):
     """The kernel `fill_texels`.
 
-    `rows` of (offset, width, height); `codes`: of the filter and of both wraps; `slopes`: or None.
+    `rows` of (offset, width, height); `codes`: of the filter and of both wraps; `slopes` may be None.
     """
     cdef tl_levels levels
-    cdef const float[:, :, ::1] own = slopes
+    cdef const float[:, :, ::1] slopes_view = slopes
     cdef int64_t n = ids.shape[0]
     if n == 0 or texels.shape[1] == 0:
         return
     levels.texels, levels.rows, levels.n_channels = &texels[0, 0], &rows[0, 0], <int>texels.shape[1]
-    levels.n_levels = 1 if own is None else <int>rows.shape[0]
+    levels.n_levels = 1 if slopes_view is None else <int>rows.shape[0]
     levels.filter, levels.wrap_u, levels.wrap_v = <tl_filter><int>codes[0], <tl_wrap><int>codes[1], <tl_wrap><int>codes[2]
     cdef const float *first = NULL
-    if own is not None:
-        first = &own[0, 0, 0]
+    if slopes_view is not None:
+        first = &slopes_view[0, 0, 0]
     with nogil:
         K.fill_texels(&levels, &ids[0], &uv[0, 0], first, background, n, &out[0, 0])
 
@@ -190,11 +190,11 @@ def halve_rows(const float[:, ::1] level, int64_t width, int64_t height, int64_t
 
 
 cdef class PixelPoints:
-    """`tl_points` of the instances of a picture: positions of vertices, and the kind of value that is found at a point."""
+    """`tl_points` of the instances of a picture: positions of vertices, and the kind of value to compute at points."""
 
     cdef tl_points points
     cdef tl_shaded_scene scene
-    cdef SnappedMesh mesh  # the first: all have its window
+    cdef SnappedMesh mesh  # the first mesh: all share its window
     cdef uint8_t[::1] instances
     cdef uint8_t[::1] meshes
     cdef object arrays
@@ -253,7 +253,7 @@ cdef class Valued:
         self.mesh.planes = &planes[0] if planes is not None else NULL
 
     def list_planes(self, int64_t first, int64_t end):
-        """The kernel `list_planes`. Those of all triangles must be there before `fill_planes`."""
+        """The kernel `list_planes`. `fill_planes` reads the planes of all triangles."""
         with nogil:
             K.list_planes(&self.mesh, first, end)
 
@@ -279,7 +279,7 @@ def list_edges(SnappedMesh mesh, int64_t[::1] starts, int32_t[::1] last_low, int
                uint64_t[::1] edges) -> int:
     """Write the edges of the triangles that are not culled; returns how many, -1 when an index is outside the vertices.
 
-    `edges` has room for three a triangle; the others are scratch, as in `tl_edge_scratch`.
+    `edges` has room for three a triangle; the other arrays are `tl_edge_scratch`.
     """
     cdef tl_edge_scratch scratch
     cdef int64_t n = 0, bad_row = -1
@@ -312,7 +312,7 @@ def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels,
 def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] sizes_fx or None, bint is_disc,
                int32_t x_fx, int32_t y_fx, Target target, origin: tuple[int, int], int subpixel_bits, int64_t first_row,
                int64_t n_rows):
-    """Clear rows of ids and depth and draw snapped points there, as the sample (x_fx, y_fx) off the centre sees them.
+    """Clear rows of ids and depth and draw snapped points into them; samples lie (x_fx, y_fx) off the centres of pixels.
 
     `sizes_fx`: a size each, or None: all have `size_fx`. Column 0 and row 0 of the target are the pixel `origin`.
     """
@@ -339,7 +339,7 @@ def png_room(int64_t n_rows, int64_t n_bytes) -> int:
 
 def encode_rows(const uint8_t[:, ::1] pixels, const uint8_t[::1] above, int pixel_bytes, uint32_t adler,
                 uint8_t[::1] row, uint8_t[::1] out) -> tuple[int, int]:
-    """The kernel `encode_rows`. `above`: the row before them. Returns Adler-32, too."""
+    """The kernel `encode_rows`. `above`: the row before the first. Returns Adler-32, too."""
     cdef tl_png_rows rows
     cdef int64_t n
     rows.pixels, rows.above = &pixels[0, 0], &above[0]

@@ -26,7 +26,7 @@ def snap_points(Source source, int64_t first, int64_t end, int bits, int grid_bi
 
 
 cdef class PieceScratch:
-    """Memory in which up to n_pieces parts of edges wait to be resolved: at least the edges of the largest polygon."""
+    """A buffer of n_pieces unresolved parts of edges: at least as many as the largest polygon has edges."""
 
     cdef tl_piece_scratch scratch
     cdef object arrays
@@ -41,7 +41,7 @@ cdef class PieceScratch:
 
 
 cdef class SnappedPolygons:
-    """Snapped polygons in a window: their rings, and how they are drawn."""
+    """Snapped polygons in a window: their rings, boxes and weights, and the kernels that draw them."""
 
     cdef tl_polygons set
     cdef uint8_t[::1] is_wide, is_simple
@@ -68,7 +68,7 @@ cdef class SnappedPolygons:
 
     @property
     def boxes_px(self) -> I32:
-        """The pixels that each polygon reaches into: left, top, right, bottom (P, 4), cut off at the window."""
+        """The boxes of the polygons in pixels: left, top, right, bottom (P, 4), clipped to the window."""
         return np.asarray(self.boxes)[: self.n_polygons]
 
     cdef tl_polygons asking(self) noexcept:
@@ -86,7 +86,7 @@ cdef class SnappedPolygons:
         return most
 
     def make_weights(self, int64_t max_crossings):
-        """Make room for the weights of rings that `certify` finds; where areas are exact, rings may cross so often."""
+        """Allocate the weights of rings that `certify` writes; `max_crossings`: as for `topleft.polygons`."""
         self.crossings_left = self.max_crossings = max_crossings
         self.set.crossings_left = &self.crossings_left
         self.weights, self.is_simple = np.zeros(self.n_rings + 1, np.int8), np.zeros(self.n_polygons + 1, np.uint8)
@@ -108,7 +108,7 @@ cdef class SnappedPolygons:
         return most
 
     def certify(self, int64_t first, int64_t end, int64_t[::1] room or None):
-        """Find out of polygons [first, end) whether their rings meet; without `room` they are trusted not to."""
+        """Test whether the rings of polygons [first, end) meet; without `room` they are assumed to stay apart."""
         cdef tl_polygons set = self.asking()
         cdef int64_t *words = &room[0] if room is not None else NULL
         with nogil:
@@ -127,7 +127,7 @@ cdef class SnappedPolygons:
         return np.asarray(self.weights)[: self.n_rings]
 
     def at_sample(self, int32_t sample_x_fx, int32_t sample_y_fx):
-        """Sample pixels at so many sub-pixels from their centre from now on."""
+        """Move the sample of pixels from their centre, in sub-pixels, for all further calls."""
         self.set.sample_x_fx, self.set.sample_y_fx = sample_x_fx, sample_y_fx
 
     def sort(self, int64_t band_rows, int64_t n_bands, int64_t[::1] starts, int32_t[::1] listed or None):
@@ -138,7 +138,7 @@ cdef class SnappedPolygons:
             K.sort_polygons(boxes, self.n_polygons, band_rows, n_bands, &starts[0], to)
 
     def mask_even_odd(self, int64_t polygon, uint8_t[:, ::1] out, int64_t top, int64_t bottom, int32_t[::1] bits):
-        """The kernel `mask_even_odd`. `bits`: those of the rows, 0."""
+        """The kernel `mask_even_odd`. `bits`: scratch for the rows, 0."""
         cdef tl_polygons set = self.asking()
         with nogil:
             K.mask_even_odd(&set, polygon, self.width, top, bottom, <uint64_t *>&bits[0], &out[0, 0])
@@ -146,7 +146,7 @@ cdef class SnappedPolygons:
 
     def mask_nonzero(self, int64_t polygon, uint8_t[:, ::1] out, int64_t top, int64_t bottom, uint32_t[::1] at,
                      int32_t[::1] room, int32_t[::1] cells, uint64_t[::1] bits):
-        """The kernel `mask_nonzero`. `cells`: a row, 0."""
+        """The kernel `mask_nonzero`. `cells`: scratch for a row, 0."""
         cdef tl_polygons set = self.asking()
         with nogil:
             K.mask_nonzero(&set, polygon, self.width, top, bottom, &at[0], &room[0], room.shape[0], &cells[0],
@@ -157,7 +157,7 @@ cdef class SnappedPolygons:
               bint waits, int64_t band_rows, const int64_t[::1] starts or None, const int32_t[::1] listed or None,
               int64_t first_band, int64_t end_band, int32_t[::1] cells, uint8_t[::1] scratch,
               PieceScratch pieces or None):
-        """Paint bands of rows: the background, then their polygons; without `listed` all of them."""
+        """Paint bands of rows: the background, then the polygons of the band in `listed`; without `listed` all polygons."""
         cdef tl_polygons set = self.asking()
         cdef tl_label_job job
         cdef int64_t band
@@ -178,9 +178,9 @@ cdef class SnappedPolygons:
     def add_shares(self, float[::1] pixels, const float[:, ::1] colors or None, int64_t band_rows,
                    const int64_t[::1] starts, const int32_t[::1] listed, int64_t first_band, int64_t end_band,
                    int32_t[::1] cells, PieceScratch pieces or None, bint is_alone):
-        """Add the shares of polygons to bands of rows, to at most 1; with colours (P, C) mix these in by them.
+        """Add the shares of polygons to bands of rows, to at most 1; with colours (P, C) blend the colours by the shares.
 
-        `is_alone`: the only polygon is drawn over the picture.
+        `is_alone`: the only polygon replaces the pixels of the bands.
         """
         cdef tl_polygons set = self.asking()
         cdef tl_share_job job
@@ -195,7 +195,7 @@ cdef class SnappedPolygons:
             for band in range(first_band, end_band):
                 job.top, job.bottom = band * band_rows, min((band + 1) * band_rows, self.height)
                 job.first, job.end = starts[band], starts[band + 1]
-                if is_alone:  # also where it is not
+                if is_alone:  # also in bands that the polygon does not reach
                     job.listed, job.first, job.end = NULL, 0, 1
                 K.share_polygons(&set, &job)
         self.raise_if_given_up()

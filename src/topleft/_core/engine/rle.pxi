@@ -8,10 +8,10 @@ def list_runs(pixels: Array, box: tuple[int, int, int, int], corner: tuple[int, 
               int64_t n) -> tuple[int, int]:
     """Append the runs of pictures (N, H, W), of int32 or bytes, to a table of n: rows (start, end, key).
 
-    `box`: left, top, right and bottom of the part to read of each; `corner`: where pixel (0, 0) of each lies in the
-    frame, x and y, and the height of the frame. `rows`: RLE_LINE numbers for each row of the box. The key of int32 pixels is their value, and those of the background are
-    left out; that of bytes, 0 and 1, is first_key and the number of their picture. Returns the number of runs, and the
-    first picture for which there is no room.
+    `box`: left, top, right and bottom of the part to read of each picture; `corner`: x and y of pixel (0, 0) in the
+    frame, and the height of the frame. `rows`: RLE_LINE numbers for each row of the box. The key of int32 pixels is
+    their value, and the background has no runs; the key of bytes, 0 and 1, is first_key plus the index of the picture.
+    Returns the number of runs, and the first picture for which there is no room.
     """
     cdef const uint8_t[::1] raw = as_bytes(pixels)
     cdef tl_run_source source

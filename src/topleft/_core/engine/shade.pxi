@@ -1,7 +1,7 @@
 # Shades pixels and tests their alpha: textures, materials and lights, and the passes that use them.
 
 cdef class Mipmap:
-    """A picture of linear light and its halves: uint16 texels as `tl_texture` has them, a row (offset, width, height) a level."""
+    """`tl_texture`: uint16 texels of linear light, a row (offset, width, height) for each mip level."""
 
     cdef tl_texture texture
     cdef object texels
@@ -25,7 +25,7 @@ cdef class Mipmap:
 
 
 cdef class Surroundings:
-    """Light from all around, as `tl_surroundings` has it; texels (N, 4) of a picture, a row (offset, size) a level, or None."""
+    """`tl_surroundings`: texels (N, 4) of an environment map, a row (offset, size) for each mip level; or None."""
 
     cdef tl_surroundings surroundings
     cdef object texels
@@ -119,29 +119,29 @@ cdef class ShadingTable:
         self.shading.materials, self.shading.n_materials = m, len(materials)
 
     cdef ShadingTable seen(self, const double[:, ::1] clip_from_eye, const double[:, ::1] view, double width, double height):
-        """Return the same, seen by a camera in a whole picture of this size; `view`: (4, 4), to eye space."""
-        cdef ShadingTable own = ShadingTable.__new__(ShadingTable)
-        cdef tl_shading *s = &own.shading
+        """Return the table for a camera and the size of its whole picture; `view`: (4, 4), to eye space."""
+        cdef ShadingTable table = ShadingTable.__new__(ShadingTable)
+        cdef tl_shading *s = &table.shading
         cdef int i, k
-        own.shading, own.materials, own.arrays = self.shading, self.materials, self.arrays
-        own.center = self.center
-        find_rays(clip_from_eye, view, self.center, width, height, &own.rays)
-        s.has_perspective = own.rays.has_perspective
+        table.shading, table.materials, table.arrays = self.shading, self.materials, self.arrays
+        table.center = self.center
+        find_rays(clip_from_eye, view, self.center, width, height, &table.rays)
+        s.has_perspective = table.rays.has_perspective
         for k in range(3):
-            s.eye[k] = <float>own.rays.rows[0][k]
+            s.eye[k] = <float>table.rays.rows[0][k]
             for i in range(4):
-                s.ray[i][k] = <float>own.rays.rows[1 + i][k]
+                s.ray[i][k] = <float>table.rays.rows[1 + i][k]
             for i in range(3):
-                s.eye_from[i][k] = <float>own.rays.rows[5 + i][k]
-        return own
+                s.eye_from[i][k] = <float>table.rays.rows[5 + i][k]
+        return table
 
     @property
     def camera_rays(self) -> tuple[bool, F64, float]:
-        """Return `camera_rays` of the camera that sees it."""
+        """Return `camera_rays` of the table's camera."""
         return self.rays.has_perspective, np.array([[self.rays.rows[i][k] for k in range(3)] for i in range(9)]), self.rays.scale
 
     cdef void set_headlight(self, const double *at, float color, float ambient) noexcept:
-        """Take one light in a direction of eye space, which wraps round surfaces, and light from all sides."""
+        """Set a wrapped light in a direction of eye space, and ambient light."""
         cdef double total
         cdef int i, k
         for i in range(3):
@@ -153,10 +153,10 @@ cdef class ShadingTable:
         self.headlight.kind, self.headlight.falloff = <tl_light_kind>2, 0.0
         self.shading.lights, self.shading.n_lights = &self.headlight, 1
 
-    @cython.cdivision(True)  # IEEE: no number where there is none
+    @cython.cdivision(True)  # IEEE: NaN for 0 / 0
     cdef int set_lights(self, const double[:, ::1] lights, const double[:, ::1] world_from_mesh,
                         float ambient, tl_light *light) except -1:
-        """Take lights as they are in the world or in eye space, and light from all sides.
+        """Set lights of the world or of eye space, and ambient light.
 
         Parameters
         ----------
@@ -164,9 +164,9 @@ cdef class ShadingTable:
             Rows (kind, x, y, z, falloff, red, green, blue, direction of a spot (3), cone scale, cone offset, whether it
             is in eye space).
         world_from_mesh
-            (4, 4): where the mesh stands.
+            (4, 4): the pose of the mesh.
         light
-            Room for them.
+            Room for `lights`.
         """
         cdef Py_ssize_t n = lights.shape[0], i, j, k
         cdef double[4][8] rows
@@ -215,19 +215,19 @@ cdef class ShadingTable:
         return 0
 
     cdef void from_eye(self, double *way) noexcept:
-        """Turn what is in eye space to shading space, but for the scale."""
-        cdef double[3] given = [way[0], way[1], way[2]]
+        """Rotate a vector from eye space to shading space."""
+        cdef double[3] vector = [way[0], way[1], way[2]]
         cdef double total
         cdef Py_ssize_t i, j
         for i in range(3):
             total = 0.0
             for j in range(3):
-                total = total + self.rays.rows[5 + j][i] * given[j]
+                total = total + self.rays.rows[5 + j][i] * vector[j]
             way[i] = total
 
     @cython.cdivision(True)
     cdef void direct(self, double *way, bint in_eye) noexcept:
-        """Make a direction of the mesh, or of eye space, a unit vector of shading space."""
+        """Convert a direction of the mesh, or of eye space, to a unit vector of shading space."""
         cdef double total = 0.0
         cdef Py_ssize_t i
         if in_eye:
@@ -239,13 +239,13 @@ cdef class ShadingTable:
             way[i] = way[i] / total
 
     def set_surroundings(self, Surroundings surroundings):
-        """Take the light that comes from all around."""
+        """Set the environment light."""
         self.arrays += (surroundings,)
         self.shading.surroundings = &surroundings.surroundings
 
     def set_picture(self, int show, Mipmap matcap or None, background: Sequence[float], background_bytes: Sequence[int],
                     bint wants_opacity):
-        """Take the quantity that the picture shows, its background, and whether its alpha is the opacity of full materials."""
+        """Set the quantity to show, the background, and whether alpha is the opacity of full materials."""
         cdef tl_shading *s = &self.shading
         cdef int k
         s.show, s.wants_opacity = <tl_show>show, wants_opacity
@@ -257,13 +257,13 @@ cdef class ShadingTable:
         self.set_fog((0, 0, 0), 0, 0, 0, 0)
 
     def set_turn(self, eye_from: Sequence[Sequence[float]]):
-        """Take the rows of a matrix (3, 3) that takes normals to the space that they are told in."""
+        """Set the rows of a matrix (3, 3) from shading space to the space of the written normals."""
         cdef int k
         for k in range(3):
             copy_floats(self.shading.eye_from[k], eye_from[k], 3)
 
     def set_fog(self, color: Sequence[float], float near, float scale, float distance_start, float distance_scale):
-        """Take the depth cue."""
+        """Set the depth cue."""
         cdef tl_shading *s = &self.shading
         copy_floats(s.fog_color, color, 3)
         s.fog_near, s.fog_scale, s.distance_start, s.distance_scale = near, scale, distance_start, distance_scale
@@ -272,60 +272,60 @@ cdef class ShadingTable:
 def see(meshes: Sequence[SnappedMesh], kept: Sequence[ShadingTable], const double[:, ::1] clip_from_eye,
         const double[:, :, ::1] views, bint has_w, bint finds_inverse_w, double width, double height,
         empty: Callable[..., Array]) -> list[ShadingTable]:
-    """Return the tables of meshes as a camera sees them in a whole picture of this size.
+    """Return the tables of meshes for a camera and the size of its whole picture.
 
-    `views`: (N, 4, 4), to eye space. `has_w`: with perspective; `finds_inverse_w`: 1/w is found for the vertices that
-    show, where it can be; otherwise for all, in memory of `empty(shape, dtype)`.
+    `views`: (N, 4, 4), to eye space. `has_w`: with perspective; `finds_inverse_w`: shading computes 1/w of visible
+    vertices where a mesh allows it; otherwise 1/w of all vertices is written here, to `empty(shape, dtype)`.
     """
     cdef int64_t i, first = 0, n = 0
     cdef SnappedMesh mesh
-    cdef ShadingTable own
+    cdef ShadingTable table
     cdef float[:, ::1] rows
     cdef const double[:, ::1] view
     cdef const uint8_t[::1] finds = np.array([finds_inverse_w and (<SnappedMesh>mesh).can_find_inverse_w for mesh in meshes], np.uint8)
-    cdef list found = []
+    cdef list tables = []
     for i in range(len(meshes)):
-        own = kept[i]
-        n += 0 if not has_w or finds[i] else own.n_vertices
+        table = kept[i]
+        n += 0 if not has_w or finds[i] else table.n_vertices
     if n:
         rows = empty((n, 4), np.float32)
     for i in range(len(meshes)):
-        mesh, own = meshes[i], kept[i]
-        n = own.n_vertices
+        mesh, table = meshes[i], kept[i]
+        n = table.n_vertices
         view = views[i]
-        own = own.seen(clip_from_eye, view, width, height)
-        own.shading.finds_inverse_w = has_w and finds[i]
+        table = table.seen(clip_from_eye, view, width, height)
+        table.shading.finds_inverse_w = has_w and finds[i]
         if has_w and not finds[i] and n:
             set_inverse_w(mesh, (<ShadingTable>kept[i]).normals[:n], rows[first:first + n])
-            own.arrays, own.shading.normals = (own.arrays, rows), &rows[first, 0]
+            table.arrays, table.shading.normals = (table.arrays, rows), &rows[first, 0]
             first += n
-        found.append(own)
-    return found
+        tables.append(table)
+    return tables
 
 
 def light_all(tables: Sequence[ShadingTable], const double[:, ::1] lights or None, to_headlight: Any, float ambient,
               const double[:, :, ::1] places):
-    """Light the meshes of tables by rows of `ShadingTable.set_lights`, or by a headlight; and from all sides.
+    """Set the lights of tables, rows as in `ShadingTable.set_lights`, or a headlight; and ambient light.
 
-    `places`: (N, 4, 4), where each mesh stands.
+    `places`: (N, 4, 4), the poses of the meshes.
     """
     cdef double[3] at = to_headlight
     cdef int64_t i, n = lights.shape[0] if lights is not None else 0
     cdef uint8_t[::1] room = np.zeros(max(1, n * len(tables)) * sizeof(tl_light), np.uint8)
-    cdef ShadingTable own
+    cdef ShadingTable table
     for i in range(len(tables)):
-        own = tables[i]
+        table = tables[i]
         if lights is None:
-            own.set_headlight(at, max(0.0, 1.0 - ambient), ambient)
+            table.set_headlight(at, max(0.0, 1.0 - ambient), ambient)
         else:
-            own.lights = room
-            own.set_lights(lights, places[i], ambient, <tl_light *>&room[0] + i * n)
+            table.lights = room
+            table.set_lights(lights, places[i], ambient, <tl_light *>&room[0] + i * n)
 
 
 cdef int set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out) except -1:
-    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped.
+    """Copy rows of four numbers, a row a vertex, and write 1/w over the fourth, for all snapped vertices.
 
-    Those of a `UnprojectedMesh` are written when it is drawn.
+    `UnprojectedMesh` writes its rows when it is drawn.
     """
     cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
     if isinstance(mesh, UnprojectedMesh):
@@ -352,7 +352,7 @@ cdef int set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1]
 
 
 cdef enum:
-    PROJECTED_BLOCK = 1 << 12  # vertices that are projected before a look whether one of them is clipped
+    PROJECTED_BLOCK = 1 << 12  # vertices that are projected between two tests for clipped vertices
 
 
 cdef class UnprojectedMesh(SnappedMesh):
@@ -361,7 +361,7 @@ cdef class UnprojectedMesh(SnappedMesh):
     cdef tl_projected projected
 
     cdef bint project(self) noexcept nogil:
-        """Project the vertices with their 1/w; tells whether all of them are drawn where they lie."""
+        """Project the vertices and their 1/w; returns False where a vertex is bad, wide or clipped."""
         cdef const tl_source *source = self.snapped.mesh.source
         cdef tl_vertex_counts counts
         cdef int64_t i
@@ -374,7 +374,7 @@ cdef class UnprojectedMesh(SnappedMesh):
 
 
 cdef class ShadedScene:
-    """The instances of a picture as kernels shade them; keeps their arrays alive."""
+    """`tl_shaded_scene` of the instances of a picture; keeps their arrays alive."""
 
     cdef tl_shaded_scene scene
     cdef SnappedMesh mesh  # the first: all have its window
@@ -406,14 +406,14 @@ cdef class ShadedScene:
         cdef uint8_t *picture = &pixels[0, 0, 0]
         cdef bint is_drawn
         if mesh.snapped.mesh.n_vertices < HELD_VERTICES and target.height * target.width <= HELD_PX:
-            is_drawn = self.draw_waiting(mesh, &window, &rows, picture)
+            is_drawn = self.draw_unprojected(mesh, &window, &rows, picture)
         else:
             with nogil:
-                is_drawn = self.draw_waiting(mesh, &window, &rows, picture)
+                is_drawn = self.draw_unprojected(mesh, &window, &rows, picture)
         raise_if_given_up()
         return is_drawn
 
-    cdef bint draw_waiting(self, UnprojectedMesh mesh, const tl_window *window, const tl_target *rows, uint8_t *pixels) noexcept nogil:
+    cdef bint draw_unprojected(self, UnprojectedMesh mesh, const tl_window *window, const tl_target *rows, uint8_t *pixels) noexcept nogil:
         cdef tl_slice slice = no_slice()
         slice.end, slice.is_first, slice.is_last = mesh.snapped.n_triangles, True, True
         if not mesh.project() or K.draw_mesh(&mesh.snapped, window, rows, &slice) >= 0:

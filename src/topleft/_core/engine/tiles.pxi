@@ -1,9 +1,9 @@
-# Windows of huge rasters: which triangles each of them needs; visibility buffers put together. Included by kernels.pyx.
+# Windows of huge rasters: lists the triangles of each window, merges visibility buffers. Included by kernels.pyx.
 
 
 def list_spans(tiling: tuple[int, int, int, int, int], const double[:, :, ::1] corners_px, int64_t first_triangle,
                int32_t[:, ::1] boxes, int64_t[::1] starts, int32_t[:, ::1] spans or None) -> int:
-    """The kernel `list_spans`. `tiling`: width and height of the raster, those of a window, sub-pixel bits."""
+    """The kernel `list_spans`. `tiling`: width and height of the raster and of a window, sub-pixel bits."""
     cdef tl_tiling t
     cdef int64_t bad = -1
     cdef tl_window_span *out = NULL
@@ -43,14 +43,14 @@ def count_windows(const int32_t[:, ::1] spans, const int64_t[::1] starts, int32_
 
 
 cdef class StridedMesh:
-    """The vertices and the triangles of a mesh where they lie, in memory or in a mapped file."""
+    """The vertices and the triangles of a mesh in memory or in a mapped file, with strides."""
 
     cdef tl_corners mesh
     cdef Py_buffer points, triangles
     cdef int64_t n_triangles
 
     def __cinit__(self, points: Array, triangles: Array):
-        """`points`: (V, C), `triangles`: (T, 3) int32 or int64; the numbers of a row lie side by side."""
+        """`points`: (V, C), `triangles`: (T, 3) int32 or int64; each row is contiguous."""
         PyObject_GetBuffer(points, &self.points, PyBUF_STRIDED_RO)
         PyObject_GetBuffer(triangles, &self.triangles, PyBUF_STRIDED_RO)
         self.mesh.points, self.mesh.point_stride = <const char *>self.points.buf, self.points.strides[0]
@@ -64,9 +64,9 @@ cdef class StridedMesh:
         PyBuffer_Release(&self.triangles)
 
     def take(self, const int32_t[::1] which or None, int64_t first, uint8_t[::1] out) -> int:
-        """Copy the corners of some triangles, or of those from `first` on; `out` says how many.
+        """Copy the corners of the triangles `which`, or of the triangles from `first` on; `out` sets how many.
 
-        Returns the first that names a vertex that does not exist, or -1.
+        Returns the first triangle with an index outside the vertices, or -1.
         """
         cdef int64_t n = out.shape[0] // (3 * self.mesh.point_bytes), bad = -1
         if n:

@@ -2,7 +2,7 @@
 
 
 cdef inline tl_slice no_slice() noexcept nogil:
-    """A slice of nothing, of no clusters, that lists nothing."""
+    """An empty slice, without clusters or lists."""
     cdef tl_slice slice
     memset(&slice, 0, sizeof(slice))
     return slice
@@ -23,7 +23,7 @@ cdef class SnappedMesh:
     def __init__(self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide or None,
                  const int32_t[:, ::1] triangles, Pieces pieces or None, how: tuple[int, int, int, int, int, int],
                  Viewport viewport or None, const uint8_t[::1] is_used=None, UnsnappedPoints exact=None):
-        """`how`: that of a view, see `topleft._core.raster.view.RasterState`; with `exact` there are no records."""
+        """`how`: of `topleft._core.raster.view.RasterState`; with `exact` there are no records."""
         cdef int test
         self.viewport, self.is_used, self.exact = viewport, is_used, exact
         self.arrays = (source, records, wide, triangles, pieces)
@@ -48,11 +48,11 @@ cdef class SnappedMesh:
 
     @property
     def n_triangles(self) -> int:
-        """Triangles of the mesh, before any of them is cut."""
+        """How many triangles the mesh has, before clipping."""
         return self.snapped.n_triangles
 
     def at_sample(self, int32_t x_fx, int32_t y_fx) -> SnappedMesh:
-        """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
+        """Return the mesh with its samples off the centres of the pixels, in sub-pixels."""
         if self.snapped.mesh.sample_x_fx == x_fx and self.snapped.mesh.sample_y_fx == y_fx:
             return self
         cdef SnappedMesh seen = self.copy()
@@ -60,13 +60,13 @@ cdef class SnappedMesh:
         return seen
 
     def numbered_from(self, int32_t first_id) -> SnappedMesh:
-        """Return the same mesh with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
+        """Return the mesh with ids that begin at `first_id` in the buffers that `draw` fills."""
         cdef SnappedMesh named = self.copy()
         named.snapped.first_id = first_id
         return named
 
     def named(self, const int32_t[::1] names) -> SnappedMesh:
-        """Return the same mesh with other ids in the buffers that `draw` fills: triangle i is called names[i]."""
+        """Return the mesh with the id names[i] for triangle i in the buffers that `draw` fills."""
         cdef SnappedMesh named = self.copy()
         named.snapped.names = &names[0] if names.shape[0] else NULL
         named.arrays = (self.arrays, names)
@@ -78,7 +78,7 @@ cdef class SnappedMesh:
         return self.snapped.names != NULL or self.snapped.first_id != 0
 
     def moved(self, int64_t x_px, int64_t y_px) -> SnappedMesh:
-        """Return the same mesh behind a window that begins x_px columns and y_px rows later."""
+        """Return the mesh in a window that begins x_px columns and y_px rows later."""
         cdef SnappedMesh part = self.copy()
         part.x_px += x_px
         part.y_px += y_px
@@ -86,14 +86,14 @@ cdef class SnappedMesh:
 
     @property
     def can_find_inverse_w(self) -> bool:
-        """Whether shading finds 1/w of the vertices that show, from their positions."""
+        """Whether shading can compute 1/w of visible vertices from their positions."""
         cdef const tl_source *source = self.snapped.mesh.source
         return source != NULL and source.matrix != NULL
 
     def with_inverse_w(self, int64_t n_pixels, empty: Callable[..., Array] = np.empty) -> SnappedMesh:
-        """Return the same mesh with 1/w of all vertices at hand, if so many pixels ask for enough of them.
+        """Return the mesh with 1/w of all vertices computed, where `n_pixels` are enough to repay it.
 
-        `empty(shape, dtype)` gives memory for them.
+        `empty(shape, dtype)` allocates the array.
         """
         cdef const tl_source *source = self.snapped.mesh.source
         cdef double[::1] inv_w
@@ -130,14 +130,14 @@ cdef class SnappedMesh:
         return w
 
     def guess_seen(self, int64_t width, int64_t height) -> tuple[float, float, float]:
-        """Return about how many triangles reach into the picture, how often they cover each pixel, and their rows in all.
+        """Estimate how many triangles reach into the picture, how often they cover each pixel, and the sum of their rows.
 
-        From the boxes and areas of up to 128 of them; one with a vertex that is wide or outside of a clip plane counts as
-        if it covered the picture.
+        From the boxes and areas of up to 128 triangles; a triangle with a vertex that is wide or outside of a clip plane
+        counts as if it covered the picture.
         """
         cdef const tl_vertex *v = self.snapped.mesh.vertices
         cdef const int32_t *t = self.snapped.triangles
-        cdef const int32_t *given
+        cdef const int32_t *corners
         cdef const double *points = NULL
         cdef int64_t n_triangles = self.snapped.n_triangles, last = self.snapped.mesh.n_vertices - 1, n, i, k, n_seen = 0, stride = 0
         cdef double left = self.x_px, top = self.y_px, right = left + width, bottom = top + height, cols, rows
@@ -151,9 +151,9 @@ cdef class SnappedMesh:
             points, stride = self.exact.points.points, self.exact.points.stride
         n = min(n_triangles, 128)
         for i in range(n):
-            given, is_wide = t + 3 * (i * n_triangles // n), False
+            corners, is_wide = t + 3 * (i * n_triangles // n), False
             for k in range(3):
-                at = given[k]  # read once: another thread may write it
+                at = corners[k]  # read once: another thread may write it
                 if not 0 <= at <= last:
                     return 0.0, 0.0, 0.0  # an error that draw finds
                 if points != NULL:
@@ -178,7 +178,7 @@ cdef class SnappedMesh:
         return n_seen * each, total * each / n_pixels, n_rows * each
 
     def guess_scatter(self, int64_t n_rows) -> float:
-        """Return the share of triangles that are taller than `n_rows` or lie farther from the next, from up to 64 of them.
+        """Estimate, from up to 64 triangles, the share that spans more than `n_rows` together with the next triangle.
 
         0 where vertices are not snapped.
         """
@@ -191,7 +191,7 @@ cdef class SnappedMesh:
         for i in range(n):
             t = self.snapped.triangles + 3 * (i * (self.snapped.n_triangles - 1) // n)
             low, high = 2.0**62, -2.0**62
-            for k in range(4):  # its corners, and one of the next
+            for k in range(4):  # the corners of triangle i, and a corner of the next
                 if 0 <= t[k] <= last:
                     low, high = min(low, <double>v[t[k]].y_fx), max(high, <double>v[t[k]].y_fx)
             n_far += high - low > far
@@ -224,7 +224,7 @@ cdef class SnappedMesh:
                 K.drop_sides(&self.snapped, &is_single[0], first, end, &triangles[0, 0])
 
     def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True) -> int:
-        """Draw rows of a picture, which the first of several meshes clears and the last one finishes.
+        """Draw rows of a picture; the first of several meshes clears them, the last mesh finishes them.
 
         Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
         """
@@ -250,9 +250,9 @@ cdef class SnappedMesh:
 
     def draw_slice(self, Target target, int64_t first_row, int64_t n_rows, int64_t first,
                    int32_t[::1] outside) -> tuple[int, int]:
-        """Clear rows of a picture and draw there the triangles from `first` on for which `outside` has room, 16 numbers left.
+        """Clear rows of a picture and draw the triangles from `first` on, as many as `outside` has room for, less 16.
 
-        Triangles that reach other rows are listed in `outside`; returns the first bad row or -1, and their number.
+        `outside` lists the triangles that reach other rows; returns the first bad row or -1, and how many are listed.
         """
         cdef tl_window picture = self.window(0, target.height, target.width)
         cdef tl_slice slice = no_slice()
@@ -272,8 +272,8 @@ cdef class SnappedMesh:
                   bint is_clamped, Bins bins=None) -> int:
         """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
 
-        `cells`: those of these rows, clear. `bins`: have the triangles of these rows, which are a band; None: all are
-        looked at. Returns as `draw` does, or AREA_OVERFLOW when the cells must be wide.
+        `cells`: of the rows, clear. `bins`: the rows are a band of it; None: all triangles are tested. Returns as `draw`
+        does, or AREA_OVERFLOW when the cells must be wide.
         """
         cdef tl_slice slice = no_slice()
         cdef tl_area target
@@ -293,7 +293,7 @@ cdef class SnappedMesh:
 
     def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row,
               int64_t n_rows, bint is_flat, bint is_u8, int n_channels, const uint8_t[::1] ground=None):
-        """Colour the rows [first_row, first_row + n_rows) by their labels; `ground`, of flat ones: the colour elsewhere."""
+        """Colour the rows [first_row, first_row + n_rows) by their labels; `ground`, with flat colours: the background."""
         cdef int64_t width = labels.shape[1]
         cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
         cdef const void *under = data(ground) if ground is not None else NULL
@@ -312,9 +312,12 @@ cdef class SnappedMesh:
               int n_channels, bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows,
               const uint8_t[::1] ground or None, int32_t[::1] packed or None, int32_t[::1] cells or None,
               bint is_large_shapes=False) -> int:
-        """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
+        """Blend the colours of triangles, in their order, into rows [first_row, first_row + n_rows) of a picture.
 
-        `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. `is_large_shapes`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows. Returns as `draw` does.
+        `band_rows`: rows of a band, which is finished before the next. `ground`: the colour that the rows are cleared to,
+        or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas.
+        `is_large_shapes`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows.
+        Returns as `draw` does.
         """
         cdef tl_canvas canvas
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -336,15 +339,15 @@ cdef class SnappedMesh:
         return bad_row
 
     def is_large_shapes(self, int64_t width, int64_t height, int n_samples, int most) -> bool:
-        """Tell whether a picture of the mesh is to be written row by row: large triangles, which are snapped.
+        """Return whether to write a picture of the mesh row by row: large, snapped triangles.
 
-        `most`: SHAPES_OF_BITS, SHAPES_STORED or SHAPES_LABELLED, by the other way to draw it.
+        `most`: SHAPES_OF_BITS, SHAPES_STORED or SHAPES_LABELLED, by the path that would draw it otherwise.
         """
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
         return self.snapped.mesh.exact == NULL and tl_is_large_shapes(n, n_samples, width, height, <tl_shape_limit>most)
 
     def blends_large_shapes(self, int64_t width, int64_t height) -> bool:
-        """Tell whether flat colours are to be blended over a background row by row: large triangles, which are snapped."""
+        """Return whether to blend flat colours over a background row by row: large, snapped triangles."""
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
         return self.snapped.mesh.exact == NULL and tl_shapes_are_blended(n, width, height)
 
@@ -356,14 +359,14 @@ cdef class SnappedMesh:
         cdef tl_window window = self.window(first_row, n_rows, width)
         cdef uint8_t[::1] flat = as_bytes(pixels)
         cdef const uint8_t[::1] palette = as_bytes(colors)
-        cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+        cdef const tl_transfer *c_transfer = NULL if transfer is None else &transfer.transfer
         cdef int sample_bits = int(samples_fx.shape[0]).bit_length() - 1
         memset(&canvas, 0, sizeof(canvas))
         canvas.n_channels, canvas.is_u8 = 1 if pixels.ndim == 2 else pixels.shape[2], pixels.dtype == np.uint8
         canvas.pixels = &flat[first_row * width * canvas.n_channels * (1 if canvas.is_u8 else 4)]
         canvas.stride_px, canvas.colors, canvas.ground, canvas.is_flat = width, data(palette), &ground[0], True
         with nogil:
-            bad_row = K.fill_large_shapes(&self.snapped, &window, &canvas, &samples_fx[0, 0], sample_bits, own)
+            bad_row = K.fill_large_shapes(&self.snapped, &window, &canvas, &samples_fx[0, 0], sample_bits, c_transfer)
         raise_if_given_up()
         return bad_row
 
@@ -398,7 +401,7 @@ cdef class Bins:
 
     def __init__(self, SnappedMesh mesh, int64_t height, int64_t width, int32_t reach_fx, int band_bits,
                  int32_t[:, ::1] room):
-        """`room`: (3, n_triangles + 16), or 5 rows of them, to know the columns of each band, too.
+        """`room`: (3, n_triangles + 16), or (5, n_triangles + 16) for the columns of each band, too.
 
         `bad_row` is -1, or a triangle has an index outside the vertices.
         """
@@ -420,17 +423,17 @@ cdef class Bins:
                     K.find_columns(&self.bins, self.n_bands, &self.columns[0, 0])
 
     def fill(self, int32_t[::1] listed):
-        """Sort the triangles into `listed`, which has room for `n_listed` and one more."""
+        """Sort the triangles into `listed`, which has room for `n_listed` + 1."""
         self.listed = listed
         with nogil:
             K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
 
     cdef void take(self, tl_slice *slice, int64_t band) noexcept:
-        """Make the triangles of a band those of a slice."""
+        """Set the triangles of a slice to a band's."""
         slice.ids, slice.end = &self.listed[0] + self.starts[band], self.starts[band + 1] - self.starts[band]
 
     cdef const int32_t *backwards(self, int64_t band) noexcept nogil:
-        """Return the triangles of a band after they have been turned round: from the last to the first."""
+        """Reverse the triangles of a band in place and return them."""
         cdef int32_t *ids = &self.listed[0] + self.starts[band]
         cdef int64_t i, n = self.starts[band + 1] - self.starts[band]
         cdef int32_t other
@@ -442,10 +445,10 @@ cdef class Bins:
 
 def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t[:, ::1] room or None, Bins bins,
                int64_t first_band, int64_t end_band):
-    """Clear and draw bands of several pictures, a mesh each, one band of all after the other.
+    """Clear and draw bands of several pictures, a mesh each: a band of all pictures before the next band.
 
-    `room`: near memory for the ids and depth of a band, (2, rows * (W + 16)), from where they are written past the
-    caches; `bins` know their columns. None: bands are drawn in place.
+    `room`: a buffer for the ids and depth of a band, (2, rows * (W + 16)), that stays in the cache and is copied by
+    streaming stores; `bins` hold the columns of each band. None: bands are drawn in place.
     """
     cdef SnappedMesh mesh
     cdef Target target
@@ -494,14 +497,14 @@ cdef class Split:
     cdef tl_split split
 
     def __init__(self, int64_t[:, ::1] rows, int32_t[::1] columns, int32_t[:, ::1] ids, float[:, ::1] depth):
-        """Take room (H, 2) for where pixels of a row begin and end, and for `room_of` pixels and S - 1 samples of each."""
+        """`rows` (H, 2): the range of each row; the others have room for `room_of` pixels, of S - 1 samples each."""
         self.rows, self.columns, self.ids, self.depth = rows.base, columns.base, ids.base, depth.base
         self.split.rows, self.split.columns, self.split.ids = &rows[0, 0], &columns[0], &ids[0, 0]
         self.split.depth, self.split.room = &depth[0, 0], columns.shape[0]
 
     @staticmethod
     def room_of(int64_t height, int64_t width, int64_t n_bands) -> int:
-        """Return for how many pixels there must be room where a picture is drawn in bands."""
+        """Return the size of `columns` for a picture that is drawn in bands."""
         return height * width + 16 * n_bands
 
     def spread_ids(self, const int32_t[:, ::1] first_ids, int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows):
@@ -523,40 +526,40 @@ def draw_split_bands(meshes: Sequence[SnappedMesh], Target first, int32_t[:, ::1
                      Bins bins, int64_t first_band, int64_t end_band):
     """Clear and draw bands of the first sample's picture, and list the pixels where other samples see more triangles.
 
-    `meshes`: as each sample sees it; `ids` and `depth`: memory for the others in a band, (S - 1, rows * (W + 16)).
+    `meshes`: the mesh, moved to each sample; `ids` and `depth`: scratch for the other samples, (S - 1, rows * (W + 16)).
     """
     cdef tl_snapped seen[16]
     cdef SnappedMesh mesh
     cdef tl_target rows, other
     cdef tl_window window
-    cdef tl_seen_samples found
+    cdef tl_seen_samples samples
     cdef tl_slice slice = no_slice()
     cdef int k, n_samples = len(meshes)
     cdef int64_t band, first_row, at = (first_band << bins.band_bits) * first.width + 16 * first_band
     for k in range(n_samples):
         mesh = meshes[k]
         seen[k] = mesh.snapped
-    memset(&found, 0, sizeof(found))
-    found.sample_bits, found.ids, found.depth, found.plane = n_samples.bit_length() - 1, &ids[0, 0], &depth[0, 0], ids.shape[1]
-    found.first_stride = first.width
+    memset(&samples, 0, sizeof(samples))
+    samples.sample_bits, samples.ids, samples.depth, samples.plane = n_samples.bit_length() - 1, &ids[0, 0], &depth[0, 0], ids.shape[1]
+    samples.first_stride = first.width
     slice.is_first = slice.is_last = True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
         rows = other = first.rows(first_row)
         window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, first.height - first_row), first.width)
         bins.take(&slice, band)
-        found.first_ids = <int32_t *>rows.pixels
-        found.row0, found.n_rows = first_row, window.height
-        found.col0, found.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
-        found.stride = other.stride_px = (found.n_cols + 15) & ~<int64_t>15
+        samples.first_ids = <int32_t *>rows.pixels
+        samples.row0, samples.n_rows = first_row, window.height
+        samples.col0, samples.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
+        samples.stride = other.stride_px = (samples.n_cols + 15) & ~<int64_t>15
         with nogil:
             K.draw_mesh(&seen[0], &window, &rows, &slice)
-            window.x_px += found.col0
-            window.width = found.n_cols
-            for k in range(1, n_samples if found.n_cols else 0):
+            window.x_px += samples.col0
+            window.width = samples.n_cols
+            for k in range(1, n_samples if samples.n_cols else 0):
                 other.pixels, other.depth = &ids[k - 1, 0], &depth[k - 1, 0]
                 K.draw_mesh(&seen[k], &window, &other, &slice)
-            at = K.split_pixels(&found, &split.split, at)
+            at = K.split_pixels(&samples, &split.split, at)
         raise_if_given_up()
 
 
@@ -564,15 +567,15 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
          bint is_farthest, int band_bits, int64_t first_band, int64_t end_band, bint is_first) -> int:
     """Write the nearest layers of all meshes together, as planes (K, H, W), in bands of 2**band_bits rows.
 
-    `bins`: those of each mesh, or None, where a band is to look at all triangles. `is_first`: clear the planes before;
-    otherwise they hold layers already. Returns as `SnappedMesh.draw` does.
+    `bins`: of each mesh, or None, where a band tests all triangles. `is_first`: clear the planes before; otherwise the
+    planes hold layers. Returns as `SnappedMesh.draw` does.
     """
     cdef tl_peeled peeled
     cdef tl_target target
     cdef tl_window window
     cdef tl_slice slice = no_slice()
     cdef SnappedMesh mesh
-    cdef Bins own
+    cdef Bins mesh_bins
     cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
     cdef list pairs = list(zip(meshes, bins, strict=True))
     cdef int64_t i, n = len(pairs)
@@ -585,10 +588,10 @@ def peel(meshes: Sequence[SnappedMesh], bins: Sequence[Bins | None], int32_t[:, 
         first_row = band << band_bits
         peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
         for i in range(n):
-            mesh, own = pairs[i]
+            mesh, mesh_bins = pairs[i]
             slice.ids, slice.end = NULL, mesh.snapped.n_triangles
-            if own is not None:
-                slice.ids, slice.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
+            if mesh_bins is not None:
+                slice.ids, slice.end = &mesh_bins.listed[0] + mesh_bins.starts[band], mesh_bins.starts[band + 1] - mesh_bins.starts[band]
             slice.is_first, slice.is_last = is_first and i == 0, i == n - 1
             window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
             with nogil:
