@@ -71,7 +71,7 @@ TL_INLINE void put_id(void *rast, int64_t pixel, int32_t id, int is_f64)
 /* Whether a triangle and its corners exist: checked again, because arrays may have changed since the check. */
 TL_INLINE int has_corners(const tl_grad_view *view, int64_t n_rows, int32_t id)
 {
-    if (id >= view->n_triangles)
+    if (id < 0 || id >= view->n_triangles)
         return 0;
     const int32_t *c = view->tri + 3 * (int64_t)id;
     const uint64_t n = (uint64_t)n_rows;
