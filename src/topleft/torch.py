@@ -20,7 +20,7 @@ from typing import Any, get_args
 from topleft import DepthLayers, peel
 from topleft._core.base.arrays import as_pair
 from topleft._core.base.threads import parse_threads
-from topleft._core.gradients.tensors import TexelFilter, TexelsBeyond, as_filter, as_rule, check_texture, halved_axes
+from topleft.annex.tensors import Call, TexelFilter, TexelsBeyond, as_filter, as_rule, check_texture, halved_axes
 from topleft.errors import MissingPackageError
 from topleft.typing import BoundaryOption, EdgesOption, FilterModeOption, LossOption
 
@@ -30,6 +30,7 @@ try:
 except ImportError:
     raise MissingPackageError("topleft.torch needs PyTorch: pip install torch") from None
 
+from topleft._torch import operators
 from topleft._torch.checks import (
     INTS,
     KINDS,
@@ -42,18 +43,6 @@ from topleft._torch.checks import (
     len_of,
     same_dtype,
 )
-from topleft._torch.operators import (
-    each,
-    halves_across,
-    interpolate_values,
-    joined,
-    look_up,
-    outline,
-    rasterize_mesh,
-    smooth,
-    threads_of,
-)
-from topleft._torch.pictures import draw_attributes, squares
 
 __all__ = [
     "DepthPeeler",
@@ -198,8 +187,7 @@ def rasterize(
     """
     check_mesh(glctx, pos, tri, ranges)
     height, width = as_pair("resolution", resolution)
-    size = height, width, glctx.threads or 0, glctx.output_db
-    rast, rast_db = rasterize_mesh(pos, tri, ranges, None, *size)
+    rast, rast_db = operators.rasterize(pos, tri, ranges, None, (height, width, glctx.output_db, glctx.threads or 0))
     return rast, rast_db if grad_db else rast_db.detach()
 
 
@@ -247,21 +235,22 @@ class DepthPeeler:
 
     def rasterize_next_layer(self) -> tuple[Tensor, Tensor]:
         """Return `rast` and `rast_db` of the next layer, as `rasterize` does."""
-        height, width = self._resolution
-        k = self._n_shown
+        (height, width), (pos, tri, ranges) = self._resolution, self._mesh
+        k, threads = self._n_shown, self._context.threads or 0
         if k == MOST_LAYERS:
             raise ValueError(f"a DepthPeeler has at most {MOST_LAYERS} layers")
         if k >= (len(self._layers[0]) if self._layers else 0):
-            options: Any = {
-                "layers": max(FIRST_LAYERS, 2 * k),
-                "threads": threads_of(self._context.threads, width * height),
-            }
-            pos, tri, ranges = self._mesh
-            self._layers = [peel(v, t, (width, height), **options) for v, t in each(pos.detach(), tri, ranges)]
-        ids = torch.from_numpy(joined([layers.planes[0][k] for layers in self._layers], (height, width)))
+            n = threads or Call((), torch.get_num_threads()).threads_of(width * height)
+            options: Any = {"layers": max(FIRST_LAYERS, 2 * k), "threads": n}
+            vertices, triangles = operators.numpy_of(pos), operators.numpy_of(tri)
+            meshes = [(one, triangles) for one in vertices] if ranges is None else [
+                (vertices, triangles[first : first + count]) for first, count in ranges.tolist()
+            ]  # fmt: skip
+            self._layers = [peel(*mesh, (width, height), **options) for mesh in meshes]
+        shown = [torch.from_numpy(layers.planes[0][k]) for layers in self._layers]
+        ids = torch.stack(shown) if shown else torch.empty((0, height, width), dtype=torch.int32)
         self._n_shown += 1
-        size = height, width, self._context.threads or 0, self._context.output_db
-        rast, rast_db = rasterize_mesh(*self._mesh, ids, *size)
+        rast, rast_db = operators.rasterize(pos, tri, ranges, ids, (height, width, self._context.output_db, threads))
         return rast, rast_db if self._grad_db else rast_db.detach()
 
 
@@ -326,7 +315,7 @@ def interpolate(
         raise ValueError(f"rast_db must have shape {tuple(rast.shape)} when diff_attrs is given, got {got}")
     given, points_of, slopes = same_dtype(attr, (rast, len(tri)), rast_db if wanted else None)
     attrs = given if given.ndim == 3 else given[None]
-    out, out_da = interpolate_values(attrs, points_of, tri, slopes, wanted)
+    out, out_da = operators.interpolate(attrs, points_of, tri, slopes, wanted)
     return out, out_da
 
 
@@ -398,7 +387,8 @@ def texture(
         made = texture_construct_mip(tex, max_mip_level, is_cube) if mip is None else as_mip(tex, mip, max_mip_level)
     at, footprint, bias, *levels = same_dtype(uv, uv_da if made else None, mip_level_bias if made else None, tex, *made)
     how = how if made else min(how, TexelFilter.LINEAR)
-    return look_up(levels, at, footprint, bias, int(how), int(TexelsBeyond[boundary_mode.upper()]))
+    out: Tensor = operators.texture(at, footprint, bias, levels, (how, TexelsBeyond[boundary_mode.upper()]))
+    return out
 
 
 def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mode: bool = False) -> list[Tensor]:
@@ -527,11 +517,12 @@ def antialias(
     check("pos", pos, f"(V, 4), (1, V, 4) or ({len(color)}, V, 4)", fits)
     check_tri(tri)
     rule = as_rule(edges)
-    across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
-    given, points_of, vertices = same_dtype(color, (rast, len(tri)), pos)
-    mesh = vertices if vertices.ndim == 3 else vertices[None]
-    of_edges = [across.to(torch.int32), *outline(mesh.detach(), tri, across, *color.shape[1:3])]
-    out = smooth(given, points_of, mesh, tri, of_edges, int(rule), float(pos_gradient_boost))
+    across = checked_hash(topology_hash, tri)
+    given, points_of, mesh = same_dtype(color, (rast, len(tri)), pos if pos.ndim == 3 else pos[None])
+    if pos_gradient_boost != 1:
+        still = mesh.detach()
+        mesh = still + pos_gradient_boost * (mesh - still)
+    out: Tensor = operators.antialias(given, points_of, mesh, tri, across, (rule,))[0]
     return out.to(color.dtype)
 
 
@@ -596,13 +587,13 @@ def render(
     is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, pos.shape[0])
     check("attr", attr, f"(V, K), with 1 or {pos.shape[0]} before", is_table)
     height, width = as_pair("resolution", resolution)
-    across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
+    across = checked_hash(topology_hash, tri)
     mesh, values = same_dtype(pos, attr if attr.ndim == 3 else attr[None])
     keeps = (
         not torch.compiler.is_compiling() and torch.is_grad_enabled() and (mesh.requires_grad or values.requires_grad)
     )
-    options = int(as_rule(edges)), glctx.threads or 0, keeps
-    drawn: Tensor = draw_attributes(mesh, tri, values, across, height, width, *options)[0]
+    options = height, width, as_rule(edges), glctx.threads or 0, keeps
+    drawn: Tensor = operators.render(mesh, tri, values, across, options)[0]
     return drawn
 
 
@@ -669,17 +660,18 @@ def photometric_loss(
     check("attr", attr, f"(V, {target.shape[3]}), with 1 or {pos.shape[0]} before", fits)
     if loss not in get_args(LossOption):
         raise ValueError(f"loss must be 'l2', got {loss!r}")
-    across = halves_across(tri) if topology_hash is None else checked_hash(topology_hash, tri)
+    across = checked_hash(topology_hash, tri)
     mesh, values, wished = same_dtype(pos, attr if attr.ndim == 3 else attr[None], target.detach())
-    found: Tensor = squares(mesh, tri, values, wished, across, int(as_rule(edges)), glctx.threads or 0)[0]
+    options = as_rule(edges), glctx.threads or 0
+    found: Tensor = operators.squares(mesh, tri, values, wished, across, options)[0]
     return found
 
 
-def checked_hash(topology_hash: Tensor, tri: Tensor) -> Tensor:
+def checked_hash(topology_hash: Tensor | None, tri: Tensor) -> Tensor | None:
     """Return what lies across edges, of the shape of `tri`."""
-    if topology_hash.shape != tri.shape:
-        raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(topology_hash.shape)}")
-    return topology_hash
+    if topology_hash is None or topology_hash.shape == tri.shape:
+        return topology_hash
+    raise ValueError(f"topology_hash must have shape {tuple(tri.shape)}, got {tuple(topology_hash.shape)}")
 
 
 def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
@@ -710,7 +702,8 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
             [-1, -1,  0]], dtype=torch.int32)
     """
     check_tri(tri)
-    return halves_across(tri)
+    across: Tensor = operators.halves_across(tri)
+    return across
 
 
 def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> None:

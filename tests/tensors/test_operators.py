@@ -4,6 +4,7 @@ import hashlib
 import io
 import re
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ from engine_cases import ON_EACH_ISA, on
 
 torch = pytest.importorskip("torch")
 
-import topleft.torch as dr  # noqa: E402 (imports torch)
+import topleft as tl  # noqa: E402 (PyTorch may be missing)
+import topleft.torch as dr  # noqa: E402
 from topleft import scenes  # noqa: E402
+from topleft._core.base.arrays import as_checked_triangles  # noqa: E402
+from topleft._core.gradients import tensors  # noqa: E402
 from topleft._core.gradients.pictures import AttributePictures  # noqa: E402
-from topleft._core.gradients.tensors import as_rule  # noqa: E402
+from topleft._core.gradients.tensors import PixelGrid, as_rule  # noqa: E402
 from topleft._torch import operators  # noqa: E402
 
 CTX = dr.RasterizeContext()
@@ -169,14 +173,26 @@ def test_rast_is_copied_and_saved_as_any_tensor():
 @pytest.mark.parametrize("rule", EDGES)
 @pytest.mark.parametrize("other", [2**31 - 1, -(2**31), 10**9])
 def test_what_lies_across_edges_may_change_once_the_outline_is_known(isa, rule, other):
-    pos, tri, colours = sphere(level=2)
-    rast, _ = dr.rasterize(CTX, pos, tri, (40, 50))
-    color, _ = dr.interpolate(colours, rast, tri)
-    across = dr.antialias_construct_topology_hash(tri)
-    outline = [torch.full_like(across, other), *operators.outline(pos, tri, across, 40, 50)]
+    pos, tri, colours = (one.numpy() for one in sphere(level=2))
+    grid, ids = PixelGrid(tri, 1, 40, 50), tl.rasterize(pos, tri, (50, 40)).triangle
+    rast, _ = tensors.points(grid, pos, [(one, 0) for one in ids], is_flipped=True, with_db=False)
+    color, _ = tensors.values(grid, colours[None], rast)
+    outline = tensors.outline_of(grid, pos, tensors.halves_across(tri))
+    changed = replace(outline, across=np.full_like(tri, other))
     with on(isa):
-        out = operators.smooth(color, rast, pos, tri, outline, int(as_rule(rule)), 1.0)
-    assert torch.isfinite(out).all()
+        out = tensors.smooth(grid, as_rule(rule), changed, pos, rast, color)
+    assert np.isfinite(out).all()
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("first", [-1, -(2**30), 2**31 - 1])
+def test_ranges_that_changed_since_they_were_checked_show_nothing(isa, dtype, first):
+    pos, tri, _ = sphere(dtype=dtype)
+    ids = torch.zeros(1, 4, 5, dtype=torch.int32)
+    with on(isa):
+        rast, _ = operators.rasterize(pos[0], tri, torch.tensor([[first, 1]]), ids, (4, 5, False, 1))
+    assert not rast.any()
 
 
 def test_gradients_are_those_of_one_picture_after_the_other():
@@ -294,7 +310,7 @@ def test_indices_of_no_vertex_are_refused(index):
 @pytest.mark.parametrize("dtype", [torch.int32, torch.int64])
 def test_checked_triangles_lie_in_memory_that_no_other_thread_can_write(dtype):
     tri = torch.tensor([[0, 1, 2]], dtype=dtype)
-    checked = operators.triangles_of(tri, 3)
+    checked = as_checked_triangles(operators.numpy_of(tri), 3)
     tri[:] = 2**30
     assert (checked == [[0, 1, 2]]).all()
     assert not checked.flags.writeable

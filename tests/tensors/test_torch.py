@@ -11,8 +11,9 @@ torch = pytest.importorskip("torch")
 
 import topleft.torch as dr  # noqa: E402 (imports torch)
 from topleft import scenes  # noqa: E402
+from topleft._core.base.arrays import as_frozen  # noqa: E402
+from topleft._core.raster import operations  # noqa: E402
 from topleft._core.raster.verbs import rasterize as draw  # noqa: E402
-from topleft._torch import operators  # noqa: E402
 
 CTX = dr.RasterizeContext(threads=1)
 F64 = torch.float64
@@ -106,12 +107,15 @@ def test_rasterize_of_ranges_has_ids_of_the_whole_tri():
     assert not rast[2].any()
 
 
-def test_rasterize_reads_tensors_without_a_copy(monkeypatch):
+def test_rasterize_reads_vertices_without_a_copy_and_copies_triangles_once(monkeypatch):
     pos, tri = cube(torch.float32)
     seen = []
-    monkeypatch.setattr(operators, "draw", lambda v, t, *rest, **more: seen.append((v, t)) or draw(v, t, *rest, **more))
+    monkeypatch.setattr(
+        operations, "draw", lambda v, t, *rest, **more: seen.append((v, t)) or draw(v, t, *rest, **more)
+    )
     dr.rasterize(CTX, pos, tri, (8, 8))
-    assert [one.ctypes.data for one in seen[0]] == [pos.data_ptr(), tri.data_ptr()]
+    assert seen[0][0].ctypes.data == pos.data_ptr()
+    assert as_frozen(seen[0][1]) is seen[0][1]
 
 
 def test_rasterize_without_derivatives_returns_none_of_them():
