@@ -20,11 +20,27 @@ FUZZER = Path(__file__).parents[1] / "support/hostile/changing.py"
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="fork and mprotect are POSIX")
 
 
-def test_calls_whose_arrays_change_do_not_crash():
-    command = [sys.executable, FUZZER, "--cases", "60", "--seconds", "3600"]
+def run_cases(n, *options):
+    """Run the fuzzer, which ends where something crashes."""
+    command = [sys.executable, FUZZER, "--cases", str(n), "--seconds", "3600", *options]
     ended = subprocess.run(command, capture_output=True, text=True)
     assert ended.returncode == 0, f"{ended.stdout[-1500:]}\n{ended.stderr[:3000]}"
-    assert "60 cases, none that must not be" in ended.stdout
+    assert f"{n} cases, none that must not be" in ended.stdout
+
+
+def test_calls_whose_arrays_change_do_not_crash():
+    run_cases(60)
+
+
+@pytest.mark.parametrize("kind", ["gradients", "backward", "grids"])
+def test_gradients_and_grids_whose_arrays_change_do_not_crash(kind):
+    run_cases(20, "--kind", kind)
+
+
+@pytest.mark.parametrize("kind", ["torch", "jax"])
+def test_operations_whose_tensors_change_do_not_crash(kind):
+    pytest.importorskip(kind)
+    run_cases(6, "--kind", kind)
 
 
 def test_arrays_change_while_a_call_may_read_them():

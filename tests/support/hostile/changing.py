@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from changing_arrays import Changing
+from changing_tensors import backward, gradients, grids, jax_arrays, torch_tensors
 from draws import REFUSALS, SAMPLINGS, Draw, FromRandom, view_of
 
 import topleft as tl
@@ -394,14 +395,20 @@ CASES: dict[str, Callable[[Changing], Case]] = {
     "rasters": rasters,
     "rings": rings,
     "pictures": pictures,
+    "gradients": gradients,
+    "backward": backward,
+    "grids": grids,
 }
+
+#: Those that need PyTorch or JAX, by `--kind`.
+TENSOR_CASES = {"torch": torch_tensors, "jax": jax_arrays}
 
 
 def run_one(seed: int, kind: str | None = None) -> str:
     """Make the calls of a case, again and again, while its arrays change; "drawn" if ever, or the first refusal."""
     draw = Draw(FromRandom(seed))
     changing = Changing(draw)
-    name, call = CASES[kind or draw.of(["verb", "verb", "pictures", "pictures", *CASES])](changing)
+    name, call = (CASES | TENSOR_CASES)[kind or draw.of(["verb", "verb", "pictures", "pictures", *CASES])](changing)
     print(f"seed {seed}: {name} {changing}", flush=True)
     outcomes: list[str] = []
     end = time.monotonic() + SECONDS_OF_A_CASE
@@ -422,7 +429,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60)
     parser.add_argument("--cases", type=int, default=10**12, help="end after so many")
     parser.add_argument("--seed", type=int, default=0, help="of the first case")
-    parser.add_argument("--kind", choices=CASES, default=None)
+    parser.add_argument("--kind", choices=CASES | TENSOR_CASES, default=None)
     options = parser.parse_args()
     warnings.simplefilter("ignore")  # of NumPy, for odd numbers, and of Python, for a fork beside threads
     found: Counter[str] = Counter()
