@@ -8,7 +8,7 @@ import pytest
 
 import topleft as tl
 from topleft._meshes.windows import blocks as blocks_file
-from topleft._meshes.windows.blocks import triangles_of
+from topleft._meshes.windows.blocks import open_triangles
 
 RNG = np.random.default_rng(5)
 POINTS = RNG.uniform(0, 100, (300, 3)).astype(np.float32)
@@ -84,7 +84,7 @@ def test_binary_ply_is_mapped(tmp_path, options):
 def test_numbers_side_by_side_are_rows_of_the_file(tmp_path):
     for order, extra, n_columns in (("<", False, 1), ("<", True, 3)):
         write_ply(tmp_path / "mesh.ply", order=order, extra=extra)
-        triangles = triangles_of(tmp_path / "mesh.ply", None)
+        triangles = open_triangles(tmp_path / "mesh.ply", None)
         assert len(triangles.columns) == n_columns
         assert np.array_equal(triangles.corners(np.array([499, 0], np.int32)), POINTS[TRIANGLES[[499, 0]]])
 
@@ -96,7 +96,7 @@ def test_corners_are_those_of_numpy(dtype, kind, is_reversed):
     points, triangles = (50 * POINTS).astype(kind), TRIANGLES.astype(dtype)
     if is_reversed:
         points, triangles = points[::-1, :2], np.asfortranarray(triangles[::-2])
-    mesh = triangles_of((points, triangles), None)
+    mesh = open_triangles((points, triangles), None)
     which = np.array([3, 1, 249], np.int32)
     assert np.array_equal(mesh.corners(which), points[triangles[which]])
     assert np.array_equal(mesh.corners(slice(17, 91)), points[triangles[17:91]])

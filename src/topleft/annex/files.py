@@ -1,7 +1,7 @@
 """Reads and writes files as the command line does: PNG, layers, polygons and masks, within limits of memory."""
 
 from topleft._core.polygons.rle import encode_polygons
-from topleft._core.raster.rle import annotation_of, measured
+from topleft._core.raster.rle import annotation_members, annotation_of
 from topleft._meshes.io import png
 from topleft._meshes.io.layer_files import layer_paths, save_layers
 from topleft._meshes.io.limits.budget import LIMITS, Budget
@@ -14,12 +14,12 @@ __all__ = [
     "VECTOR_SUFFIXES",
     "Budget",
     "PolygonPicture",
+    "annotation_members",
     "annotation_of",
     "arrays_of",
     "encode_polygons",
     "layer_paths",
     "load_polygons",
-    "measured",
     "png",
     "read_picture",
     "save_layers",

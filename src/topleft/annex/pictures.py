@@ -4,12 +4,11 @@ from topleft._core.engine import isa_available, isa_in_use, use_isa
 from topleft._core.raster.sampling import sample_positions
 from topleft._meshes.camera.camera import CameraLike, as_camera
 from topleft._meshes.camera.matrices import (
-    FRAMING_MARGIN,
     bounding_sphere,
     box_corners,
     ends_to_frame,
+    frame_of_sphere,
     orbit_view,
-    sine_of_tangent,
     tangent,
 )
 from topleft._meshes.lod.levels import keep_levels
@@ -19,7 +18,6 @@ from topleft._meshes.picture.layers import draw_layers
 from topleft._meshes.picture.view_layers import gbuffer_of
 
 __all__ = [
-    "FRAMING_MARGIN",
     "CameraLike",
     "as_camera",
     "as_pose",
@@ -27,6 +25,7 @@ __all__ = [
     "box_corners",
     "draw_layers",
     "ends_to_frame",
+    "frame_of_sphere",
     "gbuffer_of",
     "isa_available",
     "isa_in_use",
@@ -34,7 +33,6 @@ __all__ = [
     "levels_of",
     "orbit_view",
     "sample_positions",
-    "sine_of_tangent",
     "tangent",
     "use_isa",
 ]

@@ -23,7 +23,7 @@ from topleft._core.base.defaults import MAX_CROSSINGS, SUFFIXES
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.notes import listening
 from topleft._core.base.options import Sampling
-from topleft.annex.files import PolygonPicture, annotation_of, encode_polygons, load_polygons, measured
+from topleft.annex.files import PolygonPicture, annotation_members, annotation_of, encode_polygons, load_polygons
 from topleft.typing import RuleOption
 
 DEFAULT_SIDE = 1024
@@ -98,7 +98,7 @@ def write_annotations(pictures: list[PolygonPicture], options: argparse.Namespac
         rles = encode_polygons(given, frame, options.rule, owners=picture.owners)  # none of the last without polygons
         for said, own, part, rle in zip_longest(picture.objects, picture.annotations, picture.parts, rles):
             if own is not None:
-                annotations.append({"iscrowd": 0, **own, **measured(rle)} if len(part.counts) else own)
+                annotations.append({"iscrowd": 0, **own, **annotation_members(rle)} if len(part.counts) else own)
             elif len(part.counts):
                 category = said.get("category_id")
                 made = annotation_of(rle, len(annotations) + 1, 1, category if isinstance(category, int) else 1)

@@ -29,7 +29,7 @@ from topleft._core.base.notes import listening
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
 from topleft.annex.files import VECTOR_SUFFIXES, load_polygons
-from topleft.annex.windows import WINDOW, extent_of, triangles_of
+from topleft.annex.windows import WINDOW, extent_of, open_triangles
 from topleft.typing import RasterKindOption
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ def raster_of(options: argparse.Namespace) -> Tiles:
         return raster_of_polygons(options)
     named = options.mesh.split(",")
     mesh = tuple(named) if len(named) == 2 and all(name.endswith(".npy") for name in named) else options.mesh
-    triangles = triangles_of(mesh, options.folder)
+    triangles = open_triangles(mesh, options.folder)
     values = None
     kind: Any = options.kind or ("labels" if options.labels else "height_map")
     more: dict[str, Any] = {}

@@ -28,15 +28,7 @@ from topleft._core.base.arrays import as_number
 from topleft._core.base.color import Color, as_color
 from topleft._core.base.options import check_choice
 from topleft.annex.files import png
-from topleft.annex.pictures import (
-    FRAMING_MARGIN,
-    bounding_sphere,
-    box_corners,
-    ends_to_frame,
-    orbit_view,
-    sine_of_tangent,
-    tangent,
-)
+from topleft.annex.pictures import bounding_sphere, box_corners, ends_to_frame, frame_of_sphere, orbit_view, tangent
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
 from topleft.typing import CullOption, SamplesOption, UpOption
@@ -151,13 +143,12 @@ class MeshView:
         """Return the camera of the view."""
         center, radius = bounding_sphere(ends_to_frame(mesh))
         aspect = self.size[0] / self.size[1]
-        tan_y = tangent((self.fov or 40.0) / 2)
-        distance = radius * FRAMING_MARGIN / sine_of_tangent(tan_y * min(1.0, aspect)) / self.zoom
-        height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect) / self.zoom
+        fov_y_deg = self.fov or 40.0
+        distance, height = (length / self.zoom for length in frame_of_sphere(radius, fov_y_deg, aspect))
         if not self.fov:
             distance = 4 * radius
         matrix = orbit_view(center, distance, self.azimuth, self.elevation, up=self.up)  # type: ignore[arg-type]
-        half_px = height / 2 if not self.fov else distance * tan_y
+        half_px = height / 2 if not self.fov else distance * tangent(fov_y_deg / 2)
         matrix[:2, 3] += np.array(self.pan) * half_px
         reach = 1.01 * radius
         near, far = max(distance - reach, 1e-3 * distance, 1e-4 * radius), distance + reach

@@ -125,10 +125,10 @@ def encode_ids(ids: NDArray[Any], labels: ArrayLike, *, compressed: bool) -> lis
 
 def annotation_of(rle: dict[str, Any], own: int, image: int, category: int) -> dict[str, Any]:
     """Return the annotation of COCO of an object with run lengths."""
-    return {"id": own, "image_id": image, "category_id": category, "iscrowd": 0} | measured(rle)
+    return {"id": own, "image_id": image, "category_id": category, "iscrowd": 0} | annotation_members(rle)
 
 
-def measured(rle: dict[str, Any]) -> dict[str, Any]:
+def annotation_members(rle: dict[str, Any]) -> dict[str, Any]:
     """Return the members of an annotation that run lengths give: area, box (left, top, width, height), themselves."""
     height = rle["size"][0]
     ends = np.cumsum(

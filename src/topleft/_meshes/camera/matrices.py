@@ -260,6 +260,14 @@ def box_matrix(left: float, right: float, bottom: float, top: float, near: float
     return matrix
 
 
+def frame_of_sphere(radius: float, fov_y_deg: float, aspect: float) -> tuple[float, float]:
+    """The distance from which a sphere is just inside a frame, and the height of the frame without perspective."""
+    narrow = min(1.0, aspect)
+    # The sphere touches the pyramid of view at sin, not tan, of the half angle.
+    distance = radius * FRAMING_MARGIN / sine_of_tangent(tangent(fov_y_deg / 2) * narrow)
+    return distance, 2 * radius * FRAMING_MARGIN / narrow
+
+
 def framing_matrices(
     ends: F64,
     points: F64 | None,
@@ -278,9 +286,7 @@ def framing_matrices(
     center, radius = bounding_sphere(ends)
     fov_y_deg, aspect = as_fov(fov_y_deg), as_positive("aspect", aspect)
     tan_y = tangent(fov_y_deg / 2)
-    # The sphere touches the pyramid of view at sin, not tan, of the half angle.
-    distance = radius * FRAMING_MARGIN / sine_of_tangent(tan_y * min(1.0, aspect))
-    height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
+    distance, height = frame_of_sphere(radius, fov_y_deg, aspect)
     right, above = 0.0, 0.0
     if points is not None:
         turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]

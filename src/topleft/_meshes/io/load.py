@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib import import_module
 from typing import TypeVar
 
 import numpy as np
@@ -29,6 +30,12 @@ from topleft.errors import MeshError, MissingPackageError
 Made = TypeVar("Made")
 
 GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
+READERS = {
+    **dict.fromkeys(GLTF_SUFFIXES, "gltf.reader.read_gltf"), ".dae": "collada.read_collada", ".obj": "obj.read_obj",
+    ".off": "stl_off.read_off", ".ply": "ply.read_ply", ".stl": "stl_off.read_stl", ".stl_ascii": "stl_off.read_stl",
+}  # fmt: skip
+"""The reader of each suffix, by module and name: it is imported when a file needs it. trimesh reads all others."""
+
 ARCHIVE_SUFFIXES = (".zip", ".zae", ".tgz", ".gz", ".bz2")
 MESHIO_READERS: dict[str, tuple[str, ...]] = {
     ".bdf": ("nastran",), ".f3grid": ("flac3d",), ".inp": ("abaqus",), ".mdpa": ("mdpa",), ".mesh": ("medit",),
@@ -190,46 +197,21 @@ def _has_textures(part: Mesh) -> bool:
 
 
 def _parts(source: InputFile) -> list[Mesh]:
-    """The meshes of the file; readers are imported when a file needs them."""
-    match source.path.suffix.lower():
-        case suffix if suffix in GLTF_SUFFIXES:
-            from topleft._meshes.io.gltf.reader import read_gltf
+    """The meshes of the file."""
+    suffix = source.path.suffix.lower()
+    if suffix in ARCHIVE_SUFFIXES:
+        from topleft._meshes.io.limits.archives import unpacked
 
-            return read_gltf(source)
-        case ".obj":
-            from topleft._meshes.io.obj import read_obj
+        with unpacked(source.path, source.budget) as (folder, paths):
+            members = [InputFile(path, source.budget, archive=source, home=folder) for path in paths]
+            return [part for member in members for part in _parts(member)]
+    if suffix in MESHIO_READERS:
+        from topleft._meshes.io.solvers import read_by_meshio
 
-            return read_obj(source)
-        case ".ply":
-            from topleft._meshes.io.ply import read_ply
-
-            return read_ply(source)
-        case ".stl" | ".stl_ascii":
-            from topleft._meshes.io.stl_off import read_stl
-
-            return read_stl(source)
-        case ".off":
-            from topleft._meshes.io.stl_off import read_off
-
-            return read_off(source)
-        case ".dae":
-            from topleft._meshes.io.collada import read_collada
-
-            return read_collada(source)
-        case suffix if suffix in ARCHIVE_SUFFIXES:
-            from topleft._meshes.io.limits.archives import unpacked
-
-            with unpacked(source.path, source.budget) as (folder, paths):
-                members = [InputFile(path, source.budget, archive=source, home=folder) for path in paths]
-                return [part for member in members for part in _parts(member)]
-        case suffix if suffix in MESHIO_READERS:
-            from topleft._meshes.io.solvers import read_by_meshio
-
-            return read_by_meshio(source, MESHIO_READERS[suffix])
-        case _:
-            from topleft._meshes.io.foreign import read_by_trimesh
-
-            return read_by_trimesh(source)
+        return read_by_meshio(source, MESHIO_READERS[suffix])
+    module, _, name = READERS.get(suffix, "foreign.read_by_trimesh").rpartition(".")
+    read: Callable[[InputFile], list[Mesh]] = getattr(import_module(f"topleft._meshes.io.{module}"), name)
+    return read(source)
 
 
 def _points(source: InputFile) -> Points:

@@ -167,19 +167,6 @@ class InputFile:
                 self._not_laid.add(id(picture))
         return self._pictures[key]
 
-    def picture_content(self, name: str) -> bytes | None:
-        """The bytes of a picture that the mesh names, for the caller to decode; counted each time."""
-        path = self.find(name, "textures")
-        content = None if path is None else self.read_at(path, name, "textures")
-        if content is None:
-            return None
-        try:
-            with opened(content) as image:
-                return content if self.may_have(image.width * image.height, name) else None
-        except Exception:  # as in `_decode`
-            self.notes.add("textures that cannot be read", name)
-            return None
-
     def may_lay(self, picture: U8, name: str) -> bool:
         """Whether a texture may be made of a picture, or of as many pixels; if not, that is noted.
 

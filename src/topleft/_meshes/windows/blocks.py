@@ -190,7 +190,7 @@ def received(array: Array | MappedArray) -> Array:
     return np.ndarray(array.shape, array.dtype, memory, 0, array.strides)
 
 
-def triangles_of(mesh: Any, folder: str | os.PathLike[str] | None) -> Triangles:
+def open_triangles(mesh: Any, folder: str | os.PathLike[str] | None) -> Triangles:
     """Return the triangles of whatever `tiles` takes; anything else is a `TypeError`.
 
     A `MeshError` if a file is broken or has no triangles, a `ValueError` if arrays have the wrong shape.
@@ -244,7 +244,7 @@ def triangles_of_file(path: Path) -> Triangles:
     except MeshError as error:
         raise MeshError(f"cannot read {path}: {error}") from None
     mesh: Any = load(path)
-    return triangles_of(mesh, None)
+    return open_triangles(mesh, None)
 
 
 def side_by_side(columns: tuple[Array, ...]) -> tuple[Array, ...]:

@@ -26,7 +26,7 @@ from topleft._meshes.field.field import grid_of
 from topleft._meshes.windows import areas, drawing
 from topleft._meshes.windows.ahead import in_order, kept_memory
 from topleft._meshes.windows.areas import AreaIndex, Areas, are_polygons, areas_of, extent_of_polygons
-from topleft._meshes.windows.blocks import BLOCK, Triangles, fingerprint_of, mapped_npy, triangles_of
+from topleft._meshes.windows.blocks import BLOCK, Triangles, fingerprint_of, mapped_npy, open_triangles
 from topleft._meshes.windows.drawing import ON_GRIDS, Crop, painter_of, without_values
 from topleft._meshes.windows.jobs import MappedJob, SentJob
 from topleft._meshes.windows.spans import SPAN_BYTES, Tiling, WindowIndex
@@ -105,7 +105,7 @@ class WindowedRaster:
         self._folder = None if folder is None else os.fspath(as_path("folder", folder))
         check_choice("kind", kind, tuple(drawing.KINDS))
         is_of_areas = are_polygons(mesh)
-        self.triangles: Any = mesh if is_of_areas else triangles_of(mesh, self._folder)
+        self.triangles: Any = mesh if is_of_areas else open_triangles(mesh, self._folder)
         grid: Grid | None = None
         if isinstance(size, Grid) or kind in ON_GRIDS or extent is not None or pixel_size is not None:
             grid = grid_of(size, pixel_size, extent, y, lambda: extent_of(self.triangles))

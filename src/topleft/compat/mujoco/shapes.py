@@ -21,9 +21,6 @@ ARROW, ARROW1, ARROW2, FLEX, SKIN, TRIANGLE = 100, 101, 102, 105, 106, 108
 TAKES_SIZE = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, ARROW, ARROW1, ARROW2, TRIANGLE)
 """Geoms whose mesh follows from their size."""
 
-MOST_GRID = 200
-"""Cells of a plane without end, which reaches a little beyond the far plane."""
-
 SHARP = 0.8
 """Cosine to the normal of the face below which a corner of a mesh takes that one."""
 
