@@ -15,14 +15,14 @@ from topleft._core.base.memory import SCRATCH
 from topleft._core.base.threads import run_parts
 from topleft._core.polygons.prepared import Prepared
 
-#: Labels of a band of rows that is drawn at a time: it stays in the second-level cache.
+#: Bytes of labels of a band of rows, which is drawn in the L2 cache.
 BAND_BYTES = 1 << 20
 
-#: Pixels a polygon, from its box. Below, the bands' order itself misses the caches, and spans wait instead:
-#: 200,000 cells of 84 px in random order, 20,000 of 800 px.
+#: Pixels a polygon, from its box. Below, the order of the bands itself misses the caches, and spans are buffered
+#: instead: 200,000 cells of 84 px in random order, 20,000 of 800 px.
 MIN_PIXELS_FOR_BANDS = 600
 
-#: Bits and cells that are held at a time: more rows are drawn in several passes over the edges.
+#: The most bits and cells in memory: more rows are drawn in several passes over the edges.
 MAX_BITS = 1 << 30
 MAX_CELLS = 1 << 24
 MAX_LISTED_CROSSINGS = 1 << 22
@@ -38,7 +38,7 @@ def draw_mask(
     polygon: int = 0,
     rows: tuple[int, int] | None = None,
 ) -> None:
-    """Write the mask of one polygon, or rows of it, over contiguous (H, W) bytes."""
+    """Write the mask of a polygon, or rows of it, over contiguous (H, W) bytes."""
     compiled, (width, height) = prepared.compiled, prepared.frame.size
     begin, stop = (0, height) if rows is None else rows
     height = stop - begin
@@ -67,7 +67,7 @@ def draw_mask(
 
 
 def sort_bands(prepared: Prepared, band_rows: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:
-    """Return the polygons of each band of rows, and the first place of each band."""
+    """Return where the list of each band of rows begins, and the polygons of all bands."""
     height = prepared.frame.size[1]
     n_bands = -(-height // band_rows)
     starts = np.empty(n_bands + 2, np.int64)
@@ -112,7 +112,7 @@ def draw_labels(
 
 
 def add_shares(prepared: Prepared, pixels: npt.NDArray[np.float32], colors: npt.NDArray[np.float32] | None) -> None:
-    """Write the shares of polygons, their sum up to 1, over contiguous (H, W) pixels, or mix colours in, (H, W, C)."""
+    """Write the shares of polygons, their sum up to 1, over contiguous (H, W) pixels, or blend colours (H, W, C)."""
     is_alone = colors is None and len(prepared) == 1
     if colors is None and not is_alone:
         pixels.fill(0)
@@ -127,15 +127,15 @@ def add_shares(prepared: Prepared, pixels: npt.NDArray[np.float32], colors: npt.
 
     def draw_part(first: int, end: int) -> None:
         i = parts.pop()
-        own = cells[i * n_cells : (i + 1) * n_cells]
+        cells_of_thread = cells[i * n_cells : (i + 1) * n_cells]
         how = band_rows, starts, listed, first, end
-        prepared.compiled.add_shares(flat, colors, *how, own, prepared.piece_scratch(), is_alone)
+        prepared.compiled.add_shares(flat, colors, *how, cells_of_thread, prepared.piece_scratch(), is_alone)
 
     run_parts(draw_part, -(-height // band_rows), n_threads)
 
 
 def cells_for(prepared: Prepared, n_rows: int) -> int:
-    """Return how many cells the largest box needs, of up to n_rows rows, or those of a single row of it."""
+    """Return how many cells the largest box needs, of up to n_rows rows, at least a row of the widest box."""
     boxes = prepared.compiled.boxes_px.astype(np.int64)
     if not len(boxes):
         return engine.LEAST_SHARE_CELLS

@@ -29,7 +29,7 @@ from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.errors import MissingPackageError
 from topleft.typing import RuleOption
 
-#: Entries allocated at a time, beyond those of the largest polygon; memory that is not written costs nothing.
+#: Entries allocated at a time, at least those of a polygon; pages that are not written cost nothing.
 MAX_ENTRIES_AT_ONCE = 1 << 27
 
 #: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
@@ -54,17 +54,17 @@ class Overlap:
     size : (int, int)
         Width and height of the picture.
     nodata : number, optional
-        The value of pixels without data in rasters, unless a method gets another one; that of the `Grid`.
+        The value of pixels without data in rasters, unless a method gets another; by default of the `Grid`.
     grid : Grid, optional
-        Where the picture lies. Rasters of rasterio and xarray that lie elsewhere are then refused.
+        Where the picture lies. Rasters of rasterio and xarray that lie elsewhere raise an error.
 
     Examples
     --------
     >>> import topleft as tl
-    >>> found = tl.overlap([[[(0.5, 0), (2, 0), (2, 1), (0.5, 1)]]], (3, 1))
-    >>> found.pixels.tolist(), found.areas.tolist()
+    >>> table = tl.overlap([[[(0.5, 0), (2, 0), (2, 1), (0.5, 1)]]], (3, 1))
+    >>> table.pixels.tolist(), table.areas.tolist()
     ([0, 1], [0.5, 1.0])
-    >>> found.means([[2.0, 8.0, 9.0]]).tolist()
+    >>> table.means([[2.0, 8.0, 9.0]]).tolist()
     [6.0]
     """
 
@@ -116,7 +116,7 @@ class Overlap:
         return csr_array((self.areas, self.pixels, self.starts), shape=self.shape)
 
     def to_sparse(self) -> Any:
-        """Return the table as `sparse.COO` (P, H, W) of pydata/sparse, of float32: no picture is made.
+        """Return the table as `sparse.COO` (P, H, W) of pydata/sparse, of float32, without a dense array.
 
         Raises
         ------
@@ -133,10 +133,7 @@ class Overlap:
         )
 
     def sums(self, raster: npt.ArrayLike, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
-        """Return the integral (P,) of a raster (H, W) over each polygon; pixels without data count 0.
-
-        `means` says which pixels these are.
-        """
+        """Return the integral (P,) of a raster (H, W) over each polygon; pixels without data count 0, see `means`."""
         values = self._values_of(raster, nodata)
         return self._added(np.where(np.isnan(values), 0.0, values) * self.areas)
 
@@ -144,13 +141,13 @@ class Overlap:
         """Return the mean (P,) of a raster (H, W) over each polygon; pixels without data do not count.
 
         Pixels have no data where the raster is NaN or `nodata`, where a masked array is masked, and where a raster of
-        xarray or an open dataset of rasterio, of one band, has its own number of no data. A polygon over such pixels
-        alone has the mean NaN.
+        xarray or an open dataset of rasterio, of a single band, has its number of no data. The mean is NaN where no
+        pixel of a polygon has data.
         """
         return self._mean_of(self._values_of(raster, nodata))
 
     def counts(self, raster: npt.ArrayLike | None = None, *, nodata: float | None = None) -> npt.NDArray[np.float64]:
-        """Return how many pixels with data (P,) each polygon has, shares of pixels added up; see `means`.
+        """Return the sum (P,) of the shares of pixels with data in each polygon; see `means`.
 
         Without a raster all pixels count, as in `totals`.
         """
@@ -191,10 +188,10 @@ class Overlap:
         firsts = np.flatnonzero(is_first)
         sums = np.add.reduceat(areas, firsts)
         order = np.lexsort((values[firsts], -sums, polygons[firsts]))  # the largest area first, then the least number
-        own = polygons[firsts][order]
-        is_best = np.ones(len(own), np.bool_)
-        is_best[1:] = own[1:] != own[:-1]
-        result[own[is_best]] = values[firsts][order][is_best]
+        of_polygons = polygons[firsts][order]
+        is_best = np.ones(len(of_polygons), np.bool_)
+        is_best[1:] = of_polygons[1:] != of_polygons[:-1]
+        result[of_polygons[is_best]] = values[firsts][order][is_best]
         return result
 
     def quantiles(
@@ -228,18 +225,18 @@ class Overlap:
     def spread(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Return a raster (H, W): the values (P,) of polygons, weighted by the area shared with each pixel.
 
-        Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
+        Amounts a pixel's area are conserved: the raster sums to the sum of values times areas.
         """
-        own = as_real("values", values)
-        if own.shape != (len(self),):
-            raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {own.shape}")
+        amounts = as_real("values", values)
+        if amounts.shape != (len(self),):
+            raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {amounts.shape}")
         self._check_pixels()
-        weights = np.repeat(own, np.diff(self.starts)) * self.areas
+        weights = np.repeat(amounts, np.diff(self.starts)) * self.areas
         picture: npt.NDArray[np.float64] = np.bincount(self.pixels, weights, minlength=self.shape[1])  # type: ignore[assignment]
         return picture.reshape(self.size[::-1])
 
     def _check_pixels(self) -> None:
-        """Raise an error for a table made by hand with pixels outside of the grid; a pass over the entries."""
+        """Raise an error where a table of the caller has pixels outside of the grid; a pass over the entries."""
         n = self.shape[1]
         unsigned = self.pixels.view(f"u{self.pixels.dtype.itemsize}")  # below 0 is beyond
         if len(unsigned) and int(unsigned.max()) >= n:
@@ -251,8 +248,8 @@ class Overlap:
             nodata = self.nodata
         else:
             as_number("nodata", nodata)
-            nodata = np.asarray(nodata).item()  # a whole number stays one
-        given = raster
+            nodata = np.asarray(nodata).item()  # an integer stays an integer
+        caller_raster = raster
         if hasattr(raster, "read") and hasattr(raster, "count"):  # of rasterio
             if raster.count != 1:
                 raise ValueError(f"raster must have one band, got {raster.count}: pass raster.read(1, masked=True)")
@@ -265,14 +262,14 @@ class Overlap:
             raise ValueError(f"raster must have shape {self.size[::-1]}, got {array.shape}")
         check_real("raster", array, "biuf")
         if self.grid is not None:
-            check_centers(given, (self.grid.x_centers, self.grid.y_centers), self.grid.pixel_size)
+            check_centers(caller_raster, (self.grid.x_centers, self.grid.y_centers), self.grid.pixel_size)
         self._check_pixels()
-        own = array.reshape(-1)[self.pixels]
-        values = own.astype(np.float64)
+        entries = array.reshape(-1)[self.pixels]
+        values = entries.astype(np.float64)
         with np.errstate(all="ignore"):
             for number in numbers:
                 if number is not None:
-                    values[own == number] = np.nan  # Python's number takes the dtype of the raster
+                    values[entries == number] = np.nan  # Python's number takes the dtype of the raster
         if is_masked is not np.ma.nomask:
             values[is_masked.reshape(-1)[self.pixels]] = np.nan
         return values
@@ -286,7 +283,7 @@ class Overlap:
     def _sorted(
         self, values: npt.NDArray[np.float64]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-        """Return the numbers of each polygon in their order, the areas of their entries, and where polygons begin."""
+        """Return the numbers of each polygon, ascending, the areas of their entries, and where polygons begin."""
         known = np.flatnonzero(~np.isnan(values))
         polygons = self.polygons[known]
         order = known[np.lexsort((values[known], polygons))]
@@ -296,7 +293,7 @@ class Overlap:
     def _reduced(
         self, ufunc: np.ufunc, values: npt.NDArray[np.float64], empty: float = np.nan
     ) -> npt.NDArray[np.float64]:
-        """Return a function's value for the entries of each polygon; `empty` without entries."""
+        """Reduce the entries of each polygon by a ufunc; `empty` where a polygon has no entry."""
         is_full = np.diff(self.starts) > 0
         result = np.full(len(self), empty)
         if is_full.any():
@@ -327,11 +324,11 @@ def overlap(
     Parameters
     ----------
     rings, size, crs, rule, origin, subpixel_bits, assume_valid, max_crossings, threads
-        As in `polygons`. The `nodata` of a `Grid` is that of the table.
+        As in `polygons`. The table takes the `nodata` of a `Grid`.
     triangles : array_like of integers, shape (T, 3), optional
         Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
     out : Overlap, optional
-        A table that is no longer needed: its memory is used again, if it is large enough.
+        A table that is no longer needed: its memory is reused, if it is large enough.
 
     Returns
     -------
@@ -349,7 +346,7 @@ def overlap(
     Notes
     -----
     Each area has an error below ``2**-24`` for each edge that passes its pixel. Where polygons tile a pixel, its areas
-    sum to 1 within as much; those of a polygon sum to its area inside of the frame.
+    sum to 1 within as much; the areas of a polygon sum to its area inside of the frame.
 
     Examples
     --------
@@ -362,37 +359,37 @@ def overlap(
     """
     is_nonzero = parse(RuleOption, "rule", rule) == "nonzero"
     if triangles is None:
-        given = in_crs_of(size, rings, crs)
+        ring_set = in_crs_of(size, rings, crs)
     else:
         if crs is not None:
             raise ValueError("crs is for polygons, not for triangles=")
         vertices = as_points(rings, "vertices")
-        given = rings_of_triangles(vertices, as_checked_triangles(triangles, len(vertices)))
-    found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1, max_crossings)
-    prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
-    warn_if_apart(prepared, given, size)
+        ring_set = rings_of_triangles(vertices, as_checked_triangles(triangles, len(vertices)))
+    rings_px, frame = frame_of(ring_set, size, origin, subpixel_bits, threads, 1, max_crossings)
+    prepared = prepare(SCRATCH, rings_px, frame, is_nonzero=is_nonzero)
+    warn_if_apart(prepared, ring_set, size)
     prepared.certify(assume_valid=assume_valid)
     if out is not None and not isinstance(out, Overlap):
         raise TypeError(f"out must be an Overlap, got {type(out).__name__}")
-    found_areas = list_areas(prepared, [] if out is None else out._room)
-    return found_areas if not isinstance(size, Grid) else replace(found_areas, nodata=size.nodata, grid=size)
+    table = list_areas(prepared, [] if out is None else out._room)
+    return table if not isinstance(size, Grid) else replace(table, nodata=size.nodata, grid=size)
 
 
 Chunk = tuple[npt.NDArray[Any], npt.NDArray[np.float32]]
 
 
 def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
-    """Return the table of snapped polygons; `used` is memory to take, if it fits."""
+    """Return the table of snapped polygons; `used`: arrays to reuse, if they are large enough."""
     size, n = prepared.frame.size, len(prepared)
     boxes = prepared.compiled.boxes_px.astype(np.int64)
     widths, heights = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
-    before = np.concatenate([[0], np.cumsum(widths * heights)])  # entries that there can be before each polygon
+    before = np.concatenate([[0], np.cumsum(widths * heights)])  # the most entries before each polygon
     dtype = np.int32 if size[0] * size[1] <= INT32_MAX else np.int64
     starts = np.zeros(n + 1, np.int64)
     if not n or 0 in size:
         return Overlap(starts, np.empty(0, dtype), np.empty(0, np.float32), size)
     n_threads = max(1, min(prepared.threads_with_pieces(), n))
-    most = max(MAX_BLOCK_ENTRIES, int((widths * heights).max())) + TAIL  # that a thread keeps for itself
+    most = max(MAX_BLOCK_ENTRIES, int((widths * heights).max())) + TAIL  # of the buffer of a thread
     if n_threads > 1 and not fits((n_threads, most), dtype, np.float32):
         n_threads = 1
     n_cells = cells_for(prepared, size[1])
@@ -407,7 +404,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
 
     rooms: list[Chunk] = []
     done, n_listed, entries = 0, 0, []
-    while done < n:  # as many polygons as there is room for: all, except in huge tables
+    while done < n:  # a pass lists all polygons, except in huge tables
         end = end_of_room(before, done, MAX_ENTRIES_AT_ONCE)
         n_room = int(before[end] - before[done])
         check_fits((n_listed + n_room,), dtype, np.float32)
@@ -424,7 +421,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
 
 
 def end_of_room(before: npt.NDArray[np.int64], first: int, n_entries: int) -> int:
-    """Return the end of the polygons from `first` on that so many entries have room for; at least one."""
+    """Return the end of the polygons from `first` on that fit into n_entries; at least a polygon."""
     end = int(np.searchsorted(before, before[first] + n_entries, "right")) - 1
     return min(len(before) - 1, max(end, first + 1))
 
@@ -437,10 +434,10 @@ def list_range(
     room: Chunk,
     cells: npt.NDArray[np.int32],
 ) -> None:
-    """Write the entries of a range of polygons to the begin of `room`, and where each ends to `starts`.
+    """Write the entries of a range of polygons to the begin of `room`, and where each polygon ends to `starts`.
 
-    One thread, with a row of `cells` each, writes them there. Several take blocks of polygons in turn: the
-    thread with the next block writes it there, the others copy theirs behind the blocks before it.
+    `cells`: a row for each thread. Several threads pop blocks of polygons from a queue: the thread with the next block
+    in order writes it to `room`, other threads write to a buffer and copy it when the blocks before are done.
     """
     begin, last = polygons
     pixels, areas = room
@@ -453,38 +450,38 @@ def list_range(
     while bounds[-1] < last:
         bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
     most = int(np.diff(before[bounds]).max()) + TAIL
-    waiting, free = deque(pairwise(bounds)), deque(cells)
-    taking, turn = Lock(), Condition()
+    blocks, free = deque(pairwise(bounds)), deque(cells)
+    queue_lock, turn = Lock(), Condition()
     done = begin
     is_lost = False
 
     def list_blocks(*_: int) -> None:
         nonlocal done, is_lost
-        scratch, own_cells = prepared.piece_scratch(), free.popleft()
-        own_starts = np.empty(len(starts), np.int64)
-        own = np.empty(most, pixels.dtype), np.empty(most, np.float32)
+        scratch, thread_cells = prepared.piece_scratch(), free.popleft()
+        block_starts = np.empty(len(starts), np.int64)
+        block = np.empty(most, pixels.dtype), np.empty(most, np.float32)
         try:
             while True:
-                with taking:
-                    if not waiting:
+                with queue_lock:
+                    if not blocks:
                         return
-                    first, end = waiting.popleft()
-                own_starts[first] = 0
-                is_next = done == first  # all before it have ended: no copy
+                    first, end = blocks.popleft()
+                block_starts[first] = 0
+                is_next = done == first  # all blocks before are done: no copy
                 at = int(starts[first] - starts[begin])
-                to = (pixels[at:], areas[at:]) if is_next else own
-                prepared.compiled.list_shares(first, end, own_starts, *to, own_cells, scratch)
+                to = (pixels[at:], areas[at:]) if is_next else block
+                prepared.compiled.list_shares(first, end, block_starts, *to, thread_cells, scratch)
                 with turn:
                     while not is_lost and done != first:
                         turn.wait()
                     if is_lost:
                         return
-                    at, n_entries = int(starts[first] - starts[begin]), int(own_starts[end])
-                    starts[first + 1 : end + 1] = own_starts[first + 1 : end + 1] + starts[first]
+                    at, n_entries = int(starts[first] - starts[begin]), int(block_starts[end])
+                    starts[first + 1 : end + 1] = block_starts[first + 1 : end + 1] + starts[first]
                     done = end
                     turn.notify_all()
                 if not is_next:
-                    pixels[at : at + n_entries], areas[at : at + n_entries] = own[0][:n_entries], own[1][:n_entries]
+                    pixels[at : at + n_entries], areas[at : at + n_entries] = block[0][:n_entries], block[1][:n_entries]
         except BaseException:
             with turn:  # wake the threads that wait for this block
                 is_lost = True

@@ -29,7 +29,7 @@ from topleft.typing import RuleOption, SamplingOption
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """The values of polygons: a row of `table` each, and one for pixels of none."""
+    """The values of polygons, a row of `table` each, and of pixels outside of all polygons."""
 
     table: npt.NDArray[Any]  # (P, ...), of the picture's dtype
     background: npt.NDArray[Any]  # a row
@@ -67,34 +67,34 @@ def polygons(
     rule : "evenodd" or "nonzero"
         A point is inside if the rings wind round it an odd number of times, or any number of times but 0.
     values : "index", number, or array_like (P,) or (P, C), optional
-        The value of a pixel in a polygon: "index" its number, as int32; one number for all, or one for each, of any
-        dtype; or a colour for each. Without it the result is a mask.
+        The value of a pixel in a polygon: "index" the index of the polygon, as int32; a number for all polygons or for
+        each, of any dtype; or a colour for each. Without `values` the result is a mask.
     background : number or array_like (C,), optional
         The value of a pixel in no polygon. The default is -1 with ``values="index"``, with other values the `nodata` of
         the `Grid`, or 0.
     crs : str, int or CRS, optional
-        The CRS of the points; pyproj takes them to that of the `Grid`. The default is the grid's, and a
-        GeoSeries or GeoDataFrame with another one is refused.
+        The CRS of the points; pyproj transforms them to the CRS of the `Grid`. The default is the CRS of the grid, and
+        a GeoSeries or GeoDataFrame in another CRS raises an error.
     sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16"; "area"; "outer" or "inner"
         A pixel is inside when its centre is. With several samples, and with exact areas, masks are the share of the
         pixel that lies inside of any polygon (with "area" the sum of the polygons' shares, at most 1), and colours
-        are mixed by it. "outer": all pixels that meet a polygon in positive area (the meaning of rasterio's
-        `all_touched`); "inner": all that lie wholly inside of one.
+        are blended by this share. "outer": all pixels that meet a polygon in positive area (the meaning of rasterio's
+        `all_touched`); "inner": all pixels that lie wholly inside of a polygon.
     origin : (int, int)
         The pixel of the whole picture that is row 0, column 0 here.
     subpixel_bits : int, 0 to 16
         Points snap to ``2**-subpixel_bits`` pixels.
     assume_valid : bool
-        For "area", "outer" and "inner": the rings of a polygon neither cross nor touch, its first one is its border and
-        all others are holes in it; they may run either way. Saves the search for crossings. Pictures of other
-        polygons are undefined.
+        For "area", "outer" and "inner": the rings of a polygon neither cross nor touch, its first ring is its border
+        and all other rings are holes in it; rings may run either way. Saves the search for crossings. Pictures of
+        other polygons are undefined.
     max_crossings : int
         For "area", "outer" and "inner": how often rings may cross or touch within the picture; fifty million
-        take some 4 s. Where more than 64 edges pass a pixel side by side, it counts as well.
+        take some 4 s. A pixel that more than 64 edges pass side by side counts as well.
     threads : int or None
-        The result is the same to the bit.
+        Does not change a bit of the result.
     out : ndarray of the result's dtype, shape (H, W) or (H, W, C), optional
-        Where the result goes. The first write to a fresh array takes several times as long as drawing few polygons.
+        The array to write. The first write to a fresh array takes several times as long as drawing few polygons.
 
     Returns
     -------
@@ -107,14 +107,14 @@ def polygons(
     ValueError
         For a wrong shape, an unknown option, offsets that do not fit, a ring of fewer than three points, a point
         that is not finite or lies beyond ``2**60`` sub-pixels, rings that cross more than `max_crossings` times, or
-        another CRS than that of the grid.
+        a CRS other than the CRS of the grid.
     TypeError
         If an item is no polygon, or a dtype is wrong.
 
     Notes
     -----
-    Each pixel on a border that two polygons share belongs to exactly one of them: a point on an edge lies to the right
-    of it, or below. Areas are exact except for one rounding to ``2**-24`` for each edge that passes the pixel.
+    A pixel centre on a border that two polygons share belongs to exactly one of the two: a point on an edge lies to the
+    right of it, or below. Areas are exact except for a rounding to ``2**-24`` for each edge that passes the pixel.
 
     References
     ----------
@@ -140,14 +140,14 @@ def polygons(
     """
     how = parse_sampling(sampling)
     is_nonzero = parse(RuleOption, "rule", rule) == "nonzero"
-    given = in_crs_of(size, rings, crs).apart_from(out)
-    found, frame = frame_of(given, size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
+    ring_set = in_crs_of(size, rings, crs).apart_from(out)
+    rings_px, frame = frame_of(ring_set, size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
     shape = frame.size[::-1]
     if values is None:
         if background is not None:
             raise ValueError("background needs values: a mask is False where no polygon is")
-        prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
-        warn_if_apart(prepared, given, size)
+        prepared = prepare(SCRATCH, rings_px, frame, is_nonzero=is_nonzero)
+        warn_if_apart(prepared, ring_set, size)
         if how in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER):
             with Canvas.of(FRESH, "mask", out, shape, np.bool_) as (mask, canvas):
                 if canvas.size:
@@ -164,9 +164,9 @@ def polygons(
         return result
     if background is None and isinstance(size, Grid) and not isinstance(values, str):
         background = size.nodata
-    paint = as_paint(apart_from(out, "values", values), background, len(found), how)
-    prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
-    warn_if_apart(prepared, given, size)
+    paint = as_paint(apart_from(out, "values", values), background, len(rings_px), how)
+    prepared = prepare(SCRATCH, rings_px, frame, is_nonzero=is_nonzero)
+    warn_if_apart(prepared, ring_set, size)
     with Canvas.of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
         if canvas.size:
             paint_values(prepared, canvas, paint, how, is_nonzero=is_nonzero, assume_valid=assume_valid)
@@ -174,22 +174,23 @@ def polygons(
 
 
 def in_crs_of(size: object, rings: Any, crs: object) -> RingSet:
-    """Return the rings in the CRS of a grid, if that has one.
+    """Return the rings in the CRS of a grid, if the grid has a CRS.
 
-    A `ValueError` if they say that they are of another one, and `crs` does not; or if `crs` is given and the grid has
-    none.
+    A `ValueError` if `rings.crs` is another CRS and `crs` is None, or if `crs` is set and the grid has no CRS.
     """
-    given, own, of_grid = as_rings(rings), crs_text(crs), size.crs if isinstance(size, Grid) else None
+    ring_set, crs_of_points, of_grid = as_rings(rings), crs_text(crs), size.crs if isinstance(size, Grid) else None
     if of_grid is None:
-        if own is not None:
-            raise ValueError(f"crs needs a Grid with a CRS, which the points then go to, got crs={own!r}")
-        return given
-    said = crs_text(getattr(rings, "crs", None)) if own is None else own
-    if said is None or is_same_crs(said, of_grid):
-        return given
-    if own is None:
-        raise ValueError(f"rings must be of the CRS of the grid, {of_grid}, got {said}: crs={said!r} transforms them")
-    return RingSet(transformed(given.points, own, of_grid), given.rings, given.polygons)
+        if crs_of_points is not None:
+            raise ValueError(f"crs needs a Grid with a CRS, which the points then go to, got crs={crs_of_points!r}")
+        return ring_set
+    crs_of_rings = crs_text(getattr(rings, "crs", None)) if crs_of_points is None else crs_of_points
+    if crs_of_rings is None or is_same_crs(crs_of_rings, of_grid):
+        return ring_set
+    if crs_of_points is None:
+        raise ValueError(
+            f"rings must be of the CRS of the grid, {of_grid}, got {crs_of_rings}: crs={crs_of_rings!r} transforms them"
+        )
+    return RingSet(transformed(ring_set.points, crs_of_points, of_grid), ring_set.rings, ring_set.polygons)
 
 
 def frame_of(
@@ -201,7 +202,7 @@ def frame_of(
     n_samples: int,
     max_crossings: object = MAX_CROSSINGS,
 ) -> tuple[RingSet, Frame]:
-    """Return the rings in pixels, and the window that they are drawn in."""
+    """Return the rings in pixels, and the frame to draw."""
     if isinstance(size, Grid):
         rings, size = RingSet(size.to_pixels(rings.points), rings.rings, rings.polygons), size.size
     bits = as_subpixel_bits(subpixel_bits)
@@ -211,23 +212,25 @@ def frame_of(
     return rings, Frame(as_size(size), corner, bits, grid_bits, parse_threads(threads), most)
 
 
-def warn_if_apart(prepared: Prepared, given: RingSet, size: object) -> None:
+def warn_if_apart(prepared: Prepared, rings: RingSet, size: object) -> None:
     """Warn the caller's caller when no polygon meets a pixel of the grid."""
-    if not isinstance(size, Grid) or not len(given.points) or 0 in size.size or prepared.frame.origin != (0, 0):
+    if not isinstance(size, Grid) or not len(rings.points) or 0 in size.size or prepared.frame.origin != (0, 0):
         return
     left, top, right, bottom = prepared.compiled.boxes_px.T
     if ((left < right) & (top < bottom)).any():
         return
-    (x_min, y_min), (x_max, y_max) = given.points.min(axis=0).tolist(), given.points.max(axis=0).tolist()
-    own, grid = [x_min, x_max, y_min, y_max], list(size.extent)
-    are_degrees, is_grid_of_degrees = (-180 <= e[0] and e[1] <= 360 and -90 <= e[2] and e[3] <= 90 for e in (own, grid))
+    (x_min, y_min), (x_max, y_max) = rings.points.min(axis=0).tolist(), rings.points.max(axis=0).tolist()
+    box, box_of_grid = [x_min, x_max, y_min, y_max], list(size.extent)
+    are_degrees, is_grid_of_degrees = (
+        -180 <= e[0] and e[1] <= 360 and -90 <= e[2] and e[3] <= 90 for e in (box, box_of_grid)
+    )
     why = "are they of another CRS than the grid?"
     if are_degrees != is_grid_of_degrees:
         degrees, other = ("polygons", "grid") if are_degrees else ("grid", "polygons")
         why = f"the {degrees} may be degrees, the {other} cannot: transform the polygons to the CRS of the grid"
     warnings.warn(
         "no polygon meets a pixel of the grid: the polygons lie in x {:g} to {:g}, y {:g} to {:g}, the grid in x {:g} "
-        "to {:g}, y {:g} to {:g}; ".format(*own, *grid)
+        "to {:g}, y {:g} to {:g}; ".format(*box, *box_of_grid)
         + why,
         stacklevel=3,
     )
@@ -315,11 +318,11 @@ def paint_values(
         return
     height, width = out.shape[:2]
     n_bytes = paint.table.itemsize * int(np.prod(paint.table.shape[1:]))
-    if n_bytes in (1, 4):  # written as they are
+    if n_bytes in (1, 4):  # the kernel writes values of these sizes
         dtype = np.int8 if n_bytes == 1 else np.int32
-        own = np.ascontiguousarray(np.append(_as_words(paint.table, dtype), 0), np.int32)  # never empty
+        words = np.ascontiguousarray(np.append(_as_words(paint.table, dtype), 0), np.int32)  # never empty
         background = int(_as_words(paint.background[None], dtype)[0])
-        draw_labels(prepared, _as_words(out, dtype).reshape(height, width), own, background, str(how))
+        draw_labels(prepared, _as_words(out, dtype).reshape(height, width), words, background, str(how))
         return
     labels: npt.NDArray[np.int32] = SCRATCH.scratch("labels", (height, width), np.int32)
     draw_labels(prepared, labels, None, -1, str(how))
@@ -332,5 +335,5 @@ def paint_values(
 
 
 def _as_words(array: npt.NDArray[Any], dtype: type) -> npt.NDArray[Any]:
-    """Return the rows of an array as numbers of as many bytes."""
+    """Return the bytes of an array as numbers of `dtype`."""
     return np.ascontiguousarray(array).view(np.uint8).reshape(-1).view(dtype)

@@ -13,14 +13,14 @@ from topleft._core.base.memory import SCRATCH, Memory, times_that_fit
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.polygons.rings import RingSet
 
-#: Points, and pixels, that are worth a thread: below, one is done before the other has begun.
+#: The least points, and pixels, for each thread: with less, a thread is done before the next has started.
 MIN_POINTS_PER_THREAD = 50_000
 MIN_PIXELS_PER_THREAD = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The window that is drawn, and the grid that points snap to."""
+    """The window to draw, and the grid that points snap to."""
 
     size: tuple[int, int]
     origin: tuple[int, int]
@@ -44,11 +44,11 @@ class Prepared:
 
     @property
     def n_threads(self) -> int:
-        """How many threads drawing is worth."""
+        """How many threads to draw with."""
         return threads_for(self.frame, self.n_points)
 
     def certify(self, *, assume_valid: bool) -> None:
-        """Find the polygons with rings that do not meet, and the sign of each ring's area."""
+        """Test which polygons have rings that do not meet, and compute the sign of each ring's area."""
         compiled, n = self.compiled, len(self)
         compiled.make_weights(self.frame.max_crossings)
         n_words = 0 if assume_valid else compiled.certify_words()
@@ -68,7 +68,7 @@ class Prepared:
         return max(4096, self.most_edges), height, width
 
     def threads_with_pieces(self) -> int:
-        """Return how many threads have memory for such polygons: fewer than drawing is worth where it is scarce."""
+        """Return how many threads to draw with: `n_threads`, or as many as have memory for `pieces_shape`."""
         shape = self.pieces_shape()
         if shape is None:
             return self.n_threads
@@ -76,13 +76,13 @@ class Prepared:
         return times_that_fit(self.n_threads, (n_words,), np.int64)
 
     def piece_scratch(self) -> engine.PieceScratch | None:
-        """Return memory for polygons with rings that meet, None when there are none."""
+        """Return scratch for polygons with rings that meet, None where all rings stay apart."""
         shape = self.pieces_shape()
         return None if shape is None else engine.PieceScratch(*shape)
 
 
 def threads_for(frame: Frame, n_points: int) -> int:
-    """Return how many threads a picture is worth."""
+    """Return how many threads to draw a picture with."""
     if frame.threads is not None:
         return frame.threads
     n_worth = max(n_points // MIN_POINTS_PER_THREAD, frame.size[0] * frame.size[1] // MIN_PIXELS_PER_THREAD)
@@ -90,7 +90,7 @@ def threads_for(frame: Frame, n_points: int) -> int:
 
 
 def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -> Prepared:
-    """Snap the points of polygons and find their boxes."""
+    """Snap the points of polygons and compute their boxes."""
     points, n = rings.points, len(rings.points)
     source = engine.Source(points)
     columns: npt.NDArray[np.int32] = memory.scratch("polygon points", (2, n + engine.POLYGON_PAD), np.int32)

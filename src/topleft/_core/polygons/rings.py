@@ -37,7 +37,7 @@ class RingSet:
         return RingSet(self.points[rings[0] : rings[-1]], rings - rings[0], polygons - polygons[0])
 
     def apart_from(self, out: object) -> RingSet:
-        """Return it with copies of the arrays that `out` may share memory with."""
+        """Return the polygons with copies of the arrays that `out` may share memory with."""
         overlap = np.may_share_memory
         if out is None or (
             isinstance(out, np.ndarray)
@@ -55,15 +55,15 @@ def as_rings(values: Any) -> RingSet:
     if isinstance(values, RingSet):
         return values
     values = _without_tensors(values)
-    found = _from_offsets(values)
-    if found is not None:
-        return _bounded(found)
-    found = _from_shapely(values)
-    if found is None:
+    rings = _from_offsets(values)
+    if rings is not None:
+        return _bounded(rings)
+    rings = _from_shapely(values)
+    if rings is None:
         values = values.to_numpy() if hasattr(values, "to_numpy") else values
         listed = [_rings_of_geometry(g) for g in _geometries(values)] if _is_geometry(values) else _nested(values)
-        found = _join(listed)
-    return _checked(found)
+        rings = _join(listed)
+    return _checked(rings)
 
 
 def rings_of_triangles(points: npt.NDArray[Any], triangles: npt.NDArray[np.int32]) -> RingSet:
@@ -90,7 +90,7 @@ def as_points(values: Any, name: str) -> npt.NDArray[Any]:
 
 
 def _without_tensors(values: Any) -> Any:
-    """Return arrays of other libraries as NumPy's, by themselves or in lists, as the first elements tell."""
+    """Convert arrays of other libraries to NumPy arrays, alone or in lists; tests the first element of each list."""
     if _is_tensor(values):
         return as_array("rings", values)
     if isinstance(values, (list, tuple)) and _has_tensors(values):
@@ -131,7 +131,7 @@ def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
         raise TypeError(f"{name} must be integers, got dtype {offsets.dtype}")
     if offsets.ndim != 1 or len(offsets) < 1:
         raise ValueError(f"{name} must have shape (n + 1,), got {offsets.shape}")
-    offsets = np.array(offsets, np.int64)  # a copy: nobody else changes it after the check
+    offsets = np.array(offsets, np.int64)  # a copy: the caller's array may change after the check
     steps = offsets[1:] - offsets[:-1]
     least = np.minimum.reduce(steps, initial=3)
     if offsets[0] != 0 or offsets[-1] != n or least < 0:
@@ -160,7 +160,7 @@ def _from_ragged(coordinates: npt.NDArray[Any], offsets: Sequence[Any]) -> RingS
 
 
 def _from_shapely(values: Any) -> RingSet | None:
-    """Return shapely geometries, one or a sequence or a GeoSeries; None when it is none of these. Imports nothing."""
+    """Return shapely geometries, a geometry, a sequence or a GeoSeries; None for other values. Imports nothing."""
     shapely: Any = sys.modules.get("shapely")
     if shapely is None:
         return None
@@ -232,7 +232,7 @@ def _xy(ring: Iterable[Sequence[float]]) -> list[tuple[float, float]]:
 
 
 def _depth(values: Any) -> int:
-    """Return how many levels of lists there are, as the first elements tell."""
+    """Return how many levels of lists there are, from the first element of each level."""
     if isinstance(values, np.ndarray):
         return values.ndim
     if isinstance(values, (list, tuple)):
@@ -287,12 +287,12 @@ def _join(listed: list[list[Any]]) -> RingSet:
     return RingSet(joined, np.cumsum(lengths), np.cumsum(counts))
 
 
-def _checked(found: RingSet) -> RingSet:
+def _checked(rings: RingSet) -> RingSet:
     """Return rings of at least three points each."""
-    lengths = found.rings[1:] - found.rings[:-1]
+    lengths = rings.rings[1:] - rings.rings[:-1]
     if np.minimum.reduce(lengths, initial=3) < 3:
         raise _too_few(lengths)
-    return _bounded(found)
+    return _bounded(rings)
 
 
 def _too_few(lengths: I64) -> ValueError:
@@ -300,8 +300,8 @@ def _too_few(lengths: I64) -> ValueError:
     return ValueError(f"rings must have at least 3 points, ring {k} has {lengths[k]}")
 
 
-def _bounded(found: RingSet) -> RingSet:
-    """Return as many points and rings as kernels can number."""
-    if max(len(found.points), len(found.rings)) > 2**31 - 1:
-        raise ValueError(f"rings must have at most {2**31 - 1} points, got {len(found.points)}")
-    return found
+def _bounded(rings: RingSet) -> RingSet:
+    """Return the rings, or raise an error for more points or rings than int32 can index."""
+    if max(len(rings.points), len(rings.rings)) > 2**31 - 1:
+        raise ValueError(f"rings must have at most {2**31 - 1} points, got {len(rings.points)}")
+    return rings

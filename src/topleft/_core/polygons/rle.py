@@ -1,4 +1,4 @@
-"""`to_rle`: run lengths of masks, ids and polygons, as COCO has them.
+"""`to_rle`: run lengths of masks, ids and polygons, in the format of COCO.
 
 Input: masks, ids, or rings and a size. Output: a dict for each object, which `pycocotools` reads.
 """
@@ -40,8 +40,7 @@ def to_rle(
     size : (int, int), optional
         Width and height of the picture in pixels that polygons are in.
     labels : array_like (N,) of int, optional
-        Which numbers of the ids are wanted: ``range(len(scene))`` of an instance map. One that no pixel has gives an
-        empty mask.
+        The ids to encode: ``range(len(scene))`` of an instance map. The mask of an id that no pixel has is empty.
     rule, subpixel_bits
         Of polygons, as for `polygons`.
     compressed : bool
@@ -51,7 +50,7 @@ def to_rle(
     -------
     dict, or list of dict
         `size`, [H, W], and `counts`: how many pixels are outside, then inside, then outside and so on, down the columns
-        from the left one on. Of a mask (H, W) one dict; else a list, of each mask, label or polygon.
+        from left to right. A dict for a mask (H, W); otherwise a list of a dict for each mask, label or polygon.
 
     Raises
     ------
@@ -59,16 +58,16 @@ def to_rle(
         For a wrong shape, bytes other than 0 and 1, ids beyond int32, labels that are not different, both `size` and
         `labels`, and as `polygons` does.
     TypeError
-        For dtypes that are none of these.
+        For other dtypes.
 
     Notes
     -----
-    `counts` is the text that ``pycocotools.mask.encode`` makes of the same mask, byte for byte. A polygon is its mask
-    under the rule of `polygons`; `pycocotools` draws polygons in its own way, and its masks differ along the border.
+    `counts` equals the text of ``pycocotools.mask.encode`` of the mask, byte for byte. Polygons are drawn under the
+    rule of `polygons`; `pycocotools` draws polygons by another rule, and its masks differ along the border.
 
     References
     ----------
-    T.-Y. Lin and others, Microsoft COCO: Common Objects in Context, 2014; the format as its tools have it in C.
+    T.-Y. Lin and others, Microsoft COCO: Common Objects in Context, 2014; the format as in the C code of its tools.
 
     Examples
     --------
@@ -80,7 +79,7 @@ def to_rle(
     >>> tl.to_rle(mask)
     {'size': [2, 3], 'counts': '2111'}
     >>> ids = np.array([[-1, 4, 4], [-1, 7, 4]])
-    >>> [one["counts"] for one in tl.to_rle(ids, labels=[7, 4], compressed=False)]
+    >>> [rle["counts"] for rle in tl.to_rle(ids, labels=[7, 4], compressed=False)]
     [[3, 1, 2], [2, 1, 1, 2]]
     >>> tl.to_rle([[(0, 0), (2, 0), (2, 2), (0, 2)]], (3, 2), compressed=False)
     [{'size': [2, 3], 'counts': [0, 4, 2]}]
@@ -115,17 +114,17 @@ def encode_polygons(
     owners: npt.NDArray[np.int64] | None = None,
     compressed: bool = True,
 ) -> list[dict[str, Any]]:
-    """Return the run lengths of the mask of each polygon, drawn in its box alone.
+    """Return the run lengths of the mask of each polygon, drawn only in its box.
 
-    `owners`: the object that each is part of, ascending from 0 on; then of each object, the union of its parts.
+    `owners`: the object of each polygon, ascending from 0 on; the mask of an object is the union of its polygons.
     """
     is_nonzero = parse(RuleOption, "rule", rule) == "nonzero"
-    found, frame = frame_of(as_rings(rings), size, (0, 0), subpixel_bits, 1, 1)  # type: ignore[arg-type]
-    prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+    rings_px, frame = frame_of(as_rings(rings), size, (0, 0), subpixel_bits, 1, 1)  # type: ignore[arg-type]
+    prepared = prepare(SCRATCH, rings_px, frame, is_nonzero=is_nonzero)
     table, boxes = RunTable(frame.size), prepared.compiled.boxes_px.tolist()
     mask: npt.NDArray[np.uint8] = SCRATCH.scratch("labels", frame.size[::-1], np.uint8)
-    firsts = np.arange(len(found)) if owners is None else np.flatnonzero(np.diff(owners, prepend=-1))
-    for first, end in pairwise([*firsts.tolist(), len(found)]):
+    firsts = np.arange(len(rings_px)) if owners is None else np.flatnonzero(np.diff(owners, prepend=-1))
+    for first, end in pairwise([*firsts.tolist(), len(rings_px)]):
         shown = [box for box in boxes[first:end] if box[0] < box[2] and box[1] < box[3]]
         if not shown:
             continue
@@ -137,7 +136,7 @@ def encode_polygons(
             table.add(mask[None], box=(left, top, right, bottom), key=key)
         else:  # parts may be thousands: the rectangles of a crowd
             window: dict[str, Any] = {"origin": (left, top), "subpixel_bits": frame.subpixel_bits, "threads": 1}
-            union = polygons(found.part(first, end), (right - left, bottom - top), rule=rule, **window)
+            union = polygons(rings_px.part(first, end), (right - left, bottom - top), rule=rule, **window)
             table.add(union.view(np.uint8)[None], at=(left, top), key=key)
-    n = len(found) if owners is None else int(owners[-1]) + 1 if len(owners) else 0
+    n = len(rings_px) if owners is None else int(owners[-1]) + 1 if len(owners) else 0
     return table.encode(table.keys.astype(np.int32), n, compressed=compressed)
