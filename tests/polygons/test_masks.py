@@ -66,6 +66,7 @@ def test_squares_of_runs_that_end_near_whole_words_equal_reference(isa, left, ri
 
 @ON_EACH_ISA
 @ON_EACH_RULE
+@settings(max_examples=100)
 @given(wild_seeds)
 def test_labels_of_wild_polygons_are_the_last_masks(isa, rule, seed):
     rng = np.random.default_rng(seed)

@@ -47,7 +47,7 @@ def test_overdraw_adversarial_scene_equals_reference(make):
         comparing.check_overdraw(scene)
 
 
-@settings(max_examples=800)
+@settings(max_examples=400)
 @given(pixel_scenes() | clip_scenes())
 def test_overdraw_any_scene_equals_reference(scene):
     comparing.check_overdraw(scene)
@@ -210,7 +210,6 @@ def test_interpolate_within_bound(make):
         comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
 
 
-@settings(max_examples=600)
 @given(pixel_scenes() | clip_scenes(), st.integers(0, 2**32 - 1))
 def test_interpolate_any_scene_within_bound(scene, seed):
     values = np.random.default_rng(seed).uniform(-1, 1, (len(scene.vertices), 1)).astype(np.float32)

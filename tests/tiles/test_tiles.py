@@ -153,14 +153,12 @@ def test_far_coordinates_on_a_grid_lose_nothing():
     points = rng.uniform(0, 0.2, (40, 3)) + [500000.0, 5.5e6, 0]
     triangles = rng.integers(0, 40, (60, 3))
     grid = tl.Grid((10_000_000, 9_000_000), (490000.0, 500000.2, 5.4955e6, 5.5045e6))
-    near = grid.to_pixels(points) - [9_800_000, 0]
     raster = tl.tiles((points, triangles), grid, window=1 << 16)
     (x0, y0), (x1, y1) = grid.to_pixels(points).min(axis=0).astype(int), grid.to_pixels(points).max(axis=0).astype(int)
     whole = tl.rasterize(
         np.column_stack([grid.to_pixels(points), points[:, 2]]), triangles, (x1 - x0, y1 - y0), origin=(x0, y0)
     ).triangle
     assert same(raster[y0:y1, x0:x1], whole)
-    assert near.shape == (40, 2)
 
 
 def test_slices_are_those_of_the_whole():
@@ -234,6 +232,7 @@ def test_explain_counts_windows_and_spans():
         ({"kind": "depth", "depth_test": "more"}, ValueError, "depth_test must be one of"),
         ({"kind": "height_map", "surface": "inner"}, ValueError, "surface must be"),
         ({"kind": "field", "values": [1.0]}, ValueError, "values must have shape"),
+        ({"kind": "field", "values": "speed"}, ValueError, r"values must be a \.npy file or .* \(none\), got 'speed'"),
         ({"kind": "fill", "values": COLORS[:3]}, ValueError, "colors must have 50 rows, one per triangle, or 60"),
         ({"memory": 0}, ValueError, "memory must be at least 1"),
         ({"threads": 0}, ValueError, "threads must be at least 1"),
@@ -321,8 +320,3 @@ def test_values_by_name_are_those_of_the_file(tmp_path):
     named = tl.tiles((points, triangles), (6, 6), kind="field", values=tmp_path / "depth.npy", window=4)
     given = tl.tiles((points, triangles), (6, 6), kind="field", values=[1.0, 2.0, 3.0], window=4)
     assert np.array_equal(named[:, :], given[:, :], equal_nan=True)
-
-
-def test_values_by_a_name_that_is_not_there_are_refused():
-    with pytest.raises(ValueError, match=r"values must be a \.npy file or a property of .* \(none\), got 'speed'"):
-        tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), (6, 6), kind="field", values="speed")
