@@ -14,6 +14,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, U8
 from topleft._core.base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._core.base.memory import FRESH
+from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.points import PointFragments, draw_points
 from topleft._core.raster.rasterize import refuse_many
 from topleft._core.raster.view import View, ViewOptions
@@ -92,7 +93,7 @@ def w_of(bent: F64, projection: F64) -> F64:
     return np.where(w > 0, w, 1)
 
 
-def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:
+def shade_cloud(frags: Fragments, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:
     """The picture (H, W, 4) of a cloud: its colours, lit where it has normals.
 
     A `ValueError` if an option has no meaning for points.

@@ -7,12 +7,10 @@ with alpha.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
 
 from topleft._core.base.array_types import U8
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.points import PointFragments
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.model.environment import Environment
 from topleft._meshes.model.light import Fog, Light
@@ -108,9 +106,9 @@ def shade(
     options = ShadingOptions.parse(
         shading, color, background, depth_range, lights, ambient, material, matcap, fog, environment, threads
     )
-    if frags._subject_kind == "Points":
-        return shade_cloud(cast(PointFragments, frags), cast(Points, mesh), camera, options)
-    return shade_by(frags, scene_of(cast(Mesh, mesh)), camera, options)
+    if isinstance(mesh, Points):
+        return shade_cloud(frags, mesh, camera, options)
+    return shade_by(frags, scene_of(mesh), camera, options)
 
 
 def shade_by(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOptions) -> U8:
@@ -121,13 +119,13 @@ def shade_by(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOpt
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene | Points) -> None:
-    """Raise an error unless the subject can be the one that was drawn: kernels index its arrays by fragments."""
+    """Raise an error unless the subject can be what was drawn: kernels index its arrays by fragments."""
     if not isinstance(frags, Fragments):
         raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
     kind, drawn = frags._subject_kind, frags._counts()
     if not isinstance(mesh, SUBJECTS[kind]):
         raise TypeError(f"mesh must be a {kind}, got {type(mesh).__name__}")
-    given = [(len(cast(Points, mesh)),) * 2] if kind == "Points" else counts_of(scene_of(cast(Mesh, mesh)))
+    given = [(len(mesh), len(mesh))] if isinstance(mesh, Points) else counts_of(scene_of(mesh))
     if len(drawn) != len(given):
         raise ValueError(f"mesh must be the scene that was drawn, of {len(drawn)} instances, got one of {len(given)}")
     for k, (old, new) in enumerate(zip(drawn, given, strict=True)):
