@@ -141,9 +141,9 @@ def threads_to_draw(view: View, work: Work, sink: Sink) -> int:
 
 
 def draws_at_once(view: View, n_triangles: int) -> bool:
-    """Tell whether one thread takes vertices to a shaded picture in one call: what shows decides nothing.
+    """Whether one call of one thread draws and shades the picture: it is small, and needs no bands and no bounds.
 
-    No other thread, no bands of rows; and no bounds of depth, as so many triangles have short rows.
+    Bounds of depth do not pay where so many triangles have short rows.
     """
     costs, (width, height) = cost_table(), view.size
     is_plain = view.sampling is Sampling.CENTER and view.single_sided is None and not view.is_exact
@@ -371,7 +371,7 @@ def drawing(view: View, work: Work, sink: Sink) -> Drawing:
 
 
 def pays_to_sort(view: View, work: Work, sink: Sink) -> bool:
-    """Tell whether triangles are sorted into bands of rows: few of a large picture, or each far from the one before."""
+    """Tell whether triangles are sorted into bands of rows: few of a large picture, or each far from the last."""
     costs, n_pixels, n = cost_table(), view.size[0] * view.size[1], work.n_triangles
     has_depth = sink in (Sink.NEAREST, Sink.FARTHEST, Sink.PAINT)
     is_stored = has_depth or sink in (Sink.COUNT, Sink.LABEL)
@@ -515,7 +515,7 @@ def pays_to_split(view: View, n_triangles: int) -> bool:
 
 
 def earlier_wins(test: DepthTestOption | None, *, has_depth: bool) -> bool:
-    """Tell whether the triangle with the lower index shows where depths are equal; otherwise the later one does."""
+    """Tell whether the triangle with the lower index shows at equal depth; otherwise that with the higher index."""
     return test is not None and has_depth
 
 

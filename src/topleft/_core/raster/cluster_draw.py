@@ -175,7 +175,7 @@ class ClusteredMesh(BoxView):
             mesh = self.try_part(None, FRESH)
         if mesh is None:
             mesh = self.try_part(triangles, FRESH)
-        if mesh is None:  # a vertex beside one of them, which need not be used, does not fit
+        if mesh is None:  # an unused vertex beside a used one does not fit
             mesh = snap_mesh(FRESH, points, own, view, with_depth=True, out=None).mesh
         return mesh
 

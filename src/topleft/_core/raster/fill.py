@@ -1,4 +1,4 @@
-"""Fills a picture with the colours of triangles: of the one that shows in a pixel, or blended one after the other.
+"""Fills a picture with the colours of triangles: of the visible triangle of a pixel, or blended in their order.
 
 Several samples are resolved: their colours are averaged, as values or in linear light. With straight alpha
 colours are weighted by it: the mean of premultiplied colours, made straight again.
@@ -118,7 +118,7 @@ class Painting(NamedTuple):
 def draw_fill(
     memory: Memory, vertices: ArrayLike, triangles: ArrayLike, colors: ArrayLike, view: View, style: Style, out: object
 ) -> NDArray[Any]:
-    """`fill`, on the memory given."""
+    """Draw as `fill` does, in this memory."""
     if view.sampling in (Sampling.OUTER, Sampling.INNER):
         raise ValueError(
             f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"

@@ -31,7 +31,7 @@ class Viewer(Protocol):
 
 
 class GivenCorners(NamedTuple):
-    """The arrays that a visibility buffer was drawn from, as given; derivatives along the picture come from them."""
+    """The caller's arrays that a visibility buffer was drawn from; derivatives along the picture come from them."""
 
     vertices: ArrayLike
     triangles: ArrayLike
@@ -120,10 +120,10 @@ class Fragments:
     mask : ndarray of bool, shape (H, W)
         Where there is a triangle.
     id, instance : ndarray of int32, shape (H, W)
-        The same as `triangle`, and 0 where there is one: of several instances `SceneFragments` tells more.
+        Equal to `triangle`, and 0 where there is a triangle: of several instances `SceneFragments` tells more.
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
-        The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
-        the first sample, which is nearest to the centre; `sample` gives those of another.
+        `triangle` and `depth` of each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are
+        then of the first sample, which is nearest to the centre; `sample` returns the fragments of another.
 
     Examples
     --------

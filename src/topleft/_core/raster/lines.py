@@ -59,7 +59,7 @@ def draw_wireframe(
     antialias: bool,
     out: object,
 ) -> NDArray[Any]:
-    """`wireframe`, on the memory given."""
+    """Draw as `wireframe` does, in this memory."""
     width, height = view.size
     hides = as_depth(depth, (height, width))
     hides = None if hides is None else np.asarray(apart_from(out, "depth", hides))

@@ -97,7 +97,7 @@ def merge(
             names = _as_names(shares[i], own_ids, i)
         if ids is None or depth is None:
             ids = np.full(own_ids.shape, -1, np.int32)
-            depth = own_depth.copy()  # the background's, as the first one has it
+            depth = own_depth.copy()  # of the background, as in the first buffer
         if own_ids.shape != ids.shape:
             raise ValueError(f"buffers must have one shape, got {own_ids.shape} as buffer {i} after {ids.shape}")
         _merge_into(ids, depth, own_ids, own_depth, names, test, n_threads)

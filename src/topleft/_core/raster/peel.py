@@ -38,7 +38,7 @@ class DepthLayers:
     depth : ndarray of float32, shape (H, W, K)
         Its depth; +inf where there are fewer, -inf with ``depth_test="greater"``.
     planes : (ndarray of int32, ndarray of float32), each of shape (K, H, W)
-        The same numbers as they lie in memory.
+        `triangle` and `depth` as they lie in memory.
 
     Examples
     --------
@@ -91,7 +91,7 @@ class DepthLayers:
         return self.rows(k, 0, self.planes[0].shape[1])
 
     def rows(self, k: int, top: int, n_rows: int) -> Fragments:
-        """Return rows [top, top + n_rows) of layer k in the same way."""
+        """Return rows [top, top + n_rows) of layer k as a visibility buffer."""
         n = len(self.planes[0])
         if not isinstance(k, int | np.integer):
             raise TypeError(f"k must be an integer, got {shown(k)}")

@@ -37,7 +37,7 @@ class PointFragments(Fragments):
     Attributes
     ----------
     point : ndarray of int32, shape (H, W)
-        Index of the point that shows in the pixel, -1 where there is none; the same as `triangle` and `id`.
+        Index of the point that shows in the pixel, -1 where there is none; equal to `triangle` and `id`.
     depth, mask, instance, samples_triangle, samples_depth
         As in `Fragments`, of points. The depth of a point is that of its centre.
 
@@ -199,7 +199,7 @@ def draw_points(
     *,
     is_farthest: bool = False,
 ) -> PointFragments:
-    """`points`, of checked options, on the memory given; larger sizes are cut to the largest."""
+    """Draw as `points` does, by checked options, in this memory; larger sizes are cut to the largest."""
     (width, height), n_samples = view.size, view.sampling.n_samples
     check_fits((n_samples, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n_samples, height, width), np.int32)

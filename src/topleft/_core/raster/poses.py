@@ -31,7 +31,7 @@ class FragmentsBatch(Sequence[Fragments]):
     depth : ndarray of float32, shape (B, H, W)
         Its depth.
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (B, H, W, S)
-        The same for each sample, with several a pixel; all else is then of the first sample.
+        `triangle` and `depth` of each sample, with several a pixel; all else is then of the first sample.
 
     Examples
     --------
@@ -60,7 +60,7 @@ class FragmentsBatch(Sequence[Fragments]):
     @overload
     def __getitem__(self, i: slice) -> Sequence[Fragments]: ...
     def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
-        """Return one of them; its arrays are views."""
+        """Return the visibility buffer of a pose; its arrays are views."""
         return self._frags[i]
 
     @property
@@ -185,7 +185,7 @@ class PlanOfPoses(Planned):
         self._plan = plan
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-        """Return the plan's own triangles, as `Planned` does."""
+        """Return the triangles of the plan, as `Planned` does."""
         return self._plan.triangles_of(triangles, n_vertices)
 
 

@@ -99,7 +99,7 @@ def draw_sliced(memory: Memory, snapped: Snapped, target: engine.Target, height:
 class Canvas(NamedTuple):
     """An array to return, and the contiguous aligned array that is drawn into: the returned array where that is both.
 
-    As a context it gives both, and at its end both are the same picture.
+    As a context it returns both, and at its end both hold the picture.
     """
 
     result: NDArray[Any]
@@ -153,7 +153,7 @@ def refuse_many(view: View, verb: str) -> None:
 
 
 def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
-    """`coverage`, on the memory given."""
+    """Draw as `coverage` does, in this memory."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.MASK, out)
     snapped = snap_to_cover(memory, vertices, triangles, view, out=out)
@@ -204,7 +204,7 @@ def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object
 
 
 def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
-    """`overdraw`, on the memory given."""
+    """Draw as `overdraw` does, in this memory."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.COUNT, out)
     snapped = snap_to_cover(memory, vertices, triangles, view, out=out)
@@ -280,7 +280,7 @@ def draw_fragments(
     out: object,
     names: NDArray[np.int32] | None = None,
 ) -> Fragments:
-    """`rasterize`, on the memory given; with `names` triangle i is called names[i], which ascend."""
+    """Draw as `rasterize` does, in this memory; with `names` triangle i is called names[i], which ascend."""
     options = fragment_options(view, depth_test, background_depth, out)
     return draw_arrays(memory, vertices, triangles, view, options, names)
 

@@ -71,7 +71,7 @@ class Snapped:
         return len(self.given.triangles)
 
     def refuse(self) -> NoReturn:
-        """Raise an error for the first triangle with an index or a vertex that cannot be drawn, as one was not."""
+        """Raise an error for the first triangle with an index or a vertex that cannot be drawn."""
         self.given.check_indices()
         if self.mesh.exact is not None:  # no vertex was checked before
             check_finite(self.given.points, self.given.triangles, with_depth=False)
@@ -321,7 +321,7 @@ def refine(
 ) -> tuple[NDArray[np.int64] | None, bool]:
     """Shift vertices and pieces in place to the grid of the samples, which is `n_bits` finer.
 
-    Returns the table of wide vertices, a new one if there was none and one is needed, and whether a vertex has left the
+    Returns the table of wide vertices, made now if it is first needed now, and whether a vertex has left the
     range; such vertices are marked.
     """
     if pieces:

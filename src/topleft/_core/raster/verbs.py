@@ -1,4 +1,4 @@
-"""The five verbs on fresh memory, and `Rasterizer`, the same on memory that is kept."""
+"""The five verbs on fresh memory, and `Rasterizer`, which has them on memory that is kept."""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ def rasterize(
         ``.triangle`` (H, W) int32 with -1 for none, ``.depth`` (H, W) float32, ``.mask`` (H, W) bool,
         ``.barycentric()``, ``.interpolate(values)``. With several samples a pixel also ``.samples_triangle`` and
         ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
-        ``.sample(i)`` gives the same of another.
+        ``.sample(i)`` returns the fragments of another.
 
     Raises
     ------
@@ -351,7 +351,7 @@ def wireframe(
 
 
 class LentMemory:
-    """Lends a memory to one call at a time, and refuses another one while it runs."""
+    """Lends a memory to one call at a time, and refuses other calls while it runs."""
 
     def __init__(self) -> None:
         self._lock, self.memory = Lock(), KeptMemory()

@@ -95,7 +95,7 @@ class BentMesh:
         return ids if self.parts is None else self.wholes[ids]
 
     def at_corners(self, corners: npt.NDArray[Any]) -> F64:
-        """Values (T', 3, K) at the corners of the parts, of those (T, 3, K) at the corners of the mesh's triangles."""
+        """Values (T', 3, K) at the corners of the parts, from values (T, 3, K) at the corners of the mesh."""
         values: F64 = corners[self.source].astype(np.float64)
         if self.parts is not None:
             values[self.parts.rows] = weighed(self.parts.weights, values[self.parts.rows])
@@ -141,7 +141,7 @@ class BentMesh:
         return made
 
     def outline(self, projection: F64, cull: str) -> npt.NDArray[np.intp]:
-        """The parts of the mesh's own edges as triangles (N, 3) without area, each edge once, for `wireframe`.
+        """The parts of the edges of the mesh as triangles (N, 3) without area, each edge once, for `wireframe`.
 
         `cull` leaves out the edges that only culled triangles have.
         """
@@ -256,13 +256,13 @@ class LensMap:
         xx, yy, half = (((a - middle) + (b - middle)) / step**2 for a, b in ends)
         squares = xx**2 + yy**2 + 2 * (half - (xx + yy) / 2) ** 2
         bends = np.sqrt(squares.sum(axis=2))
-        if not self.lens.has_planar_range:  # shares of a chord are not those of its arc
+        if not self.lens.has_planar_range:  # a share of a chord is not that share of its arc
             bends += 0.01 * np.sqrt(sum(((a - b) ** 2).sum(axis=2) for a, b in ends[:2])) / (2 * step)
         return np.asarray(bends.max(axis=1))
 
 
 def weighed(weights: F64, corners: npt.NDArray[Any]) -> F64:
-    """Values (T, 3, K) at the corners of parts, of those (T, 3, K) at the corners of their triangles."""
+    """Values (T, 3, K) at the corners of parts, from values (T, 3, K) at the corners of their triangles."""
     sums: F64 = weights[:, :, 0, None] * corners[:, None, 0]
     for k in (1, 2):
         sums += weights[:, :, k, None] * corners[:, None, k]

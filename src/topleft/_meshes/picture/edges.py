@@ -82,7 +82,7 @@ def draw_edges(
 def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """The depth that edges may have and still show: farther by the slope of the surface within a pixel.
 
-    The slope along each axis is the smaller of those to the two neighbours: the other one may jump to another surface.
+    The slope along each axis is the smaller slope to the two neighbours: the other may jump to another surface.
     """
     behind = depth.copy()
     for axis in range(2):

@@ -107,7 +107,7 @@ def shown_of(frags: Fragments, scene: Scene) -> Sequence[ShownInstance]:
 def join(
     parts: Sequence[VisiblePart], shape: tuple[int, ...], background: Any, make: Callable[[VisiblePart], NDArray[Any]]
 ) -> NDArray[np.float32]:
-    """A picture made part by part; that of a part that fills it is returned, not copied."""
+    """A picture made part by part; the picture of a part that fills it is returned, not copied."""
     if len(parts) == 1 and parts[0].box == WHOLE:
         return make(parts[0])
     picture = empty(shape, np.float32)
@@ -152,7 +152,7 @@ class SceneFragments(InstanceIds, Fragments):
     depth, mask
         As in `Fragments`. `interpolate` takes a sequence of arrays, one of each instance, all with as many channels.
     samples_instance, samples_triangle, samples_id, samples_depth : ndarray, shape (H, W, S)
-        The same for each sample, with several a pixel.
+        `instance`, `triangle`, `id` and `depth` of each sample, with several a pixel.
 
     Examples
     --------
@@ -318,7 +318,7 @@ class SceneFragments(InstanceIds, Fragments):
 class MeshFragments(SceneFragments):
     """The visibility buffer of a mesh that was drawn as its scene of one instance: behind a lens, or with holes.
 
-    `triangle` and `id` hold triangles of the mesh, and attributes are those of its vertices.
+    `triangle` and `id` hold triangles of the mesh, and attributes are of its vertices.
     """
 
     _subject_kind = "Mesh"

@@ -172,7 +172,7 @@ LAYERS: Mapping[str, Callable[[GBuffer], Array]] = MappingProxyType({
         world_normal, camera_normal, uv, flow,
     )
 })  # fmt: skip
-"""How each layer is made; `LayerOption` of `topleft.typing` has the same names in the same order."""
+"""How each layer is made; `LayerOption` of `topleft.typing` has these names in this order."""
 
 
 NOT_OF_POINTS = ("barycentric", "uv")

@@ -150,7 +150,7 @@ def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """The materials of a mesh, the same in every view; tables are kept by it."""
+    """The materials of a mesh in every view; tables are kept by it."""
 
     materials: Sequence[Material]
     is_by_triangle: bool
@@ -162,7 +162,7 @@ class Surface:
 
     @cached_property
     def is_metallic(self) -> bool:
-        """Whether one of them is."""
+        """Whether a material is metallic and rough."""
         return any(one.is_metallic_rough for one in self.materials)
 
 

@@ -81,7 +81,7 @@ class Placed:
     scene: Scene
     """The scene as drawn."""
     whole: Scene
-    """The scene that ids count the triangles of: the drawn one except through a lens."""
+    """The scene that ids count the triangles of: the drawn scene except through a lens."""
     camera: Camera
     clip_from_world: NDArray[np.float64]
     view: View
@@ -234,10 +234,10 @@ class Placed:
 
     @cached_property
     def joined(self) -> list[engine.SnappedMesh]:
-        """All instances as a few meshes, one for each run that culls alike; none of large scenes or clipped ones."""
+        """All instances as a few meshes, one for each run that culls alike; none of large or clipped scenes."""
         scene, culls = self.scene, self.sides[0]
         is_end = culls[1:] != culls[:-1]
-        if self.given_numbers is not None:  # of one mesh they count on
+        if self.given_numbers is not None:  # the ids of a joined mesh count on
             is_end = is_end | (np.diff(self.given_numbers) != np.diff(scene.first_ids)[:-1])
         starts = [0, *(np.flatnonzero(is_end) + 1).tolist()]
         is_small = scene.first_vertices[-1] <= VERTICES_AT_ONCE and 0 < scene.n_triangles <= TRIANGLES_AT_ONCE

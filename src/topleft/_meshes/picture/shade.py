@@ -125,7 +125,7 @@ class ShadingOptions:
 
 @lru_cache(maxsize=64)
 def plain_material(color: Color | None) -> Material:
-    """The material of a mesh that has none; checking one takes a hundredth of a small picture."""
+    """The material of a mesh that has none; the check of a material takes a hundredth of a small picture."""
     return Material(color)
 
 

@@ -26,7 +26,7 @@ UNSHARED: AbstractContextManager[Memory] = nullcontext(FRESH)
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """The subject and the camera: a `cloud` of points, or else a `scene`; a mesh alone is a scene of one."""
+    """The subject and the camera: a `cloud` of points, or else a `scene`; a mesh alone is a scene of one instance."""
 
     scene: Scene
     cloud: Points | None
@@ -48,7 +48,7 @@ class Shot:
         return cls(scene, None, seen_by, checked, is_mesh=scene is not subject)
 
     def memory(self, rasterizer: Rasterizer | None) -> AbstractContextManager[Memory]:
-        """Give the memory of a `Rasterizer` of a mesh's size, which draws nothing else meanwhile, or fresh memory.
+        """Return the memory of a `Rasterizer` of a mesh's size, which draws nothing else meanwhile, or fresh memory.
 
         Fragments refer to their inputs, so fresh memory is not drawn into again.
         """
