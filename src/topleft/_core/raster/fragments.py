@@ -16,6 +16,7 @@ from topleft._core.base.memory import empty
 from topleft._core.base.texels import ValueLevels, as_levels
 from topleft._core.raster.backward import Backward
 from topleft._core.raster.sampling import SplitSamples
+from topleft._core.raster.view import View
 from topleft.typing import EdgesOption, EncodingOption, FilterOption, WrapOption
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
@@ -162,9 +163,10 @@ class Fragments:
         self._n_vertices = n_vertices
         self._n_triangles = n_triangles
 
-    def drawn_from(self, corners: GivenCorners) -> Self:
-        """Keep the mesh that it was drawn from, for derivatives and distances; returns itself."""
-        self.corners = corners
+    def drawn_from(self, vertices: ArrayLike, triangles: ArrayLike, view: View) -> Self:
+        """Keep the arrays that it was drawn from, for derivatives and distances; returns itself."""
+        camera = view.transform, view.viewport, view.origin, view.zero_to_one
+        self.corners = GivenCorners(vertices, triangles, *camera)
         return self
 
     @property

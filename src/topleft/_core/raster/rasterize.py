@@ -20,7 +20,7 @@ from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Drawing, Route
 from topleft._core.raster.classic import draw_classic
-from topleft._core.raster.fragments import Fragments, GivenCorners
+from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.sampling import (
     SamplePass,
     draw_planes,
@@ -294,7 +294,6 @@ def draw_arrays(
     names: NDArray[np.int32] | None = None,
 ) -> Fragments:
     """`draw_fragments` with checked options."""
-    corners = GivenCorners(vertices, triangles, view.transform, view.viewport, view.origin, view.zero_to_one)
     if view.sampling.n_samples > 1:  # samples are drawn from the snapped mesh on first access
         memory = MemoryOf(memory, "samples")
     out = None if options.ids_out is None and options.depth_out is None else (options.ids_out, options.depth_out)
@@ -302,7 +301,7 @@ def draw_arrays(
     if names is not None:
         snapped = replace(snapped, mesh=snapped.mesh.named(names))
     route, drawing = choices.route(view, snapped.work, options.test, wants_depth=options.depth_out is not None)
-    return ROUTES[route](memory, snapped, view, options, drawing).drawn_from(corners)
+    return ROUTES[route](memory, snapped, view, options, drawing).drawn_from(vertices, triangles, view)
 
 
 def draw_labels(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:

@@ -12,7 +12,7 @@ from topleft._core.base.memory import Memory, MemoryOf, check_fits
 from topleft._core.base.options import Sink
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh
-from topleft._core.raster.fragments import Fragments, GivenCorners
+from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import (
     FragmentOptions,
     buffers_of,
@@ -39,8 +39,7 @@ def draw_static(
     frags = draw_clusters(memory, mesh, view, options)
     if frags is None:
         return draw_arrays(memory, mesh.vertices, mesh.triangles, view, options)
-    corners = mesh.vertices, mesh.triangles, view.transform, view.viewport, view.origin, view.zero_to_one
-    return frags.drawn_from(GivenCorners(*corners))
+    return frags.drawn_from(mesh.vertices, mesh.triangles, view)
 
 
 def draw_clusters(memory: Memory, mesh: Static, view: View, options: FragmentOptions) -> Fragments | None:

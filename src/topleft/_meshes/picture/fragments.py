@@ -276,7 +276,7 @@ class SceneFragments(InstanceIds, Fragments):
                 local = local_part(ids[box], first, first + len(mesh.triangles))
                 numbers = len(mesh.vertices), len(mesh.triangles)
                 frags = Fragments(local, self.depth[box], snapped.moved(left, top), *numbers)
-                frags.corners = placed.corners(i)
+                frags.drawn_from(mesh.vertices, mesh.triangles, placed.view_of(i))
                 parts.append(VisiblePart(i, box, frags, self.whole[i], None if bent is None else bent[i]))
         return tuple(parts)
 

@@ -21,7 +21,6 @@ from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh
-from topleft._core.raster.fragments import GivenCorners
 from topleft._core.raster.rasterize import refuse_many
 from topleft._core.raster.sampling import sample_positions
 from topleft._core.raster.snap import snap_mesh
@@ -302,11 +301,6 @@ class Placed:
             found = CULL_CODES["back"] if is_all else self.view.cull, None if is_all else is_single
             self._sides_of_looks[key] = found
         return found
-
-    def corners(self, i: int) -> GivenCorners:
-        """Return the arrays and the view that an instance is drawn from."""
-        mesh, view = self.scene[i].mesh, self.view_of(i)
-        return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport, view.origin, view.zero_to_one)
 
     def snap_parts(
         self, some: NDArray[np.intp], triangles_of: Callable[[int], NDArray[np.int32]]
