@@ -12,7 +12,7 @@ from topleft._core.base.memory import FreshMemory
 from topleft._core.base.options import Sink
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Route
-from topleft._core.raster.rasterize import draw_fragments
+from topleft._core.raster.rasterize import draw_fragments, fragment_options
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 
@@ -52,7 +52,8 @@ def scene(rng, n, size):
 def draw(points, triangles, size, *, bounded, force, test="less", out=None, **view):
     pays = []
     force(pays_to_bound=lambda *_: pays.append(1) or bounded)
-    frags = draw_fragments(FreshMemory(), points, triangles, View.parse(size, view), test, None, out)
+    view = View.parse(size, view)
+    frags = draw_fragments(FreshMemory(), points, triangles, view, fragment_options(view, test, None, out))
     assert pays
     return frags
 

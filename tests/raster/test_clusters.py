@@ -11,7 +11,7 @@ from topleft._core.base.memory import FreshMemory
 from topleft._core.base.options import Sink
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
+from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw, fragment_options
 from topleft._core.raster.static_mesh import draw_static
 from topleft._core.raster.view import View
 
@@ -66,9 +66,10 @@ def cameras(rng, n):
 
 def draw(mesh, clusters, depth_test="less", size=SIZE, **view):
     view = View.parse(size, view)
+    options = fragment_options(view, depth_test, None, None)
     if clusters is None:
-        return draw_fragments(FreshMemory(), *mesh, view, depth_test, None, None)
-    return draw_static(FreshMemory(), Clustered(*mesh, clusters), view, depth_test, None, None)
+        return draw_fragments(FreshMemory(), *mesh, view, options)
+    return draw_static(FreshMemory(), Clustered(*mesh, clusters), view, options)
 
 
 def assert_same_fragments(got, expected):
@@ -329,8 +330,9 @@ def test_out_and_background_are_as_without():
     mesh = as_arrays("blob")
     view = View.parse(SIZE, {"transform": tl.Camera.look_at((0, 0, 3)).clip_from_world(SIZE)})
     out = np.zeros(SIZE[::-1], np.int32)[:, ::-1], np.zeros((SIZE[0], SIZE[1]), np.float32).T
-    expected = draw_fragments(FreshMemory(), *mesh, view, "less", 7.0, None)
-    got = draw_static(FreshMemory(), Clustered(*mesh, Clusters(*mesh)), view, "less", 7.0, out)
+    options = fragment_options(view, "less", 7.0, out)
+    expected = draw_fragments(FreshMemory(), *mesh, view, options._replace(ids_out=None, depth_out=None))
+    got = draw_static(FreshMemory(), Clustered(*mesh, Clusters(*mesh)), view, options)
     assert got.triangle is out[0]
     assert_same(out[0], expected.triangle)
     assert_same(out[1], expected.depth)

@@ -13,7 +13,7 @@ from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_cen
 import topleft as tl
 from topleft._core.base.memory import FRESH
 from topleft._core.raster import choices
-from topleft._core.raster.rasterize import draw_fragments
+from topleft._core.raster.rasterize import draw_fragments, fragment_options
 from topleft._core.raster.sampling import POSITIONS
 from topleft._core.raster.view import View
 from topleft.methods.reference import sampling as ref
@@ -213,7 +213,8 @@ def split_ids(vertices, triangles, size, memory=FRESH, depth_test="less", backgr
     """The visibility buffer as pictures have it drawn."""
     view = View.parse(size, options).but(is_split=True)
     with choices.forced(pays_to_split=True):
-        return draw_fragments(memory, vertices, triangles, view, depth_test, background_depth, out)
+        options = fragment_options(view, depth_test, background_depth, out)
+        return draw_fragments(memory, vertices, triangles, view, options)
 
 
 def kept(frags):

@@ -16,7 +16,7 @@ from topleft._core.base.arrays import as_array, as_checked_triangles, as_out, as
 from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.rasterize import draw_arrays, fragment_options
+from topleft._core.raster.rasterize import draw_fragments, fragment_options
 from topleft._core.raster.view import Planned, View, ViewOptions
 from topleft.typing import DepthTestOption, EncodingOption, FilterOption, WrapOption
 
@@ -261,7 +261,7 @@ def rasterize_poses(
     def draw_pose(i: int) -> Fragments:
         ids, depth = (None if array is None else array[i] for array in outs)
         own = options._replace(ids_out=ids, depth_out=depth)
-        return draw_arrays(FRESH, of_poses[i], indices, replace(checked, transform=transforms[i]), own)
+        return draw_fragments(FRESH, of_poses[i], indices, replace(checked, transform=transforms[i]), own)
 
     parts = run_parts(lambda first, end: [draw_pose(i) for i in range(first, end)], n, n_threads) if n else []
     frags, (ids, depth) = [drawn for part in parts for drawn in part], outs

@@ -261,6 +261,10 @@ class FragmentOptions(NamedTuple):
         return cls(test, background_depth, ids_out, depth_out)
 
 
+#: The options of a call that names none.
+DEFAULT_OPTIONS = FragmentOptions("less", np.inf, None, None)
+
+
 def fragment_options(
     view: View, depth_test: DepthTestOption | None, background_depth: float | None, out: object
 ) -> FragmentOptions:
@@ -275,25 +279,10 @@ def draw_fragments(
     vertices: ArrayLike,
     triangles: ArrayLike,
     view: View,
-    depth_test: DepthTestOption | None,
-    background_depth: float | None,
-    out: object,
-    names: NDArray[np.int32] | None = None,
-) -> Fragments:
-    """Draw as `rasterize` does, in this memory; with `names` triangle i is called names[i], which ascend."""
-    options = fragment_options(view, depth_test, background_depth, out)
-    return draw_arrays(memory, vertices, triangles, view, options, names)
-
-
-def draw_arrays(
-    memory: Memory,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    view: View,
     options: FragmentOptions,
     names: NDArray[np.int32] | None = None,
 ) -> Fragments:
-    """`draw_fragments` with checked options."""
+    """Draw as `rasterize` does, in this memory; with `names` triangle i is called names[i], which ascend."""
     if view.sampling.n_samples > 1:  # samples are drawn from the snapped mesh on first access
         memory = MemoryOf(memory, "samples")
     out = None if options.ids_out is None and options.depth_out is None else (options.ids_out, options.depth_out)

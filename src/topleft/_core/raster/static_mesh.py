@@ -13,32 +13,16 @@ from topleft._core.base.options import Sink
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.rasterize import (
-    FragmentOptions,
-    buffers_of,
-    copy_planes,
-    draw_arrays,
-    fragment_options,
-    planes_of,
-)
+from topleft._core.raster.rasterize import FragmentOptions, buffers_of, copy_planes, draw_fragments, planes_of
 from topleft._core.raster.sampling import lay_background, sample_positions
 from topleft._core.raster.view import Static, View
-from topleft.typing import DepthTestOption
 
 
-def draw_static(
-    memory: Memory,
-    mesh: Static,
-    view: View,
-    depth_test: DepthTestOption | None,
-    background_depth: float | None,
-    out: object,
-) -> Fragments:
+def draw_static(memory: Memory, mesh: Static, view: View, options: FragmentOptions) -> Fragments:
     """Return the visibility buffer of a mesh that does not change, as `rasterize` does; the draw is counted."""
-    options = fragment_options(view, depth_test, background_depth, out)
     frags = draw_clusters(memory, mesh, view, options)
     if frags is None:
-        return draw_arrays(memory, mesh.vertices, mesh.triangles, view, options)
+        return draw_fragments(memory, mesh.vertices, mesh.triangles, view, options)
     return frags.drawn_from(mesh.vertices, mesh.triangles, view)
 
 

@@ -15,7 +15,7 @@ from topleft._core.base.threads import parse_threads
 from topleft._core.raster.fill import Style, draw_fill
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.lines import draw_wireframe
-from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
+from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw, fragment_options
 from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import AlphaOption, BlendOption, DepthTestOption, PerOption, ResolveOption
 
@@ -278,7 +278,9 @@ def rasterize(
            [ 0.5,  0.5, -inf, -inf]], dtype=float32)
     """
     # fragments refer to the arrays that they were drawn from, so none of these can be reused
-    return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
+    checked = View.parse(size, view)
+    options = fragment_options(checked, depth_test, background_depth, out)
+    return draw_fragments(FRESH, vertices, triangles, checked, options)
 
 
 def wireframe(
@@ -447,8 +449,9 @@ class Rasterizer:
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
         checked = self._view(view)
+        options = fragment_options(checked, depth_test, background_depth, out)
         with self._lent as memory:
-            return draw_fragments(memory, vertices, triangles, checked, depth_test, background_depth, out)
+            return draw_fragments(memory, vertices, triangles, checked, options)
 
     def wireframe(
         self,

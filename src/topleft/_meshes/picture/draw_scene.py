@@ -21,13 +21,12 @@ from topleft._core.base.threads import count_threads, run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import BoxView, Survey, draw_clustered, equal_bands
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.rasterize import FragmentOptions, draw_fragments
-from topleft._core.raster.sampling import SamplePass, draw_sorted, draw_split
+from topleft._core.raster.rasterize import DEFAULT_OPTIONS, FragmentOptions, draw_fragments
+from topleft._core.raster.sampling import SamplePass, draw_sorted, draw_split, lay_background
 from topleft._core.raster.snap import refuse_changed
 from topleft._core.raster.static_mesh import draw_static
 from topleft._meshes.picture.placed import Placed
 from topleft._meshes.scene.scene import Scene, unchecked_scene
-from topleft.typing import DepthTestOption
 
 #: Instances that are drawn before others are tested against their depths; each later round has twice as many.
 FIRST_ROUND = 64
@@ -56,24 +55,17 @@ class SampleTarget(NamedTuple):
 
 
 def draw_ids(
-    memory: Memory,
-    placed: Placed,
-    depth_test: DepthTestOption | None = "less",
-    background_depth: float | None = None,
-    out: object = None,
-    *,
-    is_split: bool = True,
+    memory: Memory, placed: Placed, options: FragmentOptions = DEFAULT_OPTIONS, *, is_split: bool = True
 ) -> Fragments:
-    """Return the visibility buffer of a placed scene; `memory` and `out`: for one instance; `is_split` as in `View`."""
+    """Return the visibility buffer of a placed scene; `is_split` as in `View`. Several instances have other memory."""
     if placed.is_mesh or len(placed.scene) == 1:  # the length of a scene takes a hundredth of a small picture
         mesh, view = placed.scene[0].mesh, placed.view_of(0)
         view = view.but(is_split=True) if is_split and view.sampling.n_samples > 1 else view
         if view.static is not None:
-            drawn = draw_static(memory, view.static, view, depth_test, background_depth, out)
+            drawn = draw_static(memory, view.static, view, options)
         else:
-            drawn = draw_fragments(memory, mesh.vertices, mesh.triangles, view, depth_test, background_depth, out)
+            drawn = draw_fragments(memory, mesh.vertices, mesh.triangles, view, options)
         return drawn if placed.is_plain_mesh else placed.kind_of_fragments.of(drawn, placed)
-    options = FragmentOptions.parse(depth_test, background_depth, None)
     sink = choices.fragment_sink(options.test, has_depth=True)
     (width, height), positions = placed.view.size, placed.positions
     shape = len(positions), height, width
@@ -90,8 +82,7 @@ def draw_ids(
     else:
         draw_scene(placed, targets)
         frags = placed.fragments(ids, depth, positions)
-    if background_depth is not None:
-        depth[frags.drawn_planes[0] < 0] = background_depth
+    lay_background(frags.drawn_planes[0], depth, sink, options.background)
     return frags
 
 

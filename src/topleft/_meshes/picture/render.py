@@ -23,7 +23,7 @@ from topleft._core.base.memory import Memory, empty
 from topleft._core.base.options import Sink
 from topleft._core.raster import choices
 from topleft._core.raster.fragments import Fragments
-from topleft._core.raster.rasterize import refuse_many
+from topleft._core.raster.rasterize import FragmentOptions, refuse_many
 from topleft._core.raster.snap import source_of
 from topleft._core.raster.verbs import Rasterizer
 from topleft._core.raster.view import View, ViewOptions, WindowOptions
@@ -287,4 +287,5 @@ def rasterize_mesh(
     out = view.pop("out", None) if shot.is_mesh else None
     with shot.memory(rasterizer) as memory:
         placed = Placed.parse(shot, {"cull": cull, "threads": threads, **view})
-        return draw_ids(memory, placed, depth_test, background_depth, out, is_split=False)
+        options = FragmentOptions.parse(depth_test, background_depth, out)
+        return draw_ids(memory, placed, options, is_split=False)

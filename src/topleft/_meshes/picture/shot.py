@@ -15,6 +15,7 @@ from topleft._core.base.memory import FRESH, Memory
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
 from topleft._meshes.lod.detail import detailed
+from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
 from topleft._meshes.scene.scene import IN_PLACE, Scene, as_meshes, as_subject, scene_of
 
@@ -61,7 +62,7 @@ class Shot:
         return rasterizer._lent
 
     @property
-    def subject(self) -> Any:
+    def subject(self) -> Mesh | Scene | Points:
         """The points, the mesh or the scene, as verbs take it."""
         if self.cloud is not None:
             return self.cloud

@@ -19,7 +19,7 @@ from topleft._core.base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import Sampling, parse
 from topleft._core.raster.fill import Style, draw_fill
-from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
+from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw, fragment_options
 from topleft._core.raster.static_mesh import draw_static
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
@@ -183,9 +183,10 @@ class Plan:
         elif self.verb == "overdraw":
             draw_overdraw(memory, vertices, self._triangles_given, view, None)
         elif self.verb == "rasterize" and self._mesh is not None:
-            draw_static(memory, self._mesh, view, depth_test, None, None)
+            draw_static(memory, self._mesh, view, fragment_options(view, depth_test, None, None))
         elif self.verb == "rasterize":
-            draw_fragments(memory, vertices, self._triangles_given, view, depth_test, None, None)
+            options = fragment_options(view, depth_test, None, None)
+            draw_fragments(memory, vertices, self._triangles_given, view, options)
         else:
             colors = np.full((self.n_triangles, 4), 128, np.uint8)
             style = Style("triangle", None, "replace", "straight", "values")

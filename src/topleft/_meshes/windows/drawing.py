@@ -25,7 +25,7 @@ from topleft._core.base.grid import Grid
 from topleft._core.base.memory import FRESH, Memory
 from topleft._core.base.options import parse
 from topleft._core.raster.fill import colors_are_flat
-from topleft._core.raster.rasterize import Canvas, draw_fragments
+from topleft._core.raster.rasterize import Canvas, draw_fragments, fragment_options
 from topleft._core.raster.verbs import coverage, fill, overdraw
 from topleft._core.raster.view import View
 from topleft._meshes.field.field import draw_field, draw_heights, is_per_face
@@ -253,7 +253,8 @@ def _rasterize(painter: Painter, payload: Payload, crop: Crop, out: tuple[Array 
     test, background = painter.style.get("depth_test", "less"), painter.style.get("background_depth")
     view = View.parse(crop.size, painter.view_at(crop))  # type: ignore[arg-type]
     points, names = painter.points(payload), payload.triangles
-    draw_fragments(kept_memory(), points, rows(len(names)), view, test, background, out, names)
+    options = fragment_options(view, test, background, out)
+    draw_fragments(kept_memory(), points, rows(len(names)), view, options, names)
 
 
 def colors_of(values: Any, triangles: Triangles, options: dict[str, Any]) -> Values:
