@@ -47,6 +47,10 @@ __all__ = ["antialias", "interpolate", "rasterize", "render", "texture"]
 Array = Any
 
 
+def __dir__() -> list[str]:
+    return list(__all__)
+
+
 def call(function: Callable[..., Any], shapes: Any, *args: Any) -> Any:
     """Call the engine with NumPy arrays; a sample of `jax.vmap` is a call."""
 

@@ -61,6 +61,11 @@ __all__ = [
     "texture_construct_mip",
 ]
 
+
+def __dir__() -> list[str]:
+    return list(__all__)
+
+
 #: `DepthPeeler` draws so many layers at first, and doubles them up to what `topleft.peel` keeps.
 FIRST_LAYERS, MOST_LAYERS = 4, 16
 
@@ -583,9 +588,7 @@ def render(
     >>> render(RasterizeContext(), pos, tri, torch.ones(4, 1), (1, 4)).flatten()
     tensor([1.0000, 1.0000, 0.5000, 0.0000])
     """
-    check_mesh(glctx, pos, tri, None)
-    is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, pos.shape[0])
-    check("attr", attr, f"(V, K), with 1 or {pos.shape[0]} before", is_table)
+    check_drawn(glctx, pos, tri, attr)
     height, width = as_pair("resolution", resolution)
     across = checked_hash(topology_hash, tri)
     mesh, values = same_dtype(pos, attr if attr.ndim == 3 else attr[None])
@@ -653,13 +656,12 @@ def photometric_loss(
     >>> photometric_loss(context, pos, tri, torch.ones(3, 1), torch.zeros(1, 2, 2, 1)).item()
     1.0
     """
-    check_mesh(glctx, pos, tri, None)
-    check("target", target, "(B, H, W, K)", is_tensor(target) and target.ndim == 4 and target.shape[0] == pos.shape[0])
-    is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, pos.shape[0])
-    fits = is_table and attr.shape[-1] == target.shape[3]
-    check("attr", attr, f"(V, {target.shape[3]}), with 1 or {pos.shape[0]} before", fits)
+    check_drawn(glctx, pos, tri, attr)
+    b, k = pos.shape[0], attr.shape[-1]
+    fits = is_tensor(target) and target.ndim == 4 and target.shape[0] == b and target.shape[3] == k
+    check("target", target, f"({b}, H, W, {k})", fits)
     if loss not in get_args(LossOption):
-        raise ValueError(f"loss must be 'l2', got {loss!r}")
+        raise ValueError(f"loss must be 'l2', got {loss!r}: render() gives the pictures for a loss of your own")
     across = checked_hash(topology_hash, tri)
     mesh, values, wished = same_dtype(pos, attr if attr.ndim == 3 else attr[None], target.detach())
     options = as_rule(edges), glctx.threads or 0
@@ -706,10 +708,24 @@ def antialias_construct_topology_hash(tri: Tensor) -> Tensor:
     return across
 
 
-def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> None:
-    """Check what `rasterize` is given."""
+def check_drawn(glctx: object, pos: Tensor, tri: Tensor, attr: Tensor) -> None:
+    """Check what `render` is given."""
+    check_context(glctx)
+    check("pos", pos, "(B, V, 4)", is_tensor(pos) and pos.ndim == 3 and pos.shape[2] == 4)
+    check_tri(tri)
+    is_table = is_tensor(attr) and attr.ndim in (2, 3) and len_of(attr) in (1, pos.shape[0])
+    check("attr", attr, f"(V, K), with 1 or {pos.shape[0]} before", is_table)
+
+
+def check_context(glctx: object) -> None:
+    """Check the first argument of functions that draw."""
     if not isinstance(glctx, RasterizeContext):
         raise TypeError(f"glctx must be a RasterizeContext, got {type(glctx).__name__}")
+
+
+def check_mesh(glctx: object, pos: Tensor, tri: Tensor, ranges: Tensor | None) -> None:
+    """Check what `rasterize` is given."""
+    check_context(glctx)
     if ranges is None:
         check("pos", pos, "(B, V, 4), or (V, 4) with ranges", is_tensor(pos) and pos.ndim == 3 and pos.shape[2] == 4)
         check_tri(tri)

@@ -247,6 +247,46 @@ def test_gradients_of_gradients_are_refused():
         g.sum().backward()
 
 
+def test_torch_func_and_tangents_are_refused_by_name():
+    pos, tri, colours = sphere(level=1)
+
+    def run(pos):
+        return dr.render(CTX, pos, tri, colours, (4, 4)).sum()
+
+    with pytest.raises(
+        NotImplementedError, match=r"takes torch\.autograd\.grad and backward\(\), no torch\.func\.grad"
+    ):
+        torch.func.grad(run)(pos)
+    with pytest.raises(NotImplementedError, match=r"pos must have no tangent: .* by backward\(\) alone"):
+        torch.func.jvp(run, (pos,), (pos,))
+    with torch.autograd.forward_ad.dual_level():
+        tex = torch.autograd.forward_ad.make_dual(torch.ones(1, 2, 2, 1), torch.ones(1, 2, 2, 1))
+        with pytest.raises(NotImplementedError, match="tex must have no tangent"):
+            dr.texture(tex, torch.zeros(1, 2, 2, 2))
+
+
+@pytest.mark.parametrize(("n", "size"), [(0, (3, 4)), (0, (0, 0)), (2, (0, 4)), (2, (3, 0)), (1, (0, 0))])
+@pytest.mark.parametrize("has_mesh", [True, False])
+def test_no_pictures_and_no_pixels_have_empty_results_and_no_gradients(n, size, has_mesh):
+    pos = torch.zeros(n, 3 if has_mesh else 0, 4, requires_grad=True)
+    tri = torch.tensor([[0, 1, 2]] if has_mesh else [], dtype=torch.int64).reshape(-1, 3)
+    attr = torch.ones(*pos.shape[:2], 2, requires_grad=True)
+    tex, cube = (torch.ones(*shape, 4, 4, 2, requires_grad=True) for shape in ((n,), (1, 6)))
+    color = torch.zeros(n, *size, 2, requires_grad=True)
+    rast, rast_db = dr.rasterize(CTX, pos, tri, size)
+    out, out_da = dr.interpolate(attr, rast, tri, rast_db, "all")
+    way = torch.zeros(n, *size, 3)
+    found = [
+        rast, out, dr.DepthPeeler(CTX, pos, tri, size).rasterize_next_layer()[0], dr.texture(tex, out, out_da),
+        dr.texture(cube, way, boundary_mode="cube"), dr.render(CTX, pos, tri, attr, size),
+        *(dr.antialias(color, rast, pos, tri, edges=rule) for rule in EDGES),
+    ]  # fmt: skip
+    assert all(one.shape[:3] == (n, *size) for one in found)
+    loss = dr.photometric_loss(CTX, pos, tri, attr, color)
+    given = [pos, attr, tex, cube]
+    assert not any(one.any() for one in torch.autograd.grad(loss + sum(one.sum() for one in found), given))
+
+
 def test_memory_may_lie_anyhow():
     pos, tri, colours = sphere(2)
     expected = gradients(pos, tri, colours, torch.ones(1, 2, 2, 3))
@@ -325,6 +365,10 @@ def test_rast_of_other_programs_may_hold_anything():
         dr.interpolate(torch.ones(3, 1), rast, torch.tensor([[0, 1, 2]]))
     assert torch.equal(dr.antialias(torch.ones(1, 2, 2, 1), rast, torch.ones(1, 3, 4), torch.tensor([[0, 1, 2]])),
                        torch.ones(1, 2, 2, 1))  # fmt: skip
+
+
+def test_dir_shows_public_names_alone():
+    assert dir(dr) == sorted(dr.__all__)
 
 
 def test_unknown_rules_are_refused():
@@ -448,9 +492,11 @@ def test_drawing_in_one_of_triangles_behind_the_eye_and_slivers_has_the_gradient
 @pytest.mark.parametrize(
     ("change", "kind", "message"),
     [
-        ({"target": torch.zeros(2, 4, 4, 3)}, ValueError, "target must have shape (B, H, W, K), got (2, 4, 4, 3)"),
-        ({"attr": torch.zeros(3, 2)}, ValueError, "attr must have shape (V, 3), with 1 or 1 before, got (3, 2)"),
-        ({"loss": "l3"}, ValueError, "loss must be 'l2', got 'l3'"),
+        ({"target": torch.zeros(2, 4, 4, 3)}, ValueError, "target must have shape (1, H, W, 3), got (2, 4, 4, 3)"),
+        ({"target": torch.zeros(1, 4, 4, 2)}, ValueError, "target must have shape (1, H, W, 3), got (1, 4, 4, 2)"),
+        ({"attr": torch.zeros(3)}, ValueError, "attr must have shape (V, K), with 1 or 1 before, got (3,)"),
+        ({"pos": torch.zeros(3, 4)}, ValueError, "pos must have shape (B, V, 4), got (3, 4)"),
+        ({"loss": "l1"}, ValueError, "loss must be 'l2', got 'l1': render() gives the pictures for a loss of your own"),
         ({"edges": "none"}, ValueError, "edges must be 'silhouette', 'area' or 'straight-through', got 'none'"),
         ({"attr": torch.zeros(2, 3)}, IndexError, "[0, 2)"),
     ],

@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torch.autograd.forward_ad import unpack_dual
 
 #: The largest id that float32 counts up to; the bits of larger ones are counted on from there.
 LAST_EXACT_ID = 1 << 24
@@ -45,6 +46,8 @@ def check(name: str, value: object, wish: str, has_shape: object, kinds: tuple[t
         raise TypeError(f"{name} must be {kinds[1]}, got {value.dtype}{hint}")
     if not has_shape:
         raise ValueError(f"{name} must have shape {wish}, got {tuple(value.shape)}")
+    if not torch.compiler.is_compiling() and unpack_dual(value).tangent is not None:
+        raise NotImplementedError(f"{name} must have no tangent: topleft.torch has gradients by backward() alone")
 
 
 def check_tri(tri: Tensor) -> None:

@@ -62,6 +62,24 @@ def typed(names: str) -> str:
     return "".join(f"{kinds.get(name[-1], 'Tensor ')}{name.rstrip('?*')}, " for name in names.split())
 
 
+def called(op: Any) -> Callable[..., Any]:
+    """Return a function that calls an operator, and refuses `torch.func` by name."""
+
+    def call(*args: Any) -> Any:
+        if torch.compiler.is_compiling():
+            return op(*args)
+        try:
+            return op(*args)
+        except RuntimeError as error:
+            if "functorch transforms" not in str(error):
+                raise
+            raise NotImplementedError(
+                "topleft.torch takes torch.autograd.grad and backward(), no torch.func.grad"
+            ) from None
+
+    return call
+
+
 def flat(given: Sequence[Any]) -> list[Any]:
     """Return tensors, those of lists among them."""
     return [one for part in given for one in (part if isinstance(part, list | tuple) else [part])]
@@ -134,12 +152,12 @@ def operator_of(operation: Operation) -> Any:
     op = define(operation.name, f"({typed(operation.given)}int[] options) -> {returned}", run, fake)
     op.register_autograd(backward, setup_context=keep)
     if operation.vjp is tensors.times:
-        return op
+        return called(op)
     given_back = typed(operation.kept) + typed(" ".join(f"g_{name}?" for name in results[: operation.n_out]))
     back = f"({given_back}int[] options, bool[] needs) -> Tensor[]"
     backward_op = define(f"{operation.name}_vjp", back, vjp, fake_vjp)
     backward_op.register_autograd(once)
-    return op
+    return called(op)
 
 
 operations = tensors.ANTIALIAS, tensors.INTERPOLATE, tensors.RASTERIZE, tensors.RENDER, tensors.SQUARES, tensors.TEXTURE

@@ -85,7 +85,8 @@ class PixelGrid:
     def view(self, pos: Array) -> engine.GradientView:
         """Return the engine's view of a picture with these vertices (V, 4)."""
         size = self.width, self.height
-        scale, shift = ((0.5, 0.5), (0.0, 0.0)) if self.in_pixels else ((1 / self.width, 1 / self.height), (-1.0, -1.0))
+        whole = 1 / max(1, self.width), 1 / max(1, self.height)
+        scale, shift = ((0.5, 0.5), (0.0, 0.0)) if self.in_pixels else (whole, (-1.0, -1.0))
         return engine.GradientView(pos, self.tri, size, scale, shift, np.inf if self.in_pixels else 1.0)
 
     def views(self, pos: Array) -> list[engine.GradientView]:
@@ -155,7 +156,7 @@ def values(
     check_counted("attr", attr.shape[1:])
     out = empty(grid.shape(attr.shape[2]), attr.dtype)
     out_da = empty(grid.shape(2 * len(wanted)), attr.dtype)
-    view, columns = grid.view(attr[0, :0]), np.asarray(wanted, np.int32)
+    view, columns = grid.view(np.empty((0, 4), attr.dtype)), np.asarray(wanted, np.int32)
 
     def work(band: Band) -> int:
         i = band.picture
@@ -180,7 +181,7 @@ def values_vjp(
     check_counted("attr", attr.shape[1:])
     g_attr, g_rast = np.zeros(attr.shape, attr.dtype), empty(rast.shape, attr.dtype)
     g_db = None if g_da is None else empty(rast.shape, attr.dtype)
-    view, columns = grid.view(attr[0, :0]), np.asarray(wanted if g_da is not None else (), np.int32)
+    view, columns = grid.view(np.empty((0, 4), attr.dtype)), np.asarray(wanted if g_da is not None else (), np.int32)
 
     def work(band: Band, sums: list[engine.GradientSums]) -> int:
         i = band.picture
@@ -304,7 +305,7 @@ def texels_vjp(
     grid, dtype = look.grid, look.uv.dtype
     view, codes = grid.view(np.empty((0, 4), dtype)), (int(look.filter), int(look.beyond))
     n_channels, n_pictures = g_out.shape[3], len(look.levels[0])
-    ends = np.cumsum([level[0].size // n_channels if n_channels else 0 for level in look.levels])
+    ends = np.cumsum([math.prod(level.shape[1:-1]) for level in look.levels])
     places = (look.uv, look.uv_da, look.bias) if of_places else (None,) * 3
     g_uv, g_da, g_bias = (None if one is None else empty(one.shape, dtype) for one in places)
 
@@ -349,7 +350,7 @@ def outline_of(grid: PixelGrid, pos: Array, across: NDArray[np.int32]) -> Outlin
     sides, views = empty(edges.shape, np.int32), [grid.view(one) for one in pos]
     n_parts = max(1, min(n_threads, len(grid.tri) // MIN_TRIANGLES_PER_PART))
 
-    for has_sides in (False, True):
+    for has_sides in (False, True) if n else ():
 
         def write(i: int, _: int, *, has_sides: bool = has_sides) -> None:
             k, part = divmod(i, n_parts)
