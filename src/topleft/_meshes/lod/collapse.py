@@ -1,7 +1,7 @@
-"""Collapse: a mesh with fewer triangles, by fast-simplification, and the points that each of its vertices replaces.
+"""Collapses the edges of a mesh by fast-simplification, and finds the points that each vertex of the result replaces.
 
-In: points, triangles. Out: fewer of both, and which points have become one. Their distance from the mesh is
-measured elsewhere: nothing here bounds it.
+In: points, triangles. Out: fewer of both, and the row of each old point. Without a bound on the distance: see
+`distance.py`.
 
 Based on: M. Garland, P. S. Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997.
 """
@@ -17,13 +17,13 @@ import numpy.typing as npt
 from topleft._core.base.array_types import F64, I32
 from topleft.errors import MissingPackageError
 
-#: Scales to be tried: the diameter of a mesh, per triangle that is wanted.
+#: Scales to try in turn: the diameter of a mesh, per wanted triangle.
 FINENESS = (10.0, 1.0)
 
-#: A result with more than so many times the triangles that were wanted has another try.
+#: A result with more than 1.25 times the wanted triangles is rejected, and the next scale is tried.
 TOO_MANY = 1.25
 
-#: A result with more than this share of the triangles is a failure: nearly nothing can be collapsed.
+#: A result with more than this share of the triangles is a failure: hardly any edge can be collapsed.
 STUCK = 0.8
 
 #: The package keeps its mesh in a global variable.
@@ -31,9 +31,9 @@ _lock = threading.Lock()
 
 
 class Collapsed(NamedTuple):
-    """The collapsed mesh: points (N, 3) float64, triangles (K, 3) int32, and the row (V,) that each point went into.
+    """The collapsed mesh: points (N, 3) float64, triangles (K, 3) int32, and the row (V,) of each old point's vertex.
 
-    -1 where a point vanished with all its triangles; None unless `with_pairs`.
+    The row is -1 where a point vanished with all its triangles; `into` is None unless `with_pairs`.
     """
 
     points: F64
@@ -55,8 +55,8 @@ def collapser() -> Any:
 def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
     """The number of triangles of the next level; 0: there is none.
 
-    Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
-    nothing but its borders.
+    Borders stay, and a border of n sides needs about n triangles: the ratio applies to all other triangles. Otherwise
+    a level would have nothing but its borders.
     """
     n_fixed = len(border_points(triangles))
     n_free = int((len(triangles) - n_fixed) * ratio)
@@ -65,7 +65,7 @@ def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
 
 
 def collapse(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool = True) -> Collapsed:
-    """Fewer triangles, about as many as wanted; more where nothing can be collapsed. Open borders stay as they are.
+    """Collapse to about `n_wanted` triangles; more where edges cannot be collapsed. Open borders do not change.
 
     Parameters
     ----------
@@ -73,42 +73,42 @@ def collapse(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool = T
     triangles : (T, 3) int32
     n_wanted : int
     with_pairs : bool
-        Whether to find which points became one, which takes memory.
+        Whether to compute `into`, which takes memory.
 
     Notes
     -----
     The package collapses in rounds, the cheapest edges first; the thresholds of the rounds are absolute. Points are
-    scaled so that a mesh with the wanted number of triangles needs the middle ones: the distance by which a
-    collapse moves the surface goes with the area of triangles. On the blob of 200,000 triangles that makes the bounds
-    1.1 to 7 times smaller than a scale of 1 does. A finer scale may end the rounds early; then a coarser one has its
-    turn, then a grid.
+    scaled so that a mesh with the wanted number of triangles needs the middle thresholds: the distance by which a
+    collapse moves the surface is proportional to the area of triangles. On the blob of 200,000 triangles the bounds
+    are 1.1 to 7 times smaller than with a scale of 1. A finer scale may end the rounds early; then a coarser scale is
+    tried, then a grid.
 
     The package moves open borders as if there were no surface outside: on the bunny, which is open below, bounds
     are 4 to 6 times smaller where borders stay.
     """
     for fineness in FINENESS:
-        found = collapse_at(points, triangles, n_wanted, fineness, with_pairs=with_pairs)
-        if len(found.triangles) <= TOO_MANY * n_wanted:
-            return found
-    gathered = gather(points, triangles, n_wanted)
-    if not 0 < n_wanted < len(gathered.triangles):
-        return found
-    again = collapse_at(*gathered[:2], n_wanted, FINENESS[-1], with_pairs=with_pairs)
-    return joined(gathered, again) if 0 < len(again.triangles) < len(found.triangles) else found
+        collapsed = collapse_at(points, triangles, n_wanted, fineness, with_pairs=with_pairs)
+        if len(collapsed.triangles) <= TOO_MANY * n_wanted:
+            return collapsed
+    clustered = gather(points, triangles, n_wanted)
+    if not 0 < n_wanted < len(clustered.triangles):
+        return collapsed
+    again = collapse_at(*clustered[:2], n_wanted, FINENESS[-1], with_pairs=with_pairs)
+    return joined(clustered, again) if 0 < len(again.triangles) < len(collapsed.triangles) else collapsed
 
 
 def joined(first: Collapsed, second: Collapsed) -> Collapsed:
-    """Two steps as one."""
+    """The composition of two steps."""
     if first.into is None or second.into is None:
         return second
     return second._replace(into=np.where(first.into < 0, np.int32(-1), second.into[first.into]).astype(np.int32))
 
 
 def gather(points: F64, triangles: I32, n_wanted: int) -> Collapsed:
-    """The mesh with points that share a cell of a grid made one of them; open borders stay as they are.
+    """The mesh with all points of a cell of a grid merged into one of these points; open borders do not change.
 
-    The package does not touch needles, which the poles of a globe are made of. Cells are a third of a side of the
-    triangles that are wanted, so no shape is lost that those could show.
+    The package does not collapse needles, as at the poles of a globe. Cells are a third of a side of the wanted
+    triangles, so no shape is lost that the wanted triangles could show.
 
     References
     ----------
@@ -131,7 +131,7 @@ def gather(points: F64, triangles: I32, n_wanted: int) -> Collapsed:
 
 
 def left_of(triangles: I32, into: I32) -> tuple[I32, I32]:
-    """The triangles with three corners where points go into others, and the row of each point in use; else -1."""
+    """The triangles that keep three different corners under `into`, and the new row of each used point; else -1."""
     corners = into[triangles]
     a, b, c = corners.T
     corners = corners[(a != b) & (b != c) & (c != a)]
@@ -142,22 +142,22 @@ def left_of(triangles: I32, into: I32) -> tuple[I32, I32]:
 
 
 def border_points(triangles: I32) -> npt.NDArray[np.int64]:
-    """The points of sides that one triangle has."""
+    """The points of sides that belong to a single triangle."""
     return np.unique(open_sides(triangles))
 
 
 def open_sides(triangles: I32) -> npt.NDArray[np.int64]:
-    """The sides (N, 2) that one triangle has, the lower of their points first."""
+    """The sides (N, 2) that belong to a single triangle, the lower of their points first."""
     n = len(triangles)
     key = np.empty(3 * n, np.int64)
     for k in range(3):
-        one, other = triangles[:, k], triangles[:, (k + 1) % 3]
-        key[k * n : (k + 1) * n] = np.minimum(one, other).astype(np.int64) << 32 | np.maximum(one, other)
+        a, b = triangles[:, k], triangles[:, (k + 1) % 3]
+        key[k * n : (k + 1) * n] = np.minimum(a, b).astype(np.int64) << 32 | np.maximum(a, b)
     key.sort()
     is_new = np.ones(3 * n + 1, np.bool_)
     np.not_equal(key[1:], key[:-1], out=is_new[1:-1])
-    own = key[is_new[:-1] & is_new[1:]]
-    return np.stack([own >> 32, own & 0xFFFFFFFF], axis=1)
+    open_keys = key[is_new[:-1] & is_new[1:]]
+    return np.stack([open_keys >> 32, open_keys & 0xFFFFFFFF], axis=1)
 
 
 def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, with_pairs: bool) -> Collapsed:
@@ -179,14 +179,14 @@ def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, 
 
 
 def rows_of_pairs(pairs: Any, triangles: I32, n_points: int, left: I32) -> I32 | None:
-    """The row that each point went into, from pairs of points: the second went into the first.
+    """The new row of each old point, from pairs of points: the second was merged into the first.
 
-    None where the pairs leave other triangles than the package does, as of a mesh that is one point or one line.
+    None where the pairs leave other triangles than the package does, as of a mesh that is a point or a line.
     """
     pairs = np.asarray(pairs).reshape(-1, 2)
     into = np.arange(n_points, dtype=np.int32)
     into[pairs[:, 1]] = pairs[:, 0]
-    while True:  # a point that another went into may have gone into a third: each round halves the way
+    while True:  # chains of merges: each round halves their length
         further = into[into]
         if np.array_equal(further, into):
             break

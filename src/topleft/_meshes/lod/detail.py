@@ -1,8 +1,8 @@
-"""Detail: the coarsest level of a mesh that a view cannot tell from it, within a tolerance in pixels.
+"""Detail: the coarsest level of a mesh whose picture differs by at most a tolerance in pixels.
 
 In: a mesh or scene, a camera, a size, a tolerance. Out: `Detail`: the level, its bound in pixels, and why no other.
 
-Let p be a point of one surface that shows in the picture, at clip = (x, y, z, w), q one of the other, and d = q - p.
+Let p be a visible point of one surface, at clip = (x, y, z, w), q a point of the other surface, and d = q - p.
 With u = x / w, rows l of the linear part of the matrix and a viewport W wide, exactly
 
     px(q) - px(p) = W/2 (l_x - u l_w) . d / w(q),      and so for y with v and H.
@@ -35,7 +35,7 @@ from topleft._meshes.scene.adapt import as_mesh
 from topleft._meshes.scene.scene import Scene
 from topleft.typing import CullOption
 
-#: Parts are drawn where they have at most this share of the triangles of the level that would do for all of them.
+#: Parts are drawn where they have at most this share of the triangles of the level for the whole mesh.
 MOST_CUT = 0.5
 
 
@@ -46,24 +46,24 @@ class Detail:
     Attributes
     ----------
     level : int
-        0: the mesh itself. Of a mesh that is put together from parts the coarsest level among them.
+        0: the mesh itself. Of a mesh in parts the coarsest level of the parts.
     mesh : Mesh
-        The mesh that is drawn: the `.triangle` of its visibility buffer are rows of its triangles.
+        The mesh to draw: the `.triangle` of its visibility buffer are rows of its triangles.
     bound : float
         How far its surface may lie from the mesh, object units.
     bound_px : float
         The largest error of a visible point, pixels.
     tolerance : float
-        The limit that was given, pixels.
+        The limit, pixels.
     n_triangles : int
         Triangles of the mesh itself.
     why : str
     rejected : tuple of str
     n_drawn : int
-        Triangles that are drawn. Those of a mesh that is put together from parts are all that parts have, and those of
-        other parts have one corner three times.
+        Triangles that are drawn. The triangles of a mesh in parts are the triangles of all parts of all levels; where a
+        part is not chosen, its triangles are degenerate, a corner three times.
     n_parts : int
-        Of how many parts, each of a level of its own, the mesh is put together; 0: it is one level.
+        How many parts, each at a level chosen for it, the mesh has; 0: it is a single level.
 
     Examples
     --------
@@ -98,12 +98,12 @@ def choose_detail(
     viewport: tuple[int, int] | None = None,
     origin: tuple[int, int] = (0, 0),
 ) -> Detail:
-    """The coarsest level of a mesh with all points within a tolerance of where they belong in a picture.
+    """The coarsest level of a mesh that moves no visible point by more than a tolerance.
 
     Parameters
     ----------
     mesh : Mesh, or whatever `as_mesh` takes
-        Its levels are made when they are needed first, and kept with it; see `simplify`.
+        Its levels are computed at the first use, and cached with it; see `simplify`.
     camera : Camera
     size : (width, height), pixels
     tolerance : float
@@ -126,16 +126,16 @@ def choose_detail(
 
     Notes
     -----
-    Each point of the mesh that shows lies within `bound_px` of a point of the level in the picture, and the other way
-    round; the snap to sub-pixels moves either by 1/512 pixel at most along each axis. The order in which surfaces hide
-    each other, and their light, may differ by more.
+    Each visible point of the mesh lies within `bound_px` of a point of the level in the picture, and the other way
+    round; the snap to sub-pixels moves either by 1/512 pixel at most along each axis. Occlusion between surfaces, and
+    their light, may differ by more.
 
-    Of a mesh of 500,000 triangles or more each part has a level of its own where that leaves at most half of the
-    triangles. `rasterize_mesh` and `render` draw these parts, in a scene those of each instance, without edges and
-    without anything that shows through; otherwise one level is drawn, which all of the mesh allows.
+    Each part of a mesh of 500,000 triangles or more is drawn at its coarsest level where that leaves at most half of
+    the triangles. `rasterize_mesh` and `render` draw these parts, in a scene for each instance, where no edges and
+    nothing translucent is drawn; otherwise the whole mesh is drawn at a single level.
 
-    It is the mesh itself where no bound holds: with a lens; where the mesh may reach the near or the far plane or the
-    eye; where a side is culled, since turns of triangles are not bounded; where materials cut holes.
+    The level is 0 where no bound holds: with a lens; where the mesh may reach the near or the far plane or the eye;
+    where a side is culled, since turns of triangles are not bounded; where materials cut holes.
 
     Examples
     --------
@@ -168,7 +168,7 @@ def choose_detail(
         return f"level {i}, {len(levels[i].mesh.triangles):,} triangles: may {off}"
 
     matrix = screen.clip_from_world if place is None else engine.product(screen.clip_from_world, place)
-    (i,), (scale,) = (found.tolist() for found in screen.coarsest(matrix[None], levels, tolerance))
+    (i,), (scale,) = (column.tolist() for column in screen.coarsest(matrix[None], levels, tolerance))
     if (cut := screen.cut(matrix, levels, i, tolerance)) is not None:
         used = np.unique(cut.levels)
         why = f"each part is the coarsest of levels {used[0]} to {used[-1]} that is sure to be within {tolerance:g} px"
@@ -192,23 +192,23 @@ class ScreenError(NamedTuple):
 
     clip_from_world: F64
     viewport: tuple[int, int]
-    window: F64  # as `window_of` gives it
+    window: F64  # of `window_of`
 
     def scale_of(self, place: F64 | None, *levels: Level) -> float | None:
-        """The most pixels of a unit on some levels; None where that is unknown."""
+        """The most pixels of a unit on some levels; None where there is no bound."""
         matrix = self.clip_from_world if place is None else engine.product(self.clip_from_world, place)
         return engine.pixels_per_unit(matrix, self.viewport, self.window, np.stack([level.extent for level in levels]))
 
     def coarsest(self, matrices: F64, levels: Levels, tolerance: float) -> tuple[NDArray[np.int64], F64]:
-        """The last level that is sure to be within a tolerance under each matrix, 0 for none, and its scale."""
-        found: NDArray[np.int64] = np.empty(len(matrices), np.int64)
+        """The coarsest level that is surely within a tolerance under each matrix, and its scale."""
+        chosen: NDArray[np.int64] = np.empty(len(matrices), np.int64)
         scales: F64 = np.empty(len(matrices))
-        given = matrices, self.viewport, self.window, levels.extents, levels.bounds, tolerance
-        engine.coarsest_levels(*given, found, scales)
-        return found, scales
+        how = matrices, self.viewport, self.window, levels.extents, levels.bounds, tolerance
+        engine.coarsest_levels(*how, chosen, scales)
+        return chosen, scales
 
     def cut(self, matrix: F64, levels: Levels, level: int, tolerance: float) -> ChosenParts | None:
-        """The mesh put together from parts that are sure to be within a tolerance, if a level is much finer."""
+        """The mesh of the coarsest parts that are surely within a tolerance, if a level is much finer."""
         parted = levels.parted if may_cut(levels, level) else None
         if parted is None:
             return None
@@ -219,12 +219,12 @@ class ScreenError(NamedTuple):
 
 
 def may_cut(levels: Levels, level: int) -> bool:
-    """Whether the mesh is in parts, and a level so fine that some of them may take its place."""
+    """Whether the mesh has parts, and the level so many triangles that parts may be coarser."""
     return levels.parts is not None and len(levels[level].mesh.triangles) >= LEAST_PARTED
 
 
 class ChosenParts(NamedTuple):
-    """A mesh put together from parts of several levels, with their levels and its bounds."""
+    """A mesh of parts of several levels, the level of each part, and the bounds of the mesh."""
 
     mesh: CutMesh
     levels: NDArray[np.intp]
@@ -240,14 +240,14 @@ def screen_error_of(
 
 
 def check_tolerance(tolerance: float) -> float:
-    """The tolerance, if it is one."""
+    """The tolerance as float, or an error."""
     if not 0 <= as_number("tolerance", tolerance) < math.inf:
         raise ValueError(f"tolerance must be at least 0 pixels, got {tolerance!r}")
     return float(tolerance)
 
 
 def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, material: Material | None) -> str | None:
-    """Why the mesh itself is drawn, as far as that is known without its levels."""
+    """Why the mesh itself is drawn, or None where its levels decide."""
     if tolerance == 0:
         return "tolerance=0: the picture of the mesh itself, to the bit"
     if not len(mesh.triangles):
@@ -256,7 +256,7 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, ma
         return "no bound is known for the bend of the lens"
     if cull is not None and str(cull) != "none":
         return f"cull={str(cull)!r}: which way a triangle is turned has no bound"
-    if any(has_holes(one, mesh) for one in (mesh.materials if material is None else (material,))):
+    if any(has_holes(each, mesh) for each in (mesh.materials if material is None else (material,))):
         return "a material cuts holes, and they have no bound"
     return None
 
@@ -264,7 +264,7 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str | None, ma
 def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> F64:
     """The window in normalised device coordinates: lower and upper x, and y, (4,).
 
-    All of the viewport, so that a window of a picture has the level of the whole; more where the window has more.
+    At least the viewport, so that a window of a picture has the level of the whole picture.
     """
     ends = []
     for first, n, whole in zip(origin, size, viewport or size, strict=True):
@@ -276,7 +276,7 @@ def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: t
 def detailed(
     scene: Scene, camera: Camera, size: tuple[int, int], tolerance: float, *, in_parts: bool = False, **options: Any
 ) -> Scene:
-    """The scene as it is drawn within a tolerance; options as for `choose_detail`, `in_parts` as for `Shot.within`."""
+    """The scene to draw within a tolerance; options as for `choose_detail`, `in_parts` as for `Shot.within`."""
     if not isinstance(options.get("material"), Material | None):
         raise TypeError(f"material must be a Material, got {shown(options['material'])}")
     if check_tolerance(tolerance) == 0:
@@ -291,16 +291,16 @@ def detailed(
     def use(mesh: Mesh, at: NDArray[np.intp] | int) -> None:
         of_instance[at] = chosen.setdefault(id(mesh), (len(chosen), mesh))[0]
 
-    for one, material, at in scene.looks(options.get("material")):
-        if why_whole(one, camera, tolerance, options.get("cull"), material):
-            use(one, at)
+    for mesh, material, at in scene.looks(options.get("material")):
+        if why_whole(mesh, camera, tolerance, options.get("cull"), material):
+            use(mesh, at)
             continue
-        levels = levels_of(one)
-        found = screen.coarsest(matrices[at], levels, tolerance)[0]
-        for level in sorted(set(found.tolist())):
-            own = at[found == level]
-            use(levels[level].mesh if level else one, own)
-            for i in own.tolist() if in_parts and may_cut(levels, level) else ():
+        levels = levels_of(mesh)
+        chosen_levels = screen.coarsest(matrices[at], levels, tolerance)[0]
+        for level in sorted(set(chosen_levels.tolist())):
+            instances = at[chosen_levels == level]
+            use(levels[level].mesh if level else mesh, instances)
+            for i in instances.tolist() if in_parts and may_cut(levels, level) else ():
                 if (cut := screen.cut(matrices[i], levels, level, tolerance)) is not None:
                     use(cut.mesh, i)
     return scene.with_meshes([mesh for _, mesh in chosen.values()], of_instance)

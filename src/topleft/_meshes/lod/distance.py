@@ -1,9 +1,9 @@
 """Bounds the two-sided Hausdorff distance of two surfaces, for every point of both.
 
-In: points and triangles of two surfaces. Out: `DistanceBounds`: a distance that is met, and one that is not passed.
+In: points and triangles of two surfaces. Out: `DistanceBounds`: a lower and an upper bound of the distance.
 
-The kernels (`csrc/mesh/nearest.c`, `csrc/mesh/reach.c`) look at triangles by branch and bound; this file puts the
-triangles of a surface in an order that keeps neighbours together, cuts the work in blocks, and adds a bound on
+The kernels (`csrc/mesh/nearest.c`, `csrc/mesh/reach.c`) search triangles by branch and bound; this file sorts the
+triangles of a surface along a curve that keeps neighbours together, cuts the work in blocks, and adds a bound on
 rounding.
 """
 
@@ -20,20 +20,20 @@ from topleft._core.base.array_types import F64, I32
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._meshes.model.mesh import coincident
 
-#: A bound may pass the distance known to be met by this share of it ...
+#: The upper bound may exceed the lower by this share of it ...
 SHARE = 1 / 16
 
 #: ... or by this share of the size of the surface: half a pixel of a picture in which it is 131,072 pixels wide.
 LEAST = 2.0**-18
 
-#: Errors of float64, as a share of the largest coordinate: a cut moves a corner by less than four roundings of
-#: 2**-53 of it, a foot is found with fewer than 64, and squares and roots lose less than 2**-45 of the distance.
+#: Errors of float64, as a share of the largest coordinate: a cut moves a corner by less than four roundings of 2**-53,
+#: a foot by less than 64, and squares and roots lose less than 2**-45 of the distance.
 ROUNDING_OF_CUT, ROUNDING_OF_FOOT, ROUNDING_OF_ROOT = 2.0**-51, 2.0**-47, 2.0**-45
 
-#: Points or triangles that a thread takes at a time: the result must not depend on the threads.
+#: Points or triangles of a block, which a single thread computes: the result does not depend on the threads.
 BLOCK = 4096
 
-#: Points whose distance is looked at before triangles are.
+#: The most points whose distances are computed before the triangles'.
 MOST_SAMPLES = 1 << 18
 
 #: Bits of the place of a triangle along each axis. With the 31 bits of its index they fill 64.
@@ -48,7 +48,7 @@ class DistanceBounds(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """How far triangles are from a surface at least and at most, and into how many pieces one of them was cut."""
+    """Bounds of the distance of triangles from a surface, and the most pieces that a triangle was cut into."""
 
     known: float
     bound: float
@@ -56,9 +56,9 @@ class Reach(NamedTuple):
 
 
 class TriangleTree:
-    """Triangles (T, 3) int32 of points (V, 3) float64, at least one, among which the nearest are found.
+    """Triangles (T, 3) int32 of points (V, 3) float64, at least one triangle, to search for the nearest.
 
-    Vertices at one place should have one index: neighbours are found by them.
+    Vertices at equal places should share an index: it decides which triangles are neighbours.
     """
 
     def __init__(self, points: F64, triangles: I32) -> None:
@@ -66,7 +66,7 @@ class TriangleTree:
 
     @classmethod
     def of_mesh(cls, vertices: npt.NDArray[Any], triangles: I32, center: F64) -> TriangleTree:
-        """The surface of a mesh, without the vertices that no triangle uses, moved so that `center` is the origin."""
+        """The surface of a mesh, without unused vertices, moved so that `center` is the origin."""
         points, corners = welded(vertices, triangles)
         return cls(points - center, corners)
 
@@ -86,43 +86,43 @@ class TriangleTree:
 
     @cached_property
     def in_order(self) -> I32:
-        """The triangles (T, 3) in their order."""
+        """The triangles (T, 3), sorted by `order`."""
         return self.triangles[self.order]
 
     @cached_property
     def tree(self) -> engine.Tree:
-        """The triangles in their order, in boxes that are a little larger than they."""
+        """The tree of boxes of the sorted triangles; boxes are a little wider than their triangles."""
         slack = float(np.abs(self.points).max()) * 2.0**-22
         return engine.Tree(self.points, self.in_order, slack)
 
     def farthest(self, points: F64) -> float:
         """How far the farthest of points is from the surface."""
-        found = np.empty(len(points), np.int32)
+        nearest = np.empty(len(points), np.int32)
 
         def find(first: int, end: int) -> float:
-            return max(self.tree.find_nearest(points, *block, found) for block in blocks(first, end, len(points)))
+            return max(self.tree.find_nearest(points, *block, nearest) for block in blocks(first, end, len(points)))
 
         return max(run_parts(find, n_blocks(len(points)), available_threads()))
 
 
-def measure(one: TriangleTree, other: TriangleTree) -> DistanceBounds:
-    """Bounds on the Hausdorff distance between two surfaces: of the point farthest from the other surface, either way.
+def measure(surface: TriangleTree, other_surface: TriangleTree) -> DistanceBounds:
+    """Bounds on the Hausdorff distance of two surfaces: of the point farthest from the other surface, either way.
 
     `bound` holds for every point of both, rounding included.
     """
-    ends = [(one, other), (other, one)]
+    ends = [(surface, other_surface), (other_surface, surface)]
     at_corners = max(target.farthest(some_points(source)) for source, target in ends)
     size = max(float(np.ptp(surface.points, axis=0).max()) for surface, _ in ends)
-    found = [reach(source, target, at_corners, LEAST * size) for source, target in ends]
-    known, bound, n_pieces = (max(numbers) for numbers in zip(*found, strict=True))
+    reaches = [reach(source, target, at_corners, LEAST * size) for source, target in ends]
+    known, bound, n_pieces = (max(numbers) for numbers in zip(*reaches, strict=True))
     largest = max(float(np.abs(surface.points).max()) for surface, _ in ends)
-    # A corner of a piece has been cut out of one that was cut out of another: at most as often as there are pieces.
+    # Pieces are cut from pieces: a corner is rounded at most once for each piece.
     rounding = (ROUNDING_OF_CUT * n_pieces + ROUNDING_OF_FOOT) * largest
     return DistanceBounds(known, bound * (1 + ROUNDING_OF_ROOT) + rounding)
 
 
 def reach(source: TriangleTree, target: TriangleTree, known: float, least: float) -> Reach:
-    """The distances of the triangles of one surface from another, and the most pieces of one."""
+    """The `Reach` of the triangles of a surface from another."""
     n, tree = len(source.triangles), target.tree
 
     def find(first: int, end: int) -> Reach:
@@ -137,25 +137,25 @@ def reach(source: TriangleTree, target: TriangleTree, known: float, least: float
 
 
 def n_blocks(n: int) -> int:
-    """How many blocks n points or triangles are."""
+    """How many blocks n points or triangles have."""
     return -(-n // BLOCK)
 
 
 def blocks(first: int, end: int, n: int) -> list[tuple[int, int]]:
-    """The blocks [first, end) of n points or triangles, as ranges of these."""
+    """The ranges of blocks [first, end) of n points or triangles."""
     return [(i, min(i + BLOCK, n)) for i in range(first * BLOCK, min(end * BLOCK, n), BLOCK)]
 
 
 def some_points(surface: TriangleTree) -> F64:
-    """At most about `MOST_SAMPLES` points of a surface: their distances only spare work."""
+    """About `MOST_SAMPLES` points of a surface at most: their distances only save work."""
     step = max(1, len(surface.points) // MOST_SAMPLES)
     return np.ascontiguousarray(surface.points[::step])
 
 
 def welded(vertices: npt.NDArray[Any], triangles: I32) -> tuple[F64, I32]:
-    """Points (N, 3) float64 that triangles use, each place once, and the triangles that are left of them.
+    """The places (N, 3) float64 of used points, without duplicates, and the triangles with these indices.
 
-    Triangles with two corners at one place are left out, since they cover nothing; unless there are no others.
+    Triangles with two corners at equal places are dropped, since they cover nothing; unless all are such.
     """
     first, group = coincident(vertices)
     corners = group[triangles]

@@ -1,6 +1,6 @@
-"""Levels of detail: a mesh and coarser ones in its stead, each with a bound on its distance from the mesh.
+"""Levels of detail: a mesh and coarser meshes that replace it, each with a bound on its distance from the mesh.
 
-In: a mesh. Out: `Levels`, which are kept with the mesh, and in a file on request.
+In: a mesh. Out: `Levels`, which are cached with the mesh, and stored in a file on request.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from topleft._meshes.lod.parts import PartedMesh, Parts, parts_of_arrays
 from topleft._meshes.model.mesh import Mesh
 from topleft.errors import MeshError
 
-#: The arrays of a mesh, by the names that they have in files.
+#: The arrays of a mesh, by their names in files.
 ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "uv1", "material_of_triangle")
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A mesh in the stead of another.
+    """A mesh that replaces a finer mesh.
 
     Attributes
     ----------
     mesh : Mesh
     bound : float
-        No point of either surface is farther than that from the other one, in units of object space.
+        An upper bound of the Hausdorff distance of the two surfaces, in units of object space.
     known : float
-        About how far some point is, as measured: so `bound` is at most `bound / known` times too large. 0: not known.
+        A lower bound, but for rounding: `bound` is at most `bound / known` times too large. 0: not known.
 
     Examples
     --------
@@ -58,7 +58,7 @@ class Level:
 
     @cached_property
     def extent(self) -> F64:
-        """The box round it all, lowest and highest x, y, z, and the sphere, centre and radius: (10,) float64."""
+        """The box of the mesh, lowest and highest x, y, z, and its sphere, centre and radius: (10,) float64."""
         box = self.mesh.bounds
         center, radius = bounding_sphere(self.mesh.extreme_points())
         if not (np.isfinite(box).all() and np.isfinite(radius)):
@@ -77,7 +77,7 @@ class Levels(Sequence[Level]):
     coarser : sequence of Level
         Each with fewer triangles than the one before.
     parts : optional
-        The parts that `simplify` has cut a large mesh into, for views that need some finely and others coarsely.
+        The parts that `simplify` has cut a large mesh into, for views that need finer and coarser parts.
 
     Examples
     --------
@@ -89,31 +89,31 @@ class Levels(Sequence[Level]):
     """
 
     def __init__(self, mesh: Mesh, coarser: Sequence[Level] = (), parts: Parts | None = None) -> None:
-        # Not the mesh itself: it keeps its levels alive, and a circle would keep both for ever.
+        # A copy: a reference to the mesh, whose levels are cached with it, would keep both alive for ever.
         self._original = Level(replace(mesh))
         self._coarser = tuple(coarser)
         self.parts = parts
 
     @cached_property
     def parted(self) -> PartedMesh | None:
-        """The levels in parts, of a large mesh: made at the first use, and as large as they are."""
+        """The levels of a large mesh in parts: computed at the first use, with copies of all arrays."""
         return None if self.parts is None else PartedMesh([level.mesh for level in self], self.parts)
 
     @cached_property
     def extents(self) -> F64:
-        """That of each level, (N, 10) float64."""
+        """The extents of the levels, (N, 10) float64."""
         return np.stack([level.extent for level in self])
 
     @cached_property
     def bounds(self) -> F64:
-        """That of each level, (N,) float64."""
+        """The bounds of the levels, (N,) float64."""
         return np.array([level.bound for level in self], np.float64)
 
     def __len__(self) -> int:
         return 1 + len(self._coarser)
 
     def __getitem__(self, i: Any) -> Any:
-        """Return a level, or a tuple of them for a slice."""
+        """Return a level, or a tuple of levels for a slice."""
         return (self._original, *self._coarser)[i]
 
     def __iter__(self) -> Iterator[Level]:
@@ -124,12 +124,12 @@ class Levels(Sequence[Level]):
         return f"<Levels of {len(self)}: triangles {counts}>"
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the coarser levels to one .npz file, which is whole or not there.
+        """Write the coarser levels to a .npz file, atomically.
 
         Parameters
         ----------
         path : path
-            Materials and the crease angle are not written: `load` takes those of the mesh.
+            Materials and the crease angle are not written: `load` copies them from the mesh.
 
         Raises
         ------
@@ -155,22 +155,23 @@ class Levels(Sequence[Level]):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], mesh: Mesh, *, max_unpacked_bytes: int | None = None) -> Levels:
-        """Read the file of `save`, and keep the levels with the mesh.
+        """Read the file of `save`, and cache the levels with the mesh.
 
         Parameters
         ----------
         path : path
         mesh : Mesh
-            The mesh of the levels: its arrays must equal those that were saved, to the bit.
+            The mesh of the levels: its arrays must equal the saved mesh, to the bit.
         max_unpacked_bytes : int, optional
-            Of all arrays of the levels: a file with more is refused. Unless given 33,554,432, or 8 for each byte of it.
+            The most bytes of all arrays of the levels; a file with more raises an error. The default is 33,554,432, or
+            8 times the size of the file.
 
         Raises
         ------
         FileNotFoundError
             If there is no such file.
         MeshError
-            If the file is broken, or its levels are those of another mesh.
+            If the file is broken, or holds the levels of another mesh.
         """
         import zipfile
         import zlib
@@ -245,13 +246,13 @@ _levels: WeakKeyDictionary[Mesh, Levels] = WeakKeyDictionary()
 
 
 def keep_levels(mesh: Mesh, levels: Levels) -> Levels:
-    """Keep levels for as long as their mesh lives, and return them."""
+    """Cache levels for as long as their mesh lives, and return them."""
     _levels[mesh] = levels
     return levels
 
 
 def kept_levels(mesh: Mesh) -> Levels | None:
-    """The levels of a mesh, if it has any yet."""
+    """The cached levels of a mesh, or None."""
     return _levels.get(mesh)
 
 
