@@ -1,4 +1,4 @@
-"""Lenses: from straight rays to the bent ones of a real camera, in float64.
+"""Lenses: from straight rays to the bent rays of a real camera, in float64.
 
 Camera axes here are those of OpenCV: x right, y down, z along the view. The image plane lies at z = 1.
 
@@ -21,7 +21,7 @@ from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_number, as_real
 
 FLIP = np.array([1.0, -1.0, -1.0])
-"""Turns axes of OpenCV into those of OpenGL, and back."""
+"""Turns axes of OpenCV into axes of OpenGL, and back."""
 
 DEFAULT_TOLERANCE_PX = 0.125
 FINEST_TOLERANCE_PX = 2.0**-8
@@ -29,7 +29,7 @@ FINEST_TOLERANCE_PX = 2.0**-8
 
 
 class Lens(Protocol):
-    """The methods of a lens that a camera needs."""
+    """A lens, as cameras need it."""
 
     #: Radians from the axis; beyond it the lens is not evaluated.
     max_angle: ClassVar[float]
@@ -38,7 +38,8 @@ class Lens(Protocol):
     has_planar_range: ClassVar[bool]
 
     def __hash__(self) -> int:
-        """Lenses of the same terms are one."""
+        """Equal for lenses of equal terms."""
+        return hash(self.terms)
 
     @property
     def tolerance_px(self) -> float:
@@ -50,12 +51,16 @@ class Lens(Protocol):
     def range_along(self, points: F64) -> F64:
         """The distances of points (N, 3) that depth stands for, world units."""
 
-    def bend(self, points_eye: F64) -> F64:
-        """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
-
     @property
     def terms(self) -> Terms:
         """The coefficients that kernels read."""
+
+    def bend(self, points_eye: F64) -> F64:
+        """Points (N, 3) in eye space, moved so that a camera without a lens sees them where the lens shows them."""
+        points = points_eye * FLIP
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            place, reach = self.distort(points), self.range_along(points)
+        return np.stack([place[:, 0] * reach, -place[:, 1] * reach, -reach], axis=1)
 
 
 class Terms(NamedTuple):
@@ -68,7 +73,7 @@ class Terms(NamedTuple):
 
 
 @dataclass(frozen=True)
-class OpenCVLens:
+class OpenCVLens(Lens):
     """Radial and tangential distortion, thin prism and tilt, as `cv2.projectPoints` has them.
 
     Parameters
@@ -168,13 +173,9 @@ class OpenCVLens:
         """Z."""
         return points[:, 2]
 
-    def bend(self, points_eye: F64) -> F64:
-        """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
-        return _bend(self, points_eye)
-
 
 @dataclass(frozen=True)
-class FisheyeLens:
+class FisheyeLens(Lens):
     """A fisheye, as `cv2.fisheye.projectPoints` has it; it may see behind itself, up to 160 degrees from its axis.
 
     Parameters
@@ -233,10 +234,6 @@ class FisheyeLens:
         """The distance from the lens."""
         return np.sqrt(engine.row_products(points, points))
 
-    def bend(self, points_eye: F64) -> F64:
-        """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
-        return _bend(self, points_eye)
-
 
 def _as_points(points: npt.ArrayLike) -> F64:
     found = as_real("points", points)
@@ -270,10 +267,3 @@ def _check_terms(terms: list[float], tolerance_px: float) -> None:
         raise ValueError(f"the terms of a lens must be finite, got {terms}")
     if not FINEST_TOLERANCE_PX <= as_number("tolerance_px", tolerance_px) < math.inf:
         raise ValueError(f"tolerance_px must be at least {FINEST_TOLERANCE_PX}, got {tolerance_px}")
-
-
-def _bend(lens: Lens, points_eye: F64) -> F64:
-    points = points_eye * FLIP
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        place, reach = lens.distort(points), lens.range_along(points)
-    return np.stack([place[:, 0] * reach, -place[:, 1] * reach, -reach], axis=1)
