@@ -108,7 +108,7 @@ SHOWN_AS_LIGHT = np.rint(255 * light_of_bytes()).astype(np.uint8).tobytes()
 
 
 def library_of(values: Any) -> Any:
-    """PyTorch for a tensor, NumPy for anything else: what is used of them has the same names in both."""
+    """PyTorch for a tensor, NumPy for anything else: what is used of them has equal names in both."""
     return sys.modules["torch"] if type(values).__module__.startswith("torch") else np
 
 

@@ -217,7 +217,7 @@ class Renderer:
         return found
 
     def _camera(self, pose: F64, intrinsics: Intrinsics, near: float, far: float) -> tl.Camera:
-        """The camera of `tl.Camera.from_intrinsics`, without its checks: those take a fifth of a call."""
+        """The camera of `tl.Camera.from_intrinsics`, without its checks, which take a fifth of a call."""
         fx, fy, cx, cy = intrinsics
         projection = np.zeros((4, 4))
         projection[0, :3] = 2 * fx / self.width, 0, 1 - 2 * cx / self.width

@@ -91,7 +91,7 @@ class MeshRasterizer:
         return meshes_world.update_padded(new_verts_padded=verts)
 
     def forward(self, meshes_world: Any, **options: Any) -> Fragments:
-        """Draw meshes; options are those of the cameras, `cameras` and `raster_settings`."""
+        """Draw meshes; options are the options of the cameras, `cameras` and `raster_settings`."""
         cameras = options.get("cameras", self.cameras)
         settings = options.get("raster_settings", self.raster_settings)
         verts = self.transform(meshes_world, **options)

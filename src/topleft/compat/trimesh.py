@@ -36,7 +36,7 @@ SHINE: dict[str, float] = {"specular": 0.508, "shininess": 51.2}
 """Highlights of everything in trimesh's viewer."""
 
 AMBIENT = 0.2
-"""Light from all sides in OpenGL, whose numbers are those of the picture; each light adds its colour."""
+"""Light from all sides in OpenGL, whose numbers are the numbers of the picture; each light adds its colour."""
 
 DEFAULT_LIGHT = 60 / 255
 """Light of each of the two that trimesh gives a scene without lights."""
@@ -251,7 +251,7 @@ def drawn(geometry: Any, smooth: bool) -> tuple[tl.Mesh, tl.Material]:
         return tl.Mesh(own.vertices, own.triangles, crease=crease), tl.Material(**look)
     vertices: Any = own.vertices
     triangles: Any = own.triangles
-    if geometry.visual.kind == "face":  # corners of their own: put together again where the colour is the same
+    if geometry.visual.kind == "face":  # faces share no corners: they are joined where colours are equal
         vertices, triangles, light = joined_again(geometry, light)
     return tl.Mesh(vertices, triangles, None, light, crease=crease, color_interpolation="linear"), tl.Material(**look)
 
@@ -276,7 +276,7 @@ def as_rgba(color: Any, default: Sequence[int]) -> U8:
 def lights_of(scene: Any) -> tuple[list[tl.Light], float]:
     """The lights of a scene, and light from all sides."""
     own = getattr(scene, "_lights", None)
-    if own is None:  # those of the viewer: towards the corners of the scene's box, in the space of the eye
+    if own is None:  # as in the viewer: towards the corners of the scene's box, in the space of the eye
         color, corners = srgb_bytes(np.full(3, DEFAULT_LIGHT)), np.asarray(scene.bounds, np.float64)
         lights = [tl.Light(corner, color=color, space="eye") for corner in corners if corner.any()]
         return lights, AMBIENT + 2 * DEFAULT_LIGHT

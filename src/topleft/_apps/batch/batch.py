@@ -248,7 +248,7 @@ class Batch(Iterator[Result]):
         self.close()
 
     def close(self) -> None:
-        """End it: jobs that have not begun are dropped, those that have are finished."""
+        """End it: jobs that have not begun are dropped, begun jobs are finished."""
         self._results.close()  # type: ignore[attr-defined]
         if self._bar is not None:
             self._bar.close()
@@ -339,7 +339,7 @@ def _chunks(
 
 
 def _is_same(one: object, other: object) -> bool:
-    """Whether two jobs have one scene; meshes are compared by identity, names and functions by value."""
+    """Whether two jobs have equal scenes; meshes are compared by identity, names and functions by value."""
     return one is other or ((isinstance(one, (str, os.PathLike)) or callable(one)) and bool(one == other))
 
 

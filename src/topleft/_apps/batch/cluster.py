@@ -171,7 +171,7 @@ class ClusterWorkers(Workers):
             self._suspects.append((job, part, n_trials))
 
     def _try_next(self) -> None:
-        """Send the next job that workers died over, if no other one is on the way."""
+        """Send the next job that workers died over, if no other such job is on the way."""
         with self._lock:
             if self._is_trying or not self._suspects or self._ends:
                 return
@@ -180,7 +180,7 @@ class ClusterWorkers(Workers):
         self._send([job], promise, n_trials=n_trials)
 
     def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
-        """The number of jobs of a scene in a task, from the size of the first one."""
+        """The number of jobs of a scene in a task, from the size of the first job."""
         key = id(job.scene)
         if key not in self._together:
             self._together[key] = jobs_of_task(job)
@@ -217,7 +217,7 @@ def told(error: BaseException) -> BaseException:
 
 
 def jobs_of_task(job: Job) -> int:
-    """How many jobs like this one have about `TASK_ITEMS` triangles and pixels together."""
+    """How many jobs of this size have about `TASK_ITEMS` triangles and pixels together."""
     if not isinstance(job.scene, Mesh):
         return UNKNOWN_TOGETHER
     try:

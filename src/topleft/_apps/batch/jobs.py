@@ -39,7 +39,7 @@ class Checked(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One picture to be made.
+    """A picture to be drawn.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class ForeignMesh:
 
 
 class LoadedMeshes:
-    """Meshes that were made, or the errors that came instead: the `n` latest, shared by all threads."""
+    """Results of functions that make meshes, or their errors: the `n` latest, shared by all threads."""
 
     def __init__(self, n: int) -> None:
         self._n = n
@@ -187,7 +187,7 @@ class LoadedMeshes:
         self._lock = threading.Lock()
 
     def get(self, make: Callable[[], Any]) -> Any:
-        """Return the result of an equal function, or call this one."""
+        """Return the kept result of an equal function, or call the function."""
         found = self._made.get(make)
         if found is None:
             with self._lock:
@@ -220,7 +220,7 @@ class JobRunner:
         self._threads = threading.local()
 
     def draw(self, jobs: Sequence[tuple[int, Job]]) -> list[Outcome]:
-        """Return the outcome of each job; an error of one does not stop the next."""
+        """Return the outcome of each job; an error of a job does not stop the next job."""
         outcomes = []
         for index, job in jobs:
             start, picture, failure = time.perf_counter(), None, None

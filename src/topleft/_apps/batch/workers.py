@@ -28,7 +28,7 @@ MOST_OF_A_THREAD, SMALL_PX = 4, 1 << 20
 """Most jobs that a thread gets together, and the size of picture up to which it does."""
 
 N_SPOOLED = 8
-"""Files of meshes that are kept for jobs to come, besides those that a job on the way needs."""
+"""Files of meshes that are kept for jobs to come, besides files that a job on the way needs."""
 
 
 @contextmanager
@@ -214,7 +214,7 @@ class _Held:
 
 
 class HeldScenes:
-    """Meshes and scenes where workers find them, each put there once; those in use and the latest others."""
+    """Meshes and scenes where workers find them, each put there once; the meshes in use and the latest others."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()

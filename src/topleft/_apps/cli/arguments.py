@@ -101,7 +101,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def meant(word: str, known: Iterable[str]) -> str:
-    """Return the known word that is nearest to an unknown one, as the end of a message."""
+    """Return the known word that is nearest to an unknown word, as the end of a message."""
     from difflib import get_close_matches  # 3 ms that only errors need
 
     found = get_close_matches(word, list(known), 1)
@@ -121,7 +121,7 @@ def number(read: Callable[[float], float], wish: str) -> Callable[[str], float]:
 
 
 def within(low: float, high: float) -> Callable[[float], float]:
-    """A check that a number lies from one to another."""
+    """A check that a number lies from `low` to `high`."""
 
     def checked(value: float) -> float:
         if not low <= value <= high:

@@ -128,7 +128,7 @@ def depth_of(folder: Path, image: str, frame: tuple[int, int]) -> Array | None:
 
 
 def picture_of(folder: Path, image: str, folders: tuple[str, ...]) -> Path | None:
-    """The first file of an image in one of several folders."""
+    """The first file of an image in several folders."""
     paths = (folder / name / f"{int(image):06d}{suffix}" for name in folders for suffix in SUFFIXES)
     return next((path for path in paths if path.is_file()), None)
 

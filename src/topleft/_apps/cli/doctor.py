@@ -15,7 +15,7 @@ from topleft import build_info
 from topleft._apps.cli.arguments import add_command
 from topleft._core.base.threads import available_threads
 
-#: Extras for those who change the library; their packages are not listed.
+#: Extras for developers of the library; their packages are not listed.
 OWN_EXTRAS = frozenset({"all", "bench", "dev", "docs", "test"})
 
 

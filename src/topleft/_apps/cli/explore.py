@@ -48,7 +48,7 @@ def run_explore(options: argparse.Namespace) -> int:
 
 
 def add_explore_command(commands: Any) -> None:
-    """Add the command to those of `topleft`."""
+    """Add the command to the commands of `topleft`."""
     what = "move triangles in the browser and watch their pixels"
     add = add_command(commands, "explore", run_explore, what, EXPLORE_HELP).add_argument
     add("what", nargs="?", metavar="WHAT", help="a file, the name of a scene, or a link")

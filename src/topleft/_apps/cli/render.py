@@ -139,7 +139,7 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[Res
         )  # fmt: skip
         results = []
         for result in batch:
-            if isinstance(result.error, BrokenExecutor):  # all later ones fail alike
+            if isinstance(result.error, BrokenExecutor):  # all later jobs fail alike
                 raise result.error
             results.append(result)
     return sorted(results, key=lambda result: result.index)
@@ -174,7 +174,7 @@ def _elsewhere(job: Job) -> Job:
 
 
 def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
-    """Return a client of the cluster at an address, or of one on this machine that ends with the command."""
+    """Return a client of the cluster at an address, or of a cluster on this machine that ends with the command."""
     try:
         import dask
         from distributed import Client, LocalCluster

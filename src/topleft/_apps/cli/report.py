@@ -43,7 +43,7 @@ def complain_of_lacks(lines: Sequence[str], *, is_each_told: bool = False) -> No
 
 
 def one_line(error: BaseException) -> str:
-    """The error in one line, with the options of a shell where it names those of Python."""
+    """The error in one line, with the options of a shell where it names arguments of Python."""
     if isinstance(error, MemoryError):
         return "not enough memory for a mesh or picture of this size"
     if isinstance(error, OSError) and error.strerror:

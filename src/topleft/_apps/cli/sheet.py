@@ -22,7 +22,7 @@ PAPER, INK, ALARM = (255, 255, 255), (60, 60, 60), (176, 0, 32)
 def make_sheet(
     files: Sequence[Sequence[Path]], captions: Sequence[str], reasons: Sequence[str] = ()
 ) -> npt.NDArray[np.uint8]:
-    """Return a sheet of the pictures of each mesh; where one is not there, its cell says the reason.
+    """Return a sheet of the pictures of each mesh; where a picture is missing, its cell says the reason.
 
     Several pictures of several meshes: a row for each mesh. Otherwise the rows make the sheet about square.
     """

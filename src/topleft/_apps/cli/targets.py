@@ -118,7 +118,7 @@ class Orbit:
 
 
 WHITE, BACKDROP = (255, 255, 255, 255), (196, 212, 232, 255)
-"""Backgrounds of a mesh, and of a white one: not grey, because white faces are grey under white light."""
+"""Backgrounds of a mesh, and of a white mesh: not grey, because white faces are grey under white light."""
 
 NEARLY_WHITE = 240
 
@@ -245,7 +245,7 @@ def names_of(sources: Sequence[str], *, with_numbers: bool = True, with_folders:
 
 
 def folders_of(sources: Sequence[str]) -> list[str]:
-    """The {folder} of each mesh: its folder below the one that all lie in; "." there, and for shapes."""
+    """The {folder} of each mesh: its folder below the folder that all lie in; "." there, and for shapes."""
     folders = [None if source in SHAPES else Path(source).absolute().parent for source in sources]
     there = [folder for folder in folders if folder is not None]
     home = os.path.commonpath(there) if there else ""
@@ -253,7 +253,7 @@ def folders_of(sources: Sequence[str]) -> list[str]:
 
 
 def default_sampling(options: argparse.Namespace) -> str:
-    """Several samples where light is shown, one where numbers are written or pixels stand for ids or distances."""
+    """Several samples where light is shown, one where pixels are numbers, ids or distances."""
     is_light = options.shading not in ("ids", "depth") and options.opacity is None
     is_picture = not options.layers and Path(options.out).suffix.lower() != ".npz"
     return str(Sampling.MSAA4 if is_light and is_picture else Sampling.CENTER)
@@ -376,5 +376,5 @@ def _check_reached(folder: RemotePath) -> None:
         folder.exists()
     except MissingPackageError:
         raise
-    except Exception as error:  # any type: each package behind fsspec has its own
+    except Exception as error:  # any type: packages behind fsspec raise different errors
         raise UsageError(f"cannot write to {folder}: {' '.join(str(error).split()) or type(error).__name__}") from None

@@ -120,7 +120,7 @@ class Folder:
 
 
 def is_own(name: str) -> bool:
-    """Whether a file has the name of a chunk, or of one that is being written."""
+    """Whether a file has the name of a chunk, or of a chunk that is being written."""
     folder, slash, last = name.rpartition("/")
     return OWN_NAME.fullmatch(folder + slash + PART.sub(r"\1", last)) is not None
 
@@ -207,7 +207,7 @@ def fingerprints_at(folder: Folder, file: Path) -> list[tuple[object, str | None
 
 
 def write_own(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file, unless another program has written one there meanwhile."""
+    """Write a file, unless another program has written a file there meanwhile."""
     if is_whole(path) and _mark_of(path) is None:
         raise FileExistsError(f"{path} was not written by topleft: move it, or write elsewhere")
     write_whole(path, write)

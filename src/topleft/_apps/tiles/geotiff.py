@@ -67,7 +67,7 @@ class TiffStore(TileStore):
 
 
 def differences(pixels: Array) -> bytes:
-    """Return rows of pixels as differences to the pixel before; of floats byte by byte, the high ones first."""
+    """Return rows of pixels as differences to the pixel before; of floats byte by byte, the high bytes first."""
     height, width = pixels.shape[:2]
     if pixels.dtype.kind == "f":
         n_bytes = pixels.dtype.itemsize

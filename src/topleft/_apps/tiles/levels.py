@@ -45,7 +45,7 @@ class Written:
 
 
 def halved(pixels: Array, nodata: float | None, *, is_mean: bool) -> Array:
-    """Return pixels of half the size: the mean of four, those without data left out, or the upper left of them.
+    """Return pixels of half the size: the mean of four pixels, except pixels without data; or the upper left pixel.
 
     A last row or column without a partner counts twice.
     """
@@ -91,7 +91,7 @@ def write_levels(
     """Write all blocks that are not there yet, level by level.
 
     `halve` makes the level above, instead of `halved`; `prepare` converts the pixels of a window to those of the file.
-    The workers of an executor draw and write the windows; levels are made of these here.
+    The workers of an executor draw and write the windows; this process makes the levels of them.
     """
     there = blocks_with_pixels(raster, store.n_levels)
     n_blocks = int(sum(level.sum() for level in there))
@@ -108,7 +108,7 @@ def write_levels(
         store.write(level, row, column, small)
 
     def together(level: int, row: int, column: int) -> Array:
-        """The four blocks of a level that lie below one of the next."""
+        """The four blocks of a level that lie below a block of the next level."""
         rows = range(2 * row, min(2 * row + 2, there[level].shape[0]))
         columns = range(2 * column, min(2 * column + 2, there[level].shape[1]))
         height = sum(store.shape_of(level, r, columns[0])[0] for r in rows)

@@ -29,7 +29,7 @@ LARGE_BYTES = 1 << 28
 """Smaller rasters count as large as their pixels; for larger ones tiles of a window are compressed to estimate."""
 
 MOST_SAMPLES = 16
-"""The number of those tiles."""
+"""How many tiles of a window are compressed to estimate."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ Progress = Callable[[Step], object]
 
 @dataclass(frozen=True)
 class Writing:
-    """How a raster is written: over one that is there, or on with it, with a report of each block, and by whom."""
+    """How a raster is written: whether it resumes or replaces an older raster, who is told of each block, who draws."""
 
     resume: bool
     overwrite: bool
@@ -70,7 +70,7 @@ class Writing:
 
 
 def n_levels_to(size: tuple[int, int], side: int) -> int:
-    """The number of levels down to one that fits a square."""
+    """The number of levels, down to a level that fits a square."""
     n = 1
     while max(size) > side << (n - 1):
         n += 1
@@ -122,8 +122,8 @@ class TileStore(ABC):
     def tiles_of(self, level: int, row: int, column: int) -> list[tuple[int, int]]:
         """Rows and columns of the tiles of a block that lie in the level."""
         (n_columns, n_rows), (columns, rows) = self.n_tiles_of_block(), self.n_tiles(level)
-        own_rows = range(row * n_rows, min((row + 1) * n_rows, rows))
-        return [(r, c) for r in own_rows for c in range(column * n_columns, min((column + 1) * n_columns, columns))]
+        row_range = range(row * n_rows, min((row + 1) * n_rows, rows))
+        return [(r, c) for r in row_range for c in range(column * n_columns, min((column + 1) * n_columns, columns))]
 
     def shape_of(self, level: int, row: int, column: int) -> tuple[int, ...]:
         """The shape of a block."""
@@ -166,8 +166,8 @@ class TileStore(ABC):
         """Return the pixels of a block that was written."""
         pixels = np.empty(self.shape_of(level, row, column), self.dtype)
         for r, c in self.tiles_of(level, row, column):
-            own = pixels[self.location_of(r, c, row, column)]
-            height, width = self.tile[::-1] if self.is_filled else own.shape[:2]
+            part = pixels[self.location_of(r, c, row, column)]
+            height, width = self.tile[::-1] if self.is_filled else part.shape[:2]
             name = self.name(level, r, c)
             content = self.content(name)
             try:
@@ -176,15 +176,15 @@ class TileStore(ABC):
                     raise ValueError(f"it holds pixels of shape {tile.shape}")
             except DAMAGES as error:
                 raise OSError(f"{self.folder.place(name)} is damaged ({error}): resume=True writes it again") from error
-            own[...] = tile[: own.shape[0], : own.shape[1]]
+            part[...] = tile[: part.shape[0], : part.shape[1]]
         return pixels
 
     def content(self, name: str) -> bytes:
         """Return a tile as it is stored."""
-        found = self.folder.get(name)
-        if found is None:
+        content = self.folder.get(name)
+        if content is None:
             raise self.gone(name)
-        return found
+        return content
 
     def gone(self, name: str) -> FileNotFoundError:
         """The error of a tile that has been removed."""
@@ -208,7 +208,7 @@ def begin(
     n_copies: int = 1,
     prepare: Callable[[Array], Array] = np.asarray,
 ) -> bool:
-    """Resume the raster that is there, or make room for a new one; return whether it resumes.
+    """Resume the raster that is there, or make room for a new raster; return whether it resumes.
 
     `there`: files and folders at the place of the raster, and their fingerprints, None if topleft did not write them.
     `n_copies`: of all tiles, on the disk at a time. `prepare` converts the pixels of a window to those of the file.
@@ -243,7 +243,7 @@ def begin(
 
 
 def bytes_of(raster: WindowedRaster, store: TileStore, prepare: Callable[[Array], Array]) -> int:
-    """The most bytes of a raster on disk; for a large one the fullest window gives the rate of compression."""
+    """The most bytes of a raster on disk; of a large raster the fullest window gives the rate of compression."""
     counts = raster.index.counts
     w, h = raster.window_size
     n = int((counts > 0).sum()) * w * h * store.dtype.itemsize * int(np.prod(store.channels, dtype=int))

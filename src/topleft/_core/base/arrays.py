@@ -101,7 +101,7 @@ def set_aligned(instance: object, state: dict[str, Any]) -> None:
 
 
 def set_read_only(instance: object, state: dict[str, Any]) -> None:
-    """Do the same, with arrays read-only as they were."""
+    """Set the state as `set_aligned` does, with arrays read-only as they were."""
     set_aligned(instance, state)
     for value in vars(instance).values():
         if isinstance(value, np.ndarray):
@@ -191,7 +191,7 @@ def as_checked_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32
 
 
 def as_frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a read-only array that nobody can write to: a copy, unless it is one."""
+    """Return a read-only array that nobody can write to: a copy, unless it is such an array."""
     if is_frozen(array):
         return array
     own = array.copy()
@@ -274,7 +274,7 @@ def as_number(name: str, value: object) -> float:
 
 
 def as_scale(scale: object) -> float:
-    """A scale, if it is one."""
+    """Return a scale that is positive and finite; else raise a `ValueError`."""
     factor = as_number("scale", scale)
     if not 0 < factor < np.inf:
         raise ValueError(f"scale must be a positive number, got {scale!r}")
@@ -282,7 +282,7 @@ def as_scale(scale: object) -> float:
 
 
 def as_seconds(time: float) -> float:
-    """A time, if it is one."""
+    """Return a time of 0 or more seconds; else raise a `ValueError`."""
     seconds = as_number("time", time)
     if not 0 <= seconds < np.inf:
         raise ValueError(f"time must be a number of seconds, 0 or more, got {time!r}")
@@ -341,7 +341,7 @@ def check_progress(progress: object) -> None:
 
 
 def as_names(name: str, values: object) -> tuple[str, ...]:
-    """Return strings, of one or of a sequence of them."""
+    """Return strings, of a string or of a sequence of strings."""
     if isinstance(values, str):
         return (values,)
     try:
@@ -500,7 +500,7 @@ def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDA
 
 
 def as_point_size(name: str, value: ArrayLike, n_points: int) -> float | NDArray[np.float64]:
-    """Return a positive size, or one of each point, (N,) float64."""
+    """Return a positive size, or a size of each point, (N,) float64."""
     array = as_array(name, value)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name} must hold real numbers, got {array.dtype}")

@@ -44,7 +44,7 @@ def crs_text(crs: Any) -> str | None:
 
 
 def is_same_crs(one: str, other: str) -> bool:
-    """Whether two names are of one CRS; pyproj decides where they differ."""
+    """Whether two names mean an equal CRS; pyproj decides where they differ."""
     if one.casefold() == other.casefold():
         return True
     pyproj = _pyproj("comparing two CRS")
@@ -53,7 +53,7 @@ def is_same_crs(one: str, other: str) -> bool:
 
 
 def transformed(points: Array, own: str, crs: str) -> F64:
-    """Points (N, 2), x before y, of one CRS in another one."""
+    """Points (N, 2), x before y, from a CRS to another CRS."""
     pyproj = _pyproj("another CRS")
     change = pyproj.Transformer.from_crs(_known(pyproj, own), _known(pyproj, crs), always_xy=True)
     there = np.column_stack(change.transform(points[:, 0], points[:, 1]))

@@ -71,7 +71,7 @@ class Grid:
     crs: str | None = None
     nodata: float | None = None
 
-    if TYPE_CHECKING:  # an argument may be any four numbers; the attribute is as above
+    if TYPE_CHECKING:  # an argument may be any four numbers; the attribute is a tuple of floats
 
         def __init__(
             self,
@@ -97,7 +97,7 @@ class Grid:
         object.__setattr__(self, "crs", crs_text(self.crs))
         if self.nodata is not None:
             as_number("nodata", self.nodata)
-            object.__setattr__(self, "nodata", np.asarray(self.nodata).item())  # a whole number stays one
+            object.__setattr__(self, "nodata", np.asarray(self.nodata).item())  # a whole number stays an int
 
     def __repr__(self) -> str:
         """The constructor's call, without unset options."""

@@ -16,7 +16,7 @@ from topleft._core import engine
 HUGE_PAGE = 2 << 20
 CACHE_LINE = 64
 
-#: Arrays below it are NumPy's own: the system keeps memory for them, without page faults.
+#: NumPy allocates smaller arrays itself: the system keeps memory for them, without page faults.
 MIN_BLOCK_BYTES = 4 << 10
 
 #: Several arrays of so many bytes together are allocated at once before the first of them is written.
@@ -88,7 +88,7 @@ class KeptMemory:
 
 
 class ScratchMemory(FreshMemory):
-    """Results are new; scratch is the calling thread's own and kept, up to `MAX_SCRATCH_BYTES` a name."""
+    """Results are new; scratch belongs to the calling thread and is kept, up to `MAX_SCRATCH_BYTES` a name."""
 
     def __init__(self) -> None:
         self.threads = threading.local()  # `kept`: of each thread
@@ -117,7 +117,7 @@ class ScratchMemory(FreshMemory):
 
 
 class MemoryOf:
-    """Another memory, under names of its own: its buffers are not overwritten by users of the other names."""
+    """A memory with a suffix on each name: users of the bare names do not overwrite its buffers."""
 
     def __init__(self, memory: Memory, owner: str) -> None:
         self.memory, self.owner = memory, owner
@@ -154,7 +154,7 @@ class SpareMemory:
         return None
 
     def put(self, need: object, made: object) -> None:
-        """Keep what was made for a need, which nobody uses any longer."""
+        """Keep the memory of a call that has ended, for calls of an equal need."""
         self._kept.append((need, made))
 
     def release(self) -> None:
@@ -171,7 +171,7 @@ engine.keep_blocks(MAX_WAITING_BYTES)
 
 
 def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Return an uninitialised array, in memory of a freed one of about that size if there is some.
+    """Return an uninitialised array, in the memory of a freed array of about that size if there is one.
 
     Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The array and all its views own
     the memory until they are freed; then it waits for another array, `MAX_WAITING_BYTES` at most.

@@ -37,7 +37,7 @@ class Notes:
 
     @property
     def lines(self) -> list[str]:
-        """A line for each kind, in the order in which they were found."""
+        """A line for each kind, in the order of the first note of each."""
         return [f"{self._path!r}: {kind}{_list_of(list(names))}" for kind, names in self._names.items()]
 
 

@@ -46,8 +46,8 @@ SAMPLINGS = {sampling.value: sampling for sampling in Sampling}
 
 
 def parse(option: Any, name: str, value: object) -> Any:
-    """Return the word that an option has, of those of its type in `topleft.typing`; else raise a `ValueError`."""
-    check_choice(name, value, option.__args__)  # those of `get_args`, in a tenth of its time
+    """Return the word that an option has, of the words of its type in `topleft.typing`; else raise a `ValueError`."""
+    check_choice(name, value, option.__args__)  # as `get_args`, in a tenth of its time
     return str(value)
 
 
@@ -57,7 +57,7 @@ def parse_sampling(value: object) -> Sampling:
 
 
 def check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
-    """Raise a `ValueError` unless the value is one of a few words."""
+    """Raise a `ValueError` unless the value is among a few words."""
     if not (isinstance(value, str) and value in choices):
         raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
 

@@ -1,4 +1,4 @@
-"""Files behind URLs that fsspec reaches: whole or not there, as those of a disk.
+"""Files behind URLs that fsspec reaches: whole or not there, as files on a disk are.
 
 Input: a URL. Output: the methods of `pathlib.Path` that writing needs. A URL that begins with
 file:// is a path of this machine.
@@ -102,7 +102,7 @@ class RemotePath:
         return self.parent / name
 
     def __truediv__(self, name: str) -> RemotePath:
-        return replace(self, url=f"{self.url.rstrip('/')}/{name}")  # fsspec keeps file systems: the same one
+        return replace(self, url=f"{self.url.rstrip('/')}/{name}")  # fsspec keeps file systems: both URLs share one
 
     def __getstate__(self) -> dict[str, Any]:
         return {"url": self.url, "storage": self.storage}  # and not how it was reached

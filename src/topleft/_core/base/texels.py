@@ -22,7 +22,7 @@ from topleft._core.base.options import parse
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 MOST_KEPT_BYTES = 1 << 27
-"""The most bytes of levels that are kept with a texture; those of 2048 x 2048 texels of four channels take 2/3."""
+"""The most bytes of levels that are kept with a texture; 2048 x 2048 texels of four channels take 2/3 of it."""
 
 FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2, "pixelated": 3}  # tl_filter in csrc/shading.h
 WRAP_CODES = {"repeat": 0, "clamp": 1, "mirror": 2}  # tl_wrap
@@ -97,7 +97,7 @@ def as_light(array: NDArray[Any], encoding: str) -> F32:
 
 
 def levels_of(values: F32, filter: str, wraps: tuple[str, str]) -> ValueLevels:  # noqa: A002
-    """Return contiguous values (H, W, C) with their halvings, where the filter looks at those."""
+    """Return contiguous values (H, W, C) with their halvings, where the filter reads halvings."""
     height, width, n_channels = values.shape
     rows = [(0, width, height)]
     while filter in HALVING and max(width, height) > 1:

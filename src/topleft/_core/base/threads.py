@@ -36,7 +36,7 @@ def _forget_pool() -> None:
 
 
 def _hear_signals() -> None:
-    """Let kernels answer Ctrl-C in the main thread, which is the one that forked in a child."""
+    """Let kernels answer Ctrl-C in the main thread, which in a child is the thread that forked."""
     engine.handle_signals_in(threading.main_thread().ident or 0, SCRATCH.threads)
 
 

@@ -220,7 +220,7 @@ def of_pytorch3d(cameras: Any, i: int, size: object) -> Calibration:
 
 
 def rows_of(cameras: Any, name: str, shape: tuple[int, ...] | None, i: int) -> F64:
-    """The value of camera i of a batch by a name; one for all counts for each."""
+    """The value of camera i of a batch by a name; a value without a batch counts for each camera."""
     value = as_real(name, read(cameras, "cameras", name))
     if value.ndim == 0 or len(value) == 1:
         value = value.reshape(value.shape[1:])

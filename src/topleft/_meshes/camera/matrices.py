@@ -63,7 +63,7 @@ def points_to_frame(subject: Framed) -> F64:
 
 
 def ends_to_frame(subject: Framed) -> F64:
-    """A few of those points, which have the box and the bounding sphere of all."""
+    """A few of the points of `points_to_frame`: their box and bounding sphere are those of all points."""
     if isinstance(subject, Mesh | Points) and len(subject.triangles if isinstance(subject, Mesh) else subject):
         return subject.extreme_points()
     if isinstance(subject, Scene) and subject.n_triangles and np.isfinite(ends := subject.extreme_points()).all():
@@ -73,7 +73,7 @@ def ends_to_frame(subject: Framed) -> F64:
 
 
 def bounding_sphere(ends: F64) -> tuple[F64, float]:
-    """Centre (3,) of the box round points, and the distance of the farthest of them (1 if they are all one)."""
+    """Centre (3,) of the box round points, and the distance of the farthest of them (1 if all are equal)."""
     center = ends.min(axis=0) / 2 + ends.max(axis=0) / 2
     radius = math.sqrt(float(((ends - center) ** 2).sum(axis=1).max()))
     return center, radius if radius > 0 else 1.0
@@ -317,7 +317,7 @@ def as_positive(name: str, value: float) -> float:
 
 
 def as_fov(fov_y_deg: float) -> float:
-    """The field of view as a float; a `ValueError` unless it is one."""
+    """The field of view as a float; a `ValueError` unless it lies between 0 and 180 degrees."""
     if not 0 < (degrees := as_number("fov_y_deg", fov_y_deg)) < 180:
         raise ValueError(f"fov_y_deg must lie between 0 and 180, got {fov_y_deg}")
     return degrees

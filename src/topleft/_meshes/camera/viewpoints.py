@@ -124,7 +124,7 @@ def viewpoints(subject: MeshLike | Scene | npt.ArrayLike, n: int, **framing: Unp
 
 
 def _looked_at(subject: MeshLike | Scene | npt.ArrayLike, framing: FramingOptions) -> Framed:
-    """The subject of all cameras, converted once; for its sphere two points with the same sphere, and its axis."""
+    """The subject of all cameras, converted once; for its sphere two points with an equal sphere, and its axis."""
     framed = as_framed(subject)
     framing.setdefault("up", up_of(framed))
     if framing.get("fit", "sphere") != "sphere":

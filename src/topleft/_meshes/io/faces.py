@@ -18,7 +18,7 @@ def mesh_of_faces(
     source: InputFile, positions: Array, corners: I64, n_corners: I64, *, normals: Array | None, colors: Array | None,
     uv: Array | None, uv_of_corners: Array | None = None, colors_of_faces: Array | None = None,
 ) -> Mesh | None:  # fmt: skip
-    """The triangles of polygons; with vertices of their own where values end at the edges of a face."""
+    """The triangles of polygons; no two share a vertex where values end at the edges of a face."""
     if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < len(positions):
         bad = int(corners.min()) if int(corners.min()) < 0 else int(corners.max())
         raise MeshError(f"a face names vertex {bad} of {len(positions)}")
@@ -38,5 +38,5 @@ def mesh_of_faces(
         colors = colors[at]
     elif colors_of_faces is not None:
         colors = np.repeat(colors_of_faces[faces], 3, axis=0)
-    own_normals = None if normals is None else normals[at]
-    return Mesh(positions[at], np.arange(len(at), dtype=np.int32).reshape(-1, 3), own_normals, colors, uv)
+    normals_of_corners = None if normals is None else normals[at]
+    return Mesh(positions[at], np.arange(len(at), dtype=np.int32).reshape(-1, 3), normals_of_corners, colors, uv)

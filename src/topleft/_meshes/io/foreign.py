@@ -43,7 +43,7 @@ PACKAGES = {
     ".3mf": "lxml networkx", ".xaml": "lxml networkx",
     ".step": "cascadio", ".stp": "cascadio", ".ctm": "openctm",
 }  # fmt: skip
-"""Formats that trimesh reads by packages of their own."""
+"""Formats that trimesh reads by further packages."""
 
 CONVERTERS = {
     **dict.fromkeys(
@@ -61,7 +61,7 @@ CONVERTERS = {
 BINARY_DXF = b"AutoCAD Binary DXF"
 
 NODES_OF_TRIMESH = 4
-"""Nodes of glTF that take as long as one that trimesh reads: 0.2 ms."""
+"""Nodes of glTF that take as long as a node that trimesh reads: 0.2 ms."""
 
 
 def read_by_trimesh(source: InputFile) -> list[Mesh]:

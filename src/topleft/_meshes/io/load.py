@@ -150,7 +150,7 @@ def load(
 
 
 def scaled(mesh: Mesh | Points, scale: float) -> Mesh | Points:
-    """The mesh or points with coordinates times a scale, rounded once to their own type."""
+    """The mesh or points with coordinates times a scale, rounded once to their type."""
     with np.errstate(over="ignore"):
         if isinstance(mesh, Points):
             positions = mesh.positions
@@ -193,7 +193,7 @@ def _has_textures(part: Mesh) -> bool:
     """Whether a triangle has a material with a texture."""
     rows = part.material_of_triangle
     used = part.materials if rows is None else [part.materials[i] for i in np.unique(rows)]
-    return any(getattr(own, name) is not None for own in used for name in TEXTURES)
+    return any(getattr(material, name) is not None for material in used for name in TEXTURES)
 
 
 def _parts(source: InputFile) -> list[Mesh]:
@@ -215,15 +215,15 @@ def _parts(source: InputFile) -> list[Mesh]:
 
 
 def _points(source: InputFile) -> Points:
-    """The points of a file without triangles; those that are nowhere are left out."""
+    """The points of a file without triangles; points that are not finite are left out."""
     source.notes.remove("points not drawn")
     clouds = source.clouds
     positions = np.concatenate([cloud.positions for cloud in clouds])
     colors = normals = None
     if any(cloud.colors is not None for cloud in clouds):
         white = [np.full((len(cloud.positions), 4), 255, np.uint8) for cloud in clouds]
-        own = [cloud.colors for cloud in clouds]
-        colors = np.concatenate([one if one is not None else other for one, other in zip(own, white, strict=True)])
+        pairs = zip(clouds, white, strict=True)
+        colors = np.concatenate([blank if cloud.colors is None else cloud.colors for cloud, blank in pairs])
     if all(cloud.normals is not None for cloud in clouds):
         normals = np.concatenate([cloud.normals for cloud in clouds if cloud.normals is not None])
     is_somewhere = np.isfinite(positions).all(axis=1)

@@ -66,7 +66,7 @@ class _Entry:
 
 
 def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[], Material]]:
-    """The materials of a library: functions, so that pictures of unused ones are not read; `source` gets the notes."""
+    """The materials of a library: functions, so that unused pictures are not read; `source` gets the notes."""
     entries: dict[str, _Entry] = {}
     own = _Entry()
     lines = text.replace("\\\n", " ").splitlines()
@@ -262,7 +262,7 @@ class _Makers:
         return {"normal_texture": texture, "normal_scale": max(laid.bump, 0.0)}
 
     def _metallic_rough(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
-        """A metallic-rough surface; its two maps become green and blue of one."""
+        """A metallic-rough surface; its two maps become green and blue of one texture."""
         own: dict[str, Any] = {
             "roughness": _share((numbers.get("Pr") or [1.0])[0]),
             "metallic": _share((numbers.get("Pm") or [1.0 if "metallic" in maps else 0.0])[0]),
@@ -299,7 +299,7 @@ class _Makers:
     def _made(
         self, key: tuple[Any, ...], laid: _Map, largest: U8, pixels: Callable[[], U8], encoding: EncodingOption
     ) -> Texture | None:
-        """A texture, which materials that use the same share; None if it is beyond the budget."""
+        """A texture, shared by all materials that name it; None if it is beyond the budget."""
         key = (*key, laid.scale, laid.offset, laid.is_clamped, encoding)
         if key not in self._textures:
             self._source.budget.spend("max_nodes", 1)

@@ -237,7 +237,7 @@ def _columns(numbers: F64, n_of_line: I64, n: int) -> F64:
 
 
 def _positions(numbers: F64, n_of_line: I64) -> tuple[F64, U8 | None]:
-    """Positions (V, 3), and the colours (V, 4) that follow them where each has one."""
+    """Positions (V, 3), and the colours (V, 4) that follow them where each has a colour."""
     if len(n_of_line) and int(n_of_line.min()) < 3:
         row = int((n_of_line < 3).argmax())
         raise MeshError(f"its vertex {row + 1} has {n_of_line[row]} of 3 numbers")

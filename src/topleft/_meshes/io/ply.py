@@ -225,7 +225,7 @@ def _header(content: bytes) -> tuple[str, list[_Element], list[str], int]:
                 elements[-1].properties.append(_Property(name, np.dtype(DTYPES[kind])))
             case ["element" | "property" | "format", *_]:
                 raise MeshError(f"its header says {' '.join(words)[:60]!r}")
-            case _:  # comments, also those that go on in a second line
+            case _:  # comments, also such as continue in a second line
                 pass
     raise MeshError("its header does not end")
 
@@ -251,7 +251,7 @@ def _cast(values: Array, dtype: np.dtype[Any]) -> Array:
 
 
 def _listed(values: Array, dtype: np.dtype[Any]) -> Array:
-    """The entries of lists of a text; those that shall be integers, which are corners of faces, as they stand."""
+    """The entries of lists of a text; corners of faces, which the header calls integers, stay float64."""
     return values if dtype.kind in "iu" else values.astype(dtype)
 
 
@@ -376,7 +376,7 @@ def _corners(found: dict[str, Rows], source: InputFile) -> tuple[I64, I64, Rows]
 
 
 def triangles_of_strips(values: I64, lengths: I64) -> I64:
-    """The triangles (T, 3) of strips, which also end at -1; those of a strip turn all one way."""
+    """The triangles (T, 3) of strips, which also end at -1; triangles of a strip turn all one way."""
     ends = np.zeros(len(values) + 1, np.bool_)
     ends[np.cumsum(lengths)] = True
     is_break = values < 0

@@ -28,7 +28,7 @@ COLOR_TYPES = {(): 0, (2,): 4, (3,): 2, (4,): 6}
 ZLIB_HEADER, LAST_BLOCK = b"\x78\x01", b"\x03\x00"  # RFC 1950; a block of nothing
 
 BAND_BYTES = 1 << 20
-"""Rows are compressed by so much at a time, with codes of their own."""
+"""Rows are compressed by so much at a time, each with separate codes."""
 
 
 def encode(image: npt.NDArray[Any], *, text: Mapping[str, str] | None = None) -> bytes:

@@ -29,7 +29,7 @@ BROKEN = (KeyError, TypeError, AttributeError, IndexError, ValueError, OverflowE
 
 @dataclass(frozen=True)
 class ObjectRings:
-    """Polygons of one object."""
+    """Polygons of an object."""
 
     points: npt.NDArray[np.float64]  # (N, 2)
     lengths: npt.NDArray[np.int64]  # points of each ring
@@ -41,7 +41,7 @@ NO_RINGS = ObjectRings(np.empty((0, 2)), *np.zeros((2, 0), np.int64))
 
 @dataclass(frozen=True)
 class PolygonPicture:
-    """The polygons of one picture."""
+    """The polygons of a picture."""
 
     name: str
     size: tuple[int, int] | None  # pixels; None: the polygons are on a plane, y up
@@ -126,7 +126,7 @@ def leaving_out(what: str, notes: Notes) -> Iterator[None]:
 
 def _vector_content(path: Path, layer: str | None) -> dict[str, Any]:
     """A layer of a vector file in the form of GeoJSON."""
-    path.stat()  # raises the same error for a missing file as other formats
+    path.stat()  # a missing file is a FileNotFoundError, as of other formats
     try:
         import pyogrio
         import shapely
@@ -278,7 +278,7 @@ def _geojson(content: Mapping[str, Any], name: str, notes: Notes) -> PolygonPict
 
 
 def _crs_of(content: Mapping[str, Any], picture: PolygonPicture) -> str | None:
-    """The CRS of a vector file, or of GeoJSON: the one it names, as old files do, or degrees of WGS84 if it can be."""
+    """The CRS of a vector file, or of GeoJSON: the name in it, as old files have, or degrees of WGS84 if it can be."""
     if "own crs" in content:
         return content["own crs"] or None
     named = (content.get("crs") or {}).get("properties", {}).get("name")

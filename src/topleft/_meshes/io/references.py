@@ -38,7 +38,7 @@ LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 
 
 class LfsPointerError(MeshError):
-    """A file stands for one that has not been fetched."""
+    """A file stands for a file that has not been fetched."""
 
 
 class Cloud(NamedTuple):
@@ -63,7 +63,7 @@ class InputFile:
     """A mesh file and the files beside it, with their limits and notes of missing ones.
 
     `archive`: that it was unpacked from, which gets its notes and its points. `home`: the folder that it may name files
-    of, its own unless given.
+    of; the folder of `path` unless given.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class InputFile:
         return None if path is None else self.read_at(path, name, what)
 
     def read_at(self, path: Path, name: str, what: str) -> bytes | None:
-        """The content of a file that has been found."""
+        """The content of a file at a path of `find`."""
         try:
             return self._read(path)
         except OSError:
@@ -210,7 +210,7 @@ def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]
 
 
 def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """The values as int64; any number for those beyond its range; fractions are refused."""
+    """The values as int64; any number for values beyond its range; fractions are refused."""
     if values.dtype.kind == "f" and not (is_whole := np.trunc(values) == values).all():
         raise MeshError(f"a corner of a face is {values[~is_whole][0]:g}, which is no index")
     with np.errstate(invalid="ignore"):

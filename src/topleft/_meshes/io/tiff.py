@@ -22,7 +22,7 @@ STRIP_BYTES = 1 << 18
 
 
 def pieces(picture: npt.NDArray[Any], more: Tags | None = None) -> Iterator[bytes]:
-    """Yield the bytes of a TIFF: a page of a picture of bytes, or one for each channel; `more`: tags of the first."""
+    """Yield the bytes of a TIFF: a page of a picture of bytes, or for each channel; `more`: tags of the first."""
     is_picture = picture.ndim == 3 and picture.dtype == np.uint8
     pages = [picture] if picture.ndim == 2 or is_picture else list(np.moveaxis(picture, -1, 0))
     strips = [_strips(page) for page in pages]

@@ -1,4 +1,4 @@
-"""Does work ahead of its caller: blocks of a mesh, windows of a raster, each on a thread of its own.
+"""Does work ahead of its caller: blocks of a mesh, windows of a raster, each on another thread.
 
 Input: a function, and its arguments. Output: its results, in order.
 """
@@ -22,7 +22,7 @@ def in_order(make: Callable[[Item], Made], items: Iterable[Item], n_threads: int
     """Yield the results of a function for items, in their order, on so many threads.
 
     At most `n_ahead` are begun before they are taken, twice as many as there are threads unless given. With one thread
-    it is the caller's, and nothing is begun ahead. In a forked child, which has no threads, the caller makes the rest.
+    the caller makes all, and nothing is begun ahead. In a forked child, without threads, the caller makes the rest.
     """
     if n_threads == 1:
         yield from map(make, items)

@@ -69,10 +69,10 @@ class Areas:
     def corners(self, which: I32, memory: Memory = FRESH) -> RingSet:  # noqa: ARG002
         """The rings of some of the polygons."""
         rings, polygon_offsets = self.rings.rings, self.rings.polygons
-        own_rings, n_rings = _ranges(polygon_offsets[which], polygon_offsets[which + 1])
-        own_points, n_points = _ranges(rings[own_rings], rings[own_rings + 1])
+        ring_rows, n_rings = _ranges(polygon_offsets[which], polygon_offsets[which + 1])
+        point_rows, n_points = _ranges(rings[ring_rows], rings[ring_rows + 1])
         ring_offsets, offsets = (np.concatenate([[0], np.cumsum(n)]).astype(np.int64) for n in (n_points, n_rings))
-        return RingSet(self.rings.points[own_points], ring_offsets, offsets)
+        return RingSet(self.rings.points[point_rows], ring_offsets, offsets)
 
 
 def _ranges(
@@ -91,7 +91,7 @@ def areas_of(subject: Any, grid: Grid | None, crs: object) -> Areas:
 
 
 def extent_of_polygons(subject: Any) -> Extent:
-    """The box round polygons in units of their own."""
+    """The box round polygons, in the units of their points."""
     points = in_crs_of(None, subject, None).points
     if not len(points):
         raise ValueError("no polygons have no extent")

@@ -51,7 +51,7 @@ class Triangles(Protocol):
     n_vertices: int
 
     def corners(self, which: slice | I32, memory: Memory = FRESH) -> Array:
-        """The corners (N, 3, C) of triangles, in memory that is given or in a fresh array."""
+        """The corners (N, 3, C) of triangles, in memory of the caller or in a fresh array."""
 
     def indices(self, which: slice | I32) -> Array:
         """The vertices (N, 3) of triangles."""
@@ -82,16 +82,16 @@ class IndexedTriangles:
         return np.asarray(self.triangles[which])
 
     def corners(self, which: slice | I32, memory: Memory = FRESH) -> Array:
-        """The corners (N, 3, C) of triangles, in memory that is given or in a fresh array."""
+        """The corners (N, 3, C) of triangles, in memory of the caller or in a fresh array."""
         points, triangles = self.columns[0], self.triangles
         if len(self.columns) == 1 and is_copied(points) and is_copied(triangles) and triangles.dtype in INDICES:
             first, end, _ = which.indices(self.n) if isinstance(which, slice) else (0, len(which), 1)
-            found: Array = memory.empty("corners", (end - first, 3, self.n_components), points.dtype)
+            corners: Array = memory.empty("corners", (end - first, 3, self.n_components), points.dtype)
             mesh = engine.StridedMesh(points, triangles)
-            bad = mesh.take(None if isinstance(which, slice) else which, first, found.reshape(-1).view(np.uint8))
+            bad = mesh.take(None if isinstance(which, slice) else which, first, corners.reshape(-1).view(np.uint8))
             if bad >= 0:
                 raise self._bad_index(which, bad)
-            return found
+            return corners
         rows = self.indices(which)
         if rows.size and not (rows.min() >= 0 and rows.max() < self.n_vertices):
             raise self._bad_index(which, int(np.argmax(((rows < 0) | (rows >= self.n_vertices)).any(axis=1))))
@@ -137,7 +137,7 @@ class SeparateTriangles:
         self.faces: Array | None = None
 
     def indices(self, which: slice | I32) -> Array:
-        """The vertices (N, 3) of triangles: three of their own."""
+        """The vertices (N, 3) of triangles, which share none."""
         numbers = np.arange(*which.indices(self.n)) if isinstance(which, slice) else which.astype(np.int64)
         return 3 * numbers[:, None] + np.arange(3)
 
@@ -180,7 +180,7 @@ def sent(array: Array) -> Array | MappedArray:
 
 
 def received(array: Array | MappedArray) -> Array:
-    """Return the array that was sent."""
+    """Return the array that `sent` described."""
     if not isinstance(array, MappedArray):
         return as_aligned(array)
     n_bytes = sum((n - 1) * step for n, step in zip(array.shape, array.strides, strict=True)) + array.dtype.itemsize

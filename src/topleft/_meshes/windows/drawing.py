@@ -80,7 +80,7 @@ class Values(NamedTuple):
         return np.ascontiguousarray(self.array[at])
 
     def range(self) -> tuple[float, float]:
-        """The lowest and the highest finite value, found block by block: values may be mapped."""
+        """The lowest and the highest finite value, read block by block: values may be mapped."""
         low, high = np.inf, -np.inf
         for first in range(0, len(self.array), RANGE_ROWS):
             part = self.array[first : first + RANGE_ROWS]
@@ -97,7 +97,7 @@ class Kind:
     name: str
     draw: Callable[[Painter, Payload, Crop], Array]
     options: tuple[str, ...]
-    """Of the verb, beside those of the view."""
+    """Of the verb, beside the options of the view."""
     values: Callable[[Any, Any, dict[str, Any]], Values] | None = None
     """Of values, the mesh and options: the checked values. None: the verb has no values."""
     needs: str | None = None
@@ -211,7 +211,7 @@ _rows = np.empty((0, 3), np.int32)
 
 
 def rows(n: int) -> I32:
-    """Return triangles (n, 3) that have three corners each of their own."""
+    """Return triangles (n, 3) that have three corners each and share none."""
     global _rows
     known = _rows
     if len(known) < n:

@@ -180,7 +180,7 @@ class WindowedRaster:
 
     @property
     def index(self) -> WindowIndex | AreaIndex:
-        """Which triangles each window needs; made at the first use."""
+        """Which triangles each window needs; computed at the first use."""
         if self._index is None and isinstance(self.triangles, Areas):
             self._index = AreaIndex(self.triangles, self.tiling)
         elif self._index is None:
@@ -240,14 +240,14 @@ class WindowedRaster:
         return SentJob(without_values(self.painter), self.painter.gather(self.triangles, which), crop)
 
     def __iter__(self) -> Iterator[Window]:
-        """Give all windows, row by row, each with an array of its own."""
+        """Give all windows, row by row, each with a fresh array."""
         return self.windows()
 
     def windows(self, *, reuse: bool = False) -> Iterator[Window]:
         """Yield all windows, row by row; with `reuse` the next one may overwrite pixels: fresh ones cost a touch."""
         n_threads = max(1, min(self.n_threads, self.n_windows))
         n_ahead = 2 * n_threads if n_threads > 1 else 1
-        own_threads = 1 if n_threads > 1 else None
+        n_threads_each = 1 if n_threads > 1 else None
         w, h = self.window_size
         shape = (w * h, *self.painter.channels)
         spare = [np.empty(shape, self.dtype) for _ in range(n_ahead)] if reuse and self.n_windows else []
@@ -257,7 +257,7 @@ class WindowedRaster:
             (x, y), (width, height) = self.place(row, column)
             memory = spare.pop() if reuse else None
             out = None if memory is None else memory[: width * height].reshape(height, width, *shape[1:])
-            pixels = self.draw_window(row, column, threads=own_threads, out=out)
+            pixels = self.draw_window(row, column, threads=n_threads_each, out=out)
             return Window(row, column, x, y, pixels, int(self.index.counts[row, column])), memory
 
         self.index  # noqa: B018  (made once, here, on all threads)
@@ -301,19 +301,19 @@ class WindowedRaster:
             raise IndexError(f"a raster of shape {self.shape} has no {len(keys)} indices")
         keys += [slice(None)] * (len(self.shape) - len(keys))
         ranges = []
-        for one, n in zip(keys[:2], self.shape[:2], strict=True):
-            if isinstance(one, slice):
-                ranges.append(range(*one.indices(n)))
+        for index, n in zip(keys[:2], self.shape[:2], strict=True):
+            if isinstance(index, slice):
+                ranges.append(range(*index.indices(n)))
             else:
-                i = range(n)[one]
+                i = range(n)[index]
                 ranges.append(range(i, i + 1))
-        if any(one.step < 1 for one in ranges):
+        if any(places.step < 1 for places in ranges):
             raise IndexError("steps of slices of a raster must be positive")
         rows, columns = ranges
-        width, height = (one[-1] + 1 - one[0] if one else 0 for one in (columns, rows))
+        width, height = (places[-1] + 1 - places[0] if places else 0 for places in (columns, rows))
         part = self.read(columns.start, rows.start, width, height)[:: rows.step, :: columns.step]
-        own = tuple(0 if not isinstance(one, slice) else slice(None) for one in keys[:2])
-        return part[(*own, *keys[2:])]
+        first = tuple(slice(None) if isinstance(index, slice) else 0 for index in keys[:2])
+        return part[(*first, *keys[2:])]
 
     def explain(self) -> str:
         """Return the costs of drawing it: windows, triangles listed, memory, in lines; makes the index."""
@@ -334,7 +334,7 @@ class WindowedRaster:
 
 
 def extent_of(subject: Any) -> Extent:
-    """The box round polygons, or round the points that triangles use, found block by block."""
+    """The box round polygons, or round the points that triangles use, read block by block."""
     if are_polygons(subject):
         return extent_of_polygons(subject)
     triangles: Triangles = subject
@@ -350,12 +350,12 @@ def extent_of(subject: Any) -> Extent:
 
 
 def values_of(name: str | os.PathLike[str], triangles: Any) -> Any:
-    """The values of a .npy file, or those that a mapped PLY file has of its vertices or faces by this name."""
+    """The values of a .npy file, or a property of this name of the vertices or faces of a mapped PLY file."""
     text = os.fspath(name)
     if text.endswith(".npy"):
         return mapped_npy(pathlib.Path(text))
     named = getattr(triangles, "named", {})
     if text in named:
         return named[text]
-    there = ", ".join(one for one, array in named.items() if np.ndim(array) == 1) or "none"
+    there = ", ".join(name for name, array in named.items() if np.ndim(array) == 1) or "none"
     raise ValueError(f"values must be a .npy file or a property of the mesh's PLY file ({there}), got {text!r}")

@@ -63,7 +63,7 @@ class Tiling:
 
 @dataclass(frozen=True)
 class _Run:
-    """Spans of a block: those of row first_row + i lie from starts[i] to starts[i + 1]."""
+    """Spans of a block: row first_row + i has the spans from starts[i] to starts[i + 1]."""
 
     first_row: int
     starts: npt.NDArray[np.int64]
@@ -73,7 +73,7 @@ class _Run:
 
 @dataclass(frozen=True)
 class _SortedRow:
-    """The triangles of each window of a row, and the spans that reach over more windows than are listed one by one."""
+    """The triangles of each window of a row, and the spans that reach over more windows than are listed singly."""
 
     starts: npt.NDArray[np.int64]
     triangles: I32
@@ -81,13 +81,13 @@ class _SortedRow:
 
     def of_column(self, column: int) -> I32:
         """The triangles of a window, ascending."""
-        own = self.triangles[self.starts[column] : self.starts[column + 1]]
+        short = self.triangles[self.starts[column] : self.starts[column + 1]]
         if not len(self.long):
-            return own
+            return short
         crossing = self.long[(self.long[:, 1] <= column) & (column < self.long[:, 2]), 0]
         if not len(crossing):
-            return own
-        return np.insert(own, np.searchsorted(own, crossing), crossing)  # both ascend
+            return short
+        return np.insert(short, np.searchsorted(short, crossing), crossing)  # both ascend
 
 
 class WindowIndex:
@@ -104,7 +104,7 @@ class WindowIndex:
         folder: str | None,
         n_threads: int = 1,
     ) -> None:
-        """`check`: looks at the corners of each block, and gets a function that names one of its triangles."""
+        """`check`: looks at the corners of each block, and gets a function that names a triangle of the block."""
         self.tiling = tiling
         check_fits((tiling.n_rows, tiling.n_columns + 1), np.int32, np.int32)
         self.counts = np.zeros((tiling.n_rows, tiling.n_columns), np.int32)
@@ -193,12 +193,12 @@ class WindowIndex:
         if self._pid != os.getpid():  # a forked child: the lock may be held by a thread that is not there
             self._pid, self._lock, self._kept = os.getpid(), threading.Lock(), OrderedDict()
         with self._lock:
-            found = self._kept.get(row)
-            if found is None:
-                found = self._kept[row] = self._sorted(row)
+            spans = self._kept.get(row)
+            if spans is None:
+                spans = self._kept[row] = self._sorted(row)
                 while len(self._kept) > N_ROWS_KEPT:
                     self._kept.popitem(last=False)
-        return found.of_column(column)
+        return spans.of_column(column)
 
     def _sorted(self, row: int) -> _SortedRow:
         parts = []

@@ -19,7 +19,7 @@ TEXTURE_2D, TEXTURE_CUBE, TEXTURE_SKYBOX = range(3)
 """Of mjtTexture."""
 
 LIGHT_SPOT, LIGHT_DIRECTIONAL = range(2)
-"""Of mjtLightType; others are not drawn by MuJoCo's own renderer either."""
+"""Of mjtLightType; others are not drawn by the renderer of MuJoCo either."""
 
 SRGB = 2
 """Of mjtColorSpace: texels that are decoded before light meets them."""
@@ -107,7 +107,7 @@ class Looks:
         return across, down, -0.5 if is_endless else 0.0
 
     def texture(self, k: int) -> tl.Texture:
-        """A texture of the model; those of cubes end at the rims of their squares."""
+        """A texture of the model; textures of cubes end at the rims of their squares."""
         if k not in self.textures:
             model, encoding = self.model, "srgb" if self.model.tex_colorspace[k] == SRGB else "linear"
             n = int(model.tex_nchannel[k])
@@ -121,7 +121,7 @@ class Looks:
         return self.textures[k]
 
     def laid_on_cube(self, mesh: tl.Mesh, geom: Any, k: int) -> tl.Mesh:
-        """The mesh with coordinates in the squares of a cube texture; directions are those of the unit shape."""
+        """The mesh with coordinates in the squares of a cube texture; directions are taken from the unit shape."""
         scale = np.ones(3)
         if geom.type in shapes.TAKES_SIZE and not self.model.mat_texuniform[geom.matid]:
             scale = 1 / np.maximum(geom.size.astype(np.float64), 1e-9)

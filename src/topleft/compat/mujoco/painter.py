@@ -221,7 +221,7 @@ def deformed(model: Any, geom: Any, scene: Any) -> tuple[tl.Mesh, ...]:
 
 
 def orthonormal(axes: F64) -> F64:
-    """Rotations (N, 3, 3) of float32 as those of float64, whose columns are at right angles to the last bits."""
+    """Rotations (N, 3, 3) of float32 as rotations of float64, whose columns are at right angles to the last bits."""
     x, y = axes[:, :, 0], axes[:, :, 1]
     x = x / np.sqrt((x * x).sum(axis=1, keepdims=True))
     y = y - x * (x * y).sum(axis=1, keepdims=True)
@@ -231,7 +231,7 @@ def orthonormal(axes: F64) -> F64:
 
 
 def looks_of(geoms: list[Any]) -> tuple[Any, ...]:
-    """What geoms look like, wherever they stand: equal ones are drawn alike."""
+    """What geoms look like, wherever they stand: equal looks are drawn alike."""
     numbers = [
         (one.type, one.dataid, one.matid, one.texid, one.texuniform, one.emission, one.specular, one.shininess)
         for one in geoms
@@ -252,7 +252,7 @@ def cross(a: F64, b: F64) -> F64:
 
 
 def camera_of(pair: Any, size: tuple[int, int]) -> tuple[tl.Camera, F64]:
-    """The camera between those of two eyes, and where it is."""
+    """The camera between the cameras of two eyes, and where it is."""
     place, forward, up = (
         (np.asarray(getattr(pair[0], name), np.float64) + getattr(pair[1], name)) / 2
         for name in ("pos", "forward", "up")

@@ -1,4 +1,4 @@
-"""Meshes of MuJoCo's geoms: primitives in as many slices and stacks as its own, meshes and height fields of a model.
+"""Meshes of MuJoCo's geoms: primitives in the slices and stacks of MuJoCo, meshes and height fields of a model.
 
 Input: the type and size of a geom, an `MjModel`. Output: `Mesh` with texture coordinates, in the space of the geom.
 """
@@ -22,7 +22,7 @@ TAKES_SIZE = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, ARROW, ARROW1, ARROW2, 
 """Geoms whose mesh follows from their size."""
 
 SHARP = 0.8
-"""Cosine to the normal of the face below which a corner of a mesh takes that one."""
+"""Cosine to the normal of the face below which a corner of a mesh takes the normal of the face."""
 
 
 class Parts:
@@ -53,7 +53,7 @@ class Parts:
         i = np.arange((len(radius) - 1) * (n_slices + 1)).reshape(-1, n_slices + 1)[:, :-1]
         lower, upper = i, i + n_slices + 1
         quads = np.stack([lower, lower + 1, upper + 1, lower, upper + 1, upper], axis=2).reshape(-1, 2, 3)
-        has_area = np.repeat([radius[:-1] > 0, radius[1:] > 0], n_slices, axis=1).T  # at a pole one of two has none
+        has_area = np.repeat([radius[:-1] > 0, radius[1:] > 0], n_slices, axis=1).T  # at a pole one is empty
         self.add(points, normals.reshape(-1, 3), uv, quads[has_area])
 
     def add_disk(self, radius: tuple[float, float], height: float, side: int, n_slices: int) -> None:
@@ -161,7 +161,7 @@ def laid(mesh: tl.Mesh, across: float, down: float, shift: float) -> tl.Mesh:
 
 
 def asset(model: Any, i: int) -> tl.Mesh:
-    """A mesh of a model: its own for 2 k, its convex hull for 2 k + 1."""
+    """A mesh of a model: mesh k for 2 k, its convex hull for 2 k + 1."""
     k, is_hull = divmod(i, 2)
     first, n = int(model.mesh_vertadr[k]), int(model.mesh_vertnum[k])
     points = np.array(model.mesh_vert[first : first + n], np.float64)

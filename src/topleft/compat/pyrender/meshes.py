@@ -256,7 +256,7 @@ def looks_of(mesh: Any, material: Any, smooth: bool) -> tuple[Any, Any, Any]:
 
 
 def material_of(own: Any) -> MetallicRoughnessMaterial:
-    """The material of one of trimesh, PBRMaterial or SimpleMaterial."""
+    """The material of a material of trimesh, PBRMaterial or SimpleMaterial."""
     if isinstance(own, MetallicRoughnessMaterial):
         return own
     if not hasattr(own, "baseColorTexture"):

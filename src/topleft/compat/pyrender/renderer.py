@@ -22,7 +22,7 @@ from topleft.compat.pyrender.values import GLTF, DirectionalLight, Light, Render
 F32 = npt.NDArray[np.float32]
 
 MOST_LIGHTS = 4
-"""Of each kind, as in pyrender: those nearest to the first mesh."""
+"""Of each kind, as in pyrender: the lights nearest to the first mesh."""
 
 FALLOFF = 1e12
 """Light of a point falls off as 1 / (d^2 + 1 / FALLOFF): as 1 / d^2, but for what is nearer than a millionth."""
@@ -187,7 +187,7 @@ class Shot:
         }
 
     def _lights(self, near: F64) -> list[tl.Light]:
-        """The lights of the scene, at most four of each kind, those nearest to a point."""
+        """The lights of the scene, at most four of each kind, the nearest to a point."""
         kinds: dict[type, list[tuple[float, int, Light, F64]]] = {}
         for k, node in enumerate(self.scene._parents):
             if node.light is not None:

@@ -97,7 +97,7 @@ def as_vector(name: str, value: Any, n: int) -> F64:
 
 
 def as_rgb(name: str, value: Any, n: int) -> F64:
-    """A colour of n floats, 0 to 1: integers are those of 0 to 255, and a missing opacity is 1."""
+    """A colour of n floats, 0 to 1: integers mean 0 to 255, and a missing opacity is 1."""
     array = np.asarray([] if value is None else value)
     scale = 255.0 if array.dtype.kind in "iu" and array.size and array.max() > 1 else 1.0
     array = array.astype(np.float64) / scale
@@ -475,5 +475,5 @@ class MetallicRoughnessMaterial(Material):
 
 
 def as_texture(value: Any) -> Texture | None:
-    """A texture of whatever a material takes for one."""
+    """A texture of whatever a material takes as a texture."""
     return value if value is None or isinstance(value, Texture) else Texture(source=value)

@@ -27,7 +27,7 @@ N_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 def entry(tree: Tree, kind: str, index: Any) -> Tree:
-    """A row of one of the lists of the file."""
+    """A row of a list of the file."""
     rows = tree.get(kind, [])
     if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
         raise MeshError(f"{kind}[{index!r}] is no entry of a list")
@@ -162,7 +162,7 @@ def normalized(values: Array) -> Array:
 
 
 def uri_content(uri: Any, source: InputFile, what: str) -> bytes | None:
-    """The bytes of a URI: of a file beside the mesh, or its own."""
+    """The bytes of a URI: of a file beside the mesh, or the bytes in it."""
     if not isinstance(uri, str):
         raise MeshError(f"a uri of {what} must be text, got {uri!r}"[:120])
     if not uri.startswith("data:"):

@@ -39,7 +39,7 @@ class DracoSize(NamedTuple):
 
 
 class DracoBytes:
-    """Bytes that are read one after the other; those beyond the end are an IndexError."""
+    """Bytes that are read one after the other; reading beyond the end is an IndexError."""
 
     def __init__(self, content: bytes, at: int) -> None:
         self._content = content
@@ -81,7 +81,7 @@ class DracoBytes:
         self.skip(int(ends[n - 1]) + 1 if n else 0)
 
     def skip_bits(self) -> None:
-        """Skip bits of one probability."""
+        """Skip bits of equal probability."""
         self.byte()
         self.skip(self.number())
 
@@ -148,7 +148,7 @@ def _skip_walk(rest: DracoBytes, traversal: int) -> bool:
     if traversal not in (STANDARD, VALENCE):
         raise MeshError(f"the data is no mesh of Draco 2.2 (traversal {traversal})")
     n_with_seams = rest.byte()
-    for _ in range(2):  # symbols, and those where the walk splits
+    for _ in range(2):  # symbols, and symbols where the walk splits
         rest.number()
     n_splits = rest.number()
     if n_splits:

@@ -210,7 +210,7 @@ def uv_sets_of(row: Tree) -> tuple[int, int]:
 
 
 def cutoff_of(cutoff: float) -> dict[str, float]:
-    """The options of a material with a cutoff; one above 1 hides opaque surfaces, too."""
+    """The options of a material with a cutoff; a cutoff above 1 hides opaque surfaces, too."""
     return {"alpha_cutoff": _share(cutoff)} if cutoff <= 1 else {"alpha_cutoff": 1.0, "opacity": 0.0}
 
 
@@ -245,7 +245,7 @@ def _resized(picture: npt.NDArray[np.uint8] | None, size: tuple[int, ...]) -> np
 
 
 def _filter_of(sampler: Tree) -> FilterOption:
-    """The filter that is nearest to those of OpenGL; trilinear unless the file says otherwise."""
+    """The filter that is nearest to the filters of OpenGL; trilinear unless the file says otherwise."""
     has_halves = sampler.get("minFilter") not in (NEAREST, LINEAR)
     if sampler.get("magFilter") == NEAREST:
         return "nearest" if sampler.get("minFilter") == NEAREST else "pixelated"

@@ -59,7 +59,7 @@ class CameraOfFile:
     """A camera of a glTF file."""
 
     world_from_eye: F64
-    """(4, 4): the eye axes are those of OpenGL."""
+    """(4, 4): the eye axes are the axes of OpenGL."""
 
     kind: str
     """"perspective" or "orthographic"."""
@@ -497,7 +497,7 @@ def _checked(tree: Tree, index: Any) -> int:
 
 
 def triangles_of(corners: Array, mode: int) -> Array:
-    """The triangles (T, 3) of a list, a strip or a fan of corners; those of a strip turn all one way."""
+    """The triangles (T, 3) of a list, a strip or a fan of corners; triangles of a strip turn all one way."""
     if mode == TRIANGLES:
         return corners[: len(corners) // 3 * 3].reshape(-1, 3)
     if len(corners) < 3:
@@ -507,7 +507,7 @@ def triangles_of(corners: Array, mode: int) -> Array:
     triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     triangles[1::2] = triangles[1::2, [1, 0, 2]]
     a, b, c = triangles.T
-    return triangles[(a != b) & (b != c) & (a != c)]  # those that turn a strip round have no area
+    return triangles[(a != b) & (b != c) & (a != c)]  # triangles that turn a strip round have no area
 
 
 def _shape_of(values: dict[str, Array], triangles: Array, uv_sets: tuple[int, int]) -> _Shape | None:
@@ -533,7 +533,7 @@ def _light_of_colors(colors: Array) -> Array:
 
 
 def _flat(shape: _Shape) -> _Shape:
-    """Each triangle with vertices of its own and the normal of its plane, as the standard wants it without normals."""
+    """Each triangle with three unshared vertices and the normal of its plane, as the standard says."""
     at = shape.triangles.ravel()
     if at.size and int(at.max()) >= len(shape.positions):
         raise MeshError(f"a triangle names vertex {int(at.max())} of {len(shape.positions)}")

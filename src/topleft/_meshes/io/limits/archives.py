@@ -1,4 +1,4 @@
-"""Unpacks archives into a folder of their own: zip, tar, and single files that gzip or bzip2 have compressed.
+"""Unpacks archives into a new folder: zip, tar, and single files that gzip or bzip2 have compressed.
 
 Input: a file, unchecked. Output: files in a folder, and which of them are meshes.
 """
@@ -76,7 +76,7 @@ class Counted:
 
 
 def _written(file: IO[bytes], packed: Path, budget: Budget, folder: Path) -> list[Path]:
-    """Write the files of an archive into a folder; those that are meshes."""
+    """Write the files of an archive into a folder; return the meshes among them."""
     suffix = packed.suffix.lower()
     if suffix in (".zip", ".zae"):
         return _written_of_zip(file, budget, folder)
@@ -119,7 +119,7 @@ def _check_method(row: zipfile.ZipInfo) -> None:
 
 
 def _place(folder: Path, name: str, budget: Budget) -> Path | None:
-    """Where a member goes; None for places outside, too deep, or of another one."""
+    """Where a member goes; None for places outside, too deep, or of another member."""
     budget.spend("max_nodes", NODES_OF_MEMBER)
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     if not 0 < len(parts) <= MOST_FOLDERS or any(part == ".." or ":" in part or len(part) > 200 for part in parts):
