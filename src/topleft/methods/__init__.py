@@ -1,11 +1,11 @@
 """The registry: the only list of the library's methods of filling, with the claims of each.
 
-`METHODS` are the production ones: exact, identical buffers. `CLASSICS` are those of the literature, as published, to be
-compared; a variant's name stands after a slash. Their kernels are imported on first use.
+`METHODS` are the production methods: exact, with identical buffers. `CLASSICS` are methods of the literature, as
+published, to compare with; a variant's name stands after a slash. Their kernels are imported on first use.
 
 classics/    draws triangles as the literature does: a compiled kernel for each classic
-reference/   draws triangles exactly and slowly, in integers and fractions: the reference of all others
-twins/       draws as the classics do, in Python
+reference/   draws triangles exactly and slowly, in integers and fractions: the reference of all methods
+twins/       the classics in Python
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Claims:
     Attributes
     ----------
     exact : bool
-        Every sample is decided without rounding under the method's own fill rule, for the vertices that it works on.
+        Every sample is decided without rounding under the method's fill rule, for the vertices that it works on.
     watertight : bool
         Triangles that share edges leave no sample between them out; where a method calculates in float32, with
         corners within 2**22 px (`failure_scenes.py` shows failures far beyond).
@@ -72,7 +72,7 @@ class Claims:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One way to fill, and its claims.
+    """A method to fill triangles, and its claims.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ FENG = "Y. Feng, face3d, 2018"
 
 #: Integer products of differences stay below 2**61; the published codes have 32 bits, which end at 2**14.
 INT_LIMIT = 2.0**29
-#: A Bresenham line is walked from its top, so this bounds the time that one triangle can take.
+#: A Bresenham line is walked from its top, so this bounds the time of a triangle.
 WALK_LIMIT = 2.0**21
 
 #: The claims that several classics share.

@@ -1,4 +1,4 @@
-"""The methods of the literature as published, as compiled kernels; `topleft.methods.twins` is the same in Python.
+"""The methods of the literature as published, as compiled kernels; `topleft.methods.twins` has them in Python.
 
-A kernel draws triangles over a picture. They are compiled as one module, which has a stub.
+A kernel draws triangles over a picture. The kernels are compiled as a module, which has a stub.
 """

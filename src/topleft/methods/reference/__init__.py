@@ -1,10 +1,10 @@
 """The exact reference: the rules of the picture in Python integers and fractions, slow and obviously right.
 
-In: vertices, triangles and options, as in the public calls, taken to be valid.  Out: the exact value of each pixel.
-Each pixel centre in the bounding box of each triangle is tested on its own: three edge functions in integers, then
-the fill rule.  After the snap nothing is rounded: depths, weights and attributes are fractions.  Vertices that are not
-snapped (``subpixel_bits="exact"``) are the fractions that their float64 numbers stand for.  Before it, clip space
-is float64 arithmetic in the order that the rules state; Python's floats are IEEE doubles, so this too is exact.
+In: vertices, triangles and options, as in the public calls, assumed valid.  Out: the exact value of each pixel.
+Each pixel centre in the bounding box of each triangle is tested alone: three edge functions in integers, then the fill
+rule.  After the snap nothing is rounded: depths, weights and attributes are fractions.  Vertices that are not snapped
+(``subpixel_bits="exact"``) are float64 numbers as fractions.  Before the snap, clip space is float64 arithmetic in the
+order that the rules state; Python's floats are IEEE doubles, so the results are equal to the bit.
 
 Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988 (edge functions);
 Microsoft, Direct3D 11.3 Functional Specification, 2015 (top-left rule);
@@ -97,7 +97,7 @@ def snap(vertices: Any, subpixel_bits: int | str = 8) -> list[tuple[Coordinate, 
 
 
 def round_to_float32(value: Fraction) -> float:
-    """Return the float32 nearest to an exact value, ties to even (infinity beyond the largest finite one).
+    """Return the float32 nearest to an exact value, ties to even (infinity beyond the largest finite float32).
 
     Examples
     --------
@@ -199,12 +199,12 @@ class Projection(NamedTuple):
 
 
 def grid_bits(subpixel_bits: int | str) -> int:
-    """Return the sub-pixel bits that say how far a vertex may lie: those of the default for "exact"."""
+    """Return the sub-pixel bits that bound how far a vertex may lie: for "exact" the default bits."""
     return 8 if subpixel_bits == "exact" else int(subpixel_bits)
 
 
 def cut(a: Position, b: Position, da: float, db: float) -> Position:
-    """Return the cut between the inside end a and the outside end b, the same bits for all who share the edge."""
+    """Return the cut between the inside end a and the outside end b, equal to the bit for all triangles of the edge."""
     of_a, of_b = -db / (da - db), da / (da - db)
     return tuple(p * of_a + q * of_b for p, q in zip(a, b, strict=True))
 
@@ -242,7 +242,7 @@ def pieces(
     subpixel_bits: int | str = 8, cull: str = "none", clip_depth: str = "minus_one_to_one", near_clip: bool = True,
     far_clip: bool = True,
 ) -> list[Piece]:  # fmt: skip
-    """Return the snapped triangles that are drawn, in drawing order, without the degenerate and the culled ones.
+    """Return the snapped triangles that are drawn, in drawing order, without degenerate and culled triangles.
 
     Parameters
     ----------
@@ -283,7 +283,7 @@ def edge_function(a: Any, b: Any, p: Any) -> Any:
 
 
 def is_top_left(a: Any, b: Any) -> bool:
-    """Tell whether an edge from a to b, of a triangle with positive signed area, is top or left."""
+    """Return whether an edge from a to b, of a triangle with positive signed area, is top or left."""
     is_top = b[1] == a[1] and b[0] > a[0]  # the edge function grows with y: the interior is below
     is_left = b[1] < a[1]  # the edge function grows with x: the interior is to the right
     return is_top or is_left
@@ -377,7 +377,7 @@ def visible(
 
 
 def ids(vertices: Any, triangles: Any, size: Point, **options: Any) -> np.ndarray:
-    """Return which triangle is seen: int32, shape (H, W), -1 where there is none; options as for `visible`."""
+    """Return the visible triangle: int32, shape (H, W), -1 where there is none; options as for `visible`."""
     winners = visible(vertices, triangles, size, **options)
     return _picture(size, -1, {p: f.piece.triangle for p, f in winners.items()}).astype(np.int32)
 
@@ -390,7 +390,7 @@ def depth(vertices: Any, triangles: Any, size: Point, **options: Any) -> np.ndar
 def barycentric(vertices: Any, triangles: Any, size: Point, **options: Any) -> np.ndarray:
     """Return the weights of the triangle's three vertices: Fraction, shape (H, W, 3), 0 where there is nothing.
 
-    Perspective-correct in clip space; in pixel space every w is 1, and the same formula is linear on the screen.
+    Perspective-correct in clip space; in pixel space every w is 1, and the formula is linear on the screen.
     """
     winners = visible(vertices, triangles, size, **options)
     return _picture(size, [0, 0, 0], {p: f.weights() for p, f in winners.items()})

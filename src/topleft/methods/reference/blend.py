@@ -1,4 +1,4 @@
-"""The exact reference for blending: one colour over one pixel, in fractions, or in float32 step by step.
+"""The exact reference for blending: a colour over a pixel, in fractions, or in float32 step by step.
 
 In: the old pixel, a colour, a mode, and how much of the pixel the colour covers.  Out: the new pixel.
 
@@ -20,7 +20,7 @@ ONE = np.float32(1)
 
 
 def nearest(value: Fraction) -> int:
-    """Return the nearest integer, the upper one of two."""
+    """Return the nearest integer, ties upwards."""
     return floor(value + Fraction(1, 2))
 
 
@@ -63,7 +63,7 @@ def blend_uint8(old: Sequence[int], color: Sequence[int], mode: str, alpha: str,
 
 
 def _alpha_uint8(alpha: int, coverage: Fraction, share: Fraction) -> Fraction:
-    """Return the alpha of a colour in a pixel: unchanged in a whole one, else a multiple of 2**-15."""
+    """Return the alpha of a colour in a pixel: unchanged in a whole pixel, else a multiple of 2**-15."""
     return Fraction(alpha, 255) if coverage == 1 else Fraction(nearest(share * 2**15 * alpha / 255), 2**15)
 
 
@@ -108,7 +108,7 @@ def blend(
     vertices: Any, triangles: Any, colors: Any, size: Point, *, per: str, mode: str, alpha: str = "straight",
     background: Any = 0, coverages: Any = None, **view: Any,
 ) -> np.ndarray:  # fmt: skip
-    """Return the picture of triangles blended one after the other, shape (H, W, C), of the colours' dtype.
+    """Return the picture of triangles blended in their order, shape (H, W, C), of the colours' dtype.
 
     ``coverages`` (T, H, W) are the areas of each triangle, for flat colours; without them the samples of `fragments`
     are covered whole. Colours of vertices are linear on the screen and must be uint8, rounded to nearest, ties to even.

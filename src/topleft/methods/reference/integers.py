@@ -1,12 +1,12 @@
-"""The exact picture of many triangles, fast: edge functions of blocks of triangles at once, as wide as they need to be.
+"""The exact picture of many triangles, fast: edge functions of blocks of triangles at once, as wide as needed.
 
-In: vertices in pixels, float64, as they are or after a snap (`snapped`, `projected`). Out: how many triangles cover
-each sample, which one shows, its depth; which squares an edge meets; the areas in them.
+In: vertices in pixels, float64, unchanged or after a snap (`snapped`, `projected`). Out: how many triangles cover each
+sample, the visible triangle and its depth; the squares that an edge meets; the areas of triangles in squares.
 
 A block holds triangles with boxes of about the same size. Coordinates are int64 where all of them are multiples of
 2^-16 px and edge functions fit, otherwise float64: signs in doubt are decided again in fractions. They are
 Python integers where centres of pixels are no float64. `topleft.methods.reference` tests a sample at a time in
-fractions; tests hold one to the other.
+fractions; tests compare the two modules.
 
 Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988;
 J. R. Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997;
@@ -32,7 +32,7 @@ I64 = NDArray[np.int64]
 Point = tuple[int, int]
 Block = tuple[Array, I64, I64, int, int]  # triangles, first row and column of each box, rows and columns of a box
 
-BLOCK_SAMPLES = 2**18  # at a time: they fit into the second-level cache
+BLOCK_SAMPLES = 2**18  # at a time: they fit in the L2 cache
 SIDES = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # of boxes of a block
 INT64_LIMIT = 2**29  # of coordinates from the first sample: products of two differences stay below 2^60
 CENTER_LIMIT = 2**48  # sixteenths of a pixel are float64 below
@@ -45,20 +45,20 @@ NOTHING = np.iinfo(np.int64).max
 
 
 def snapped(vertices: Any, snap: int | str = 8) -> F64:
-    """Return vertices (V, 2 or 3) after a snap of x and y to 2**-snap pixels, ties to even; depth stays as it is.
+    """Return vertices (V, 2 or 3) after a snap of x and y to 2**-snap pixels, ties to even; depth does not change.
 
-    Or to "px", the middle of their pixel by truncation, to "float32", or "exact": as they are.
+    Or to "px", the middle of their pixel by truncation, to "float32", or "exact": unchanged.
     """
-    found: F64 = np.array(vertices, np.float64)
-    xy = found[:, :2]
+    points: F64 = np.array(vertices, np.float64)
+    xy = points[:, :2]
     if snap == "px":
         # From 2^52 px on there is no float64 between pixels: half a pixel more is the next even number, or none.
-        found[:, :2] = np.trunc(xy) + 0.5
+        points[:, :2] = np.trunc(xy) + 0.5
     elif snap == "float32":
-        found[:, :2] = xy.astype(np.float32)
+        points[:, :2] = xy.astype(np.float32)
     elif snap != "exact":
-        found[:, :2] = np.rint(xy * 2.0 ** int(snap)) * 2.0 ** -int(snap)
-    return found
+        points[:, :2] = np.rint(xy * 2.0 ** int(snap)) * 2.0 ** -int(snap)
+    return points
 
 
 def projected(vertices: Any, viewport: Point, snap: int | str = 8, transform: Any = None) -> F64:
@@ -113,7 +113,7 @@ def side(p: Array, q: Array, x: Array, y: Array) -> Array:
 
 
 class ExactPicture:
-    """The samples of a window: one a pixel, so many sixteenths of a pixel from its centre.
+    """The samples of a window: a sample for each pixel, in sixteenths of a pixel from its centre.
 
     Parameters
     ----------
@@ -122,17 +122,17 @@ class ExactPicture:
     triangles : array_like, shape (T, 3)
     size, origin, sample : (int, int)
     depth_tests : tuple of "less", "greater" or None
-        By which `ids` are told apart; None: the last triangle shows.
+        The keys of `ids`; None: the last triangle is visible.
     cull : {"none", "back", "front"}
     rule : {"top-left", "bottom-right"}
-        Which edges own the samples on them.
+        Which edges include the samples on them.
 
     Attributes
     ----------
     count : ndarray of int32, shape (H, W)
         How many triangles cover the sample.
     ids : dict of ndarray of int32, shape (H, W)
-        Which triangle shows by each depth test, -1 for none; of equal depths in float32 the lowest.
+        The visible triangle by each depth test, -1 for none; of equal depths in float32 the lowest.
     """
 
     def __init__(
@@ -158,13 +158,13 @@ class ExactPicture:
 
     @property
     def triangle(self) -> I32:
-        """Which triangle shows by the first depth test."""
+        """The visible triangle by the first depth test."""
         return next(iter(self.ids.values()))
 
     @cached_property
     def is_edge(self) -> NDArray[np.bool_]:
         """Whether an edge of a triangle, culled or not, meets the pixel's square, its border included: (H, W)."""
-        found, half = np.zeros(self.size[::-1], bool), self.step / 2 if self.step == 1 else self.step // 2
+        met, half = np.zeros(self.size[::-1], bool), self.step / 2 if self.step == 1 else self.step // 2
         for block in self.blocks(np.arange(len(self.xy)), half):
             i, rows, cols = self._places(block)
             x, y = self._samples(rows, cols)
@@ -179,8 +179,8 @@ class ExactPicture:
                 k, row, col = np.nonzero(is_met)
                 row, col = rows[k, row, 0], cols[k, 0, col]
                 is_seen = (row < self.size[1]) & (col < self.size[0])
-                found[row[is_seen], col[is_seen]] = True
-        return found
+                met[row[is_seen], col[is_seen]] = True
+        return met
 
     def depth(self, ids: I32) -> tuple[F64, F64]:
         """Return the depth of the triangles `ids` at their samples, NaN for -1; and the largest |z| of each."""
@@ -292,7 +292,7 @@ class ExactPicture:
 
 
 def in_units(corners: F64, origin: Point, sample: Point) -> tuple[Array, Array, int]:
-    """Return corners, the first sample and the step from one to the next as numbers that edges are exact or sure in."""
+    """Return corners, the first sample and the step between samples, as numbers in which edges are exact or sure."""
     first = [16 * o + 8 + s for o, s in zip(origin, sample, strict=True)]  # in sixteenths of a pixel
     largest = abs(corners).max(initial=0)
     for bits in (4, 8, 16):

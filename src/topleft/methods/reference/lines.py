@@ -46,7 +46,7 @@ def lines(
         )  # fmt: skip
         indices = [indices[i] for i in sorted({piece.triangle for piece in drawn})]
     edges = {(min(a, b), max(a, b)) for i, j, k in indices for a, b in ((i, j), (j, k), (k, i))}
-    found = []
+    clipped = []
     for edge in sorted(edges):
         if len(points[edge[0]]) == 4:
             first, last = ((*map(float, points[i]), 0.0, 0.0, 0.0) for i in edge)
@@ -55,8 +55,8 @@ def lines(
             ends = [End(reference.snap([points[i]], subpixel_bits)[0], (*points[i], 0)[2]) for i in edge]
         if ends:
             upper, lower = sorted(ends, key=lambda end: (end.xy_fx[1], end.xy_fx[0]))
-            found.append((upper, lower))
-    return found
+            clipped.append((upper, lower))
+    return clipped
 
 
 def _cut_line(p: Position, q: Position, view: Projection) -> list[End]:

@@ -34,13 +34,13 @@ def layers(
     [[[1, 0], [0, -1], [0, -1]]]
     """
     sign = -1 if depth_test == "greater" else 1
-    found: dict[Point, list[tuple[float, int]]] = defaultdict(list)
+    fragments_of: dict[Point, list[tuple[float, int]]] = defaultdict(list)
     for fragment in reference.fragments(vertices, triangles, size, **view):
         depth = round_to_float32(fragment.depth()) if np.shape(vertices)[1] > 2 else 0.0
-        found[fragment.row, fragment.column].append((sign * depth, fragment.piece.triangle))
+        fragments_of[fragment.row, fragment.column].append((sign * depth, fragment.piece.triangle))
     shape = (size[1], size[0], n_layers)
     ids, depths = np.full(shape, -1, np.int32), np.full(shape, sign * inf, np.float32)
-    for pixel, keys in found.items():
+    for pixel, keys in fragments_of.items():
         for k, (key, triangle) in enumerate(sorted(keys)[:n_layers]):
             ids[pixel][k], depths[pixel][k] = triangle, sign * key
     return ids, depths
@@ -49,7 +49,7 @@ def layers(
 def over(colors: Sequence[Sequence[Fraction]], background: Sequence[Fraction] | None) -> list[Fraction]:
     """Return the composite of straight colours, the nearest first, alpha last and 1 for opaque: straight again.
 
-    `background` lies behind all; None is nothing. Where nothing is seen the result is zeros.
+    `background` lies behind all layers; None is nothing. The result is zeros where nothing is visible.
 
     Examples
     --------
@@ -60,8 +60,8 @@ def over(colors: Sequence[Sequence[Fraction]], background: Sequence[Fraction] | 
     layers = [*colors, *([] if background is None else [background])]
     n = len(layers[0]) - 1 if layers else 0
     light, alpha = [Fraction(0)] * n, Fraction(0)
-    for *color, own in layers:
-        share = (1 - alpha) * own
+    for *color, alpha_of_layer in layers:
+        share = (1 - alpha) * alpha_of_layer
         light = [seen + share * c for seen, c in zip(light, color, strict=True)]
         alpha += share
     return [c / alpha if alpha else Fraction(0) for c in light] + [alpha]

@@ -15,7 +15,7 @@ from topleft.methods.reference import Point, round_to_float32, snap
 
 
 def covers(size: Fraction, shape: str, dx: Fraction, dy: Fraction) -> bool:
-    """Tell whether a point covers a sample that is (dx, dy) pixels off its centre.
+    """Return whether a point covers a sample that is (dx, dy) pixels off its centre.
 
     Examples
     --------
@@ -42,9 +42,9 @@ def points(
     origin: Point = (0, 0),
     sample: tuple[Fraction, Fraction] = (Fraction(0), Fraction(0)),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return ids, int32 (H, W), and depths, float32 (H, W), as one sample of each pixel sees points.
+    """Return ids, int32 (H, W), and depths, float32 (H, W), of points at a sample of each pixel.
 
-    Sizes are rounded to whole sub-pixels, ties to even; `sample` lies off the centre by so many pixels.
+    Sizes are rounded to whole sub-pixels, ties to even; `sample`: pixels from the centre.
 
     Examples
     --------
@@ -56,8 +56,8 @@ def points(
     depths = np.full(size[::-1], sign * inf, np.float32)
     sizes = np.broadcast_to(np.asarray(point_size, np.float64), len(positions)).tolist()
     centers = snap(np.asarray(positions)[:, :2], subpixel_bits)
-    for i, ((x_fx, y_fx), own) in enumerate(zip(centers, sizes, strict=True)):
-        side = Fraction(round(Fraction(own) * unit), unit)
+    for i, ((x_fx, y_fx), size_px) in enumerate(zip(centers, sizes, strict=True)):
+        side = Fraction(round(Fraction(size_px) * unit), unit)
         z = round_to_float32(Fraction(float(positions[i][2]))) if len(positions[i]) > 2 else 0.0
         for row in range(size[1]):
             dy = row + origin[1] + Fraction(1, 2) + sample[1] - Fraction(y_fx, unit)

@@ -3,7 +3,7 @@
 In: rings of points in pixels, and the rule.  Out: masks, and the area of each pixel inside as a fraction.
 
 A sample is inside by its winding number: each edge that passes its row on the left counts 1 downwards and -1 upwards.
-A row is passed at its upper end, not at its lower one, and a sample on an edge lies right of it: the top-left rule.
+An edge includes its upper end, not its lower end, and a sample on an edge lies right of it: the top-left rule.
 Areas: between the heights at which edges end, cross or pass from column to column, their order does not change; the
 trapezoid between two neighbours is inside or not.
 
@@ -50,15 +50,15 @@ def snap_rings(rings: Sequence[Any], subpixel_bits: int = 8, origin: tuple[int, 
 
 
 def edges_of(rings: Sequence[Ring]) -> list[Edge]:
-    """Return the edges that are not level, from the upper end to the lower one."""
-    found: list[Edge] = []
+    """Return the edges that are not level, from the upper end to the lower end."""
+    edges: list[Edge] = []
     for ring in rings:
         for (ax, ay), (bx, by) in pairwise([*ring, *ring[:1]]):
             if ay < by:
-                found.append((ax, ay, bx, by, 1))
+                edges.append((ax, ay, bx, by, 1))
             elif by < ay:
-                found.append((bx, by, ax, ay, -1))
-    return found
+                edges.append((bx, by, ax, ay, -1))
+    return edges
 
 
 def x_at(edge: Edge, y: Fraction) -> Fraction:
@@ -128,19 +128,19 @@ def polygon_areas(
 
 def _heights(edges: Sequence[Edge], row: int, width: int) -> list[Fraction]:
     """Return the heights of a row between which no edge ends, crosses another or passes the side of a pixel."""
-    found = {Fraction(row), Fraction(row + 1)}
+    heights = {Fraction(row), Fraction(row + 1)}
     for edge in edges:
         ax, ay, bx, by, _ = edge
-        found |= {ay, by}
+        heights |= {ay, by}
         if ax != bx:
             ends = sorted(x_at(edge, min(max(Fraction(y), ay), by)) for y in (row, row + 1))
             for x in range(max(0, floor(ends[0])), min(width, floor(ends[1]) + 1) + 1):
-                found.add(ay + (x - ax) * (by - ay) / (bx - ax))
+                heights.add(ay + (x - ax) * (by - ay) / (bx - ax))
     for a, b in combinations(edges, 2):
         slopes = [(e[2] - e[0]) / (e[3] - e[1]) for e in (a, b)]
-        if slopes[0] != slopes[1]:  # where x is the same on both lines
-            found.add((b[0] - slopes[1] * b[1] - a[0] + slopes[0] * a[1]) / (slopes[0] - slopes[1]))
-    return sorted(y for y in found if row <= y <= row + 1)
+        if slopes[0] != slopes[1]:  # where x is equal on both lines
+            heights.add((b[0] - slopes[1] * b[1] - a[0] + slopes[0] * a[1]) / (slopes[0] - slopes[1]))
+    return sorted(y for y in heights if row <= y <= row + 1)
 
 
 def _add_interval(areas: list[Fraction], left: Fraction, right: Fraction, height: Fraction) -> None:

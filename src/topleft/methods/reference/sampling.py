@@ -80,9 +80,9 @@ def outer(vertices: Any, triangles: Any, size: Point, **view: Any) -> np.ndarray
 
 
 def inner(vertices: Any, triangles: Any, size: Point, **view: Any) -> np.ndarray:
-    """Return which pixel squares lie wholly inside one triangle, its border included: bool, shape (H, W).
+    """Return which pixel squares lie wholly inside a single triangle, its border included: bool, shape (H, W).
 
-    Of a triangle that a clip plane cuts, each piece counts by itself.
+    Each piece of a triangle that a clip plane cuts counts as a triangle.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def _turned(piece: Piece) -> list[Point]:
 
 
 def _meets(triangle: list[Point], square: list[Point]) -> bool:
-    """Tell whether the interiors meet: no edge of either has the other wholly outside or on its line."""
+    """Return whether the interiors meet: no edge of either has the other wholly outside or on its line."""
     return not any(
         all(reference.edge_function(a, b, p) <= 0 for p in other)
         for polygon, other in ((triangle, square), (square, triangle))
@@ -126,7 +126,7 @@ def _meets(triangle: list[Point], square: list[Point]) -> bool:
 
 
 def _holds(triangle: list[Point], square: list[Point]) -> bool:
-    """Tell whether every corner of the square is inside or on every edge."""
+    """Return whether every corner of the square is inside or on every edge."""
     edges = zip(triangle, triangle[1:] + triangle[:1], strict=True)
     return all(reference.edge_function(a, b, p) >= 0 for a, b in edges for p in square)
 
@@ -137,7 +137,7 @@ def mean(
     is_straight: bool,
     tables: tuple[npt.NDArray[np.int32], npt.NDArray[np.uint8]] | None = None,
 ) -> list[float]:
-    """Return the mean of the colours (S, C) of one pixel's samples, of uint8 rounded to nearest, ties to even.
+    """Return the mean of the colours (S, C) of a pixel's samples, of uint8 rounded to nearest, ties to even.
 
     `is_straight`: the last of 2 or 4 channels is alpha, and weights the colours. `tables`: from uint8 colours
     to light, and from light to colours.
@@ -150,13 +150,13 @@ def mean(
     n_colors = samples.shape[1] - (samples.shape[1] in (2, 4))
     alpha = [Fraction(float(sample[-1])) for sample in samples]
     is_weighted = is_straight and len(set(alpha)) > 1 and sum(alpha) != 0
-    found: list[float] = []
+    channels: list[float] = []
     for c, values in enumerate(samples.T):
         weights = alpha if is_weighted and c < n_colors else [Fraction(1)] * len(samples)
         light = tables[0][values] if tables and c < n_colors else values
         exact = sum(w * Fraction(v) for w, v in zip(weights, light.tolist(), strict=True)) / sum(weights)
         if samples.dtype != np.uint8:
-            found.append(float(exact))
+            channels.append(float(exact))
         else:
-            found.append(int(tables[1][round(exact)]) if tables and c < n_colors else round(exact))
-    return found
+            channels.append(int(tables[1][round(exact)]) if tables and c < n_colors else round(exact))
+    return channels

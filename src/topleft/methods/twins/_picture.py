@@ -1,6 +1,6 @@
 """Shared by the pure twins: a picture of counts, and spans that are clamped to it.
 
-A twin is its kernel's method written for reading: NumPy where whole rows or boxes are one expression, Python elsewhere.
+A twin is a kernel's method, written to be read: NumPy where an expression computes rows or boxes, Python elsewhere.
 """
 
 from __future__ import annotations

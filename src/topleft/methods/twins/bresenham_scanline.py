@@ -1,4 +1,4 @@
-"""Bresenham scanline in Python, where the generator of the line really is one.
+"""Bresenham scanline in Python, where the generator of the line is a generator.
 
 In: vertices, truncated to pixels.  Out: counts.  Source: see bresenham_scanline.h.
 """
@@ -40,13 +40,13 @@ FLAT_TOP, FLAT_BOTTOM = 0, 1  # which ends of the lines the flat side connects
 
 
 def fill_basic(span: Span, left: tuple[Pixel, Pixel], right: tuple[Pixel, Pixel], flat: int, variant: str) -> None:
-    """Draw the pixels between two lines, given from the top down, that begin and end in the same rows."""
+    """Draw the pixels between two lines, from the top down, that begin and end in equal rows."""
     if variant == "wireframe":
         for x, y in chain(line(*left), line(*right)):
             span(y, x, x)
         span(left[flat][1], left[flat][0], right[flat][0])
         return
-    # A line that goes outwards has its outermost pixel last, one that goes inwards has it first.
+    # A line that runs outwards has its outermost pixel last, a line that runs inwards has it first.
     left_end = 2 if left[1][0] <= left[0][0] else 1
     right_end = 1 if right[1][0] <= right[0][0] else 2
     for of_left, of_right in zip(runs(*left), runs(*right), strict=True):

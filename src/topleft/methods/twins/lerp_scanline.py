@@ -32,7 +32,7 @@ def overdraw(vertices: Any, triangles: Any, size: Pixel, variant: str = "") -> N
             b, c = c, b
         if a[1] == c[1]:
             continue
-        # The middle row: drawn by both halves, or by the upper one unless that has no height.
+        # The middle row: drawn by both halves, or by the upper half unless that has no height.
         if variant == "plus-one":
             upper, lower = range(a[1], b[1] + 1), range(b[1], c[1] + 1)
         elif a[1] == b[1]:

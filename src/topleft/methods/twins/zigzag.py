@@ -15,7 +15,7 @@ from topleft.methods.twins.edge_increment import Edges, Triple, add, set_up
 
 
 def is_behind(w: Triple, step_x: Triple, step_y: Triple | None, way: int) -> bool:
-    """Tell whether nothing is covered from here on, neither in this row nor in the next (without step_y: in this)."""
+    """Return whether no later sample is covered, neither in this row nor in the next (without step_y: in this)."""
     outward = [k for k in range(3) if step_x[k] * way <= 0]
     here = any(w[k] < 0 for k in outward)
     return here and (step_y is None or any(w[k] + step_y[k] < 0 for k in outward))
