@@ -124,6 +124,7 @@ def test_zarr_of_polygons_is_the_raster(tmp_path):
         ({"kind": "depth"}, ValueError, "kind must be 'labels', 'coverage' or 'fill' for polygons, got 'depth'"),
         ({"kind": "fill"}, ValueError, "kind 'fill' needs values"),
         ({"values": [1.0]}, ValueError, "values are for the kinds 'fill' and 'field', got .* for 'labels'"),
+        ({"kind": "coverage", "background": 1}, ValueError, "background needs values"),
         ({"cull": "back"}, TypeError, "kind 'labels' has no option 'cull'; its options are assume_valid"),
         ({"kind": "fill", "values": [1.0, 2.0]}, ValueError, "values must have shape"),
     ],
