@@ -634,7 +634,7 @@ def test_killed_run_goes_on_and_draws_no_whole_window_twice(tmp_path, kind):
         log.write_text("")
         process = run(cut)
         process.stdout.readline()
-        if n_kills < 6:
+        if n_kills < 3:
             n_drawn = rng.integers(5, 80)  # of 256
             while process.poll() is None and len(log.read_text().splitlines()) < n_drawn:
                 time.sleep(0.001)
