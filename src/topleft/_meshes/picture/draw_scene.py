@@ -57,7 +57,7 @@ class SampleTarget(NamedTuple):
 def draw_ids(
     memory: Memory, placed: Placed, options: FragmentOptions = DEFAULT_OPTIONS, *, is_split: bool = True
 ) -> Fragments:
-    """Return the visibility buffer of a placed scene; `is_split` as in `View`. Several instances have other memory."""
+    """Return the visibility buffer of a placed scene; `is_split` as in `View`. `memory` is for one instance."""
     if placed.is_mesh or len(placed.scene) == 1:  # the length of a scene takes a hundredth of a small picture
         mesh, view = placed.scene[0].mesh, placed.view_of(0)
         view = view.but(is_split=True) if is_split and view.sampling.n_samples > 1 else view
@@ -78,10 +78,10 @@ def draw_ids(
     planes = zip(ids, depth, positions, strict=True) if width and height else ()
     targets = [SampleTarget(engine.Target(sink, own, own_depth, None), at) for own, own_depth, at in planes]
     if placed.scene.n_triangles > INT32_MAX:
-        frags = placed.fragments(draw_groups(placed, targets, ids), depth, positions)
+        frags = placed.fragments(draw_groups(placed, targets, ids), depth)
     else:
         draw_scene(placed, targets)
-        frags = placed.fragments(ids, depth, positions)
+        frags = placed.fragments(ids, depth)
     lay_background(frags.drawn_planes[0], depth, sink, options.background)
     return frags
 

@@ -114,7 +114,7 @@ def draw_solid(
     ids, depth = cast("tuple[I32, F32]", solid.drawn_planes)
     for k, at in enumerate(placed.positions if ids.size else ()):
         draw_holed(placed, holed, ids[k : k + 1], depth[k : k + 1], at=at, threads=placed.view.threads)
-    return placed.fragments(ids, depth, placed.positions)
+    return placed.fragments(ids, depth)
 
 
 def holed_instances(

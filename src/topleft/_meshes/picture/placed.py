@@ -149,9 +149,9 @@ class Placed:
         """Return another scene before the camera, made for this picture alone: no mesh of it is drawn in clusters."""
         return replace(self, scene=scene, may_cluster=False)
 
-    def fragments(self, ids: Ids, depth: NDArray[np.float32], positions: Sequence[tuple[int, int]]) -> SceneFragments:
+    def fragments(self, ids: Ids, depth: NDArray[np.float32]) -> SceneFragments:
         """Return drawn planes (S, H, W) as fragments of the scene, or of its only mesh."""
-        return self.kind_of_fragments(ids, depth, self, positions)
+        return self.kind_of_fragments(ids, depth, self, self.positions)
 
     @property
     def kind_of_fragments(self) -> type[SceneFragments]:

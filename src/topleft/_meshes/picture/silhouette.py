@@ -96,11 +96,11 @@ def silhouette(
     """
     shot = Shot.of(mesh, camera, size)
     if shot.cloud is not None:
-        found = draw_share(shot.cloud, shot.camera, shot.size, sampling=sampling, cull=cull, threads=threads, **view)
+        share = draw_share(shot.cloud, shot.camera, shot.size, sampling=sampling, cull=cull, threads=threads, **view)
         if out is None:
-            return found
-        result = as_out("out", out, found.shape, found.dtype.type)
-        result[...] = found
+            return share
+        result = as_out("out", out, share.shape, share.dtype.type)
+        result[...] = share
         return result
     window: Any = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     shot = shot.within(tolerance, cull=cull, **window)
