@@ -47,11 +47,12 @@ class Baked:
     Attributes
     ----------
     values : (H, W, C) float32; of pictures uint8; of "triangle" (H, W) int32
-        The values of the mesh there, in the gutter those of the nearest texel; 0, or -1 for triangles, elsewhere.
+        The values of the mesh at the texels, in the gutter the values of the nearest texel; 0, or -1 for triangles,
+        elsewhere.
     triangle : (H, W) int32
         The triangle of each texel, -1 in the gutter and elsewhere.
     mask : (H, W) bool
-        Which texels have a value of their own: not those of the gutter.
+        Which texels the mesh covers: not the gutter.
 
     Examples
     --------
@@ -90,29 +91,29 @@ def bake(
     ----------
     mesh : Mesh, or whatever `as_mesh` takes, with `uv`
     what : str, array_like, or sequence of pictures
-        "position": as in the mesh. "normal": unit normals, as in the mesh; "tangent_normal": those of `source` in the
-        frame of the mesh along u, along v and outwards, as normal maps hold them. "color": sRGB of the vertices, 0 to
-        255. "triangle": indices. Or values of vertices (V,) or (V, K), or of corners (T, 3, K). With `cameras` pictures
-        (h, w, 3 or 4) uint8, sRGB.
+        "position": in the space of the mesh. "normal": unit normals in this space; "tangent_normal": normals of
+        `source` in the frame of the mesh along u, along v and outwards, as in normal maps. "color": sRGB of the
+        vertices, 0 to 255. "triangle": indices. Or values of vertices (V,) or (V, K), or of corners (T, 3, K). With
+        `cameras` pictures (h, w, 3 or 4) uint8, sRGB.
     size : int or (width, height)
         Texels.
     rule : {"center", "touched", "area"}
-        The triangles of a texel. "center": the one that owns its middle, by the top-left rule on vertices as they
-        are. "touched": where none does, the nearest to the middle of those that meet it, at its point nearest to the
-        middle. "area": the mean over the area that triangles cover.
+        The triangles of a texel. "center": the triangle that covers its middle, by the top-left rule on vertices that
+        are not snapped. "touched": where no triangle does, the triangle nearest to the middle of all that meet the
+        texel, at its point nearest to the middle. "area": the mean over the area that triangles cover.
     gutter : int, 0 to 1024
         Texels round charts that get the value of the nearest texel (by Euclid, the upper left of several), so that a
-        filter that reaches beyond a chart finds no background.
+        filter that reaches beyond a chart reads no background.
     source : Mesh, optional
-        Another mesh in the same place, a finer one, say: values, normals and colours are those of its point that is
-        nearest to the mesh. Ids of triangles are its own, too.
+        Another mesh at this place, a finer mesh, say: values, normals and colours are taken at its point nearest to
+        the mesh. Ids of triangles are indices of `source`, too.
     max_distance : float, optional
-        Of that point; farther ones give no value.
+        The largest distance of this point; texels farther away have no value.
     cameras : sequence of Camera, optional
-        Of the pictures: each shows the mesh alone, without a lens. A texel gets its pixel of a picture if the mesh
-        does not hide it, weighed by the squared cosine of the angle at which it is seen.
+        The cameras of the pictures, without a lens; each picture shows only the mesh. A texel gets its pixel of a
+        picture if the mesh does not hide it, weighed by the squared cosine of the angle of view.
     blend : {"best", "mean"}
-        Of several pictures the one that sees a texel best, or their weighed mean, in linear light.
+        Of several pictures the picture with the largest weight, or the weighed mean, in linear light.
     threads : int, optional
         Never changes a bit.
 
@@ -231,7 +232,7 @@ def chart_of(mesh: Mesh, size: tuple[int, int], rule: str, n_threads: int) -> Ch
 
 
 def values_to_bake(mesh: Mesh, what: object) -> F32:
-    """The values of vertices (V, K) or corners (T, 3, K) that a word names or an array holds."""
+    """The values of vertices (V, K) or corners (T, 3, K) to bake: of a word, or of an array."""
     if not isinstance(what, str):
         return as_values(cast(Any, what), len(mesh.vertices), len(mesh.triangles))
     if what == "color":
@@ -250,17 +251,17 @@ def normals_to_bake(mesh: Mesh) -> F32:
     if mesh.is_faceted:
         return np.repeat(faces_of(mesh)[:, None], 3, axis=1)
     corners = mesh.corner_normals()
-    found = mesh.vertex_normals() if corners is None else corners.rows[corners.of_corner]
-    return np.ascontiguousarray(found, np.float32)
+    normals = mesh.vertex_normals() if corners is None else corners.rows[corners.of_corner]
+    return np.ascontiguousarray(normals, np.float32)
 
 
 def faces_of(mesh: Mesh) -> F32:
-    """The unit normals of triangles, (T, 3); 0 where one has no area."""
+    """The unit normals of triangles, (T, 3); 0 where a triangle has no area."""
     return face_normals(mesh.vertices, mesh.triangles).astype(np.float32)
 
 
 def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | None) -> Baked:
-    """The values of another mesh at its points that are nearest to those of the atlas."""
+    """The values of another mesh at its points nearest to the texels of the atlas."""
     if not len(source.triangles):
         raise MeshError("source must have triangles, got none")
     word = what if isinstance(what, str) else ""
@@ -274,31 +275,31 @@ def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | 
     tree = TriangleTree(source.vertices.astype(np.float64) - center, source.triangles)
     nearest, feet = np.empty(len(at), np.int32), np.empty((len(at), 3))
     points -= center
-    found = tree.tree  # made before threads ask for it
-    run_parts(lambda first, end: found.find_nearest(points, first, end, nearest, feet), len(at), chart.n_threads)
+    engine_tree = tree.tree  # built before threads use it
+    run_parts(lambda first, end: engine_tree.find_nearest(points, first, end, nearest, feet), len(at), chart.n_threads)
     is_near = np.ones(len(at), np.bool_)
     if max_distance is not None:
         is_near = np.einsum("ij,ij->i", feet - points, feet - points) <= max_distance * max_distance
-    at, own = at[is_near], tree.order[nearest[is_near]]
+    at, nearest_triangle = at[is_near], tree.order[nearest[is_near]]
     triangle: I32 = np.full(ids.shape, -1, np.int32)
-    triangle.reshape(-1)[at] = own
+    triangle.reshape(-1)[at] = nearest_triangle
     if values is None:
         return Baked(triangle.copy(), triangle, triangle >= 0)
-    corners = source.triangles[own]
+    corners = source.triangles[nearest_triangle]
     weights = weights_of(tree.points[corners], feet[is_near]).astype(np.float32)
-    each = values[own] if values.ndim == 3 else values[corners]
-    taken = np.einsum("nk,nkc->nc", weights, each)
+    each = values[nearest_triangle] if values.ndim == 3 else values[corners]
+    values_at = np.einsum("nk,nkc->nc", weights, each)
     if word.endswith("normal"):
-        taken = unit_or_zero(taken).astype(np.float32)
+        values_at = unit_or_zero(values_at).astype(np.float32)
     if word == "tangent_normal":
-        taken = in_tangent_frame(chart, ids.reshape(-1)[at], at, taken)
-    out = np.zeros((ids.size, taken.shape[1]), np.float32)
-    out[at] = taken
+        values_at = in_tangent_frame(chart, ids.reshape(-1)[at], at, values_at)
+    out = np.zeros((ids.size, values_at.shape[1]), np.float32)
+    out[at] = values_at
     return Baked(out.reshape(*ids.shape, -1), triangle, triangle >= 0)
 
 
-def in_tangent_frame(chart: Chart, own: I32, at: npt.NDArray[np.intp], normals: F32) -> F32:
-    """Normals (N, 3) along u, along v and outwards, at texels `at` of triangles `own` of the mesh."""
+def in_tangent_frame(chart: Chart, triangle_of: I32, at: npt.NDArray[np.intp], normals: F32) -> F32:
+    """Normals (N, 3) along u, along v and outwards, at texels `at` of triangles `triangle_of` of the mesh."""
     mesh = chart.mesh
     smooth, _ = chart.values_of(normals_to_bake(mesh))
     outwards = unit_or_zero(smooth.reshape(-1, 3)[at])
@@ -306,8 +307,8 @@ def in_tangent_frame(chart: Chart, own: I32, at: npt.NDArray[np.intp], normals: 
     ta, tb, tc = (mesh.uv[mesh.triangles[:, k]].astype(np.float64) for k in range(3))  # type: ignore[index]
     (u1, v1), (u2, v2) = (tb - ta).T, (tc - ta).T
     sign = np.where(u1 * v2 - u2 * v1 < 0, -1.0, 1.0)[:, None]
-    along_u = (((b - a) * v2[:, None] - (c - a) * v1[:, None]) * sign)[own]
-    along_v = (((c - a) * u1[:, None] - (b - a) * u2[:, None]) * sign)[own]
+    along_u = (((b - a) * v2[:, None] - (c - a) * v1[:, None]) * sign)[triangle_of]
+    along_v = (((c - a) * u1[:, None] - (b - a) * u2[:, None]) * sign)[triangle_of]
     tangent = unit_or_zero(along_u - outwards * np.einsum("ij,ij->i", along_u, outwards)[:, None])
     other = np.cross(outwards, tangent)
     other *= np.where(np.einsum("ij,ij->i", other, along_v) < 0, -1.0, 1.0)[:, None]
@@ -315,25 +316,25 @@ def in_tangent_frame(chart: Chart, own: I32, at: npt.NDArray[np.intp], normals: 
     return np.stack([np.einsum("ij,ij->i", normals, axis) for axis in axes], axis=1).astype(np.float32)
 
 
-def pictures_of(given: object, cameras: Sequence[CameraLike]) -> list[tuple[U8, Camera]]:
+def pictures_of(pictures: object, cameras: Sequence[CameraLike]) -> list[tuple[U8, Camera]]:
     """Pictures and their cameras, checked."""
-    if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
-        raise TypeError(f"what must be a sequence of pictures with cameras=, got {shown(given)}")
-    if len(given) != len(cameras) or not len(cameras):
+    if isinstance(pictures, str) or not isinstance(pictures, Sequence | np.ndarray):
+        raise TypeError(f"what must be a sequence of pictures with cameras=, got {shown(pictures)}")
+    if len(pictures) != len(cameras) or not len(cameras):
         raise ValueError(
-            f"there must be a camera for each picture, got {len(given)} pictures and {len(cameras)} cameras"
+            f"there must be a camera for each picture, got {len(pictures)} pictures and {len(cameras)} cameras"
         )
-    found = []
-    for i, (one, own) in enumerate(zip(given, cameras, strict=True)):
-        picture, camera = as_array(f"what[{i}]", one), as_camera(own)
+    checked = []
+    for i, (image, camera_like) in enumerate(zip(pictures, cameras, strict=True)):
+        picture, camera = as_array(f"what[{i}]", image), as_camera(camera_like)
         if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] not in (3, 4):
             raise ValueError(
                 f"what[{i}] must be (h, w, 3) or (h, w, 4) uint8, got {picture.dtype} of shape {picture.shape}"
             )
         if camera.lens is not None:
             raise ValueError(f"cameras[{i}] must have no lens: straighten the picture first")
-        found.append((picture, camera))
-    return found
+        checked.append((picture, camera))
+    return checked
 
 
 def from_pictures(chart: Chart, pictures: Sequence[tuple[U8, Camera]], blend: str) -> Baked:
@@ -367,14 +368,14 @@ def from_pictures(chart: Chart, pictures: Sequence[tuple[U8, Camera]], blend: st
 
 
 def eye_of(camera: Camera) -> F64:
-    """Where a camera stands (x, y, z, 1), or, without perspective, the direction to it (x, y, z, 0)."""
+    """The position of a camera (x, y, z, 1), or, without perspective, the direction to it (x, y, z, 0)."""
     if not camera.projection[3, :3].any():
         return np.append(camera.view[2, :3], 0.0)
     return np.append(engine.product(engine.inverse(camera.view[:3, :3]), -camera.view[:3, 3]), 1.0)
 
 
 def with_gutter(baked: Baked, gutter: int, n_threads: int) -> Baked:
-    """Baked texels, with texels round the charts that have the value of the nearest texel."""
+    """Baked texels with a gutter: texels round the charts, with the value of the nearest texel."""
     if not gutter:
         return baked
     height = len(baked.triangle)

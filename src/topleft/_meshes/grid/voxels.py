@@ -1,6 +1,6 @@
 """Voxels: the cubes of a regular grid that a mesh fills, or that its surface meets.
 
-Input: a `Mesh` or `Scene`. Output: `Voxels`, an array (X, Y, Z) and where it stands. The kernels are csrc/sink/peel.c
+Input: a `Mesh` or `Scene`. Output: `Voxels`, an array (X, Y, Z) and its transform. The kernels are csrc/sink/peel.c
 and csrc/grid/voxels.c.
 
 Based on: Schwarz, M. and H.-P. Seidel, "Fast Parallel Surface and Solid Voxelization on GPUs", SIGGRAPH Asia 2010.
@@ -45,12 +45,12 @@ class Voxels:
     values : (X, Y, Z) bool, or float32 with several samples
         Whether a voxel is filled, or the share of it that is.
     transform : (4, 4) float64
-        Space of the mesh from indices (x, y, z): whole numbers are the middles of voxels, as in trimesh.
+        Space of the mesh from indices (x, y, z): integers are the middles of voxels, as in trimesh.
     pitch : float
         The side of a voxel.
     n_odd : int
         Columns along z that the surface crosses an odd number of times: 0 for a closed mesh. Their last crossing is
-        left out.
+        dropped.
 
     Examples
     --------
@@ -90,10 +90,10 @@ class VoxelGrid(NamedTuple):
     """The corner from which they begin."""
 
     def to_voxels(self, points: npt.NDArray[Any], samples: int = 1) -> F64:
-        """Points (V, 3) in voxels, or in samples of them, from the corner."""
-        found: F64 = np.subtract(points, self.low, dtype=np.float64)
-        found *= samples / self.pitch
-        return found
+        """Points (V, 3) in voxels from the corner, or in samples of voxels."""
+        voxel_points: F64 = np.subtract(points, self.low, dtype=np.float64)
+        voxel_points *= samples / self.pitch
+        return voxel_points
 
 
 def voxelize(
@@ -112,22 +112,22 @@ def voxelize(
     Parameters
     ----------
     mesh : Mesh, Scene, or whatever `as_mesh` takes
-        Of a scene all instances, each by itself: voxels inside two of them are filled.
+        Of a scene all instances, each filled separately: voxels inside two instances are filled.
     shape : int or (X, Y, Z), optional
-        How many voxels along the longest side, or along each axis. They are cubes: with three numbers as large as it
-        takes to hold the box, which stands in their middle.
+        How many voxels along the longest side, or along each axis. Voxels are cubes: with three numbers they are large
+        enough that the grid holds the box in its middle.
     pitch : float, optional
         The side of a voxel, instead of `shape`.
     bounds : (2, 3) array_like, optional
-        Lower and upper corner of the space to fill; the box of the mesh unless given.
+        Lower and upper corner of the space to fill; the default is the box of the mesh.
     solid : bool
         Whether the inside is filled, by the even-odd rule; otherwise the surface alone.
     rule : {"center", "touched"}
-        "center": voxels with their middle inside; of a surface those in which one of the three lines through the middle
-        along the axes meets it. "touched": every voxel that a triangle meets, too.
+        "center": voxels with their middle inside; of a surface the voxels in which a line through the middle along an
+        axis meets it. "touched": every voxel that a triangle meets, too.
     samples : 1, 2, 4 or 8
-        Samples along each axis of a voxel. With more than one the values are the shares of those that lie inside,
-        float32, for a solid by "center".
+        Samples along each axis of a voxel. With 2 and more the values are the shares of samples inside, float32, for a
+        solid by "center".
     threads : int, optional
         Never changes a bit.
 
@@ -143,14 +143,14 @@ def voxelize(
     Raises
     ------
     ValueError
-        If neither or both of `shape` and `pitch` are given, one is out of range, the bounds are no box, or the mesh has
-        no triangles and there are no bounds.
+        If not exactly one of `shape` and `pitch` is set, it is out of range, the bounds are no box, or the mesh has no
+        triangles and there are no bounds.
 
     Notes
     -----
-    Seen along z, each column belongs to the triangles that own its middle by the top-left rule, on vertices that are
+    Seen along z, a triangle crosses the columns whose middles it covers by the top-left rule, on vertices that are
     rounded to 1/256 voxel (or sample) along x and y. So a closed mesh has an even number of crossings in every column,
-    wherever parts touch. Where a crossing lies is known to 2**-22 of the depth of the grid. "touched" is
+    wherever parts touch. Crossings are computed to 2**-22 of the depth of the grid. "touched" is
     conservative: no voxel is missing that a triangle of the float64 vertices meets.
 
     Examples
@@ -172,7 +172,7 @@ def voxelize(
     if samples > 1 and not (solid and rule == "center"):
         raise ValueError(f"samples must be 1 for a surface and for rule 'touched', got {samples}")
     grid = grid_of(subject.bounds if bounds is None else as_bounds(bounds), shape, pitch, samples)
-    bodies = [(moved(one.mesh.vertices, one.transform), one.mesh.triangles) for one in scene_of(subject)]
+    bodies = [(moved(item.mesh.vertices, item.transform), item.mesh.triangles) for item in scene_of(subject)]
     n_threads = threads_for(threads, sum(len(triangles) for _, triangles in bodies))
     if samples > 1:
         check_fits(grid.shape, np.float32)
@@ -184,8 +184,8 @@ def voxelize(
         )
         return with_warning(grid, shares, n_odd)
     check_fits(grid.shape, np.bool_)
-    found: npt.NDArray[np.bool_] = FRESH.empty("voxels", grid.shape, np.bool_)
-    filled, n_odd = found.view(np.uint8), 0
+    voxels: npt.NDArray[np.bool_] = FRESH.empty("voxels", grid.shape, np.bool_)
+    filled, n_odd = voxels.view(np.uint8), 0
     if solid:
         bits, n_odd = solid_bits(grid, bodies, 1, n_threads)
         run_parts(lambda first, end: engine.expand_columns(bits, filled, first, end), len(filled), n_threads)
@@ -198,7 +198,7 @@ def voxelize(
             engine.touch_voxels(points, triangles, 0, len(triangles), filled)
         elif not solid:
             mark_surface(points, triangles, filled, n_threads)
-    return with_warning(grid, found, n_odd)
+    return with_warning(grid, voxels, n_odd)
 
 
 def with_warning(grid: VoxelGrid, values: npt.NDArray[Any], n_odd: int) -> Voxels:
@@ -265,14 +265,14 @@ def counts_of(extent: F64, pitch: float) -> list[int]:
 def solid_bits(
     grid: VoxelGrid, bodies: list[tuple[npt.NDArray[Any], I32]], samples: int, n_threads: int
 ) -> tuple[U64, int]:
-    """Bits of columns (X, Y, words) of the samples that lie in any of some bodies, and how many columns are odd."""
+    """Bits of columns (X, Y, words) of the samples inside of any body, and how many columns are odd."""
     union: U64 | None = None
     n_odd = 0
     for vertices, triangles in bodies:
         points = grid.to_voxels(vertices, samples)
-        own = "columns of one" if union is not None else "columns"
-        bits, n_own = crossings(own, points, triangles, tuple(samples * n for n in grid.shape), n_threads, fills=True)
-        n_odd += n_own
+        name = "columns of one" if union is not None else "columns"
+        bits, n = crossings(name, points, triangles, tuple(samples * n for n in grid.shape), n_threads, fills=True)
+        n_odd += n
         union = bits if union is None else np.bitwise_or(union, bits, out=union)
     assert union is not None  # a scene has an instance
     return union, n_odd
@@ -281,7 +281,7 @@ def solid_bits(
 def crossings(
     name: str, points: F64, triangles: I32, shape: tuple[int, ...], n_threads: int, *, fills: bool
 ) -> tuple[U64, int]:
-    """Bits of the columns along the last axis of a grid: filled between the crossings, or the steps of these alone."""
+    """Bits of the columns along the last axis of a grid: filled between crossings, or only the steps of crossings."""
     n_rows, n_columns, n_steps = shape
     size = (n_rows, n_columns, engine.column_words(n_steps))
     check_fits(size, np.uint64)

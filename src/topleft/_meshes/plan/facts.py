@@ -1,6 +1,6 @@
-"""Finds the facts that decide a draw: transforms, clips and snaps as the draw does, then takes a census in its place.
+"""Computes the facts that decide a draw: transforms, clips and snaps as the draw does, then counts instead of drawing.
 
-In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` turns into sentences; the bytes that a call needs.
+In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` describes in sentences; the bytes of a call.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ MOST_SHOWS = "most of the mesh shows, and drawing that cluster by cluster takes 
 
 @dataclass(frozen=True, slots=True)
 class ClusterFacts:
-    """How the clusters of a mesh fare in a view."""
+    """How many clusters of a mesh are culled and drawn in a view."""
 
-    clusters: Clusters | None  # that are drawn; None when the mesh is drawn whole
-    why_not: str = ""  # why it is drawn whole
+    clusters: Clusters | None  # the clusters to draw; None where the mesh is drawn whole
+    why_not: str = ""  # why the mesh is drawn whole
     n_outside: int = 0
     n_turned: int = 0  # away from the eye
     n_hidden: int = 0
@@ -68,8 +68,8 @@ class Facts:
     test: DepthTestOption | None
     route: Route | None  # of `rasterize`
     drawing: Drawing
-    vertex_dtype: str  # as given
-    point_dtype: str  # as worked on
+    vertex_dtype: str  # of the caller's array
+    point_dtype: str  # of the array in kernels
     is_vertex_copy: bool
     index_dtype: str
     n_vertices: int
@@ -84,44 +84,44 @@ class Facts:
     common_depth: float | None  # of all vertices
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
     is_large_shapes: bool  # large triangles, whose picture is written row by row
-    work_ms: float  # of one thread, as guessed before the draw
+    work_ms: float  # of a single thread, as estimated before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
     decided: Decided | None = None  # with vertices that are not snapped
     clusters: ClusterFacts | None = None  # of a mesh
 
     def count(self, *names: str) -> int:
-        """Return how many triangles or pieces are of some classes."""
+        """Return how many triangles or pieces are of the named classes."""
         return sum(self.census[CLASSES.index(name)][0] for name in names)
 
     @property
     def n_beyond(self) -> int:
-        """Triangles that the clip planes cut away whole."""
+        """Triangles that lie wholly outside of a clip plane."""
         return self.n_triangles - self.n_cut + self.n_pieces - sum(row[0] for row in self.census)
 
     @property
     def draws_planes(self) -> bool:
-        """Whether each sample is a picture of its own."""
+        """Whether each sample is drawn to a separate picture."""
         return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
 
     @property
     def draws_bands(self) -> bool:
-        """Whether each sample is a picture of its own, drawn band after band of rows."""
+        """Whether each sample is drawn to a separate picture, in bands of rows."""
         return self.draws_planes and not self.in_clusters
 
     @property
     def is_split(self) -> bool:
-        """Whether the samples of pixels that show one triangle are kept once."""
+        """Whether pixels that show a single triangle are stored once for all samples."""
         can_split = self.verb == "rasterize" and choices.can_split(self.view, self.n_triangles)
         return can_split and not self.in_clusters
 
     @property
     def in_clusters(self) -> bool:
-        """Whether a mesh is drawn cluster by cluster, each sample a picture of its own."""
+        """Whether a mesh is drawn cluster by cluster, each sample to a separate picture."""
         return self.clusters is not None and self.clusters.clusters is not None
 
     @property
     def is_sliced(self) -> bool:
-        """Whether each thread takes a share of the triangles."""
+        """Whether each thread draws a share of the triangles."""
         if self.view.sampling is Sampling.AREA or self.draws_planes or self.is_direct:
             return False
         return self.drawing.is_sliced
@@ -138,7 +138,7 @@ class Facts:
 
     @property
     def covered(self) -> float:
-        """Return about how many samples are covered, each as often as it is."""
+        """Return about how many times samples are covered, the sum over all samples."""
         return sum(row[2] for row in self.census)
 
 
@@ -150,9 +150,9 @@ def find_facts(
     outputs: tuple[str, ...],
     test: DepthTestOption | None,
 ) -> tuple[Facts, NDArray[np.int32]]:
-    """Return the facts of a scene, and a copy of its triangles that nobody changes; errors as of the verb."""
+    """Return the facts of a scene, and a read-only copy of its triangles; raises the errors of the verb."""
     decided = count_decided(vertices, triangles, view) if view.is_exact else None
-    asked, view = view, replace(view, is_exact=False)  # the census is that of the snapped triangles
+    caller_view, view = view, replace(view, is_exact=False)  # the census counts snapped triangles
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
     snapped.given.check_indices()
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
@@ -178,7 +178,7 @@ def find_facts(
     facts = Facts(
         verb=verb,
         outputs=outputs,
-        view=asked,
+        view=caller_view,
         test=test,
         route=route,
         drawing=drawing,
@@ -208,7 +208,7 @@ def find_facts(
 
 
 def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Decided:
-    """Draw a scene without a snap, and return how its samples were decided; of several samples the first."""
+    """Draw a scene without a snap, and return how the first sample of its pixels was decided."""
     exact = snap_mesh(FRESH, vertices, triangles, view, with_depth=False, out=None)
     mesh = exact.mesh
     if view.sampling.n_samples > 1:
@@ -233,7 +233,7 @@ def find_sink(verb: str, view: View) -> Sink:
 
 
 def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTestOption | None) -> ClusterFacts:
-    """Return the clusters that `rasterize_mesh` draws from the second picture of a mesh on, made if need be."""
+    """Return the clusters that `rasterize_mesh` draws from the second picture of a mesh on; computes them if needed."""
     n_triangles = len(mesh.triangles)
     if verb != "rasterize":
         return ClusterFacts(None, f"{verb} draws arrays, which may change")
@@ -252,15 +252,15 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTestOption 
     if not choices.pays_to_draw_from_clusters(view, n_triangles, few, seen.share_clipped):
         return ClusterFacts(None, MOST_SHOWS)
     n = len(clusters)
-    found = seen.survey(n)
-    n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
+    survey = seen.survey(n)
+    n_outside, n_turned, n_drawn = round(survey.outside * n), round(survey.turned * n), seen.count_drawn(sink)
     return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)
 
 
 def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
-    """Return the bytes of scratch, which is kept from call to call, and of results, by name.
+    """Return the bytes of scratch, which is cached from call to call, and of results, by name.
 
-    Amounts that depend on the data come on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the
+    Not included, since they depend on the data: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the
     pieces of cut triangles, about 100 bytes each; triangles in several bands of rows.
     """
     view, n = facts.view, facts.n_triangles
@@ -268,7 +268,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     n_pixels, n_samples = width * height, view.sampling.n_samples
     is_empty = n_pixels == 0
     scratch = {"records": 0 if is_empty or not n else engine.VERTEX_BYTES * facts.n_vertices}
-    if view.is_exact:  # float64 pixels stay where they are
+    if view.is_exact:  # float64 pixels are read in place
         taken = 24 if facts.is_clip_space else 8 * facts.n_components if facts.point_dtype != "float64" else 0
         scratch = {"points": 0 if is_empty or not n else taken * facts.n_vertices}
     if facts.index_dtype not in ("int32", "uint32"):
@@ -287,13 +287,13 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch |= split_bytes(n, (height, width), n_samples, facts.drawing.n_threads)[0]
     elif facts.draws_bands and not is_empty and n and choices.can_slice(view) and not facts.is_large_shapes:
         scratch |= band_bytes(n, (height, width), sum(results.values()), facts.drawing.n_threads)
-    found = facts.clusters
+    clusters = facts.clusters
     if facts.in_clusters or (facts.route is Route.DEPTH and facts.drawing.is_bounded):
         rows, segments = engine.Target.bounds_shape(height, width)
         scratch["bounds"] = 4 * rows * segments
-    if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
+    if clusters is not None and clusters.clusters is not None:  # the records are not needed, unless a plane cuts
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
-        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
+        scratch["clusters"] = 12 * len(clusters.clusters) + 4 * facts.drawing.n_threads * n + clusters.clusters.n_bytes
     elif facts.in_bands:
         n_bytes = 0 if view.sampling is Sampling.AREA else sum(results.values())
         scratch |= band_bytes(n, (height, width), n_bytes, facts.drawing.n_threads)

@@ -1,6 +1,6 @@
-"""`plan`: the choices and memory of a draw, with reasons, before it is made.
+"""`plan`: the choices and memory of a draw, with reasons, before the draw.
 
-In: the arguments of a verb. Out: a `Plan`, which explains itself, and which verbs take as `plan=` to save its work.
+In: the arguments of a verb. Out: a `Plan`: a table of choices and reasons, which verbs take as `plan=` to save checks.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ CODES: dict[str, dict[Any, str]] = {
 
 
 class Clock:
-    """When the stages of the last call ended."""
+    """The times of the stages of the last call."""
 
     def __init__(self) -> None:
         self.ns: dict[str, int] = {}
@@ -88,11 +88,11 @@ class Plan:
     stages : tuple of Stage
         In the order of the pipeline: name, choice, why, rejected.
     classes : mapping of str to int
-        Triangles, or pieces of cut ones, by the way they are drawn.
+        Triangles, or pieces of cut triangles, by the code that draws them.
     scratch_bytes, result_bytes : mapping of str to int
-        Memory by name: kept from call to call, and returned.
+        Memory by name: cached from call to call, and returned.
     threads : int
-        How many draw.
+        How many threads draw.
 
     Examples
     --------
@@ -121,7 +121,7 @@ class Plan:
 
     @property
     def measured_ms(self) -> Mapping[str, float]:
-        """The times of the stages in the last call with this plan, in milliseconds; empty before there was one."""
+        """The times of the stages in the last call with this plan, in milliseconds; empty before the first call."""
         return {name: ns / 1e6 for name, ns in self._clock.ns.items()}
 
     def __repr__(self) -> str:
@@ -139,7 +139,7 @@ class Plan:
         return as_text(self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all of it as numbers, strings, lists and dicts: for JSON."""
+        """Return the plan as numbers, strings, lists and dicts: for JSON."""
         measured = self.measured_ms
         stages = [
             asdict(stage) | {"rejected": list(stage.rejected), "measured_ms": measured.get(stage.timed_in)}
@@ -160,14 +160,14 @@ class Plan:
         }
 
     def measure(self, n_rounds: int = 5) -> Plan:
-        """Draw the scene some times on memory that is kept, note the times of the fastest, and return the plan.
+        """Draw the scene some times on cached memory, store the times of the fastest, and return the plan.
 
-        `fill` is drawn with made-up colours of four channels, one a triangle.
+        `fill` is drawn with a grey of four channels for each triangle.
         """
         n_rounds = as_count("n_rounds", n_rounds)
         memory = KeptMemory()
         best: dict[str, int] = {}
-        for _ in range(n_rounds + 1):  # the first one touches the memory
+        for _ in range(n_rounds + 1):  # the first round touches the memory
             self._run(memory)
             if not best or sum(self._clock.ns.values()) < sum(best.values()):
                 best = self._clock.ns
@@ -217,14 +217,14 @@ class Plan:
         return replace(view, threads=view.threads or self.threads, plan=self)
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-        """Return the plan's own int32 triangles, whose indices have been checked.
+        """Return the plan's int32 triangles, whose indices have been checked.
 
-        The array that the plan was made from is taken to be unchanged; any other is compared.
+        The array that `plan` was called with is assumed unchanged; any other array is compared.
 
         Raises
         ------
         ValueError
-            If the triangles are others, or there are more or fewer vertices.
+            If the triangles differ, or there are more or fewer vertices.
         """
         if n_vertices != self.n_vertices:
             raise ValueError(
@@ -246,7 +246,7 @@ class Plan:
         return self._triangles
 
     def mark(self, stage: str) -> None:
-        """Note that a stage has ended."""
+        """Store the time at which a stage has ended."""
         self._clock.mark(stage)
 
 
@@ -263,9 +263,9 @@ def plan(
     """Return the plan of a draw: at each stage the choice, its reason and the rejected alternatives.
 
     Vertices are transformed, cut and snapped as the verb does it, and triangles are counted in the code that draws
-    them: the plan counts, it does not guess. It costs about as much as a draw. With
-    ``subpixel_bits="exact"`` the scene is drawn once, so that the plan tells how many samples were in doubt and how
-    they were decided; its classes are those of the same triangles on 2**-8 px.
+    them: the plan counts, it does not guess. It takes about as long as a draw. With
+    ``subpixel_bits="exact"`` the scene is drawn once, so that the plan has the number of samples in doubt and how they
+    were decided; its classes count the triangles with vertices on 2**-8 px.
 
     Parameters
     ----------
@@ -277,14 +277,14 @@ def plan(
     depth_test : "less", "greater" or None
         As in `rasterize`.
     tolerance : float
-        Of a mesh and a camera: the largest error of outlines, pixels, as in `render`. The plan is that of the level of
-        detail that is drawn, and has a stage "detail" that tells which, and why.
+        Of a mesh and a camera: the largest error of outlines, pixels, as in `render`. The plan is for the level of
+        detail that is drawn, and has a stage "detail" with the level and the reason.
 
     Returns
     -------
     Plan
-        ``.explain()`` is a table, ``.to_dict()`` the same for JSON. As ``plan=`` of the verbs it saves the conversion
-        and the check of the triangles, and notes the time of each stage; ``.measure()`` does so too.
+        ``.explain()`` is a table, ``.to_dict()`` the plan for JSON. As ``plan=`` of the verbs it saves the conversion
+        and the check of the triangles, and stores the time of each stage, as ``.measure()`` does.
 
     Raises
     ------
@@ -322,9 +322,9 @@ def plan(
     checked.refuse_classic("plan")
     if checked.sampling in (Sampling.OUTER, Sampling.INNER, Sampling.AREA) and verb == "rasterize":
         raise ValueError(f"sampling {str(checked.sampling)!r} gives no ids: outputs must be 'coverage' or 'overdraw'")
-    found = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)
-    facts, own_triangles = find_facts(vertices, triangles, checked, verb, wanted, test)
-    facts = replace(facts, clusters=found)
+    cluster_facts = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)
+    facts, checked_triangles = find_facts(vertices, triangles, checked, verb, wanted, test)
+    facts = replace(facts, clusters=cluster_facts)
     scratch, results = memory_of(facts)
     return Plan(
         verb=verb,
@@ -338,7 +338,7 @@ def plan(
         result_bytes=MappingProxyType(results),
         threads=max(1, facts.drawing.n_threads),
         _view=checked,
-        _triangles=own_triangles,
+        _triangles=checked_triangles,
         _triangles_given=triangles,
         _arguments=(vertices, depth_test),
         _mesh=mesh,
@@ -348,16 +348,16 @@ def plan(
 def plan_mesh(
     mesh: Any, camera: Camera, size: tuple[int, int], tolerance: float, options: ViewOptions
 ) -> tuple[Mesh, Stage]:
-    """Return the level that is drawn, and its stage; set the transform."""
+    """Return the level to draw, and its stage; sets the transform."""
     if "transform" in options:
         raise ValueError("transform is that of the camera: give either")
     viewport = options.get("viewport")
     options["transform"] = camera.clip_from_world(viewport or size)
-    found = choose_detail(
+    detail = choose_detail(
         mesh, camera, size, tolerance=tolerance, cull=options.get("cull"), viewport=viewport,
         origin=options.get("origin", (0, 0)),
     )  # fmt: skip
-    return found.mesh, plan_detail(found)
+    return detail.mesh, plan_detail(detail)
 
 
 def find_verb(outputs: tuple[str, ...]) -> str:

@@ -21,7 +21,7 @@ from topleft.methods import METHODS
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One step of the pipeline.
+    """A step of the pipeline.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Stage:
     rejected : tuple of str
         Alternatives, and why they were not chosen.
     timed_in : str
-        What is timed in a call: a part of the draw, or the stage whose time contains this one.
+        What is timed in a call: a part of the draw, or the stage whose time contains this stage's.
     """
 
     name: str
@@ -59,19 +59,19 @@ def find_stages(facts: Facts) -> tuple[Stage, ...]:
     return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters))
 
 
-def with_clusters(stages: list[Stage], found: ClusterFacts) -> list[Stage]:
-    """Return the stages of a mesh that is drawn again, with one on the savings of its clusters."""
-    if found.clusters is None:
-        return [stages[0], Stage("clusters", "none", found.why_not, timed_in="method"), *stages[1:]]
-    n, n_triangles = len(found.clusters), found.clusters.n_triangles
-    names = {"outside of the picture": found.n_outside, "turned away": found.n_turned, "hidden": found.n_hidden}
+def with_clusters(stages: list[Stage], facts: ClusterFacts) -> list[Stage]:
+    """Return the stages of a mesh that is drawn again, with a stage on the savings of its clusters."""
+    if facts.clusters is None:
+        return [stages[0], Stage("clusters", "none", facts.why_not, timed_in="method"), *stages[1:]]
+    n, n_triangles = len(facts.clusters), facts.clusters.n_triangles
+    names = {"outside of the picture": facts.n_outside, "turned away": facts.n_turned, "hidden": facts.n_hidden}
     parts = [f"{count:,} {text}" for text, count in names.items() if count]
     why = "the mesh does not change, so its triangles were sorted once; " + (", ".join(parts) or "none is left out")
     rejected = (
         f"the mesh from beginning to end: all of {plural(n_triangles, 'triangle')} would be set up",
         "the order of the triangles as given: near ones that come late hide nothing",
     )
-    choice = f"{found.n_drawn:,} of {n:,} drawn, front to back, at most {engine.CLUSTER} triangles each"
+    choice = f"{facts.n_drawn:,} of {n:,} drawn, front to back, at most {engine.CLUSTER} triangles each"
     row = Stage("clusters", choice, why, rejected, timed_in="method")
     changed = []
     for stage in stages:
@@ -95,25 +95,25 @@ def vertices(n: int) -> str:
 
 
 def megabytes(n: int) -> str:
-    """Return a number of bytes as people read it."""
+    """Return a number of bytes with a unit."""
     return f"{n:,} bytes" if n < 10_000 else f"{n / 1e3:,.0f} kB" if n < 10_000_000 else f"{n / 1e6:,.0f} MB"
 
 
-def plan_detail(found: Detail) -> Stage:
-    """Tell which level of a mesh is drawn."""
-    count, n = found.n_drawn, found.n_triangles
+def plan_detail(detail: Detail) -> Stage:
+    """Describe which level of a mesh is drawn."""
+    count, n = detail.n_drawn, detail.n_triangles
     choice = f"the mesh itself, {plural(n, 'triangle')}"
-    if found.n_parts:
+    if detail.n_parts:
         choice = (
-            f"{plural(found.n_parts, 'part')}: {plural(count, 'triangle')} of {n:,}, within {found.bound_px:.3g} px"
+            f"{plural(detail.n_parts, 'part')}: {plural(count, 'triangle')} of {n:,}, within {detail.bound_px:.3g} px"
         )
-    elif found.level:
-        choice = f"level {found.level}: {plural(count, 'triangle')} of {n:,}, within {found.bound_px:.3g} px"
-    return Stage("detail", choice, found.why, found.rejected)
+    elif detail.level:
+        choice = f"level {detail.level}: {plural(count, 'triangle')} of {n:,}, within {detail.bound_px:.3g} px"
+    return Stage("detail", choice, detail.why, detail.rejected)
 
 
 def plan_input(facts: Facts) -> Stage:
-    """Tell how the caller's arrays are read."""
+    """Describe how the caller's arrays are read."""
     reads = "read as they are" if not facts.is_vertex_copy else f"copied to contiguous {facts.point_dtype}"
     converts = facts.index_dtype not in ("int32", "uint32")
     indices = "made int32, checked on the way" if converts else "read as they are, checked while drawing"
@@ -126,7 +126,7 @@ def plan_input(facts: Facts) -> Stage:
 
 
 def plan_vertices(facts: Facts) -> Iterator[Stage]:
-    """Tell about transform, clip and snap: one pass over the vertices, and one over cut triangles."""
+    """Describe transform, clip and snap: a pass over the vertices, and a pass over cut triangles."""
     view = facts.view
     kind = "snap"
     if facts.is_clip_space:
@@ -156,7 +156,7 @@ def plan_vertices(facts: Facts) -> Iterator[Stage]:
 
 
 def plan_transform(facts: Facts) -> Stage:
-    """Tell about the matrix and the divide."""
+    """Describe the matrix and the divide."""
     precision = facts.point_dtype
     if facts.view.transform is None:
         return Stage("transform", f"divide by w in {precision}", "vertices are in clip space", timed_in="snap")
@@ -172,7 +172,7 @@ def plan_transform(facts: Facts) -> Stage:
 
 
 def plan_clip(facts: Facts) -> Stage:
-    """Tell how many triangles are cut."""
+    """Describe how many triangles are cut."""
     view = facts.view
     planes = [name for name, is_on in (("near", view.near_clip), ("far", view.far_clip)) if is_on]
     names = " and ".join(planes) + (" plane" if len(planes) == 1 else " planes") if planes else "the eye's plane"
@@ -189,7 +189,7 @@ def plan_clip(facts: Facts) -> Stage:
 
 
 def plan_arithmetic(facts: Facts) -> Stage:
-    """Tell how many bits the edge functions need."""
+    """Describe how many bits the edge functions need."""
     if facts.decided is not None:
         return plan_decisions(facts.decided)
     narrow, long = facts.count("tiny", "small", "middle", "rows"), facts.count("long", "edge 64", "span 64")
@@ -202,23 +202,23 @@ def plan_arithmetic(facts: Facts) -> Stage:
     return Stage("arithmetic", ", ".join(parts) or "none", why, rejected, timed_in="method")
 
 
-def plan_decisions(found: Decided) -> Stage:
-    """Tell how the samples of vertices that are not snapped were decided."""
-    parts = [f"{plural(found.n_asked, 'sample or row end')} in doubt"]
-    if found.n_on_grid:
-        parts.append(f"{plural(found.n_on_grid, 'triangle')} on 2**-8 px, without rounding")
-    if found.n_turns:
-        parts.append(f"the turn of {plural(found.n_turns, 'triangle')}")
+def plan_decisions(decided: Decided) -> Stage:
+    """Describe how the samples of vertices that are not snapped were decided."""
+    parts = [f"{plural(decided.n_asked, 'sample or row end')} in doubt"]
+    if decided.n_on_grid:
+        parts.append(f"{plural(decided.n_on_grid, 'triangle')} on 2**-8 px, without rounding")
+    if decided.n_turns:
+        parts.append(f"the turn of {plural(decided.n_turns, 'triangle')}")
     why = (
-        f"float32 and float64 lanes decide samples beyond their error; of the rest {found.n_expansions:,} signs took "
-        f"sums of several float64, {found.n_integers:,} integers of 2,176 bits"
+        f"float32 and float64 lanes decide samples beyond their error; of the rest {decided.n_expansions:,} signs took "
+        f"sums of several float64, {decided.n_integers:,} integers of 2,176 bits"
     )
     rejected = ("the exact sign for every sample: 10 to 1,000 times as long for the same picture",)
     return Stage("arithmetic", ", ".join(parts), why, rejected, timed_in="method")
 
 
 def plan_cull(facts: Facts) -> Stage:
-    """Tell which triangles draw nothing."""
+    """Describe which triangles draw nothing."""
     names = {"degenerate": "without area", "culled": "turned away", "outside": "outside of the picture",
              "between": "between the samples"}  # fmt: skip
     parts = [f"{facts.count(name):,} {text}" for name, text in names.items() if facts.count(name)]
@@ -248,7 +248,7 @@ METHOD_NAMES = {
 
 
 def plan_method(facts: Facts) -> Stage:
-    """Tell how triangles of each size find their samples."""
+    """Describe how triangles of each size find their samples."""
     view = facts.view
     n_pixels = view.size[0] * view.size[1]
     if view.sampling is Sampling.AREA:
@@ -271,7 +271,7 @@ def plan_method(facts: Facts) -> Stage:
 
 
 def plan_sink(facts: Facts) -> Iterator[Stage]:
-    """Tell about depth, sampling and attributes."""
+    """Describe depth, sampling and attributes."""
     view, n_pixels = facts.view, facts.view.size[0] * facts.view.size[1]
     yield plan_depth(facts)
     n = view.sampling.n_samples
@@ -299,7 +299,7 @@ def plan_sink(facts: Facts) -> Iterator[Stage]:
 
 
 def plan_depth(facts: Facts) -> Stage:
-    """Tell whether samples compare depths."""
+    """Describe whether samples compare depths."""
     what = SINKS[facts.drawing.sink] if facts.view.sampling is not Sampling.AREA else "a sum of areas a pixel"
     if facts.is_direct:
         what = "the colour of the later triangle a pixel"
@@ -328,7 +328,7 @@ def plan_depth(facts: Facts) -> Stage:
 
 
 def plan_threads(facts: Facts) -> Stage:
-    """Tell how many threads draw, and the work of each."""
+    """Describe how many threads draw, and the work of each."""
     view, n = facts.view, facts.n_triangles
     n_threads, usable = facts.drawing.n_threads, available_threads()
     costs = cost_table()
@@ -354,10 +354,10 @@ def plan_threads(facts: Facts) -> Stage:
 
 
 def plan_memory(facts: Facts) -> Stage:
-    """Tell which memory is allocated."""
+    """Describe which memory is allocated."""
     scratch, results = memory_of(facts)
-    kept, made = sum(scratch.values()), sum(results.values())
+    kept, returned = sum(scratch.values()), sum(results.values())
     parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)
     rejected = ("fresh memory for each frame: its first touch takes longer; a Rasterizer keeps it",)
-    choice = f"{megabytes(kept)} of scratch, {megabytes(made)} of results, {megabytes(kept + made)} at most"
+    choice = f"{megabytes(kept)} of scratch, {megabytes(returned)} of results, {megabytes(kept + returned)} at most"
     return Stage("memory", choice, parts, rejected)

@@ -10,7 +10,7 @@ from typing import Any
 WIDTH = 110
 INDENT = " " * 12
 
-#: Stages whose time contains that of others.
+#: Stages whose time contains the time of other stages.
 WHOLE = ("snap", "method")
 
 
