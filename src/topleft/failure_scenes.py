@@ -1,4 +1,4 @@
-"""Small scenes on which methods fail, with the right picture and those that the methods draw.
+"""Small scenes on which methods fail, with the right picture and the pictures of the methods.
 
 They stand in failure_scenes.json: the first failure of each method along the families of the atlas
 (docs/measured/atlas.md), triangles left out and coordinates rounded as far as it stayed;
@@ -40,7 +40,7 @@ class Got:
 
 @dataclass(frozen=True, slots=True)
 class FailureScene:
-    """Triangles, a window, the picture that it must hold, and those of the methods that fail.
+    """Triangles, a window, its right picture, and the pictures of the methods that fail.
 
     Attributes
     ----------
@@ -92,8 +92,8 @@ def picture(rows: str) -> npt.NDArray[np.int32]:
 
 
 def scene_of(row: Mapping[str, Any]) -> FailureScene:
-    """Return a scene from the JSON object that `dataclasses.asdict` made of it."""
-    got = tuple(Got(**one) for one in row["got"])
+    """Return a scene from the JSON object of `dataclasses.asdict`."""
+    got = tuple(Got(**picture) for picture in row["got"])
     points, triangles = (tuple(map(tuple, row[name])) for name in ("points", "triangles"))
     size, origin = (tuple(row[name]) for name in ("size", "origin"))
     fields = {"points": points, "triangles": triangles, "size": size, "origin": origin, "got": got}

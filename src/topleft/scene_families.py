@@ -1,7 +1,7 @@
-"""Families of scenes for the atlas: one or two parameters each, from scenes that all methods draw to those that few do.
+"""Families of scenes for the atlas, by one or two parameters, from scenes that all methods draw to the hardest.
 
 Every scene of a family is a mesh without gaps that covers its frame, so a method has to draw each pixel once. Corners
-come from a seeded generator and the four operations and roots of IEEE arithmetic alone: the same bits on every machine.
+come from a seeded generator and only the four operations and roots of IEEE arithmetic: equal bits on every machine.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MIDDLE_PX = 512.0
 
 
 class PixelScene(NamedTuple):
-    """Triangles in pixels and the window that is drawn; `copies` times the same, one over the other."""
+    """Triangles in pixels and the window to draw; the triangles are drawn `copies` times, one over the other."""
 
     vertices: F64
     triangles: I32
@@ -38,7 +38,7 @@ class PixelScene(NamedTuple):
 
 @dataclass(frozen=True)
 class Axis:
-    """One parameter: its name and the values, from mild to harsh, as they are written."""
+    """A parameter: its name, and the values by their texts, from mild to harsh."""
 
     what: str
     values: dict[str, Any]

@@ -27,7 +27,7 @@ GOLDEN_RATIO = (1 + 5**0.5) / 2
 
 
 def large_triangle(width: int = 3840, height: int = 2160) -> Shape:
-    """One triangle that covers about half of the frame.
+    """A triangle that covers about half of the frame.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def random_triangles(
 
     Returns
     -------
-    vertices : (3 n, 3) float64, x and y in pixels, z in (0, 1), the same for the three corners
+    vertices : (3 n, 3) float64, x and y in pixels, z in (0, 1), equal for the three corners
     triangles : (n, 3) int32
     colors : (n, 3) uint8
     """
@@ -75,7 +75,7 @@ def random_triangles(
 
 
 def planar_mesh(n_points: int, width: int = 1920, height: int = 1080, seed: int = 2) -> Shape:
-    """A Delaunay triangulation that tiles the whole frame: each pixel belongs to exactly one triangle.
+    """A Delaunay triangulation that tiles the whole frame: each pixel is covered by exactly one triangle.
 
     Needs scipy, of the extras `test` and `bench`.
 
@@ -100,7 +100,7 @@ def _check_frame(width: float, height: float) -> None:
 
 
 TUTORIAL_SIZE = (640, 400)
-"""Width and height of the frame that the tutorial scenes are made for."""
+"""Width and height of the frame of the tutorial scenes."""
 
 _TUTORIAL_TRIANGLES = {
     "wide": [(10, 190), (630, 180), (300, 240)],
@@ -135,7 +135,7 @@ def square_of_four() -> Shape:
 def composite_triangle(*, major: str = "right") -> Shape:
     """A triangle cut at its middle vertex into a flat bottom and a flat top, which share the edge in row 70.
 
-    Scanline fillers call it composite, and draw it as these two; its long edge, the major one, is on the right or on
+    Scanline fillers call it composite, and draw it as two flat triangles; its long (major) edge is on the right or on
     the left.
     """
     x = np.array([70.0, 50, 80, 100])  # the top, the middle vertex, the cut of the long edge, the bottom
@@ -194,7 +194,7 @@ def blob(n_triangles: int, seed: int = 3) -> Shape:  # noqa: ARG001
     Returns
     -------
     vertices : (m, 3) float64, object space
-    triangles : (k, 3) int32; those at the poles have no area
+    triangles : (k, 3) int32; triangles at the poles have no area
     """
     columns = max(8, round(math.sqrt(n_triangles)))
     rows = max(4, n_triangles // (2 * columns))
@@ -211,7 +211,7 @@ def blob(n_triangles: int, seed: int = 3) -> Shape:  # noqa: ARG001
 
 
 def _smooth_blob(n_triangles: int = 20_000) -> Shape:
-    """The blob with one vertex at either pole and no empty triangles, for shading."""
+    """The blob with a vertex at either pole and no empty triangles, for shading."""
     vertices, triangles = blob(n_triangles)
     columns = int(triangles[0, 2])  # the second row starts below vertex 0
     remap = np.arange(len(vertices))
@@ -358,7 +358,7 @@ def shape(name: str, **parameters: Any) -> Shape:
     Parameters
     ----------
     name : str
-        One of `SHAPES`.
+        A name of `SHAPES`.
     **parameters
         Parameters of the function of that name, `segments=` for the torus, say.
 

@@ -1,4 +1,4 @@
-"""Turns its input into content of the page: arrays, a mesh, a file, the name of a scene, or a link that was copied."""
+"""Converts arrays, a mesh, a file, the name of a scene, or a copied link to the content of the page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from topleft.annex.files import Budget, arrays_of
 from topleft.errors import MeshError
 
 MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000
-"""Of what is drawn magnified."""
+"""Limits of scenes that are drawn magnified."""
 
 BASICS = {
     "shared-edge": "two triangles that share an edge through pixel centres",
@@ -45,24 +45,24 @@ FAMILIES = {
 }  # fmt: skip
 
 SCENES: tuple[str, ...] = (*BASICS, *FANS, *SPLITS, *failure_scenes.FAILURE_SCENES)
-"""Names of what is drawn magnified, in the order of the page."""
+"""Names of the scenes that are drawn magnified, in the order of the page."""
 
 
 def scene_groups() -> list[list[Any]]:
-    """All scenes as the page lists them: [heading, [[name, what it shows], ...]] each."""
+    """The scenes in the order of the page: [heading, [[name, description], ...]] each."""
     failures = {
-        name: f"{KINDS[one.kind]}: {FAMILIES[one.family].format(one.value)}"
-        for name, one in failure_scenes.FAILURE_SCENES.items()
+        name: f"{KINDS[failure.kind]}: {FAMILIES[failure.family].format(failure.value)}"
+        for name, failure in failure_scenes.FAILURE_SCENES.items()
     }
     groups = {"basics": BASICS, "fans": FANS, "splits": SPLITS, "failures of methods": failures}
-    return [[heading, [[name, told] for name, told in rows.items()]] for heading, rows in groups.items()]
+    return [[heading, [[name, text] for name, text in rows.items()]] for heading, rows in groups.items()]
 
 
 SHARED_EDGE = {
     "vertices": [[2.5, 2.5], [13.5, 1.5], [3.5, 11.5], [12.5, 10.5]], "triangles": [[0, 1, 2], [1, 3, 2]],
     "size": [16, 13], "origin": [0, 0], "other": "bresenham_scanline", "exact": True,
 }  # fmt: skip
-"""What the page begins with: an edge through pixel centres, and what one classic makes of it."""
+"""The first scene of the page: an edge through pixel centres, and the classic to compare with."""
 
 REDUCTION, THIN_PX = 10, 10
 PRESET_SIZE = (scenes.TUTORIAL_SIZE[0] // REDUCTION, scenes.TUTORIAL_SIZE[1] // REDUCTION)
@@ -70,7 +70,7 @@ MARGIN_PX = 3
 
 
 def content_of(vertices: Any, triangles: ArrayLike | None, size: Any) -> Content:
-    """Return what `topleft.explore` shows of its arguments."""
+    """Return the content for the arguments of `topleft.explore`."""
     if vertices is None and triangles is None:
         return content_of_name(SCENES[0])
     if triangles is not None:
@@ -82,7 +82,7 @@ def content_of(vertices: Any, triangles: ArrayLike | None, size: Any) -> Content
 
 
 def content_of_name(name: str, size: Any = None) -> Content:
-    """Return what stands behind a word of the command line."""
+    """Return the content for a word of the command line: a link, a scene, a shape or a file."""
     if "#" in name and (name.startswith(("#", "http://127.0.0.1:", "http://localhost:", "http://[::1]:"))):
         return Content(fragment=name.partition("#")[2])
     if name in SCENES:
@@ -98,11 +98,11 @@ def content_of_name(name: str, size: Any = None) -> Content:
 
 
 def content_of_arrays(path: Path, size: Any) -> Content:
-    """Return what an .npz file with `vertices`, `triangles` and maybe `size` holds: pixels, or a mesh."""
+    """Return the content of an .npz file with `vertices`, `triangles` and maybe `size`: pixels, or a mesh."""
     try:
         with arrays_of(path, Budget(str(path))) as array:
-            found = {name: array(name) for name in ("vertices", "triangles", "size")}
-            arrays = {name: own for name, own in found.items() if own is not None}
+            named = {name: array(name) for name in ("vertices", "triangles", "size")}
+            arrays = {name: value for name, value in named.items() if value is not None}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         if isinstance(error, FileNotFoundError) or repr(str(path)) in str(error):
             raise
@@ -118,7 +118,7 @@ def content_of_arrays(path: Path, size: Any) -> Content:
 
 
 def magnified(vertices: ArrayLike, triangles: ArrayLike, size: Any) -> dict[str, Any]:
-    """Return arrays as the page holds them, after every check."""
+    """Return arrays as a state of the page, after every check."""
     points = as_vertices(vertices, has_transform=False).astype(np.float64)
     if points.shape[1] > 3:
         raise ValueError(f"vertices must be in pixels, (V, 2) or (V, 3), got shape {points.shape}")
@@ -152,21 +152,20 @@ def window_of(points: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, 
 
 
 def scene(name: str) -> dict[str, Any]:
-    """Return a named scene as the page holds it.
+    """Return a named scene as a state of the page.
 
-    A single triangle of the tutorials is shown at a tenth of its size; along an axis on which it is thin it keeps what
-    it measures.
+    A single triangle of the tutorials is shown at a tenth of its size, except along an axis on which it is thin.
     """
     if name == SCENES[0]:
         return dict(SHARED_EDGE)
     if name in failure_scenes.FAILURE_SCENES:
-        found = failure_scenes.FAILURE_SCENES[name]
-        origin, size = window_of(found.shape()[0])
+        bad = failure_scenes.FAILURE_SCENES[name]
+        origin, size = window_of(bad.shape()[0])
         if max(size) > PRESET_SIZE[0]:
-            origin, size = found.origin, found.size
-        wrong = [one for one in found.got if one.subpixel_bits == found.subpixel_bits] or list(found.got)
+            origin, size = bad.origin, bad.size
+        wrong = [drawn for drawn in bad.got if drawn.subpixel_bits == bad.subpixel_bits] or list(bad.got)
         return {
-            "vertices": [list(point) for point in found.points], "triangles": [list(row) for row in found.triangles],
+            "vertices": [list(point) for point in bad.points], "triangles": [list(row) for row in bad.triangles],
             "size": list(size), "origin": list(origin), "method": wrong[0].method,
             "subpixel_bits": wrong[0].subpixel_bits, "exact": True,
         }  # fmt: skip

@@ -1,7 +1,7 @@
-"""Draws for the page: what methods draw of triangles, how often and how fast, and the steps of a method.
+"""Draws for the page: the triangles that methods show, counts of coverage, times, and the steps of a method.
 
-In: a question of page/engine.js, its numbers as bytes. Out: arrays. In a page without Python a worker with the kernels
-in WebAssembly answers the same questions with the same arrays (page/local.js).
+In: a request of page/engine.js, its numbers as bytes. Out: arrays. In a page without Python a worker with the kernels
+in WebAssembly answers these requests with equal arrays (page/local.js).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from topleft.methods import CLASSICS, METHODS, find_method
 from topleft.methods.classics import classic_kernels
 
 MAX_DRAWN = 1 << 18
-"""Triangles of a drawing, with their copies."""
+"""The most triangles of a drawing, with their copies."""
 
 MAX_STEPS = 40_000
-"""Of a trace: 10 MB on the way to the page."""
+"""The most steps of a trace: 10 MB to send to the page."""
 
 MAX_SUBPIXELS = 2**60
-"""Of a vertex that is traced: sums of products of its coordinates have 128 bits."""
+"""The bound of vertices that are traced: sums of products of their coordinates have 128 bits."""
 
 HEAD_WORDS, MOST_WORDS = 6, 24
 """Words of a step before its numbers, and with them; the set-up of a triangle has up to twice as many."""
@@ -40,17 +40,17 @@ class MethodDrawing:
     vertices: NDArray[np.float64]  # (V, 2) or (V, 3)
     triangles: NDArray[np.int32]  # (T, 3)
     size: tuple[int, int]
-    options: dict[str, Any]  # origin, method, subpixel_bits, sampling and cull, as verbs take them
+    options: dict[str, Any]  # origin, method, subpixel_bits, sampling and cull, as for `rasterize`
     depth_test: Any = "less"
     is_wireframe: bool = False
 
     @property
     def is_coverage(self) -> bool:
-        """Whether a picture of it holds coverage alone."""
+        """Whether a picture of the drawing holds only coverage."""
         return self.options.get("sampling") in ("area", "outer", "inner")
 
     def count(self) -> NDArray[Any]:
-        """Return how many triangles cover each pixel or sample; with areas, the sum of what they cover."""
+        """Return how many triangles cover each pixel or sample; with areas, the sum of the covered areas."""
         return overdraw(self.vertices, self.triangles, self.size, **self.options)
 
     def show(self) -> NDArray[Any]:
@@ -66,7 +66,7 @@ class MethodDrawing:
         return frags.samples_triangle
 
     def draw(self) -> tuple[NDArray[Any], NDArray[Any], float]:
-        """Return what shows, int32, or float32 of coverage and lines; counts; and the seconds of what shows."""
+        """Return `show` as int32, or float32 for coverage and lines; `count`; and the seconds of `show`."""
         counts = self.show() if self.is_wireframe else self.count()  # the first call imports kernels, touches memory
         start = time.perf_counter()
         shown = self.show()
@@ -76,7 +76,7 @@ class MethodDrawing:
 
 
 def drawings_of(request: Request) -> list[MethodDrawing]:
-    """Return what a question asks for; each of its `drawings` has `triangles`, which part of the question they are."""
+    """Return the drawings of a request; `triangles` of each of its `drawings` is the index of a part of the request."""
     size = as_size(request["size"], smallest=1)
     if max(size) > MAX_SIDE_PX:
         raise ValueError(f"size must be at most {MAX_SIDE_PX} pixels a side, got {size}")
@@ -84,27 +84,27 @@ def drawings_of(request: Request) -> list[MethodDrawing]:
     copies = int(request.get("copies", 1))
     vertices = part_of(request, 0, np.float64, request["n_components"])
     drawings = []
-    for asked in request["drawings"]:
-        triangles = part_of(request, asked["triangles"], np.int32, 3)
+    for spec in request["drawings"]:
+        triangles = part_of(request, spec["triangles"], np.int32, 3)
         if not 0 <= copies * len(triangles) <= MAX_DRAWN:
             raise ValueError(f"at most {MAX_DRAWN} triangles are drawn, got {copies} times {len(triangles)}")
-        options = {name: asked[name] for name in ("method", "subpixel_bits", "sampling", "cull") if name in asked}
+        options = {name: spec[name] for name in ("method", "subpixel_bits", "sampling", "cull") if name in spec}
         drawings.append(
             MethodDrawing(
                 vertices, np.tile(triangles, (copies, 1)), size, {"origin": (x, y), "method": "auto"} | options,
-                asked.get("depth_test", "less"), bool(asked.get("is_wireframe", False)),
+                spec.get("depth_test", "less"), bool(spec.get("is_wireframe", False)),
             )
         )  # fmt: skip
     return drawings
 
 
 def part_of(request: Request, i: int, kind: DTypeLike, n_columns: int) -> NDArray[Any]:
-    """Return a copy of the rows of numbers that a part of a question holds."""
+    """Return a copy of the rows of numbers in a part of a request."""
     return np.frombuffer(request["parts"][i], kind).reshape(-1, n_columns).copy()
 
 
 def draw(_: Session, request: Request) -> Reply:
-    """Answer the page: `shown` and `counts` of each drawing by its number, or why its method refuses it."""
+    """Answer the page: `shown` and `counts` of each drawing by its number, or the error of its method."""
     drawn: list[dict[str, Any]] = []
     arrays: dict[str, NDArray[Any] | bytes] = {}
     for i, drawing in enumerate(drawings_of(request)):
@@ -118,7 +118,7 @@ def draw(_: Session, request: Request) -> Reply:
 
 
 def trace(_: Session, request: Request) -> Reply:
-    """Answer the page: how many steps a method takes, their words as steps.h describes them, and counts."""
+    """Answer the page: how many steps a method takes, their words in the format of steps.h, and counts."""
     (drawing,) = drawings_of(request)
     (x, y), method = drawing.options["origin"], find_method(drawing.options["method"])
     if method.name == "auto":

@@ -1,4 +1,4 @@
-"""Writes what the page draws: PNG, SVG, Python code that draws the same, a test case; and the plan of it."""
+"""Exports a drawing of the page: PNG, SVG, Python code of the drawing, a test case; and explains its plan."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def export(_: Session, request: Request) -> Reply:
 
 
 def as_file(name: str, kind: str, content: bytes) -> Reply:
-    """A file as an answer."""
+    """The reply that holds a file."""
     return Reply({"name": name, "type": kind}, {"content": content})
 
 
@@ -52,9 +52,9 @@ def write_grid(drawing: MethodDrawing, pixels: NDArray[np.uint8], path: Path) ->
 
 
 def code(drawing: MethodDrawing) -> str:
-    """Return a program that draws the same.
+    """Return a program of the drawing.
 
-    Its `owners` are what `draw` gives, (H, W) or (H, W, S), or the coverage (H, W) of areas and squares.
+    Its `owners` equal the result of `MethodDrawing.draw`, (H, W) or (H, W, S), or the coverage (H, W).
     """
     lines = ["import numpy as np", "", "import topleft as tl", "", *arrays(drawing), *call(drawing)]
     name = "coverage" if drawing.is_coverage else "owners"
@@ -70,7 +70,7 @@ def code(drawing: MethodDrawing) -> str:
 
 
 def arrays(drawing: MethodDrawing) -> list[str]:
-    """The lines that make the arrays: numbers as they are, to the last bit."""
+    """The lines that create the arrays: numbers exact to the last bit."""
     points = [f"    {row!r}," for row in drawing.vertices.tolist()]
     corners = [f"    {row!r}," for row in drawing.triangles.tolist()]
     columns = drawing.vertices.shape[1]
@@ -84,24 +84,24 @@ def call(drawing: MethodDrawing) -> list[str]:
     """The lines that draw, without options that are the usual ones."""
     usual = {"origin": (0, 0), "method": "auto", "subpixel_bits": 8, "sampling": "center", "cull": "none"}
     options = {name: value for name, value in drawing.options.items() if value != usual[name]}
-    given = "".join(f", {name}={value!r}" for name, value in options.items())
+    arguments = "".join(f", {name}={value!r}" for name, value in options.items())
     size = f"({drawing.size[0]}, {drawing.size[1]})"
     if drawing.is_coverage:
-        return [f"coverage = tl.coverage(vertices, triangles, {size}{given})"]
+        return [f"coverage = tl.coverage(vertices, triangles, {size}{arguments})"]
     if drawing.options["method"] in CLASSICS:
         return [
             "numbers = np.arange(len(triangles), dtype=np.float32)[:, None]",
-            f"drawn = tl.fill(vertices, triangles, numbers, {size}, background=[-1.0]{given})",
+            f"drawn = tl.fill(vertices, triangles, numbers, {size}, background=[-1.0]{arguments})",
             "owners = drawn[..., 0].astype(np.int32)",
         ]
     is_tested = drawing.vertices.shape[1] == 3 and drawing.depth_test != "less"
     tested = f', depth_test="{drawing.depth_test}"' if is_tested else ""
     which = "samples_triangle" if "sampling" in options else "triangle"
-    return [f"owners = tl.rasterize(vertices, triangles, {size}{tested}{given}).{which}"]
+    return [f"owners = tl.rasterize(vertices, triangles, {size}{tested}{arguments}).{which}"]
 
 
 def test_case(drawing: MethodDrawing) -> str:
-    """Return a test that holds a method to the exact picture, which stands in it."""
+    """Return a test that compares a method with the exact picture, which the test contains."""
     if drawing.options.get("sampling", "center") != "center":
         raise ValueError("a test case is of pixel centres: choose the sampling 'center'")
     options = {**drawing.options, "method": "auto", "subpixel_bits": "exact"}
@@ -118,7 +118,7 @@ def test_case(drawing: MethodDrawing) -> str:
 
 
 def rows_of(owners: NDArray[np.int32]) -> list[str]:
-    """Owners as text, a sign a pixel."""
+    """Ids as text, a sign a pixel."""
     return ["".join(SIGNS[min(i, 35) + 1] for i in row) for row in owners.tolist()]
 
 
@@ -128,8 +128,8 @@ def explain(_: Session, request: Request) -> Reply:
     if classic := CLASSICS.get(drawing.options["method"]):
         return Reply({"text": f"{classic.name}: {classic.summary}.\n{classic.source}.\n\nA classic needs no plan."})
     outputs = "coverage" if drawing.is_coverage else "triangle"
-    found = plan(drawing.vertices, drawing.triangles, drawing.size, outputs=outputs, **drawing.options)
-    return Reply({"text": found.explain()})
+    drawing_plan = plan(drawing.vertices, drawing.triangles, drawing.size, outputs=outputs, **drawing.options)
+    return Reply({"text": drawing_plan.explain()})
 
 
 HANDLERS = {"pixels.export": export, "pixels.plan": explain}

@@ -1,6 +1,6 @@
-"""Lists what a page may ask, and answers it: a mistake is answered by a sentence.
+"""Answers the requests of a page; the reply to a wrong request is a sentence.
 
-A part of the page has a file of its own with its `HANDLERS`, by the words that its questions begin with.
+Each part of the page has a file with its `HANDLERS`, by the name of the request.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from topleft.typing import CullOption, DepthTestOption, SamplingOption
 
 
 def hello(session: Session, _: Request) -> Reply:
-    """What the page starts with."""
+    """Return the content, scenes, methods and limits for a page that opens."""
     content = session.content
-    given = content.pixels or {**scene(SCENES[0]), "scene": SCENES[0]}
+    pixels = content.pixels or {**scene(SCENES[0]), "scene": SCENES[0]}
     return Reply(
         {
             "tab": content.tab,
             "name": content.name,
             "fragment": content.fragment,
-            "pixels": given,
+            "pixels": pixels,
             "scenes": SCENES,
             "groups": scene_groups(),
             "methods": methods(),
@@ -46,11 +46,11 @@ def hello(session: Session, _: Request) -> Reply:
 
 
 def methods() -> list[dict[str, Any]]:
-    """All methods, as the page lists them."""
+    """All methods, in the order of the page."""
     return [
-        {"name": one.name, "summary": one.summary, "source": one.source, "is_classic": one.name in CLASSICS,
-         "has_bits": one.has_subpixel_bits, "is_integer": one.claims.integer_vertices}
-        for one in (*METHODS.values(), *CLASSICS.values())
+        {"name": method.name, "summary": method.summary, "source": method.source, "is_classic": method.name in CLASSICS,
+         "has_bits": method.has_subpixel_bits, "is_integer": method.claims.integer_vertices}
+        for method in (*METHODS.values(), *CLASSICS.values())
     ]  # fmt: skip
 
 
@@ -60,7 +60,7 @@ def take_scene(_: Session, request: Request) -> Reply:
 
 
 def take_vertices(session: Session, request: Request) -> Reply:
-    """Keep the vertices that a page has moved."""
+    """Store the vertices that a page has moved."""
     vertices = np.array(request["vertices"], np.float64)
     if vertices.size and (vertices.ndim != 2 or vertices.shape[1] not in (2, 3)):
         raise ValueError(f"vertices must have a row of two or three numbers each, got shape {vertices.shape}")
@@ -77,11 +77,11 @@ HANDLERS: dict[str, Handler] = {
     **mesh_view.HANDLERS,
     **race.HANDLERS,
 }
-"""By what a page says in "do"."""
+"""The handlers, by "do" of the request."""
 
 
 def answer(session: Session, request: Request) -> Reply:
-    """Return what a page gets for a question: its answer, or the sentence that says what is wrong with it."""
+    """Return the reply to a request: of its handler, or a sentence with the error."""
     name, header = request.get("do"), {"id": request.get("id")}
     if not isinstance(header["id"], int):
         return Reply({"id": None, "error": "a question must have a number as its id"})
@@ -93,13 +93,13 @@ def answer(session: Session, request: Request) -> Reply:
         return Reply({**header, "error": sentence(error)})
     except KeyError as error:
         return Reply({**header, "error": f"the question must hold {error}"})
-    except Exception as error:  # a fault of ours: the page says so, the terminal where
+    except Exception as error:  # a bug: the page shows a sentence, the terminal the traceback
         traceback.print_exc(file=sys.stderr)
         return Reply({**header, "error": f"a fault of the explorer, see the terminal: {sentence(error)}"})
     return Reply({**reply.header, **header}, reply.arrays)
 
 
 def sentence(error: BaseException) -> str:
-    """One line of what an error says."""
-    told: Any = str(error) or "not enough memory" if isinstance(error, MemoryError) else str(error)
-    return " ".join((told or type(error).__name__).split())[:400]
+    """The message of an error in a line."""
+    text: Any = str(error) or "not enough memory" if isinstance(error, MemoryError) else str(error)
+    return " ".join((text or type(error).__name__).split())[:400]

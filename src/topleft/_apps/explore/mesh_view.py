@@ -1,7 +1,7 @@
-"""Draws the view of a mesh that a page asks for: pictures, layers, the triangle under the pointer, the plan, files.
+"""Draws the view of a mesh for a page: pictures, layers, the triangle under the pointer, the plan, files.
 
-In: where the eye orbits, and how the mesh is to look. Out: RGBA pixels of the part of the frame that the mesh can
-cover, as they are; or, while it turns, as a JPEG, which a browser has sooner.
+In: the orbit of the eye, and the look of the mesh. Out: RGBA pixels of the part of the frame that the mesh can cover,
+uncompressed, or, while the view turns, as a JPEG, which a browser shows sooner.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from topleft.scenes import SHAPES, shape
 from topleft.typing import CullOption, SamplesOption, UpOption
 
 MAX_SIDE_PX, MAX_PIXELS = 8192, 2**23
-"""Of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""
+"""Limits of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""
 
 MAX_VERTICES = 20_000_000
-"""Of a file that is dropped on the page: a gigabyte of memory."""
+"""The most vertices of a file that is dropped on the page: a gigabyte of memory."""
 
 FIRST_SHAPE = "torus-knot"
 
 SHADINGS = ("smooth", "flat", "unlit", "normals", "depth")
 LAYERS = (*SHADINGS, "triangle", "cluster", "overdraw", "uv")
-"""What a frame shows: the shadings of `render`, and pictures of numbers."""
+"""The layers of a frame: the shadings of `render`, and pictures of numbers."""
 
 LIGHTS: dict[str, tuple[Light, ...] | None] = {
     "headlight": None,
@@ -56,7 +56,7 @@ LIGHTS: dict[str, tuple[Light, ...] | None] = {
 }
 
 AT_REST = "at rest"
-"""A sampling: several samples, but where a view moves."""
+"""A sampling: several samples, except while a view moves."""
 
 CONTROLS: dict[str, list[tuple[str, str, list[tuple[Any, str]] | None]]] = {
     "Look": [
@@ -75,13 +75,13 @@ CONTROLS: dict[str, list[tuple[str, str, list[tuple[Any, str]] | None]]] = {
         ("turn by itself", "spin", None),
     ],
 }  # fmt: skip
-"""What a page lets choose: label, name in the view, values and their texts; None is yes or no."""
+"""The controls of a page: label, field of `MeshView`, values and their texts; None is a check box."""
 
 HEAT = np.array([
     (0, 0, 0, 0), (255, 255, 204, 255), (199, 233, 180, 255), (127, 205, 187, 255), (65, 182, 196, 255),
     (29, 145, 192, 255), (34, 94, 168, 255), (37, 52, 148, 255), (8, 29, 88, 255),
 ], np.uint8)  # fmt: skip
-"""Colours of counts 0, 1, 2, 3-4, 5-8, ... and more: light to dark, which all eyes see. ColorBrewer's YlGnBu."""
+"""Colours of counts 0, 1, 2, 3-4, 5-8, ... and more: light to dark, also for the colour-blind. ColorBrewer's YlGnBu."""
 
 HEAT_STARTS = (1, 2, 3, 5, 9, 17, 33, 65)
 HEAT_LABELS = ("1", "2", "3-4", "5-8", "9-16", "17-32", "33-64", "65 and more")
@@ -94,12 +94,12 @@ WORDS = {
     "cull": get_args(CullOption),
     "sampling": get_args(SamplesOption),
 }
-"""What fields of `MeshView` may say; a job file holds it between quotes."""
+"""The values of text fields of `MeshView`; a job file quotes them."""
 
 
 @dataclass(frozen=True)
 class MeshView:
-    """What a page asks to see; lights, edges, sampling, tolerance and cull are those of `render`."""
+    """A view of a page; lights, edges, sampling, tolerance and cull as for `render`."""
 
     size: tuple[int, int]  # pixels
     azimuth: float = 35.0  # degrees, as for `Camera.framing`
@@ -118,19 +118,19 @@ class MeshView:
     @classmethod
     def parse(cls, request: Request) -> MeshView:
         """Return the view of a request, checked."""
-        given = {name: request[name] for name in cls.__dataclass_fields__ if name in request}
-        if given.get("sampling") == AT_REST:
-            given["sampling"] = "center" if "background" in request else "msaa4"
+        fields = {name: request[name] for name in cls.__dataclass_fields__ if name in request}
+        if fields.get("sampling") == AT_REST:
+            fields["sampling"] = "center" if "background" in request else "msaa4"
         for name in ("azimuth", "elevation", "zoom", "fov", "tolerance"):
-            if name in given and not math.isfinite(as_number(name, given[name])):
-                raise ValueError(f"{name} must be finite, got {given[name]}")
-        size = tuple(int(n) for n in given["size"])
+            if name in fields and not math.isfinite(as_number(name, fields[name])):
+                raise ValueError(f"{name} must be finite, got {fields[name]}")
+        size = tuple(int(n) for n in fields["size"])
         if len(size) != 2 or not 1 <= min(size) <= max(size) <= MAX_SIDE_PX or size[0] * size[1] > MAX_PIXELS:
             raise ValueError(f"size must be two numbers of 1 to {MAX_SIDE_PX}, {MAX_PIXELS} pixels, got {size}")
-        pan = tuple(float(x) for x in given.get("pan", (0.0, 0.0)))
+        pan = tuple(float(x) for x in fields.get("pan", (0.0, 0.0)))
         if len(pan) != 2 or not all(abs(x) < 1e6 for x in pan):
             raise ValueError(f"pan must be two numbers, got {pan}")
-        view = cls(**{**given, "size": size, "pan": pan})
+        view = cls(**{**fields, "size": size, "pan": pan})
         for name, words in WORDS.items():
             check_choice(name, getattr(view, name), words)
         if not 1e-3 <= view.zoom <= 1e4:
@@ -157,7 +157,7 @@ class MeshView:
         return Camera.perspective(matrix, near=near, far=far, fov_y_deg=self.fov)
 
     def look(self) -> dict[str, Any]:
-        """Return the options of `render` that say how it looks."""
+        """Return the options of `render` for the look of the view."""
         look: dict[str, Any] = {"shading": self.layer} if self.layer in SHADINGS else {}
         if self.lights != "headlight" and self.layer in ("smooth", "flat"):
             look["lights"] = LIGHTS[self.lights]
@@ -168,14 +168,14 @@ class MeshView:
         return look | self.drawn_options()
 
     def drawn_options(self) -> dict[str, Any]:
-        """Return the options that say what is drawn."""
+        """Return the options that select triangles."""
         options: dict[str, Any] = {"tolerance": float(self.tolerance)} if self.tolerance else {}
         return options | ({"cull": self.cull} if self.cull != "none" else {})
 
 
 @dataclass
 class Shown:
-    """The mesh of a page, and what is kept from frame to frame."""
+    """The mesh of a page, and memory that frames reuse."""
 
     mesh: Mesh
     name: str
@@ -184,14 +184,14 @@ class Shown:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def rasterizer_of(self, size: tuple[int, int]) -> Rasterizer:
-        """Return memory for pictures of that size."""
+        """Return the rasterizer for pictures of a size."""
         if self.rasterizer is None or self.rasterizer.size != size:
             self.rasterizer = Rasterizer(size)
         return self.rasterizer
 
 
 def shown_in(session: Session) -> Shown:
-    """Return the mesh of a page: a shape of the library where it has none."""
+    """Return the mesh of a page: a shape of the library where the page has no mesh."""
     shown = session.kept.get("mesh")
     if shown is None:
         mesh, name = session.content.mesh, session.content.name
@@ -202,7 +202,7 @@ def shown_in(session: Session) -> Shown:
 
 
 def load_bytes(data: bytes | memoryview, name: str) -> tuple[Mesh, list[str]]:
-    """Return the mesh in the bytes of a file, and what it lacks; the end of the name tells the format."""
+    """Return the mesh in the bytes of a file, and warnings; the suffix of the name is the format."""
     suffix = Path(name).suffix.lower()
     if not suffix[1:].isalnum() or len(suffix) > 12:
         raise MeshError(f"the end of the name must tell the format, as in bunny.ply, got {name[-40:]!r}")
@@ -215,14 +215,14 @@ def load_bytes(data: bytes | memoryview, name: str) -> tuple[Mesh, list[str]]:
                 mesh = load(path, max_vertices=MAX_VERTICES if len(data) > MAX_VERTICES else None)
             except MeshError as error:
                 raise MeshError(str(error).replace(str(path), Path(name).name)) from None
-        lacks = [str(one.message).replace(str(path), Path(name).name) for one in caught]
+        lacks = [str(warning.message).replace(str(path), Path(name).name) for warning in caught]
     if not isinstance(mesh, Mesh):
         raise MeshError(f"{Path(name).name!r} holds points and no triangles; topleft.render draws them")
     return mesh, lacks
 
 
 def draw(shown: Shown, view: MeshView, background: Color = (0, 0, 0, 0)) -> U8:
-    """Return the picture (H, W, 4) of a view; `background` is where nothing is."""
+    """Return the picture (H, W, 4) of a view; `background`: the colour where no triangle is."""
     mesh, camera, size = shown.mesh, view.camera(shown.mesh), view.size
     memory = shown.rasterizer_of(size)
     if view.layer in SHADINGS:
@@ -248,12 +248,12 @@ def draw(shown: Shown, view: MeshView, background: Color = (0, 0, 0, 0)) -> U8:
 
 
 def heat_classes() -> U8:
-    """The colour of each count, the last one of all that are larger."""
+    """The row of HEAT for each count, the last row for all larger counts."""
     return np.searchsorted(HEAT_STARTS, np.arange(HEAT_STARTS[-1] + 1), side="right").astype(np.uint8)
 
 
 def table_of(shown: Shown, view: MeshView, n: int) -> NDArray[np.uint32]:
-    """Return a colour for each triangle, or each cluster of them, and a last one for none, as uint32."""
+    """Return a colour for each triangle, by its id or its cluster, and a last row for no triangle, as uint32."""
     key = view.layer if not view.tolerance else f"{view.layer}, levels"
     if key not in shown.colors:
         names: NDArray[Any] = np.arange(n)
@@ -281,7 +281,7 @@ def uv_colors(uv: NDArray[np.float32], background: Color) -> U8:
 
 
 def box_of(mesh: Mesh, camera: Camera, size: tuple[int, int]) -> tuple[int, int, int, int]:
-    """Return x, y, width and height of pixels that hold all that can show: all of them where the mesh is all round."""
+    """Return x, y, width and height of the pixels that the mesh can cover: all where it surrounds the eye."""
     corners = box_corners(ends_to_frame(mesh)) @ camera.view[:3, :3].T + camera.view[:3, 3]
     width, height = size
     if camera.projection[3, 2] and corners[:, 2].max() >= -1e-6 * abs(corners[:, 2].min()):
@@ -301,11 +301,11 @@ def as_jpeg(pixels: U8) -> bytes:
     return out.getvalue()
 
 
-# What a page asks
+# The requests of a page
 
 
 def answer_open(session: Session, request: Request) -> Reply:
-    """Answer the page: the facts of its mesh; a file that came along becomes the mesh first."""
+    """Answer the page: the facts of its mesh; a file in the request replaces the mesh first."""
     lacks: list[str] = []
     if request.get("parts"):
         name = str(request.get("name", ""))
@@ -326,7 +326,8 @@ def answer_open(session: Session, request: Request) -> Reply:
 def answer_draw(session: Session, request: Request) -> Reply:
     """Answer the page: the pixels of a view, the part of the frame that they fill, and how long they took.
 
-    With a `background`, a colour, they come as a JPEG: what turns is seen sooner, and what stands is asked for again.
+    With a `background`, a colour, pixels are encoded as a JPEG: a turning view shows sooner, and at rest the page
+    requests it again without.
     """
     shown, view = shown_in(session), MeshView.parse(request)
     background = as_color("background", request["background"], 3) if "background" in request else None
@@ -345,13 +346,13 @@ def answer_draw(session: Session, request: Request) -> Reply:
         "is_jpeg": background is not None,
     }  # fmt: skip
     if view.tolerance:
-        found = choose_detail(shown.mesh, camera, view.size, tolerance=view.tolerance, cull=view.cull)  # type: ignore[arg-type]
-        header |= {"level": found.level, "level_triangles": found.n_drawn, "why": found.why}
+        detail = choose_detail(shown.mesh, camera, view.size, tolerance=view.tolerance, cull=view.cull)  # type: ignore[arg-type]
+        header |= {"level": detail.level, "level_triangles": detail.n_drawn, "why": detail.why}
     return Reply(header, {"pixels": content})
 
 
 def answer_pick(session: Session, request: Request) -> Reply:
-    """Answer the page: what shows in a pixel."""
+    """Answer the page: the visible triangle of a pixel."""
     shown, view = shown_in(session), MeshView.parse(request)
     x, y = int(request["x"]), int(request["y"])
     mesh, camera = shown.mesh, view.camera(shown.mesh)
@@ -364,20 +365,20 @@ def answer_pick(session: Session, request: Request) -> Reply:
     if view.tolerance:
         level = choose_detail(mesh, camera, view.size, tolerance=view.tolerance, cull=view.cull).mesh  # type: ignore[arg-type]
     corners = level.triangles[i].tolist()
-    found: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "triangle": i, "x": x, "y": y, "depth": float(frags.depth[0, 0]), "vertices": corners,
         "positions": level.vertices[corners].tolist(), "barycentric": frags.barycentric()[0, 0].tolist(),
         "is_level": level is not mesh, "corners_px": camera.project(level.vertices[corners], view.size)[:, :2].tolist(),
     }  # fmt: skip
     rows = [("triangle of the level" if level is not mesh else "triangle", str(i))]
     rows += [(f"vertex {corner}", numbers(level.vertices[corner])) for corner in corners]
-    rows += [("weights", numbers(found["barycentric"])), ("depth", numbers([found["depth"]]))]
+    rows += [("weights", numbers(facts["barycentric"])), ("depth", numbers([facts["depth"]]))]
     if level.uv is not None:
         rows.append(("uv", numbers(frags.interpolate(level.uv)[0, 0])))
     if level.materials:
         k = 0 if level.material_of_triangle is None else int(level.material_of_triangle[i])
         rows.append(("material", f"{k}: {level.materials[k]!r}"[:300]))
-    return Reply({**found, "rows": rows})
+    return Reply({**facts, "rows": rows})
 
 
 def numbers(values: Iterable[float]) -> str:
@@ -389,8 +390,8 @@ def answer_plan(session: Session, request: Request) -> Reply:
     """Answer the page: how the view is drawn, and why."""
     shown, view = shown_in(session), MeshView.parse(request)
     sampling: Any = view.sampling
-    made = plan(shown.mesh, view.camera(shown.mesh), view.size, sampling=sampling, **view.drawn_options())
-    return Reply({"text": made.explain()})
+    view_plan = plan(shown.mesh, view.camera(shown.mesh), view.size, sampling=sampling, **view.drawn_options())
+    return Reply({"text": view_plan.explain()})
 
 
 def answer_save(session: Session, request: Request) -> Reply:
@@ -415,7 +416,7 @@ def stem_of(shown: Shown) -> str:
 
 
 def as_code(shown: Shown, view: MeshView) -> tuple[str, bytes]:
-    """Return Python that draws the view: the same camera, to the bit."""
+    """Return Python that draws the view, with a camera that is equal to the bit."""
     camera = view.camera(shown.mesh)
     look = {"background": (0, 0, 0, 0), **view.look()}
     lights = look.pop("lights", None)
@@ -458,7 +459,7 @@ def light_code(light: Light) -> str:
 
 
 def as_job(shown: Shown, view: MeshView) -> tuple[str, bytes]:
-    """Return a job file of the view; a job frames the mesh by itself, so zoom and pan are not kept."""
+    """Return a job file of the view; a job fits the mesh in the frame, so zoom and pan are dropped."""
     lines = [
         f"# topleft render --jobs-file {stem_of(shown)}.toml",
         "# A job fits the mesh into the frame: zoom and pan of the explorer are not kept.",
@@ -487,8 +488,8 @@ def as_job(shown: Shown, view: MeshView) -> tuple[str, bytes]:
 
 def toml_text(text: str) -> str:
     """Return a TOML string."""
-    kept = "".join(c for c in text if c.isprintable())
-    return '"' + kept.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    printable = "".join(c for c in text if c.isprintable())
+    return '"' + printable.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 HANDLERS = {

@@ -1,8 +1,8 @@
-"""Packs questions and answers: a JSON header, and arrays behind it as the bytes that they are.
+"""Packs requests and replies: a JSON header, then the bytes of arrays.
 
 A frame, for either direction: the length of the header (4 bytes, little-endian), the header as UTF-8, padded with
-spaces to a multiple of 8 bytes, then each part, padded with zeros to a multiple of 8, so that a page can lay typed
-arrays over them without a copy. The header holds `parts`, the lengths of the parts; that of an answer `arrays`, too:
+spaces to a multiple of 8 bytes, then each part, padded with zeros to a multiple of 8, so that a page can view them as
+typed arrays without a copy. The header holds `parts`, the lengths of the parts; the header of a reply `arrays`, too:
 dtype, shape and part of each array by its name.
 """
 
@@ -18,15 +18,15 @@ import numpy as np
 from topleft._apps.explore.session import Reply, Request
 
 MAX_HEADER_BYTES = 4 << 20
-"""Of a question: a thousand triangles and their vertices need a tenth of it."""
+"""Of a request: a thousand triangles and their vertices need a tenth of it."""
 
 
 MAX_DIGITS = 18
-"""Of whole numbers, which int64 and float64 then hold."""
+"""Of integers, so that int64 holds them."""
 
 
 def split(reply: Reply) -> tuple[dict[str, Any], list[memoryview]]:
-    """Return the header of an answer and its parts, as a notebook sends them."""
+    """Return the header of a reply and its parts, as a notebook sends them."""
     parts: list[memoryview] = []
     arrays: dict[str, dict[str, Any]] = {}
     for name, value in reply.arrays.items():
@@ -49,7 +49,7 @@ def pack(header: dict[str, Any], parts: list[memoryview]) -> bytes:
 
 
 def unpack(frame: bytes) -> Request:
-    """Return the question in a frame."""
+    """Return the request in a frame."""
     if len(frame) < 4:
         raise ValueError(f"a message must begin with the length of its header, got {len(frame)} bytes")
     (length,) = struct.unpack_from("<I", frame)

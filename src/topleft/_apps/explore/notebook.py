@@ -1,4 +1,4 @@
-"""Shows the page in the cell of a notebook: the same module and the same questions, over the notebook's own line."""
+"""Shows the page in the cell of a notebook: its modules as a single module, its requests over the widget's messages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def widget_of(content: Content) -> Any:
     page = files("topleft._apps.explore").joinpath("page")
 
     class ExplorerWidget(anywidget.AnyWidget):  # type: ignore[misc, unused-ignore]
-        """The page in a cell; `vertices` are those that were moved."""
+        """The page in a cell; `vertices` are the vertices as the page has moved them."""
 
         _esm = one_module()
         _css = page.joinpath("explore.css").read_text(encoding="utf-8")
@@ -50,13 +50,13 @@ def widget_of(content: Content) -> Any:
 
 
 def one_module() -> str:
-    """The modules of the page as one, which a notebook takes."""
+    """The modules of the page joined to a module for a notebook."""
     page = files("topleft._apps.explore").joinpath("page")
     text = "\n".join(page.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
     return re.sub(r"^import .*;\n|^export (?!default)", "", text, flags=re.MULTILINE)
 
 
 def markup() -> str:
-    """The element of the page that holds all others."""
+    """The root element of the page."""
     text = files("topleft._apps.explore").joinpath("page", "index.html").read_text(encoding="utf-8")
     return text[text.index('<div class="explorer">') : text.index("</body>")]

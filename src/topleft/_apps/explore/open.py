@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 
 class Explorer:
-    """An open explorer: where its page is, and what has been moved there.
+    """An open explorer: the address of its page, and the vertices as the page has moved them.
 
     It ends when its page has been closed for half a minute, with `close`, or at the end of a ``with`` block.
 
     Attributes
     ----------
     url : str
-        The address of the page. Whoever has it may look, so it holds a token.
+        The address of the page. It holds a token, which grants access.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class Explorer:
         self._server.wait()
 
     def close(self) -> None:
-        """End it."""
+        """End the explorer."""
         self._server.close()
 
     def __enter__(self) -> Explorer:
@@ -74,24 +74,24 @@ def explore(
     Parameters
     ----------
     vertices : array_like, shape (V, 2) or (V, 3); or a mesh, a path, a mesh of another library; or the name of a scene
-        Pixels, or pixels and depth, with `triangles`: at most 1,000 of them, which are drawn magnified. A mesh is
-        turned and walked around. A name of `topleft.scenes.TUTORIAL_SCENES` or of
-        `topleft.failure_scenes.FAILURE_SCENES` is drawn magnified; unless anything is given, two triangles that share
-        an edge.
+        Pixels, or pixels and depth, with `triangles`, at most 1,000, which are drawn magnified. A mesh is shown from an
+        orbit. A name of `topleft.scenes.TUTORIAL_SCENES` or of `topleft.failure_scenes.FAILURE_SCENES` is drawn
+        magnified; the default is two triangles that share an edge.
     triangles : array_like of integers, shape (T, 3), optional
         Indices of vertices.
     size : (int, int), or int for a square, optional
-        Width and height of the picture in pixels, at most 256; that which holds all vertices unless given.
+        Width and height of the picture in pixels, at most 256; the default holds all vertices.
     wait : bool, optional
-        Whether to return only when the page is closed, or at Ctrl-C. In programs, not where one types, unless given.
+        Whether to return only when the page is closed, or at Ctrl-C. The default is True in programs, False in an
+        interactive interpreter.
     browser : bool
         Whether the browser is opened. The address is printed anyway.
 
     Returns
     -------
     Explorer, or a widget in a notebook
-        ``.vertices`` are the vertices as they have been moved, (V, 2) or (V, 3) float64, None for a mesh; ``.url``,
-        ``.wait()`` and ``.close()``; a widget has ``.vertices`` alone.
+        ``.vertices`` are the vertices as the page has moved them, (V, 2) or (V, 3) float64, None for a mesh; ``.url``,
+        ``.wait()`` and ``.close()``; a widget has only ``.vertices``.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def explore(
 def open_page(
     content: Content, *, host: str | None = None, port: int = 0, idle: float = 30.0, browser: bool = True
 ) -> Explorer:
-    """Return the explorer of a content, served, its address printed, the browser opened."""
+    """Serve a content, print the address, open the browser, and return the explorer."""
     from topleft._apps.explore.server import LOOPBACK, Server  # which needs the extra
 
     if host not in (None, LOOPBACK, "localhost", "::1"):
@@ -145,7 +145,7 @@ def open_page(
 
 
 def has_display() -> bool:
-    """Whether a browser can show a window: without one, those of the terminal would take it over."""
+    """Whether a browser can show a window: otherwise `webbrowser` would open a browser in the terminal."""
     return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")))
 
 

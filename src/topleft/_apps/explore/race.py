@@ -1,7 +1,7 @@
-"""Lends the scenes of the atlas to the page: families, their parameters under sliders, and the rows of the chart.
+"""Computes scenes of the atlas for the page: families, their parameters under sliders, and the rows of the chart.
 
-In: the name of a family, where its sliders stand, a seed. Out: a scene. What each method makes of it is drawn and
-counted by the page (page/race.js); `benchmarks/atlas` draws its record with the same entries, over more seeds.
+In: the name of a family, the positions of its sliders, a seed. Out: a scene. The page draws it by each method and
+counts the pixels (page/race.js); `benchmarks/atlas` draws its record with these entries, over more seeds.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Entry:
 
     @property
     def snap(self) -> str:
-        """What the method makes of vertices first, as `snapped` calls it."""
+        """The grid that the method snaps vertices to, an argument of `snapped`."""
         method = find_method(self.method)
         if self.bits == NO_SNAP:
             return NO_SNAP
@@ -50,7 +50,7 @@ class Entry:
 
     @property
     def rule(self) -> str:
-        """Which edges own the centres on them."""
+        """The fill rule: which edges include the centres on them."""
         return "bottom-right" if self.method.endswith("bottom-right") else "top-left"
 
     def options(self) -> dict[str, Any]:
@@ -62,13 +62,13 @@ class Entry:
 
 
 def entries() -> list[Entry]:
-    """Every way to fill: the engine at three precisions, by both walkers and without a snap, every classic."""
+    """All rows: the engine at three precisions, by both walkers and without a snap, every classic."""
     production = [Entry(name, *what) for name, what in PRODUCTION.items()]
     return production + [Entry(name, name) for name in CLASSICS if not name.endswith("/wireframe")]
 
 
 def value_at(axis: Axis, position: float) -> tuple[str, Any]:
-    """Return how the value at a place of the slider is written, and the value; between two numbers by their ratio."""
+    """Return the text of the value at a position of the slider, and the value; between numbers in log scale."""
     names, values = list(axis.values), list(axis.values.values())
     position = min(max(position, 0.0), len(values) - 1.0)
     i = min(int(position), len(values) - 2)
@@ -83,36 +83,36 @@ def value_at(axis: Axis, position: float) -> tuple[str, Any]:
 
 
 def is_continuous(axis: Axis) -> bool:
-    """Tell whether there is anything between the values of an axis."""
+    """Return whether an axis has values between its steps."""
     return all(isinstance(value, int | float) for value in axis.values.values())
 
 
 def scene_at(family: str, positions: Sequence[float], seed: int) -> tuple[PixelScene, list[str]]:
-    """Return the scene of a family where its sliders stand, and how their values are written."""
+    """Return the scene of a family at positions of its sliders, and the texts of the values."""
     if family not in FAMILIES:
         raise ValueError(f"family must be one of {', '.join(map(repr, FAMILIES))}, got {family!r}")
-    found = FAMILIES[family]
-    if len(positions) != len(found.axes):
-        raise ValueError(f"family {family!r} has {len(found.axes)} parameters, got {len(positions)} positions")
+    chosen = FAMILIES[family]
+    if len(positions) != len(chosen.axes):
+        raise ValueError(f"family {family!r} has {len(chosen.axes)} parameters, got {len(positions)} positions")
     if not all(map(math.isfinite, positions)) or not 0 <= seed < N_SEEDS:
         raise ValueError(f"positions must be finite and seed from 0 to {N_SEEDS - 1}, got {positions} and {seed}")
-    values = [value_at(axis, position) for axis, position in zip(found.axes, positions, strict=True)]
-    return found.make(*(value for _, value in values), seed), [written for written, _ in values]
+    values = [value_at(axis, position) for axis, position in zip(chosen.axes, positions, strict=True)]
+    return chosen.make(*(value for _, value in values), seed), [written for written, _ in values]
 
 
 def described(scene: PixelScene) -> dict[str, Any]:
-    """Return what a page knows of a scene besides its arrays; the origin as text, for it may be beyond 2**53."""
+    """Return size, origin and copies of a scene; the origin as text, since it may be beyond 2**53."""
     return {"size": scene.size, "origin": [str(at) for at in scene.origin], "copies": scene.copies}
 
 
 def answer_scene(_: Session, request: Request) -> Reply:
-    """Answer the page: a scene where its sliders stand."""
+    """Answer the page: a scene at positions of its sliders."""
     scene, written = scene_at(str(request["family"]), request["positions"], int(request["seed"]))
     return Reply({**described(scene), "values": written}, {"vertices": scene.vertices, "triangles": scene.triangles})
 
 
 def lists() -> dict[str, Any]:
-    """What a page begins with: families, their parameters, and rows of the atlas."""
+    """The families, their parameters, and the rows of the atlas, for a page that opens."""
     families = {
         name: {
             "what": family.what,
@@ -124,9 +124,9 @@ def lists() -> dict[str, Any]:
         for name, family in FAMILIES.items()
     }
     rows = [
-        {"name": one.name, "method": one.method, "bits": one.bits, "snap": one.snap,
-         "winding": find_method(one.method).claims.winding}
-        for one in entries()
+        {"name": entry.name, "method": entry.method, "bits": entry.bits, "snap": entry.snap,
+         "winding": find_method(entry.method).claims.winding}
+        for entry in entries()
     ]  # fmt: skip
     return {"families": families, "entries": rows, "n_seeds": N_SEEDS}
 

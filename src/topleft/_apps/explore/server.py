@@ -1,11 +1,11 @@
 """Serves the page and its socket: on the loopback, under an address that holds a token.
 
-Where a proxy lets no WebSocket through, the page posts the same frames one by one. Whoever lacks the token, comes from
-a page of another origin or calls the machine by another name is refused with a sentence. A question that takes long
-does not hold up others: each is answered in a thread. The server ends itself when all pages are closed for a while.
+Where a proxy blocks WebSockets, the page posts its frames one by one. The server refuses requests without the token,
+of another origin or for another host with a sentence. Each request is answered in a thread, so a slow request does not
+block others. The server ends when all pages have been closed for a while.
 
-Based on: I. Fette, A. Melnikov, RFC 6455, The WebSocket Protocol, 2011; the checks of Host and Origin are those against
-DNS rebinding and cross-site WebSocket hijacking.
+Based on: I. Fette, A. Melnikov, RFC 6455, The WebSocket Protocol, 2011; the checks of Host and Origin prevent DNS
+rebinding and cross-site WebSocket hijacking.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ except ImportError as error:
 LOOPBACK = "127.0.0.1"
 
 MAX_MESSAGE_BYTES = 256 << 20
-"""Of a question: a mesh file that is dropped on the page."""
+"""Of a request: a mesh file that is dropped on the page."""
 
 MAX_PAGES = 16
 """Open at a time."""
 
 POSTING_SECONDS = 90.0
-"""After its last question a page without a socket is taken for closed; it asks every 20, in the background every 60."""
+"""After its last request a page without a socket counts as closed; it polls every 20 s, in the background every 60."""
 
 FILES: Mapping[str, str] = {
     "": "text/html; charset=utf-8",
     "explore.css": "text/css; charset=utf-8",
     **dict.fromkeys(SCRIPTS, "text/javascript; charset=utf-8"),
 }
-"""All that is served, with its type; the first is the page itself."""
+"""The files that are served, with their types; the first is the page itself."""
 
 HEADERS = {
     "Cache-Control": "no-store",
@@ -65,23 +65,22 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-"""Nothing is fetched from elsewhere, nothing is kept, and no other page may hold this one."""
+"""The page fetches only from this server, is not cached, and no other page may frame it."""
 
 
 @dataclass
 class PostingPage:
-    """A page without a socket: its session, one question at a time, and when it is forgotten."""
+    """A page without a socket: its session, a lock that answers requests in turn, and the timer that closes it."""
 
     session: Session
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
-    forgetting: asyncio.TimerHandle | None = None
+    expiry: asyncio.TimerHandle | None = None
 
 
 class Server:
-    """The page of a content at an address, until it is closed or nobody looks at it any more.
+    """Serves the page of a content at an address, until `close`, or until no page has been open for `idle` seconds.
 
-    `host`: the loopback, unless others shall see it, too; port 0: a free one. `idle`: seconds after the last page was
-    closed until the server ends; infinite for never.
+    `host`: the loopback, or an address that other machines reach; port 0: a free port; `idle` infinite: never ends.
     """
 
     def __init__(self, content: Content, host: str = LOOPBACK, port: int = 0, idle: float = 30.0) -> None:
@@ -107,7 +106,7 @@ class Server:
         return f"http://{shown}:{self.port}/{self.token}/{fragment}"
 
     def start(self) -> None:
-        """Begin to serve, in a thread, and return when the page can be opened."""
+        """Start the thread of the server, and return when the page can be opened."""
         self._thread.start()
         self._is_ready.wait()
         if self._error is not None:
@@ -118,7 +117,7 @@ class Server:
         self._thread.join()
 
     def close(self) -> None:
-        """End the server; pages that are open say so."""
+        """End the server; open pages show that it has ended."""
         if self._loop is not None and self._end is not None and self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._end.set)
             self._thread.join()
@@ -151,39 +150,39 @@ class Server:
         )  # fmt: skip
         config.load()
         serving = EventServer(config, self._end)
-        self._close_in(600.0 if self.idle < float("inf") else self.idle)  # for a browser that never comes
+        self._close_in(600.0 if self.idle < float("inf") else self.idle)  # where no browser opens the page
         self._loop.call_soon(self._is_ready.set)
         with suppress(InvalidState):  # raised by the end of a page that is being closed at this moment
             await serving.serve(sockets=[self._socket])
 
     def _close_in(self, seconds: float) -> None:
-        """End the server after so many seconds, unless a page comes."""
+        """End the server after `seconds`, unless a page opens."""
         if self._closing is not None:
             self._closing.cancel()
         if self._loop is not None and self._end is not None and seconds < float("inf"):
             self._closing = self._loop.call_later(seconds, self._end.set)
 
-    def _come(self) -> str:
-        """Count a page in; returns why it may not come, "" when it may."""
+    def _add_page(self) -> str:
+        """Count an opened page; returns the reason where it is refused, else ""."""
         if self._pages >= MAX_PAGES:
             return f"At most {MAX_PAGES} pages may be open at a time."
         self._pages += 1
         self._close_in(float("inf"))
         return ""
 
-    def _go(self) -> None:
-        """Count a page out."""
+    def _remove_page(self) -> None:
+        """Count a closed page."""
         self._pages -= 1
         if not self._pages:
             self._close_in(self.idle)
 
-    # What comes in
+    # Requests
 
     def refusal(self, headers: Mapping[str, str], token: str, *, is_socket: bool) -> str:
-        """Return why somebody is refused, "" when nobody is."""
+        """Return why a request is refused, "" where it is not."""
         host, origin = headers.get("host", ""), headers.get("origin")
-        own = [f"{name}:{self.port}" for name in (LOOPBACK, "localhost", "[::1]")]
-        if self.host in (LOOPBACK, "localhost", "::1") and host not in own:
+        hosts = [f"{name}:{self.port}" for name in (LOOPBACK, "localhost", "[::1]")]
+        if self.host in (LOOPBACK, "localhost", "::1") and host not in hosts:
             return f"Host must be {LOOPBACK}:{self.port}: this page is for this machine alone."
         if (origin is not None or is_socket) and origin != f"http://{host}":
             return "Origin must be this page: others may not talk to it."
@@ -205,7 +204,7 @@ class Server:
         why = self.refusal(page.headers, token, is_socket=True)
         if not why and name != "socket":
             why = "There is no such socket here."
-        if why := why or self._come():
+        if why := why or self._add_page():
             await page.send_denial_response(PlainTextResponse(why + "\n", 403, HEADERS))
             return
         try:
@@ -214,7 +213,7 @@ class Server:
         except WebSocketDisconnect:
             pass
         finally:
-            self._go()
+            self._remove_page()
 
     async def _answer_all(self, page: WebSocket, session: Session) -> None:
         while True:
@@ -237,26 +236,26 @@ class Server:
             if len(frame) > MAX_MESSAGE_BYTES:
                 return PlainTextResponse(f"A message may have {MAX_MESSAGE_BYTES} bytes.\n", 413, HEADERS)
         if key not in self._posting:
-            if why := self._come():
+            if why := self._add_page():
                 return PlainTextResponse(why + "\n", 403, HEADERS)
             self._posting[key] = PostingPage(Session(self.content))
         page = self._posting[key]
         async with page.turn:
-            if page.forgetting is not None:
-                page.forgetting.cancel()
+            if page.expiry is not None:
+                page.expiry.cancel()
             reply = await reply_to(page.session, bytes(frame))
-            page.forgetting = asyncio.get_running_loop().call_later(POSTING_SECONDS, self._forget, key)
+            page.expiry = asyncio.get_running_loop().call_later(POSTING_SECONDS, self._expire, key)
         return Response(reply, headers={**HEADERS, "Content-Type": "application/octet-stream"})
 
-    def _forget(self, key: str) -> None:
-        """A page without a socket has asked nothing for long."""
+    def _expire(self, key: str) -> None:
+        """Close a page without a socket, after POSTING_SECONDS without a request."""
         if not self._posting[key].turn.locked():
             del self._posting[key]
-            self._go()
+            self._remove_page()
 
 
 async def reply_to(session: Session, message: bytes | str) -> bytes:
-    """The frame that answers a frame, or a header alone."""
+    """The frame of the reply to a frame, or to a header without parts."""
     try:
         request = unpack(message) if isinstance(message, bytes) else {**read_header(message), "parts": []}
     except ValueError as error:
@@ -267,12 +266,12 @@ async def reply_to(session: Session, message: bytes | str) -> bytes:
 
 
 class EventServer(uvicorn.Server):
-    """A server that sleeps until an event ends it: uvicorn's own looks ten times a second whether it shall end."""
+    """A server that sleeps until an event ends it: `uvicorn.Server` polls ten times a second."""
 
     def __init__(self, config: uvicorn.Config, end: asyncio.Event) -> None:
         super().__init__(config)
         self._end_event = end
 
     async def main_loop(self) -> None:
-        """Return when the server shall end."""
+        """Return when the event is set."""
         await self._end_event.wait()

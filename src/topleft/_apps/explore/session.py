@@ -1,4 +1,4 @@
-"""The content that is shown, and the state of one page.
+"""The content of an explorer, and the state of a page.
 
 In: arrays, a mesh or the name of a scene. Out: `Content`, which all pages of an explorer share, and a `Session` for
 each page.
@@ -19,14 +19,14 @@ SCRIPTS = (
     "line.js", "elements.js", "edits.js", "numbers.js", "colors.js", "engine.js", "state.js", "exact.js", "pixels.js",
     "probe.js", "steps.js", "race.js", "mesh_part.js", "pixels_part.js", "race_part.js", "steps_part.js", "explore.js",
 )  # fmt: skip
-"""The modules of the page, each behind those that it imports."""
+"""The modules of the page, each after the modules that it imports."""
 
 Request = dict[str, Any]
-"""What a page asks: "do" names it; "parts" are the arrays that came along, as bytes."""
+"""A request of a page: "do" names its handler; "parts" are its arrays, as bytes."""
 
 
 class Reply(NamedTuple):
-    """What a page gets: values for JSON, and arrays (or bytes) by name."""
+    """The reply to a request: values for JSON, and arrays (or bytes) by name."""
 
     header: dict[str, Any]
     arrays: dict[str, NDArray[Any] | bytes] = {}  # noqa: RUF012 -- of a tuple: nobody writes to it
@@ -34,7 +34,7 @@ class Reply(NamedTuple):
 
 @dataclass
 class Content:
-    """What an explorer was opened with."""
+    """The content that an explorer shows."""
 
     tab: str = "pixels"  # shown first: "pixels", "steps", "mesh" or "race"
     pixels: dict[str, Any] = field(default_factory=dict)  # the state that a link restores, without defaults
@@ -50,7 +50,7 @@ class Content:
 
 @dataclass
 class Session:
-    """One page: what its parts keep from question to question, by name."""
+    """A page: the state of its parts between requests, by name."""
 
     content: Content
     kept: dict[str, Any] = field(default_factory=dict)

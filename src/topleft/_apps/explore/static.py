@@ -1,6 +1,7 @@
 """Writes the explorer as files that need no Python: the page, the kernels in WebAssembly, and scenes.
 
-The page's worker answers what Python would (page/local.js): `data.json` holds what Python says first, and the scenes.
+The page's worker answers its requests instead of Python (page/local.js): `data.json` holds the reply to `hello`, and
+the scenes.
 """
 
 from __future__ import annotations
@@ -23,53 +24,53 @@ from topleft.methods.classics.classic_kernels import FORMS
 from topleft.scene_families import FAMILIES, walk
 
 SETS = ("simd128", "scalar")
-"""The instruction sets of the kernels; a page fetches one."""
+"""The instruction sets of the kernels; a page fetches the first that the browser runs."""
 
 IN_PLACE_OF_PYTHON = ("worker.js", "local.js", "kernels.js")
 """The modules that answer the page."""
 
 TABS = ("pixels", "steps", "race")
-"""The parts of a page without Python: meshes are drawn by Python alone."""
+"""The parts of a page without Python: only Python draws meshes."""
 
 N_SEEDS = 3
 """Of each scene of the part Race."""
 
 
 def write_static(folder: Path, content: Content) -> list[Path]:
-    """Write the page into a folder, which is made, and return what was written."""
+    """Write the page into a folder, which is created, and return the paths of the files."""
     if content.mesh is not None:
         raise ValueError(f"--export must have no mesh, got {content.name!r}: a page without Python draws none")
     page = files("topleft._apps.explore").joinpath("page")
-    modules = {name: page.joinpath(name) for name in (f"topleft-{one}.wasm" for one in SETS)}
+    modules = {name: page.joinpath(name) for name in (f"topleft-{isa}.wasm" for isa in SETS)}
     if missing := [name for name, module in modules.items() if not module.is_file()]:
         raise MissingPackageError(
             f"this installation has no {' and no '.join(missing)}: wheels of a release have them, and in a clone "
             "python packaging/wasm.py makes them (apt-get install clang lld wasi-libc libclang-rt-dev-wasm32)"
         )
-    made = {name: page.joinpath(name).read_bytes() for name in ("explore.css", *SCRIPTS, *IN_PLACE_OF_PYTHON)}
-    made |= {name: module.read_bytes() for name, module in modules.items()}
-    made["index.html"] = static_html(page).encode()
-    made["data.json"] = json.dumps(data_of(content), allow_nan=False, separators=(",", ":")).encode()
-    made["race.bin"] = race_scenes()[1]
+    contents = {name: page.joinpath(name).read_bytes() for name in ("explore.css", *SCRIPTS, *IN_PLACE_OF_PYTHON)}
+    contents |= {name: module.read_bytes() for name, module in modules.items()}
+    contents["index.html"] = static_html(page).encode()
+    contents["data.json"] = json.dumps(data_of(content), allow_nan=False, separators=(",", ":")).encode()
+    contents["race.bin"] = race_scenes()[1]
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, text in made.items():
+    for name, text in contents.items():
         written.append(folder / name)
         write_whole(written[-1], lambda file, text=text: file.write(text))  # type: ignore[misc]
     return written
 
 
 def static_html(page: Traversable) -> str:
-    """The page, marked as one whose questions a worker answers."""
+    """The page, marked so that a worker answers its requests."""
     text = page.joinpath("index.html").read_text(encoding="utf-8")
     return text.replace('<div class="explorer">', '<div class="explorer" data-worker="worker.js">')
 
 
 def data_of(content: Content) -> dict[str, Any]:
-    """What the worker knows besides the kernels."""
+    """The data of the worker besides the kernels."""
     greeting = hello(Session(content), {}).header
     families = greeting["race"]["families"]
-    for family in families.values():  # what lies between the scenes is Python's
+    for family in families.values():  # only Python computes scenes between the steps
         family["axes"] = [{**axis, "is_continuous": False} for axis in family["axes"]]
     shown = {"tabs": TABS, "saves": (), "has_plan": False, "race": {**greeting["race"], "n_seeds": N_SEEDS}}
     return {
@@ -81,31 +82,31 @@ def data_of(content: Content) -> dict[str, Any]:
 
 
 def race_scenes() -> tuple[dict[str, list[dict[str, Any]]], bytes]:
-    """The scenes of all families, from mild to harsh, and their numbers: vertices of each seed, then triangles."""
+    """The scenes of all families, from mild to harsh, and their arrays: vertices of each seed, then triangles."""
     parts: list[bytes] = []
     scenes: dict[str, list[dict[str, Any]]] = {name: [] for name in FAMILIES}
     at = 0
     for name, family in FAMILIES.items():
         for _, values in walk(family):
-            made = [family.make(*values, seed) for seed in range(N_SEEDS)]
-            first = made[0]
+            seeded = [family.make(*values, seed) for seed in range(N_SEEDS)]
+            first = seeded[0]
             scenes[name].append({
                 "at": at, "n_vertices": len(first.vertices), "n_triangles": len(first.triangles), **described(first),
             })  # fmt: skip
-            parts += [*(one.vertices.tobytes() for one in made), first.triangles.tobytes()]
+            parts += [*(scene.vertices.tobytes() for scene in seeded), first.triangles.tobytes()]
             parts.append(bytes(-sum(map(len, parts[-N_SEEDS - 1 :])) % 8))
             at += sum(map(len, parts[-N_SEEDS - 2 :]))
     return scenes, b"".join(parts)
 
 
 def classics() -> dict[str, dict[str, Any]]:
-    """The classics by name: the numbers of a method and its variant in classics.h, and what it takes."""
+    """The classics by name: the numbers of a method and its variant in classics.h, and its limits."""
     return {
         name: {
             "number": list(FORMS).index(name.partition("/")[0]),
             "form": FORMS[name.partition("/")[0]].index(name.partition("/")[2]),
-            "limit": one.limit if math.isfinite(one.limit) else None,
-            "has_bits": one.has_subpixel_bits,
+            "limit": classic.limit if math.isfinite(classic.limit) else None,
+            "has_bits": classic.has_subpixel_bits,
         }
-        for name, one in CLASSICS.items()
+        for name, classic in CLASSICS.items()
     }
